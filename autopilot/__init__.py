@@ -1,1 +1,1 @@
-"""The flight software: estimator, control cascade, mixer and the MAVLink face of the vehicle."""
+"""The flight software: estimator, control cascade, mixer and the MAVLink interface of the vehicle."""

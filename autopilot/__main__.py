@@ -8,8 +8,8 @@ import os
 
 def main() -> None:
     """Run the program."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of matrices this small threads only cost time
-    gc.disable()  # until everything is loaded (`be_punctual`): what is loaded stays
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for matrices this small, threads only cost time
+    gc.disable()  # until everything is loaded (`be_punctual`): loaded objects stay
     from autopilot.shell.program import main as run
 
     run()

@@ -1,8 +1,8 @@
-"""What a cable of links does to Cases A to C: the load's error with cords and loads as they are.
+"""The effect of a cable of links on Cases A to C: the load's error with realistic cords and loads.
 
     python benchmarks/cable_cases.py [--links 1 4 10] [--json]
 
-Flights of `bebop` with the sensors `lab`, one seed; the autopilot knows of none of it.
+Flights of `bebop` with the sensors `lab`, one seed; the autopilot is not configured for any of it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CORDS: Mapping[str, Mapping[str, float]] = {
     "Dyneema 2 mm": {"SIM_CBL_MASS": 0.0024, "SIM_CABLE_DIAM": 2.0, "SIM_CBL_EA": 2e4, "SIM_CBL_DAMP": 10.0},
     "nylon 3 mm": {"SIM_CBL_MASS": 0.0056, "SIM_CABLE_DIAM": 3.0, "SIM_CBL_EA": 3e3, "SIM_CBL_DAMP": 2.0},
 }
-# a load of 4 cm, hung at its top
+# a load of 4 cm, attached at its top
 TURNING = {"SIM_LOAD_HOOK": 0.03, "SIM_LOAD_GYR": 0.016, "SIM_LOAD_GYR_UP": 0.016}
 FIGURES = ("load_error_max_m", "load_error_rms_m", "tracking_error_max_m", "slack_events")
 

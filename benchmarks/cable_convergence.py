@@ -1,11 +1,11 @@
-"""The cable of links against theory: hanging-chain frequencies, the error of the step, the massless limit.
+"""The cable of links compared with theory: hanging-chain frequencies, error of the step, massless limit.
 
     python benchmarks/cable_convergence.py              # all tables
-    python benchmarks/cable_convergence.py --mujoco     # and the motion beside MuJoCo's (pip install mujoco)
+    python benchmarks/cable_convergence.py --mujoco     # also compare with MuJoCo (pip install mujoco)
     python benchmarks/cable_convergence.py --json
 
-Frequencies are those of the step itself: its derivative about a cable at rest is taken by differences, and
-the eigenvalues exp(lambda h) of that give frequency and damping as they are flown.
+Frequencies are those of the simulation step itself: its Jacobian about a cable at rest is computed by
+differences, and the eigenvalues exp(lambda h) of the Jacobian give frequency and damping as simulated.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ LINKS = (4, 8, 16, 32, 64)
 MODES = 3
 STEPS = (4e-4, 2e-4, 1e-4, 5e-5)  # s
 STIFFNESSES = (1e4, 1e5, 1e6, 1e7)  # N
-_SHORT = 5e-4  # s, in which no mode turns by half
+_SHORT = 5e-4  # s, shorter than half a period of every mode
 _HEIGHT = 3.0  # m, of the load
-_FIRM = 1e9  # kg, a vehicle that nothing moves
-_LIGHT = 1e-9  # kg, a load that is none
+_FIRM = 1e9  # kg, of a vehicle that nothing can move
+_LIGHT = 1e-9  # kg, instead of no load
 
 
 def chain_model(links: int, **values: float) -> ChainModel:
-    """A cord of 2.4 g/m without drag and with little damping, but for `values`."""
+    """A cord of 2.4 g/m without drag and with little damping, except for `values`."""
     known = ChainModel(links, 2.4e-3, 0.0, 1e5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return known._replace(**values)
 
 
 def without_drag(truth: Truth) -> Truth:
-    """The same vehicle in no air."""
+    """The same vehicle without drag."""
     return truth._replace(
         quad_drag=0.0, quad_drag_quadratic=0.0, spin_drag=0.0, load_drag=0.0, load_drag_quadratic=0.0
     )
@@ -76,7 +76,7 @@ class ChainPlant:
         self.rows, self.rotors = rows, rotors_of(self.force, self.force)
 
     def fly(self, seconds: float, h: float = TICK) -> PlantState:
-        """Go on for a time; the state then."""
+        """Simulate for a time; returns the state at its end."""
         steps = round(seconds / h)
         self.state = advance_chain_many(self.state, self.truth, self.rotors, self.wind, h, self.rows, steps)
         return self.state
@@ -117,7 +117,7 @@ def hanging(truth: Truth, q: tuple[float, float, float] = (0.0, 0.0, -1.0), **fi
 
 
 def hover(truth: Truth) -> tuple[float, ...]:
-    """The forces of the rotors that carry vehicle, cable and load."""
+    """The rotor forces that carry vehicle, cable and load."""
     weight = truth.quad_mass + truth.load_mass + truth.chain.mass * truth.cable_length
     return (0.25 * weight * truth.gravity,) * 4
 
@@ -126,11 +126,11 @@ def hover(truth: Truth) -> tuple[float, ...]:
 
 
 def bessel_frequencies(length: float, mass: float, load: float, gravity: float) -> Array:
-    """The lowest frequencies (rad/s) of a chain of `mass` kg/m that is held above and carries `load` kg.
+    """The lowest frequencies (rad/s) of a chain of `mass` kg/m, fixed at its top, that carries `load` kg.
 
-    With s = load/mass + z, z the height above the load, tension is mass g s, and a J0(w) + b Y0(w) with
-    w = 2 omega sqrt(s/g) its shape; above it is 0, below g y' = -omega^2 y s_0, s_0 = load/mass. Without a
-    load these are the zeros of J0(2 omega sqrt(L/g)).
+    With s = load/mass + z, where z is the height above the load, the tension is mass g s, and the shape is
+    y = a J0(w) + b Y0(w) with w = 2 omega sqrt(s/g). It is 0 at the top; at the load, where s = s_0 =
+    load/mass, g dy/ds = -omega^2 y. Without a load the frequencies are the zeros of J0(2 omega sqrt(L/g)).
     """
     if load <= _LIGHT:
         return np.asarray(jn_zeros(0, MODES) / 2.0 * np.sqrt(gravity / length))
@@ -138,7 +138,7 @@ def bessel_frequencies(length: float, mass: float, load: float, gravity: float) 
 
     def boundary(omega: float) -> float:
         a, b = 2.0 * omega * np.sqrt(below / gravity), 2.0 * omega * np.sqrt(above / gravity)
-        # of the load: T y' = load y'', so that Z1(a) = omega sqrt(s_0/g) Z0(a) = a/2 Z0(a)
+        # at the load: g dy/ds = -omega^2 y, so that Z1(a) = omega sqrt(s_0/g) Z0(a) = a/2 Z0(a)
         first = -j1(a) + 0.5 * a * j0(a)
         second = -y1(a) + 0.5 * a * y0(a)
         return float(first * y0(b) - second * j0(b))
@@ -150,8 +150,8 @@ def bessel_frequencies(length: float, mass: float, load: float, gravity: float) 
 
 
 def flown_frequencies(links: int, mass: float, load: float, length: float = 1.0) -> NDArray[np.complex128]:
-    """The slowest modes across of a hanging cable as it is flown: damping (negative) and frequency, rad/s."""
-    # so stiff that its weight hardly stretches it, so soft that it has a difference quotient; soon at rest
+    """The slowest transverse modes of a hanging cable, as simulated: damping (negative), frequency, rad/s."""
+    # stiff enough that its weight hardly stretches it, soft enough for a difference quotient; soon at rest
     model = chain_model(links, mass=mass, stiffness=1e5, damping=30.0)
     truth = without_drag(load_truth("bebop"))._replace(
         chain=model,
@@ -197,7 +197,7 @@ def frequency_errors(links: int, mass: float, load: float) -> Array:
 
 
 def swinging(model: ChainModel, attachment: Vec3 = ZERO) -> ChainPlant:
-    """A vehicle that carries its load aloft without air, the cable aslant and turning."""
+    """A vehicle that carries its load in the air, without drag; the cable is inclined and rotating."""
     truth = without_drag(load_truth("bebop"))._replace(chain=model, attachment=attachment)
     direction = np.array([0.3, 0.0, -0.95]) / np.hypot(0.3, 0.95)
     rate = (0.0, 1.5, 0.0)
@@ -207,7 +207,7 @@ def swinging(model: ChainModel, attachment: Vec3 = ZERO) -> ChainPlant:
 
 
 def step_errors(links: int = 4) -> list[float]:
-    """Greatest error (m) of the load within 1 s against the shortest step halved twice, one a step."""
+    """For each step the greatest error (m) of the load within 1 s, relative to a quarter of the shortest."""
     model = chain_model(links, stiffness=2e3, damping=2.0)
 
     def course(h: float) -> Array:
@@ -219,7 +219,7 @@ def step_errors(links: int = 4) -> list[float]:
 
 
 def massless_difference(stiffness: float, h: float = TICK, attachment: Vec3 = ZERO) -> tuple[float, float]:
-    """Of one link to the taut plant within 1 s: greatest of the load's place, m; of tension at its end, N."""
+    """Differences of one link from the taut plant: greatest of load position in 1 s, m; final tension, N."""
     plant = swinging(chain_model(1, mass=0.0, stiffness=stiffness, damping=1e-4 * stiffness), attachment)
     taut: Any = initial_taut(plant.truth)._replace(**plant.state._asdict(), rotor_force=plant.force)
     most = 0.0
@@ -230,11 +230,11 @@ def massless_difference(stiffness: float, h: float = TICK, attachment: Vec3 = ZE
     return most, abs(state.tension - taut.tension)
 
 
-# ---- beside MuJoCo
+# ---- compared with MuJoCo
 
 
 def mujoco_xml(truth: Truth, timestep: float) -> str:
-    """The same bodies, the links as rods that ball joints join."""
+    """The same bodies, with the links as rods connected by ball joints."""
     model, n = truth.chain, truth.chain.links
     link = (truth.cable_length - model.hook) / n
     half = 0.5 * model.mass * link
@@ -264,9 +264,9 @@ def mujoco_xml(truth: Truth, timestep: float) -> str:
 
 
 def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tuple[float, float, float]:
-    """Greatest difference to MuJoCo of load and points (m), of the vehicle (m), of the load's quaternion.
+    """Greatest differences to MuJoCo: load and points (m), vehicle (m), orientation of the load (rad).
 
-    A tilted vehicle flies off with constant thrust, the cable aslant and turning, the load a body that turns.
+    A tilted vehicle flies off with constant thrust; the cable is inclined and rotates, and so does the load.
     """
     import mujoco
 

@@ -1,20 +1,21 @@
-"""How much gain and delay a cascade can lose: margins against rotor lag, control rate and delay.
+"""Stability margins of the cascades in gain, phase and delay, for various rotor lags, rates and delays.
 
-The loop is linearised numerically about hover: the vehicle from (2-30)-(2-35) with first-order rotors, the
-laws from the very functions that fly, filters and all, sampled with a zero-order hold of the commands. The
-margins are those of the loop cut at the roll moment (the axis of least inertia), everything else closed:
+The loop is linearised numerically about hover: the vehicle from (2-30)-(2-35) with first-order rotors; the
+laws from the same functions that fly, including their filters; sampled with a zero-order hold of the
+commands. The margins are those of the loop opened at the roll moment (the axis of least inertia), with all
+other loops closed:
 
-* gain: the factors by which the roll command may grow and shrink before the loop is lost; * phase: at the
-crossover where it is least; * delay: the additional transport delay at which an eigenvalue leaves the unit
-circle, all commands delayed alike.
+* gain: the factors by which the roll command may grow and shrink before the loop becomes unstable; * phase:
+at the crossover where it is least; * delay: the additional transport delay at which an eigenvalue leaves the
+unit circle, with all commands delayed equally.
 
-`delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
-computation, transport.
+`delay` is the whole time between a motion and the command that responds to it, without the hold: sensor
+latency, computation, transport.
 
-The law `plumbline` knows delay and lag of the rotors, unless told otherwise by `believed_delay` and
-`believed_tau`; the lag it makes the rotors show is `wanted_tau`, its gains are those of the design
-unless others than those of Table 4-3 are given. Where a delay is believed, "sooner" is by how much
-the true delay may be less.
+The law `plumbline` assumes the true delay and lag of the rotors, unless `believed_delay` and `believed_tau`
+give others. `wanted_tau` is the lag that remains after its compensation. Its gains are those of the design,
+unless gains other than those of Table 4-3 are given. With a delay, "sooner" is by how much the true delay may
+be less.
 
     python benchmarks/cascade_margin.py [--loop attitude|position|vehicle|plumbline] [--set k_R=0.45 ...]
 """
@@ -49,7 +50,7 @@ from gcs.sweep.margin import sampled_plant, state_at
 
 Array = NDArray[np.float64]
 
-# Table 4-1; torque ratio and limits play no part in a linear model
+# Table 4-1; torque ratio and limits have no effect in a linear model
 BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
 ZERO = (0.0, 0.0, 0.0)
 HOVER = 0.25 * hover_thrust(BEBOP)  # N, each rotor
@@ -72,14 +73,14 @@ FILTERS = (
     "believed_delay",
     "wanted_tau",
 )
-GREATEST_DELAY = 0.2  # s; more is reported as this
+GREATEST_DELAY = 0.2  # s; a greater margin is reported as this
 GREATEST_GAIN = 101.0
-LOST = 1.0 + 1e-9  # spectral radius
+LOST = 1.0 + 1e-9  # spectral radius from which on a loop is unstable
 
 MOTION = LOAD_STATES  # x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
 ROTATION = slice(10, 16)
 ROLL = 1  # of the inputs f, M_x, M_y, M_z
-# name, coordinates, standard deviation: what an estimator over motion capture may leave
+# name, coordinates, standard deviation: typical errors of an estimator with motion capture
 NOISES = (
     ("load position, m", slice(0, 3), 0.0005),
     ("load velocity, m/s", slice(3, 6), 0.003),
@@ -167,7 +168,7 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
 
 
 def plumbline_built(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
-    """The law, told the delay and lag of the settings, unless others are believed."""
+    """The law, which assumes the delay and lag of the settings, unless `filters` gives others."""
     told = {
         "believed_tau": settings.rotor_tau,
         "believed_delay": settings.delay,
@@ -190,19 +191,19 @@ def plumbline_built(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
         settings.period,
         vehicle,
     )
-    # the other modes play no part in load position
+    # the other modes have no effect in load position
     filters = thesis.thesis_filters(settings.period)
     others = ThesisLaw(thesis.THESIS_GAINS, filters, QUAD_POSITION_GAINS, vehicle)
     return PlumblineLaw(constants, others, told["believed_delay"])
 
 
-LAW_MEMORY = 8  # thrust rate, rotors' thrust and moment, integral; then the commands on their way
+LAW_MEMORY = 8  # thrust rate, rotors' thrust and moment, integral; the commands in transit follow
 
 
 def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array], Array], Array]:
-    """As `law`, and its memory at hover: the thrust's rate, rotors, integral, commands on their way.
+    """As `law`, and its memory at hover: the thrust's rate, rotors, integral, commands in transit.
 
-    Mass and wind are not observed here: across the cable what is observed does not depend on the rotors, and
+    Mass and wind are not estimated here: across the cable their estimate does not depend on the rotors, and
     along it the mass is learned slowly.
     """
     built = plumbline_built(settings, vehicle)
@@ -259,7 +260,7 @@ def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, 
 
 
 def plant_of(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array, Array, Array]:
-    """(A, B, C) of the vehicle from one tick to the next; of its attitude alone for the innermost loop."""
+    """(A, B, C) of the vehicle from one tick to the next; only of its attitude for the innermost loop."""
     A, B = load_state_space(vehicle)
     if settings.loop != "attitude":
         return sampled_plant(A, B, settings.rotor_tau, delay, settings.period)
@@ -271,7 +272,7 @@ def plant_of(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array,
 
 
 def joined(plant_model: tuple[Array, ...], law_model: tuple[Array, ...], shut: Array) -> Array:
-    """State matrix of plant and law together, with the channels of `shut` (1 or 0 for f and each moment)."""
+    """State matrix of plant and law together; `shut` has a factor for f and each moment: 1 closed, 0 open."""
     A, B, C = plant_model
     Ac, Bc, Cc, Dc = law_model
     S = np.diag(shut)
@@ -324,8 +325,8 @@ def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
 
 
 def boundary(holds: Callable[[float], bool], inside: float, outside: float) -> float:
-    """Where on the way from `inside` to `outside` it first ceases to hold: in 100 strides, then by
-    bisection."""
+    """The first value on the way from `inside` to `outside` at which `holds` is false, found in 100 strides
+    and then by bisection; `outside` if there is none."""
     strides = np.linspace(inside, outside, 101)[1:]
     first = next((float(x) for x in strides if not holds(float(x))), None)
     if first is None:
@@ -338,11 +339,11 @@ def boundary(holds: Callable[[float], bool], inside: float, outside: float) -> f
 
 
 def rotor_noise(settings: Settings, vehicle: Vehicle = BEBOP) -> list[tuple[str, float, float]]:
-    """Standard deviation of a rotor command (N; the worst of the four) for each source of white noise in
-    turn.
+    """Standard deviation of a rotor command (N; the worst of the four) for each source of white noise
+    separately.
 
-    The noise is drawn anew each tick, with the deviation given in NOISES on each coordinate: what an
-    estimator leaves, not what a sensor gives. Assumes a stable loop.
+    The noise is drawn anew each tick, with the deviation given in NOISES on each coordinate: errors of an
+    estimate, not of a sensor. Assumes a stable loop.
     """
     A_p, B_p, C_p = plant_of(settings, vehicle, settings.delay)
     A_c, B_c, C_c, D_c = linearised_law(settings, vehicle)
@@ -373,7 +374,7 @@ def row(settings: Settings) -> str:
     result = margin(settings)
     head = f"{settings.rotor_tau * 1e3:6.0f} {1.0 / settings.period:6.0f} {settings.delay * 1e3:6.1f}"
     if not result.stable:
-        # the time in which the growing mode grows by e
+        # the time in which the growing mode grows by a factor of e
         growth = settings.period / math.log(result.radius)
         return f"{head}   lost: grows by e every {growth * 1e3:6.0f} ms"
     return (

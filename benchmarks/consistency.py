@@ -1,13 +1,13 @@
-"""Does the estimator know what it does not know? Its own covariance against the truth, phase by phase.
+"""Consistency of the estimator: its own covariance compared with its true error, phase by phase.
 
     python benchmarks/consistency.py [--mission NAME] [--sensors NAME ...] [--wind M_S ...] [--seeds N]
                                      [--set NAME=VALUE ...] [--jobs N]
 
-Flies a mission with each seed, fused (no wire), calm and in wind, and compares ten times a second the error
-of the estimate with the covariance that the filter has of it. Told are, for each phase of the flight and each
-part of the error state, the share of instants inside the bounds that hold 95 % of a consistent filter's
-errors, and in brackets the NEES (error^T P^-1 error) per degree of freedom, 1 for a consistent filter. While
-the cable is slack the load's place and speed stand for direction and rate.
+Flies a mission with each seed, as in a sweep (without messages), in calm air and in wind, and compares the
+error of the estimate with the filter's covariance ten times a second. Prints, for each phase of the flight
+and each part of the error state, the share of instants inside the bounds that contain 95 % of a consistent
+filter's errors, and in brackets the NEES (error^T P^-1 error) per degree of freedom, 1 for a consistent
+filter. While the cable is slack, position and speed of the load replace direction and rate.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ PARTS = {
     "accel bias": (ACCEL_BIAS, 3),
 }
 Array = NDArray[np.float64]
-# phase -> part -> NEES of each instant, and how many degrees of freedom it has
+# phase -> part -> NEES of each instant, and its number of degrees of freedom
 Nees = dict[str, dict[str, list[tuple[float, int]]]]
 
 
@@ -82,7 +82,7 @@ def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
 
 
 def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> float:
-    """Add the NEES of this instant; the error of the cable's direction, rad."""
+    """Add the NEES of this instant to `found`; returns the error of the cable's direction, rad."""
     estimate = unpack(EstimatorState, flight.core.rows.estimator, 0)
     error, P = error_of(flight, estimate), flight.core.rows.history.covariance
     slack = estimate.load.taut == 0.0
@@ -96,7 +96,7 @@ def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> floa
         place, _, speed = load.covariance
         tracked = load.source == TRACKER
         off = np.subtract(plant.x_load, load.x_load)
-        if not tracked:  # where it lies is known as seen from the vehicle, along the ground
+        if not tracked:  # the load lies on the ground: its position is known relative to the vehicle
             off = (off - error[POSITION : POSITION + 3])[:2]
         found["load place"].append((float(off @ off) / place, len(off)))
         if tracked:
@@ -106,7 +106,7 @@ def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> floa
 
 
 def flown(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Nees, dict[str, object]]:
-    """The NEES of one flight by phase, and what became of it."""
+    """The NEES of one flight by phase, and its result."""
     found: Nees = defaultdict(lambda: defaultdict(list))
     flight = SweptFlight(cell_of(mission, conditions), conditions.seed, start)
     every = round(EVERY_S * 1e6 / flight.tick_us)
@@ -145,7 +145,7 @@ def per_degree(values: list[tuple[float, int]]) -> float:
 
 
 def table(title: str, found: Nees) -> str:
-    """Rows of a Markdown table: a phase a row, a part a column."""
+    """Rows of a Markdown table: one row per phase, one column per part."""
     parts = [*PARTS, "load place", "load speed"]
     rows = [
         f"| {title} | seconds | " + " | ".join(parts) + " |",
@@ -172,7 +172,7 @@ def _one(work: tuple[Mission, Conditions, Boarding]) -> tuple[Nees, dict[str, ob
 def measure(
     mission: Mission, sensors: str, settings: dict[str, float], seeds: int, pool: ProcessPoolExecutor
 ) -> tuple[Nees, list[dict[str, object]]]:
-    """The NEES of so many seeds together, and what became of each."""
+    """The NEES of `seeds` flights together, and the result of each."""
     start = boarding(mission, Conditions(sensors=sensors, settings=settings))
     works = [
         (mission, Conditions(sensors=sensors, seed=s + 1, settings=settings), start) for s in range(seeds)

@@ -1,11 +1,11 @@
-"""The figures that README and docs/control.md state, flown anew: docs/figures.json.
+"""Flies anew the figures that README and docs/control.md state, and writes docs/figures.json.
 
     python benchmarks/figures.py [--seeds 20] [--flights 10000] [--jobs 2]
 
-Figures are those of `fit_to_fly.py`: worst of the seeds, from telemetry; the same in a lab and outdoors as
-they are, of the flights that came home; and of one sweep of Case B over many seeds.
-`tests/documentation/test_figures.py` puts them into the pages, and fails where a page says anything
-else. `make figures` does both.
+The figures are those of `fit_to_fly.py`, from telemetry, worst over the seeds; the same with realistic
+sensors and vehicles in a lab and outdoors, over the completed flights; and those of one sweep of Case B over
+many seeds. `tests/documentation/test_figures.py` writes them into the pages, and fails if a page states
+anything else. `make figures` does both.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ HEAVY_FIELD = ("field", "heavy-real")
 WINDY = {"SIM_ACT_DELAY_MS": 0.0, "SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
 LATE = {"SIM_ACT_DELAY_MS": 12.0}
 STEP = {"rise_time_90_s": 0.0, "overshoot_pct": 0.0, "settling_time_5pct_s": 0.0}
-ROOM = {"MIS_ROTOR_MARG": 35.0}  # a battery that sags has not all the thrust that it is thought to have
+ROOM = {"MIS_ROTOR_MARG": 35.0}  # a battery whose voltage sags gives less thrust than assumed
 
 
 def _real(
@@ -62,8 +62,8 @@ REAL = (
 
 
 def worst(row: Row, seeds: int, pool: multiprocessing.pool.Pool) -> dict[str, float]:
-    """The worst of each figure over the seeds, and how many flights were lost: in a clean world that ends the
-    program."""
+    """The worst of each figure over the seeds, and how many flights were lost; outside REAL a lost flight
+    ends the program."""
     flights = pool.starmap(flown, [(row, "plumbline", seed) for seed in range(1, seeds + 1)], chunksize=1)
     lost = [flight for flight in flights if flight.outcome != "completed"]
     if lost and row not in REAL:
@@ -78,7 +78,7 @@ def worst(row: Row, seeds: int, pool: multiprocessing.pool.Pool) -> dict[str, fl
 
 
 def many(flights: int) -> dict[str, float]:
-    """Case B with motion capture, a seed a flight: how many completed, and their greatest load errors."""
+    """Case B with motion capture, one seed per flight: how many completed, and quantiles of their errors."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "gcs", "sweep", "case-b", "--seeds", str(flights), "--out", folder]
         subprocess.run(command, check=True)

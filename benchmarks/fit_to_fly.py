@@ -1,8 +1,8 @@
-"""What the law holds under real sensors, delay, rotor lag, wind and a wrong load, over many seeds.
+"""The law's errors with noisy sensors, delay, rotor lag, wind and a wrong load mass, over many seeds.
 
-Flights run in one process each, through the same MAVLink queues as `gcs fly`, whose telemetry they equal byte
-for byte; every figure comes from that telemetry. A row is met when its worst seed is within the limits and no
-flight was lost. Exit code 1 if a row is not met.
+Each flight runs in one process, with all MAVLink messages between its parts; its telemetry equals that of
+`gcs fly` byte for byte, and every figure comes from it. A row is met when its worst seed is within the limits
+and no flight was lost. Exit code 1 if a row is not met.
 
     python benchmarks/fit_to_fly.py [--seeds 20] [--law plumbline] [--rows B ...] [--jobs 2] [--json FILE]
 """
@@ -37,7 +37,7 @@ Figures = dict[str, float | None]
 
 @dataclass(frozen=True)
 class Row:
-    """A flight that is asked for, and the greatest value that each of its figures may have."""
+    """A required flight, and the greatest value that each of its figures may have."""
 
     name: str
     mission: str
@@ -80,7 +80,7 @@ ROWS = (
 
 @dataclass(frozen=True)
 class Flown:
-    """What came of one flight."""
+    """The result of one flight."""
 
     outcome: str
     reason: str
@@ -88,7 +88,7 @@ class Flown:
 
 
 def before_step_max(samples: Samples) -> float | None:
-    """Greatest distance (m) of the true load from where the asked step starts, before it starts."""
+    """Greatest distance (m) of the true load from the origin of the requested step, before the step."""
     window = step_window(samples)
     step = find_step(samples.time_s[window], samples.asked_m[window], samples.asked_m_s[window])
     if step is None:

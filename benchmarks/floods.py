@@ -1,12 +1,12 @@
-"""What a flood of the ground ports costs the vehicle: processor time of a tick in flight, in peace and under
-each kind of flood.
+"""The cost of a flood of datagrams on the ground ports: processor time of a tick in flight, without a flood
+and under each kind of flood.
 
     python benchmarks/floods.py [--seconds 8] [--port 14600] [--only NAME ...]
 
-The real programs fly, the load on the cable, while as many datagrams come from 64 peers as one process sends.
-A vehicle without a signing key answers what is asked of it, as a flood that is answered costs most. A tick
-lasts 4000 us: commands are missed in real time where it takes longer. What counts is processor time of the
-autopilot's thread, so that neighbours on a busy machine do not.
+The real programs fly with the load on the cable, while one process sends as many datagrams as it can from 64
+peers. The vehicle has no signing key and answers requests, because an answered flood costs most. A tick lasts
+4000 us: in real time, commands are missed if it takes longer. Measured is the processor time of the
+autopilot's thread, so that other programs on a busy machine have no effect.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ ITEMS = 200  # of a mission that is uploaded again and again
 SUMMARY = re.compile(r"p50 (\d+) p99 (\d+) max (\d+) us; (\d+) of (\d+) took")
 
 
-LARGE, LARGE_BYTES = "large.bin", 64 * 2**20  # on the card of a vehicle that is asked for its checksum
+LARGE, LARGE_BYTES = "large.bin", 64 * 2**20  # on the card of a vehicle, for requests of its checksum
 
 
 class Flood(NamedTuple):
-    """What is said, in turn, by peers in turn; by TCP if asked for. `large`: it asks for that file."""
+    """Datagrams that the peers send in turn, over TCP if `tcp`. `large`: they request the file LARGE."""
 
     words: list[bytes]
     tcp: bool = False
@@ -74,7 +74,7 @@ def parameters(*values: tuple[bytes, float]) -> list[bytes]:
 
 
 def upload() -> list[bytes]:
-    """A mission of many items, said without waiting for its requests."""
+    """A mission of many items, sent without waiting for the vehicle's requests."""
     square = encode_mission(load_mission("square"), Home())
     items = [square[1]] * ITEMS
     said = [m.MAVLink_mission_count_message(1, 1, ITEMS, 0)]
@@ -86,7 +86,7 @@ def upload() -> list[bytes]:
 
 
 def everything_often() -> list[bytes]:
-    """All streams as often as ticks come."""
+    """Requests for all streams, more often than there are ticks."""
     ids = sorted(m.mavlink_map)
     return frames(order(m.MAV_CMD_SET_MESSAGE_INTERVAL, float(number), 1000.0) for number in ids)
 
@@ -121,7 +121,7 @@ FLOODS: dict[str, Callable[[], Flood]] = {
 
 
 def pour(flood: Flood, ports: list[int], tcp: int, sent: Any) -> None:
-    """Say it until the end; `sent` counts."""
+    """Send the flood until the process is killed; `sent` counts the datagrams."""
     peers: list[socket.socket] = []
     for _ in range(PEERS):
         if flood.tcp:
@@ -143,7 +143,7 @@ def pour(flood: Flood, ports: list[int], tcp: int, sent: Any) -> None:
 
 
 class Vehicle:
-    """One world, in which autopilots follow each other: each takes up the flight that it finds."""
+    """One simulator with one autopilot after another; each takes over the flight that it finds."""
 
     def __init__(self, folder: Path, base: int) -> None:
         self._folder, self._base = folder, base
@@ -183,13 +183,13 @@ class Vehicle:
             assert session.watch(lambda: session.view.phase_name == "hold", 60.0), session.view.phase_name
 
     def _end_autopilot(self) -> str:
-        """What it said in its life."""
+        """Stop the autopilot; returns what it printed."""
         self._autopilot.send_signal(signal.SIGINT)
         self._autopilot.wait()
         return self._log.read_text(encoding="utf-8")
 
     def under(self, flood: Flood, seconds: float) -> tuple[int, str]:
-        """How many datagrams were sent in the life of one autopilot, and what it said of its ticks."""
+        """Run a new autopilot under a flood: how many datagrams were sent, and what the autopilot printed."""
         self._end_autopilot()
         self._autopilot = self._start_autopilot(flood.large)
         self._hold()
@@ -212,7 +212,7 @@ class Vehicle:
 
 
 def main() -> None:
-    """The table."""
+    """Measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each flood")
     parser.add_argument("--port", type=int, default=14600, help="the first of five ports to use")

@@ -1,15 +1,15 @@
-"""Hostile datagrams by the million: nothing that a stranger says changes a bit of a flight, or of what is
-stored.
+"""Millions of hostile datagrams: nothing that a stranger sends may change a bit of a flight, or of the
+stored data.
 
     python benchmarks/hostile.py --in-process 10000000
     python benchmarks/hostile.py --sockets 1000000
 
-In process a mission is flown twice in step, once in peace and once under fire, and the two worlds are
-compared bit by bit at every tick: first by a vehicle with a signing key, to which everything is said that is
-not signed with it (commands, uploads, parameters, replayed frames of the true ground station), then by one
-without a key, to which everything is said that is no message, is not for it, or asks for what is refused; and
-requests for files that leave their root, or make no sense. Over sockets the real programs fly, on every port
-of theirs, and are killed and started again at the end. What fails is an assertion.
+In process, a mission is flown twice in step, once undisturbed and once under attack, and the two worlds are
+compared bit by bit at every tick. First the vehicle has a signing key, and receives what is not signed with
+it (commands, uploads, parameters, replayed frames of the true ground station). Then it has no key, and
+receives what is no message, is not for it, or must be refused. Both receive requests for files that leave
+their root, or make no sense. Over sockets, the real programs fly and are attacked on all their ports; the
+autopilot is killed and started again at the end. A failure is an assertion.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(2, 34))
 SENSORS, ANSWERS = "sensors", "answers"  # the two ends of the simulator link
 LINKS = ("gcs", "api", "stranger", "noise", "gcs", "api", "stranger", "noise", SENSORS, ANSWERS)
 MISSION = "delivery"  # waypoints, a release, and a flight home
-PATIENCE_S = 120.0  # with programs that start on a busy machine, and may have to compile
+PATIENCE_S = 120.0  # time limit: programs start on a busy machine, and may have to compile
 TICKS = 80_000  # over which the datagrams are spread
-RATE = 20_000  # of datagrams over sockets, a second
+RATE = 20_000  # datagrams per second over sockets
 
 
 def order(command: int, *params: float) -> Any:
@@ -68,7 +68,7 @@ def order(command: int, *params: float) -> Any:
 
 
 ARM = order(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-ORDERS = (  # by tick: the mission; and a flight by hand with the load on the cable to its end
+ORDERS = (  # commands by tick: the mission; and a flight by commands, with the load on the cable to the end
     {250: order(m.MAV_CMD_MISSION_START), 260: ARM},
     {
         250: order(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0),
@@ -79,18 +79,18 @@ ORDERS = (  # by tick: the mission; and a flight by hand with the load on the ca
 Make = Callable[[random.Random], bytes]
 
 
-# ---- what strangers say
+# ---- what strangers send
 
 
 def any_bytes(rng: random.Random) -> bytes:
-    """Random, or one byte again and again, most often a magic one."""
+    """Random bytes, or one byte repeated, in half the cases a magic one."""
     if rng.random() < 0.5:
         return rng.randbytes(rng.randrange(60))
     return bytes((rng.choice((0xFE, 0xFD, 0, 0xFF)),)) * rng.randrange(1, 300)
 
 
 def _random_message(rng: random.Random, kind: Any, system: int) -> Any:
-    """A message with random numbers, to this system if it is to any."""
+    """A message with random numbers, addressed to this system if it has an addressee."""
     values = list(kind.unpacker.unpack(rng.randbytes(kind.unpacker.size)))
     fields: dict[str, Any] = {}
     for name, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
@@ -105,20 +105,20 @@ def _random_message(rng: random.Random, kind: Any, system: int) -> Any:
 
 
 def random_frames(rng: random.Random, count: int, system: int) -> list[bytes]:
-    """Whole frames of messages of every kind of the dialect, with random numbers."""
+    """Complete frames of messages of every kind of the dialect, with random numbers."""
     writer, kinds = FrameWriter(255, 190), list(m.mavlink_map.values())
     return [writer.frame(_random_message(rng, rng.choice(kinds), system)) for _ in range(count)]
 
 
 def tempting_frames(rng: random.Random, count: int, key: bytes | None = None) -> list[bytes]:
-    """Whole frames of commands, parameters and uploads that would do harm, signed with a key or not."""
+    """Complete frames of commands, parameters and uploads that would do harm, signed if there is a key."""
     writer = FrameWriter(255, 190)
     sign = None if key is None else Signing(key, 10**13).signer(1)
     return [writer.frame(message, sign) for _ in range(count // 8) for message in _tempting(rng)]
 
 
 def _tempting(rng: random.Random) -> Iterator[Any]:
-    """What would do harm."""
+    """Messages that would do harm."""
     yield m.MAVLink_command_long_message(
         1, 1, rng.choice((400, 176, 20, 21, 22, 185, 246, 245, 179, 300, 211, 420, 42600)), 0,
         *(rng.choice((0.0, 1.0, 2.0, 21196.0, float("nan"), float("inf"), -1e9)) for _ in range(7)),
@@ -134,7 +134,7 @@ def _tempting(rng: random.Random) -> Iterator[Any]:
 
 
 def refused(rng: random.Random) -> Iterator[Any]:
-    """Requests that a vehicle without a key hears and must refuse."""
+    """Requests that a vehicle without a key receives and must refuse."""
     odd = rng.choice((float("nan"), float("inf"), -float("inf"), 1e30))
     yield m.MAVLink_param_set_message(1, 1, rng.choice((b"MIS_SPEED", b"NO_SUCH", b"\xff\xfe", b"")), odd, 9)
     yield m.MAVLink_command_long_message(1, 1, rng.choice((31999, 65535)), 0, *((odd,) * 7))
@@ -145,7 +145,7 @@ def refused(rng: random.Random) -> Iterator[Any]:
 
 
 def file_request(rng: random.Random) -> Any:
-    """A FILE_TRANSFER_PROTOCOL request of any operation, mostly on paths that are not, or must not be."""
+    """A FILE_TRANSFER_PROTOCOL request of any operation, mostly for paths that are missing or forbidden."""
     name = rng.choice(
         (b"../../etc/passwd", b"/..", b"a/" * 100, b"\0", b"\xff" * 200, b"@MISSION/mission.json", b"", b"/",
          b"log", b"x" * 239, b"a", b"a/b", b"a\0b", b"@SYS/../a", b"@PARAM/param.pck", rng.randbytes(20))
@@ -155,13 +155,13 @@ def file_request(rng: random.Random) -> Any:
         rng.choice((0, 1, 2**31, 2**32 - 1)), name,
     )  # fmt: skip
     payload = payload_of(packet)
-    if rng.random() < 0.2:  # a size that its data do not have
+    if rng.random() < 0.2:  # a size that does not match the data
         payload = payload[:4] + bytes((rng.randrange(256),)) + payload[5:]
     return m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload))
 
 
 def broken(rng: random.Random, frames: list[bytes]) -> bytes:
-    """A frame with a flipped bit, or cut, or with a piece of another behind it; no message any more."""
+    """A frame with a flipped bit, or truncated, or followed by a piece of another; it no longer decodes."""
     while True:
         frame = bytearray(rng.choice(frames))
         if rng.random() < 0.3:
@@ -170,17 +170,17 @@ def broken(rng: random.Random, frames: list[bytes]) -> bytes:
             frame += rng.choice(frames)[: rng.randrange(1, 20)]
         frame[rng.randrange(1, len(frame))] ^= 1 << rng.randrange(8)
         found = bytes(frame)
-        if not decode(found)[0]:  # of 65,536 changed headers one fits the checksum
+        if not decode(found)[0]:  # one of 65,536 changed headers fits the checksum
             return found
 
 
 def one_of(frames: list[bytes]) -> Make:
-    """One of these."""
+    """A maker that chooses one of these frames."""
     return lambda rng: rng.choice(frames)
 
 
 def for_a_vehicle_with_a_key(rng: random.Random) -> dict[str, Make]:
-    """All that is not signed with its key."""
+    """Makers of datagrams that are not signed with its key."""
     forged = tempting_frames(rng, 8000)
     whole = [*random_frames(rng, 20_000, 1), *forged]
     writer = FrameWriter(255, 190)
@@ -195,7 +195,7 @@ def for_a_vehicle_with_a_key(rng: random.Random) -> dict[str, Make]:
 
 
 def for_a_vehicle_without(rng: random.Random) -> dict[str, Make]:
-    """All that is no message, not for it, or to be refused; and requests for files."""
+    """Makers of datagrams that are no message, not for it, or to be refused; and of requests for files."""
     whole = [*random_frames(rng, 20_000, 1), *tempting_frames(rng, 8000)]
     writer = FrameWriter(255, 190)
     return {
@@ -229,7 +229,7 @@ class Twin:
         self.texts: list[str] = []
 
     def say(self, message: Any) -> None:
-        """A word of the true ground station."""
+        """Send a message of the true ground station."""
         frame = self.writer.frame(message, self.sign)
         self.said.append(frame)
         self.onboard.receive_ground(frame, "gcs")
@@ -244,7 +244,7 @@ class Twin:
         self.simulator.advance()
 
     def hear_stranger(self, datagram: bytes, link: str) -> Any:
-        """Hand it a datagram; what it heeds of it, which is to be nothing."""
+        """Deliver a stranger's datagram; returns what it causes, which must be nothing."""
         if link == SENSORS:
             return self.onboard.receive_sensors(datagram)
         if link == ANSWERS:
@@ -254,13 +254,13 @@ class Twin:
 
     @property
     def kept(self) -> Any:
-        """What outlives the flight."""
+        """The data that outlasts the flight."""
         endpoint = self.onboard.endpoint
         return repr((endpoint.mission, endpoint.areas, self.onboard.parameters.values()))
 
 
 def fly_under_fire(name: str, key: bytes | None, hostile: dict[str, Make], count: int, each: int) -> None:
-    """Missions in peace and under fire, tick by tick, `each` datagrams a tick, until so many have come."""
+    """Fly undisturbed and under attack, with `each` datagrams per tick, until `count` have been sent."""
     rng = random.Random(count)
     kinds, phases = Counter[str](), Counter[str]()
     spent_s, flights = 0.0, 0
@@ -312,7 +312,7 @@ def ports_of(pid: int) -> list[int]:
 
 
 def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> None:
-    """Send so many datagrams to these ports of this machine, a tenth of them by TCP; `done` counts them."""
+    """Send `count` datagrams to these ports of this machine, a tenth of them by TCP; `done` counts them."""
     rng = random.Random(seed)
     makers = list(for_a_vehicle_with_a_key(rng).values())
     sensors = [
@@ -347,7 +347,7 @@ def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> Non
 
 
 class Watched:
-    """The true API client: knows the key, starts the flights, and notes what the vehicle says of itself."""
+    """The true API client: knows the key, starts the flights, and records what the vehicle reports."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -366,7 +366,7 @@ class Watched:
         self._socket.sendto(self._writer.frame(message, self._signing.signer(2)), self._vehicle)
 
     def hear(self) -> None:
-        """One datagram of the vehicle, which is not silent for long but while it starts."""
+        """Receive one datagram of the vehicle, which is silent for long only while it starts."""
         datagram, self._vehicle = self._socket.recvfrom(65535)
         for received in decode(datagram)[0]:
             message = received.message
@@ -378,7 +378,7 @@ class Watched:
                 self.texts.append(message.text)
 
     def forget(self) -> None:
-        """What has come of a vehicle that is no more."""
+        """Discard what was received from a vehicle that has ended."""
         self._socket.setblocking(False)
         with suppress(BlockingIOError):
             while True:
@@ -386,7 +386,7 @@ class Watched:
         self._socket.settimeout(PATIENCE_S)
 
     def fly(self, until: Callable[[], bool]) -> None:
-        """Missions, one after another, until the last is over and it is enough."""
+        """Fly missions, one after another, until `until()` is true and the last mission has ended."""
         asked_ms = -10_000
         flying = False
         while not (until() and not flying):
@@ -410,7 +410,7 @@ def state_of(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:
 
 
 def over_sockets(count: int, base: int) -> None:
-    """The real programs, on every port of theirs."""
+    """Attack the real programs on all their ports."""
     listen, truth, ground, api, tcp = (f"127.0.0.1:{base + i}" for i in range(5))
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
@@ -481,7 +481,7 @@ def over_sockets(count: int, base: int) -> None:
 
 
 def main() -> None:
-    """As many datagrams as asked for."""
+    """Send as many datagrams as the options say."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--in-process", type=int, default=0, metavar="N", help="so many datagrams in process")
     parser.add_argument("--sockets", type=int, default=0, metavar="N", help="so many over sockets")

@@ -1,9 +1,9 @@
-"""Teach a policy to hover the load: PPO of Stable-Baselines3 on the compiled environments.
+"""Train a policy to hover the load, with PPO of Stable-Baselines3 on the compiled environments.
 
     pip install -e '.[learn]'
     python benchmarks/learn_to_hover.py out/hover-policy.npz
 
-prints what is learned as it goes, and how well the policy hovers at the end; the file flies as a law.
+prints the progress, and how well the policy hovers at the end; the file can be flown as a law.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ OPTIONS: dict[str, Any] = {"randomise": {"SIM_LOAD_MASS": (0.08, 0.12), "SIM_ACT
 
 
 class Progress(BaseCallback):
-    """Says every so often how the last hundred episodes went."""
+    """Prints from time to time the results of the last hundred episodes."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -51,8 +51,8 @@ class Progress(BaseCallback):
 
 
 def learn(steps: int, seed: int) -> PPO:
-    """A policy after so many steps."""
-    torch.set_num_threads(1)  # the networks are small: more of them wait for each other
+    """A policy trained for so many steps."""
+    torch.set_num_threads(1)  # the networks are small: more threads would wait for each other
     envs = SB3VecEnv(gymnasium.make_vec(plumbline.learning.HOVER, ENVS, autoreset_mode="SameStep", **OPTIONS))
     model = PPO(
         "MlpPolicy",
@@ -72,7 +72,7 @@ def learn(steps: int, seed: int) -> PPO:
 
 
 def score(model: PPO, episodes: int = 100) -> tuple[float, float]:
-    """(share of episodes without a crash, mean distance in m of the load over their last second)."""
+    """(share of episodes without a crash, mean position error in m of the load over their last second)."""
     envs = gymnasium.make_vec(plumbline.learning.HOVER, episodes, autoreset_mode="Disabled", **OPTIONS)
     seen, _ = envs.reset(seed=10_000)
     alive = np.ones(episodes, bool)
@@ -88,7 +88,7 @@ def score(model: PPO, episodes: int = 100) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Learn, look, and save."""
+    """Train, evaluate, and save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--steps", type=int, default=3_000_000)

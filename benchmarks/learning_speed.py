@@ -1,12 +1,12 @@
-"""How many physics steps a second the environments take, beside mujoco.rollout of the same vehicle.
+"""Physics steps per second of the environments, compared with mujoco.rollout of the same vehicle.
 
     pip install -e '.[peers]'
     python benchmarks/learning_speed.py
 
-A physics step is one Runge-Kutta step of the plant of 4 ms. The environments are stepped as a learner does:
-random actions, observations and rewards computed, episodes that end begun anew. MuJoCo's model has the same
-masses, inertia, rotors with their lag and a cable that is a tendon with a greatest length; it has no drag, no
-ground, no delays and computes no observations, which is in its favour.
+A physics step is one Runge-Kutta step of the plant of 4 ms. The environments are stepped as in training, with
+random actions; observations and rewards are computed, and ended episodes are reset. MuJoCo's model has the
+same masses, inertia and rotors with their lag, and a cable that is a tendon with a maximum length; it has no
+drag, no ground and no delays, and computes no observations, which is in its favour.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ ROTOR = (
 
 
 def mujoco_model(truth: Truth, integrator: str) -> Any:
-    """The vehicle for MuJoCo."""
+    """The vehicle as a MuJoCo model."""
     import mujoco
 
     c, tau, most = truth.torque_ratio, truth.rotor_tau, truth.rotor_max
@@ -71,7 +71,7 @@ def mujoco_model(truth: Truth, integrator: str) -> Any:
 
 
 def rate(run: Callable[[], int]) -> float:
-    """Steps a second of something that returns how many it took: the best of three measurements."""
+    """Steps per second of a function that returns how many it took: the best of three measurements."""
     run()
     found = []
     for _ in range(3):
@@ -83,7 +83,7 @@ def rate(run: Callable[[], int]) -> float:
 
 
 def mujoco_rate(integrator: str, flights: int, threads: int) -> float:
-    """Of mujoco.rollout, the vehicle hovering: the cable taut, the rotors carrying the weight."""
+    """Steps per second of mujoco.rollout; the vehicle hovers, with the cable taut."""
     import mujoco
     from mujoco.rollout import Rollout
 
@@ -107,7 +107,7 @@ def mujoco_rate(integrator: str, flights: int, threads: int) -> float:
 
 
 def environment_rate(count: int, threads: int, **options: Any) -> float:
-    """Of `count` environments."""
+    """Steps per second of `count` environments."""
     envs = gymnasium.make_vec(
         plumbline.learning.HOVER, count, threads=threads, autoreset_mode="SameStep", **options
     )

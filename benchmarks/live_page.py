@@ -1,9 +1,9 @@
-"""What the live page costs: script time a frame in the browser, and processor time of `gcs fly` and its page.
+"""Cost of the live page: script time per frame in the browser, processor time of `gcs fly` and its page.
 
     python benchmarks/live_page.py [--seconds 15]
 
-A flight in real time is watched by headless Chromium, which draws without a graphics card. Times are those
-that the threads and processes had the processor, so that a busy machine does not count.
+Headless Chromium, which draws without a graphics card, shows a flight in real time. All times are processor
+times of threads and processes, so that a busy machine has no effect.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WAIT_S = 60.0
 
 
 def children(pid: int) -> dict[str, int]:
-    """The processes that a process has started, by what their command line says."""
+    """The processes that a process has started, by the name of the program in their command line."""
     found = {}
     listed = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     for child in listed:

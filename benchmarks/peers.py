@@ -1,11 +1,11 @@
-"""How fast other simulators fly in a closed loop, beside Plumbline, in one run on this machine.
+"""Speed of other simulators in closed loop, compared with Plumbline, in one run on this machine.
 
     pip install '.[peers]'
     python benchmarks/peers.py [--repeat 5] [--docs docs/performance.md]
 
-Each flies what it has, as its own authors set it up: udaan a quadrotor whose load follows a circle by the law
+Each flies its own model, as its authors set it up: udaan a quadrotor whose load follows a circle by the law
 of Sreenath et al. (2013), in its own physics and in MuJoCo's; RotorPy a quadrotor without a load on a circle,
-by its law on SE(3); MuJoCo alone no law at all, only the physics of our vehicle with its load, which hovers.
+by its law on SE(3); MuJoCo alone has no law, only the physics of our vehicle with its load, which hovers.
 They are flown in turn, and the median of their processor time counts.
 """
 
@@ -34,13 +34,13 @@ from gcs.sweep.flight import boarding, fly
 from missions.fileformat import load_mission
 from sitl.vehicles.truth import load_truth
 
-FLIGHT_S = 20.0  # of a peer's flight; ours is longer, and per second costs less
+FLIGHT_S = 20.0  # of a peer's flight; ours is longer, which costs less per second
 RADIUS_M, PERIOD_S = 1.0, 8.0
 BEGIN, END = "<!-- peers -->", "<!-- end of peers -->"
 
 
 class Peer(NamedTuple):
-    """What flies, what its flight holds, and a call that flies and returns the seconds flown."""
+    """What flies, what its flight includes, and a call that flies and returns the seconds flown."""
 
     name: str
     holds: str
@@ -55,7 +55,7 @@ def circle(t: float) -> tuple[Any, Any, Any]:
 
 
 def ours() -> Peer:
-    """Case B with the sensors of the lab, without the wire."""
+    """Case B with the sensors `lab`, without messages."""
     mission, conditions = load_mission("case-b"), Conditions()
     board = boarding(mission, conditions)
     return Peer(
@@ -76,7 +76,7 @@ def udaan(mujoco_cable: str | None) -> Peer:
             model = QuadrotorCsPayloadMujoco(render=False, cable_model=mujoco_cable)
         model.payload_controller.setpoint = circle
         model.simulate(tf=FLIGHT_S, payload_position=circle(0.0)[0])
-        # what is fast only because it fell is no peer
+        # a flight that is fast only because the vehicle fell does not count
         assert np.linalg.norm(model.state.payload_position - circle(model.t)[0]) < 1.0, "udaan has crashed"
         return float(model.t)
 
@@ -127,7 +127,7 @@ def processor_s_of_a_second(peer: Peer) -> float:
 
 
 def main() -> None:
-    """Fly all in turn, print the table, and write it into the page if so asked."""
+    """Fly all in turn, print the table, and with `--docs` write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--docs", type=Path)

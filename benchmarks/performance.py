@@ -1,9 +1,9 @@
-"""How fast Plumbline is here and now, each figure beside a floor or a neighbour measured in the same run.
+"""Speed of Plumbline on this machine, each figure beside a bound or another figure of the same run.
 
     python benchmarks/performance.py [--flights 200] [--real-time 60] [--linear] [--docs docs/performance.md]
 
-Seconds are the machine's, and the machine's neighbours'; ratios are what can be compared. What is repeated is
-flown in turn, and the median counts. With --docs the tables are written into the page, between its markers.
+Seconds depend on the machine and on what else it runs; only ratios can be compared. Repeated measurements are
+made in turn, and the median counts. With --docs the tables are written into the page, between its markers.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff, Waypoint
 
 MISSION = "case-b"
-TICKS_PER_S = 250  # as the simulator has them by default
-SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors of the lab, and of its answer
+TICKS_PER_S = 250  # the simulator's default
+SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors `lab`, and of its answer
 REAL_TIME_HZ = 500
-_CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a line of `gcs fly` begins that says how far the flight is
+_CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a progress line of `gcs fly` begins
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
 
 
 class NoLog:
-    """Takes frames and forgets them."""
+    """A log that discards its frames."""
 
     def write(self, unix_us: int, *frames: bytes) -> None:
-        """Nothing."""
+        """Discard the frames."""
 
 
-# ---- the wire
+# ---- with messages
 
 
 def over_udp(folder: Path) -> tuple[dict[str, float], float, float]:
-    """The record of `gcs fly` in lockstep, the seconds until the vehicle is heard, and those in all."""
+    """The record of `gcs fly` in lockstep, the seconds until the vehicle is heard, and those in total."""
     out = folder / f"flight-{time.monotonic_ns()}"
     command = [sys.executable, "-m", "gcs", "fly", MISSION, "--sensors", "lab", "--out", str(out)]
     began = time.perf_counter()
@@ -79,7 +79,7 @@ def _echo(port: int, core: int) -> None:
 
 
 def ping_pong(exchanges: int) -> float:
-    """Wall seconds of so many exchanges between two Python processes, blocking, on one core."""
+    """Wall seconds of `exchanges` exchanges between two Python processes, blocking, on one core."""
     cores = os.sched_getaffinity(0)
     core = max(cores)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
@@ -101,18 +101,18 @@ def ping_pong(exchanges: int) -> float:
     return wall_s
 
 
-# ---- without the wire
+# ---- without messages
 
 
 def processor_s(run: Callable[[], object]) -> float:
-    """Processor seconds of a call: other work on the machine counts little."""
+    """Processor seconds of a call, on which other work on the machine has little effect."""
     began = time.process_time()
     run()
     return time.process_time() - began
 
 
 def sweep_s(flights: int) -> float:
-    """Wall seconds of a sweep of so many flights on all cores, as `gcs sweep` says them."""
+    """Wall seconds of a sweep of so many flights on all cores, as `gcs sweep` reports them."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "gcs", "sweep", MISSION, "--seeds", str(flights)]
         done = subprocess.run(
@@ -125,7 +125,7 @@ def sweep_s(flights: int) -> float:
 
 
 def holding(seconds: float) -> Mission:
-    """Take off and hold."""
+    """A mission that takes off and holds."""
     return Mission("hold", "Hold", "", (), (Takeoff(1.0), Waypoint(0.0, 0.0, 1.0, hold_s=seconds), Land()))
 
 
@@ -133,7 +133,7 @@ def holding(seconds: float) -> Mission:
 
 
 def real_time(seconds: float, folder: Path) -> tuple[str, str]:
-    """What `sitl` says of its timeliness after so many seconds, and `autopilot` of its work."""
+    """What `sitl` reports of its timeliness after so many seconds, and `autopilot` of its work."""
     port, truth = "127.0.0.1:14571", "127.0.0.1:14572"
     simulator = subprocess.Popen(
         [
@@ -186,7 +186,7 @@ Rows = Iterator[tuple[str, ...]]  # each as soon as it is measured
 
 
 def lockstep_rows(repeat: int, folder: Path) -> Rows:
-    """Through three processes, in one, and what UDP allows."""
+    """Flights through three processes and in one, and the limit that UDP sets."""
     mission, conditions = load_mission(MISSION), Conditions()
     over_udp(folder)  # loads everything once
     flown, heard, whole, floor, one = [], [], [], [], []
@@ -216,7 +216,7 @@ def lockstep_rows(repeat: int, folder: Path) -> Rows:
 
 
 def sweep_rows(repeat: int, flights: int) -> Rows:
-    """One flight without the wire, and many on all cores."""
+    """One flight without messages, and many on all cores."""
     mission = load_mission(MISSION)
     for sensors in ("lab", "ideal"):
         board = boarding(mission, Conditions(sensors=sensors))
@@ -241,7 +241,7 @@ def sweep_rows(repeat: int, flights: int) -> Rows:
 
 
 def light_rows(repeat: int) -> Rows:
-    """Processor time of commands that only say something; `gcs status` listens for a vehicle, in vain."""
+    """Processor time of commands that only print something; `gcs status` waits in vain for a vehicle."""
     for words in (["--help"], ["status", "--connect", "14573"]):
         timed = []
         for _ in range(max(repeat, 5)):
@@ -253,7 +253,7 @@ def light_rows(repeat: int) -> Rows:
 
 
 def linear_rows() -> Rows:
-    """Microseconds a tick over three decades of flights and of ticks, and over the rates there are."""
+    """Microseconds per tick over three decades of flights and of ticks, and over the possible rates."""
     mission, conditions = load_mission(MISSION), Conditions()
     board = boarding(mission, conditions)
 
@@ -274,7 +274,7 @@ def linear_rows() -> Rows:
 
 
 def all_rows(options: argparse.Namespace, folder: Path) -> Rows:
-    """The first table."""
+    """The rows of the first table."""
     yield from lockstep_rows(options.repeat, folder)
     yield from sweep_rows(options.repeat, options.flights)
     yield from light_rows(options.repeat)
@@ -284,7 +284,7 @@ def all_rows(options: argparse.Namespace, folder: Path) -> Rows:
 
 
 def table(head: Sequence[str], rows: Rows) -> str:
-    """Markdown, each line printed as soon as it stands."""
+    """A Markdown table; each line is printed as soon as it is complete."""
     lines = []
     for cells in chain((head, ["---"] * len(head)), rows):
         lines.append("| " + " | ".join(cells) + " |")
@@ -294,7 +294,7 @@ def table(head: Sequence[str], rows: Rows) -> str:
 
 
 def main() -> None:
-    """Measure, print, and write the page if so asked."""
+    """Measure, print, and with `--docs` write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--flights", type=int, default=200, help="of the sweep")

@@ -24,16 +24,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.doubles.browser import Browser, chromium, missing
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
-THEME = "dark"  # it reads on the light pages of a repository's web site too
+THEME = "dark"  # also readable on the light pages of a repository's web site
 FLIGHT = ("case-c", "--set", "SIM_GUST_N=6", "--set", "SIM_GUST_AT_S=32")
 SIZE = (720, 420)  # of the animated picture, pixels
 BEGIN_S, END_S = 28.5, 44.5  # of the flight; the gust is in it
-PERIOD_S = 3.0  # of the swing that Case C asks for
-FRAMES_PER_S, PACE = 12.0, 2.0  # of the picture; seconds of the flight in one of the picture
-LAST_S = 1.5  # how long the last frame stays before it begins anew
+PERIOD_S = 3.0  # of the swing that Case C requests
+FRAMES_PER_S, PACE = 12.0, 2.0  # of the picture; seconds of the flight per second of the picture
+LAST_S = 1.5  # how long the last frame stays before the picture repeats
 QUALITY = 70
 
-# The scene fills the window; what stands over it is the legend, load error, tension, swing and speed.
+# The scene fills the window; over it are the legend, load error, tension, swing and speed.
 ALONE = """
 const style = document.createElement("style");
 style.textContent = `body { overflow: hidden } .over.cameras { display: none }
@@ -44,7 +44,7 @@ style.textContent = `body { overflow: hidden } .over.cameras { display: none }
 document.head.append(style);
 """
 
-# The eye looks at the mean of the load over a period of its swing, so that the load swings in the picture.
+# The camera looks at the mean of the load over a period of its swing, so that the load swings in the picture.
 # The trail ends at the load.
 PREPARE = """
 const { flight, stage, transport } = window.replay;
@@ -89,13 +89,13 @@ def flown(folder: Path, *mission: str) -> str:
 
 
 def open_report(browser: Browser, address: str, width: int, height: int) -> None:
-    """Show a report once its scene and plots stand."""
+    """Open a report, and wait until its scene and plots are drawn."""
     browser.open(address, width, height, THEME)
     browser.wait("document.documentElement.dataset.ready === '1'", WAIT_S)
 
 
 def animated(browser: Browser, folder: Path, path: Path) -> None:
-    """A replay with the eye beside the vehicle, which it slowly goes around."""
+    """A replay, with a camera that slowly circles the vehicle."""
     open_report(browser, flown(folder, *FLIGHT), *SIZE)
     browser.run(ALONE)
     browser.run(PREPARE, PERIOD_S)
@@ -117,7 +117,7 @@ def report(browser: Browser, folder: Path, path: Path) -> None:
 
 
 def live(browser: Browser, folder: Path, path: Path) -> None:
-    """The live page of a flight in the wind that is pushed by a gust."""
+    """The live page of a flight in wind, with the vehicle pushed by a gust."""
     with flight(folder, "--set", "SIM_WIND_E=3", "--set", "SIM_GUST_STD=0.5") as (_, address):
         browser.open(address, 1440, 860, THEME)
         browser.wait(IN_MISSION, WAIT_S)

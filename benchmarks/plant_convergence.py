@@ -1,4 +1,4 @@
-"""Error of the plant against its step, in each of its modes: the table from which the steps were chosen.
+"""Error of the plant as a function of its step, in each mode: the table from which steps were chosen.
 
 Each case flies the same commands (constant over ticks of 4 ms) with steps h and compares the positions of
 both bodies and the attitude, along the whole flight, with a run at a step 32 times shorter than the shortest.
@@ -27,7 +27,7 @@ from sitl.vehicles.truth import load_truth
 
 TICK = 4e-3
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
-# near the ground `advance` divides what is longer than its CONTACT_STEP, so longer ones cannot be compared
+# near the ground `advance` divides steps longer than its CONTACT_STEP, so longer ones cannot be compared
 STEPS_CONTACT = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5, 3.125e-5)
 WIND = (2.0, -1.0, 0.5)
 
@@ -97,8 +97,8 @@ def _switching() -> Case:
     truth = load_truth("bebop")
     start = _aloft(truth)._replace(v_load=(0.2, 0.1, 5.0), v_quad=(0.2, 0.1, 5.0))
 
-    # Thrown upwards with the rotors at rest, the vehicle is braked by its drag and the load flies on; then
-    # full thrust until the cable snaps taut, and again. The rotors' lag puts the release inside a step.
+    # Thrown upwards with the rotors at rest, the vehicle is braked by its drag while the load flies on; then
+    # full thrust until the cable snaps taut; and so on. The rotors' lag puts the release inside a step.
     def command(tick: int) -> Forces:
         return (0.0, 0.0, 0.0, 0.0) if tick % 100 < 30 else (1.9, 1.93, 1.91, 1.92)
 

@@ -1,4 +1,4 @@
-"""How long a process has had the processor, by the system's own count: a busy machine does not enter."""
+"""Processor time of a process, as the system counts it; it does not depend on how busy the machine is."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Real flights of a load on a cable: how far the load is predicted, and known without being seen.
+"""Real flights of a load on a cable: errors of its prediction, and of its estimate without a tracker.
 
     python benchmarks/real_flights.py FOLDER [--columns MAP] [--out FILE.json]
 
 FOLDER holds recordings (`*.csv`, `*.csv.gz`); without it the environment variable PLUMBLINE_REAL_FLIGHTS
 names it. The parameters are the same for all flights, those of the column map
 (`gcs/recorded/maps/motion-capture.toml`); docs/real-flights.md says where the recordings come from and how
-the parameters were found. The length is identified anew from each flight.
+the parameters were found. The cable length is identified separately for each flight.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ COLUMNS = (
 
 
 def scored(path: Path, columns: ColumnMap) -> tuple[dict[str, Any], tuple[Score, ...]]:
-    """The figures of one flight, and the scores they are of."""
+    """The figures of one flight, and the scores from which they are computed."""
     motion = motion_of(read_recording(path, columns), columns)
     model = columns.load_model(float(np.nanmedian(distances(motion))))
     rows = rows_of(motion, model)

@@ -1,9 +1,9 @@
-"""What each effect of the world does to Cases A, B and C: the table of docs/realism.md.
+"""The influence of each effect of the world on Cases A, B and C: the table of docs/realism.md.
 
     python benchmarks/realism.py [--seeds 4] [--docs docs/realism.md] [--only WORD]
 
-Each row is three sweeps. A cell has the greatest error of the load (mm), median and worst of the flights that
-were completed; then, where it is not zero, how many were not, and the mean share of ticks at a rotor's limit.
+Each row is three sweeps. A cell has the greatest error of the load (mm), median and worst of the completed
+flights; then, if not zero, how many were not completed, and the mean share of ticks at a rotor's limit.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import plumbline
 
 CASES = ("case-a", "case-b", "case-c")
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
-LEAST_SHARE = 0.005  # of the ticks at a rotor's limit, that is told
+LEAST_SHARE = 0.005  # of the ticks at a rotor's limit, that is shown
 
 
 class Effect(NamedTuple):
-    """A row of the table: what is on beside what vehicle and sensors have."""
+    """A row of the table: the settings that are added to those of vehicle and sensors."""
 
     name: str
     settings: Mapping[str, float] = {}
@@ -79,7 +79,7 @@ EFFECTS = (
 
 
 def cell(table: Any) -> str:
-    """Of the flights of one mission."""
+    """The cell for the flights of one mission."""
     home = table[table["outcome"] == "completed"]
     text = "none came home"
     if len(home):
@@ -92,7 +92,7 @@ def cell(table: Any) -> str:
 
 
 def row(effect: Effect, seeds: int) -> str:
-    """Of the table."""
+    """A row of the table."""
     cells = []
     for case in CASES:
         try:
@@ -104,7 +104,7 @@ def row(effect: Effect, seeds: int) -> str:
                 seeds=seeds,
                 quiet=True,
             )
-        except plumbline.Error:  # the vehicle has not what the mission asks for
+        except plumbline.Error:  # the vehicle cannot do what the mission requires
             cells.append("not flyable")
         else:
             cells.append(cell(table))
@@ -112,7 +112,7 @@ def row(effect: Effect, seeds: int) -> str:
 
 
 def written(page: str, effect: Effect, line: str, seeds: int) -> str:
-    """The page with this row in its table; rows of other effects stay, if there still are such effects."""
+    """The page with this row in its table; rows of other effects stay, if those effects still exist."""
     table = page[page.index(BEGIN) : page.index(END)]
     rows = {name: row for row, name in re.findall(r"^(\| (.*?) \| .*)$", table, flags=re.MULTILINE)}
     rows[effect.name] = line
@@ -122,7 +122,7 @@ def written(page: str, effect: Effect, line: str, seeds: int) -> str:
 
 
 def main() -> None:
-    """Fly all, print the table, and write each row into the page, if so asked, when it is flown."""
+    """Fly all, print the table, and with `--docs` write each row into the page as soon as it is flown."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--docs", type=Path)

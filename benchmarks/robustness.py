@@ -1,10 +1,11 @@
-"""The sweeps of docs/robustness.md: flies them, and renews the maps in docs/images/robustness and the record
-docs/robustness.json, from which `tests/documentation/test_robustness.py` writes what the page says.
+"""Flies the sweeps of docs/robustness.md, and renews the maps in docs/images/robustness and the record
+docs/robustness.json, from which `tests/documentation/test_robustness.py` writes the text of the page.
 
     python benchmarks/robustness.py [--out DIR] [--docs DIR] [--only NAME ...] [--whole]
 
-Each is a `gcs sweep` into a directory of its own below DIR: what was flown already by the same code is kept,
-and after Ctrl-C the same command goes on. `--whole` adds the sweep of 10 000 flights over everything at once.
+Each is a `gcs sweep` into its own directory below DIR. Flights that the same code has already flown are kept,
+and after Ctrl-C the same command continues. `--whole` adds the sweep of 10 000 flights that varies all
+parameters together.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ WHOLE = {
 
 
 def cells(directory: Path, names: list[str]) -> list[dict[str, Any]]:
-    """What came of each setting with each law: how many flights, how many of them home with which errors
-    (mm), and in which phases the others were lost."""
+    """The results of each setting with each law: how many flights, how many of them completed with which
+    errors (mm), and in which phases the others were lost."""
     rows = pq.read_table(directory / "flights.parquet").to_pylist()
 
     def setting(row: dict[str, Any]) -> tuple[Any, ...]:
@@ -76,7 +77,7 @@ def cells(directory: Path, names: list[str]) -> list[dict[str, Any]]:
 
 
 def keep(record: dict[str, list[dict[str, Any]]]) -> None:
-    """Put what was flown into the record, a line for each cell."""
+    """Write the results into the record, a line for each cell."""
     stored = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {}
     parts = []
     for name, found in {**stored, **record}.items():

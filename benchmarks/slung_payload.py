@@ -1,19 +1,19 @@
-"""ArduPilot's own slung payload (SIM_SLUP) beside our load: one firmware, one mission, one mass and cable.
+"""ArduPilot's own slung payload (SIM_SLUP) beside our load: same firmware, mission, mass and cable.
 
     PLUMBLINE_ARDUCOPTER=./arducopter python benchmarks/slung_payload.py [--docs docs/autopilots.md]
 
-The firmware flies twice: its own quadrotor with its own payload, given the masses, inertia, thrust and drag
-of `iris`, and `iris` on Plumbline's world. Both lift the load, carry it 12 m at 4 m/s, stop hard and wait.
+The firmware flies twice: its own quadrotor with its own payload, with the masses, inertia, thrust and drag
+of `iris`, and `iris` in Plumbline's world. Both lift the load, carry it 12 m at 4 m/s, stop hard and wait.
 
-What a pendulum does in that wait follows from how the vehicle moves under it: with displacements from rest
-proportional to exp(s t), x of the load relative to the vehicle and k x (k complex) of the vehicle,
+The motion of a pendulum during that wait follows from the motion of the vehicle above it. With displacements
+from rest proportional to exp(s t), x of the load relative to the vehicle and k x (k complex) of the vehicle,
 
     (1 + k) s^2 = -g / L.
 
-k = 0 is a vehicle that does not move, k = -m / (M + m) one that is free to. An autopilot that holds position
-moves it by a k that takes energy out of the swing. Period and loss that follow from the k that is seen are
-the analytic ones of that flight; what a simulation loses beside is its own. (Drag of the load is left out: it
-takes some 1 % of a swing.)
+k = 0 is a vehicle that does not move, k = -m / (M + m) a vehicle that moves freely. An autopilot that holds
+position moves the vehicle with a k that takes energy out of the swing. Period and loss computed from the
+observed k are the analytic ones of that flight; any other loss is due to the simulation. (Drag of the load is
+neglected: it takes some 1 % of a swing.)
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ hold_s = 30.0
 type = "land"
 """
 # of the firmware in both flights: a slow climb, so that the take-off does not overshoot into the cable, and
-# a stop that is not smoothed as much as it would be
+# a stop that is smoothed less than by default
 SETTINGS = {"WPNAV_SPEED_UP": 50, "WPNAV_ACCEL": 300, "WPNAV_JERK": 20}
 GRAVITY = 9.80665  # the firmware's
 SPHERE_NS2_M2 = 0.5 * 1.225 * 0.07  # force of its payload at 1 m/s with SIM_SLUP_DRAG 1
-WAITED, WATCHED = 2.0, 3.0  # periods after the stop: until the fit, and of it
-HZ = 10.0  # of its payload's log, at which both are looked at
+WAITED, WATCHED = 2.0, 3.0  # periods: from the stop until the fit begins, and for which the fit lasts
+HZ = 10.0  # rate of its payload's log, at which both flights are evaluated
 
 
 class Flown(NamedTuple):
@@ -102,12 +102,12 @@ class Flown(NamedTuple):
     time_s: Floats
     vehicle_m: Floats  # (n, 3)
     below_m: Floats  # (n, 3), of the load relative to the vehicle
-    load_m_s: Floats  # (n, 3), as the simulation tells it
+    load_m_s: Floats  # (n, 3), as the simulation reports it
     tension_n: Floats
 
 
 class Swing(NamedTuple):
-    """exp(s t), and what the vehicle does meanwhile."""
+    """The motion exp(s t), and the vehicle's displacement k relative to that of the load."""
 
     s: complex  # 1/s
     k: complex
@@ -119,16 +119,16 @@ class Swing(NamedTuple):
 
     @property
     def lost(self) -> float:
-        """Share of the amplitude that a period takes."""
+        """Share of the amplitude that is lost in a period."""
         return 1.0 - float(np.exp(self.s.real * self.period_s))
 
 
 class FlatGround(UdpSocket):
-    """The link to a firmware, which is told that all ground is at 0 m: its payload asks for the terrain below
-    it, and rises for ever where that is not known."""
+    """The link to a firmware, which receives 0 m as the height of all terrain: its payload requests the
+    terrain below it, and rises for ever if that is unknown."""
 
     def drain(self) -> list[bytes]:
-        """As ever; what asks for terrain is answered."""
+        """As in the base class; requests for terrain are also answered."""
         found = super().drain()
         writer = FrameWriter(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         for one in (one for datagram in found for one in decode(datagram)[0]):
@@ -141,13 +141,13 @@ class FlatGround(UdpSocket):
 
 
 def model_of(vehicle: Vehicle) -> dict[str, Any]:
-    """The vehicle as the firmware's frame file has it."""
+    """The vehicle in the form of the firmware's frame file."""
     fast = 15.0
     drag_n = (vehicle.quad_drag_n_s_m + vehicle.quad_drag_quadratic_n_s2_m2 * fast) * fast
     weight_n = vehicle.quad_mass_kg * GRAVITY
     return {
         "mass": vehicle.quad_mass_kg,
-        "diagonal_size": vehicle.arm_m,  # its file calls so what its motors have for an arm
+        "diagonal_size": vehicle.arm_m,  # the file's name for the arm of the motors
         "moment_inertia": list(vehicle.inertia_kg_m2),
         "num_motors": 4.0,
         "hoverThrOut": weight_n / (4.0 * vehicle.rotor_max_n),
@@ -168,7 +168,7 @@ def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flo
         "SIM_SLUP_LINELEN": vehicle.cable_length_m,
         "SIM_SLUP_DRAG": vehicle.load_drag_quadratic_n_s2_m2 / SPHERE_NS2_M2,
         "TERRAIN_ENABLE": 1,
-        "SR0_EXTRA3": 5,  # the stream in which it asks for terrain
+        "SR0_EXTRA3": 5,  # the stream with its requests for terrain
     }
     shipped = (files("sitl.interfaces") / "ardupilot.parm").read_text(encoding="ascii")
     lines = [f"{name} {value:.9g}\n" for name, value in (payload | SETTINGS).items()]
@@ -180,7 +180,7 @@ def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flo
     with (
         Processes() as processes,
         closing(FlatGround()) as link,
-        closing(UdpSocket()) as truth,  # it tells none
+        closing(UdpSocket()) as truth,  # the firmware sends none
         (out / "flight.tlog").open("wb") as file,
         StopRequest("stopping") as stop,
         FlightDisplay(mission.stem, quiet=True) as display,
@@ -200,7 +200,7 @@ def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flo
 
 
 def theirs_of(log: Path) -> Flown:
-    """Out of the firmware's own log: SLUP of the payload, SIM2 of the vehicle."""
+    """A flight from the firmware's own log: SLUP of the payload, SIM2 of the vehicle."""
     payload, vehicle = [], []
     reader = DFReader_binary(str(log))
     while (m := reader.recv_match(type=["SLUP", "SIM2"])) is not None:
@@ -215,7 +215,7 @@ def theirs_of(log: Path) -> Flown:
 
 
 def fly_ours(program: Path, mission: Path, vehicle: Path, out: Path) -> Flown:
-    """The same firmware on our world."""
+    """The same firmware in our world."""
     settings = [word for name, value in SETTINGS.items() for word in ("--set", f"{name}={value}")]
     flight = ["--vehicle", str(vehicle), "--sensors", "rtk", "--out", str(out), "--quiet", *settings]
     command = [
@@ -239,12 +239,12 @@ def fly_ours(program: Path, mission: Path, vehicle: Path, out: Path) -> Flown:
 
 
 def at(time_s: Floats, rows: Floats) -> Floats:
-    """The rows, whose first column is their time, at these times."""
+    """The rows, whose first column is their time, interpolated at these times."""
     return np.array([np.interp(time_s, rows[:, 0], column) for column in rows.T[1:]]).T
 
 
 def stopped_at_0(time_s: Floats, vehicle: Floats, below: Floats, velocity: Floats, tension: Floats) -> Flown:
-    """The time at which the vehicle comes to its waypoint is 0."""
+    """The flight, with the time at which the vehicle arrives at its waypoint as 0."""
     there_s = time_s[np.argmax(vehicle[:, 0] > DISTANCE_M - 0.3)]
     return Flown(time_s - there_s, vehicle, below, velocity, tension)
 
@@ -270,7 +270,7 @@ def swing_of(flown: Flown, cable_m: float) -> Swing:
 
 
 def pendulum(k: complex, cable_m: float) -> Swing:
-    """The swing of an ideal pendulum under a vehicle that moves so."""
+    """The swing of an ideal pendulum under a vehicle that moves with this k."""
     s = cmath.sqrt(-GRAVITY / cable_m / (1.0 + k))
     return Swing(s if s.real < 0.0 else -s, k, 0.0)
 
@@ -279,19 +279,19 @@ class Lift(NamedTuple):
     """How the load leaves the ground."""
 
     tension_n: float  # greatest in the second that follows
-    share: float  # of the vehicle's speed along the cable that the load has 0.3 s after the cable came taut
-    slack_m: float  # how far the ends are closer than the cable is long when it begins to pull
+    share: float  # speed of the load over that of the vehicle, along the cable, 0.3 s after it came taut
+    slack_m: float  # the cable's length less the distance of its ends, when it begins to pull
 
 
 def rates(flown: Flown) -> tuple[Floats, Floats]:
-    """Speeds (m/s) along the cable, of the vehicle and, as it is told, of the load."""
+    """Speeds (m/s) along the cable, of the vehicle, and, as reported, of the load."""
     up = -flown.below_m / np.linalg.norm(flown.below_m, axis=1)[:, None]
     climb = np.gradient(flown.vehicle_m, flown.time_s, axis=0)
     return np.sum(climb * up, axis=1), np.sum(flown.load_m_s * up, axis=1)
 
 
 def taut_at(flown: Flown, cable_m: float) -> int:
-    """The row of the last moment before the load is carried at which the cable is slack."""
+    """The last row with a slack cable before the load is carried."""
     height = flown.vehicle_m[:, 2] + flown.below_m[:, 2]
     up = int(np.argmax((height > height[0] + 0.5) & (flown.time_s < 0.0)))
     distance = np.linalg.norm(flown.below_m[:up], axis=1)
@@ -299,7 +299,7 @@ def taut_at(flown: Flown, cable_m: float) -> int:
 
 
 def lift_of(flown: Flown, cable_m: float, weight_n: float) -> Lift:
-    """From the last time that the cable is slack before the load is carried."""
+    """The lift-off, from the last time that the cable is slack before the load is carried."""
     taut = taut_at(flown, cable_m)
     vehicle, load = rates(flown)
     begins = slice(taut - round(HZ), taut + 2)
@@ -313,7 +313,7 @@ def lift_of(flown: Flown, cable_m: float, weight_n: float) -> Lift:
 
 
 def carried(flown: Flown) -> NDArray[np.bool_]:
-    """From the start of the carrying until all is at rest."""
+    """Which rows are between the start of the carrying and the time when all is at rest."""
     return (flown.time_s > -6.0) & (flown.time_s < 20.0)
 
 
@@ -324,8 +324,8 @@ def widest_deg(flown: Flown) -> float:
 
 
 def unaccounted_m_s(flown: Flown) -> float:
-    """The greatest difference between the velocity that is told of the load and the rate at which its
-    position changes, while it is carried."""
+    """The greatest difference between the reported velocity of the load and the rate at which its position
+    changes, while it is carried."""
     place = flown.vehicle_m + flown.below_m
     rate = (place[2:] - place[:-2]) / (flown.time_s[2:] - flown.time_s[:-2])[:, None]
     told = (flown.load_m_s[2:] + 2.0 * flown.load_m_s[1:-1] + flown.load_m_s[:-2]) / 4.0
@@ -370,7 +370,7 @@ def rows_of(cable_m: float, vehicle: Vehicle, flights: Sequence[Flown]) -> list[
 
 
 def draw(flights: Sequence[Flown], cable_m: float, path: Path) -> None:
-    """Lift-off and swing of both, beside each other."""
+    """Draw lift-off and swing of both flights, side by side."""
     plt.rcParams["svg.hashsalt"] = "plumbline"
     figure, (lift, swing) = plt.subplots(1, 2, figsize=(9.0, 3.2), layout="constrained")
     for flown, name, colour in zip(flights, ("ArduPilot's own", "here"), ("C1", "C0"), strict=True):
@@ -391,7 +391,7 @@ def draw(flights: Sequence[Flown], cable_m: float, path: Path) -> None:
 
 
 def main() -> None:
-    """Fly all, print the table, and write it into the page if so asked."""
+    """Fly all, print the table, and with `--docs` write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--docs", type=Path)
     parser.add_argument("--out", type=Path, help="where the flights are left")

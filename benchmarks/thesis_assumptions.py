@@ -1,21 +1,22 @@
 """What the thesis leaves open in its cascade, and which choice gives its printed figures.
 
-The command filters (4-2) give the derivatives of x_d, q_c and R_c. Whether the errors are taken from the
-commands themselves (raw) or from the filtered ones, x_1, is not said, nor how long the step of Case A lasts.
-Here all eight choices are flown, from rest in the air, the state known exactly, with the gains of Table 4-3:
+The command filters (4-2) give the derivatives of x_d, q_c and R_c. The thesis does not say whether the errors
+are computed from the commands themselves (raw) or from the filtered ones, x_1, nor how long the step of Case
+A lasts. Here all eight choices are flown, from rest in the air, with an exactly known state and the gains of
+Table 4-3:
 
 * x: e_x from the raw or the filtered x_d; velocity and acceleration are those of the filter.
 * q: e_q from the raw or the filtered q_c; q_c', q_c'' are those of the filtered vector, normalised.
 * R raw: R_c of (3-27) as it is, Omega_c of (3-28), Omega_c' of (3-18) from the filtered elements' x_2, x_2'.
   R filtered: the rotation rebuilt from the filtered elements, Omega_c and Omega_c' its exact derivatives.
 
-Case A, without limits or lag, from the beginning of the step; printed are 0.61 s, 15 % and 1.26 s:
+Case A, without limits or lag, from the beginning of the step; the thesis prints 0.61 s, 15 % and 1.26 s:
 
-* rise to 90 %, overshoot and settling within 5 %; `*` where all three are met (0.08 s, 6 %, 0.25 s).
+* rise to 90 %, overshoot and settling within 5 %; `*` if all three are met (0.08 s, 6 %, 0.25 s).
 
 Case B, B extended and C, without limits or lag (thesis) and with those of the vehicle (bebop), at 250 Hz:
 
-* largest load error, part of the time with a rotor command beyond its limits, or when the flight was lost.
+* largest load error, share of the time with a rotor command beyond its limits, or when the flight was lost.
 
 The row marked `flies` is what autopilot/control/thesis_cascade.py does; the script flies that too and
 compares.
@@ -68,7 +69,7 @@ RATES_HZ = (250.0, 1000.0)
 CASES = ("case-b", "case-b-extended", "case-c")
 HEIGHT_M, WATCHED_S = 0.25, 7.0  # of Case A
 ALTITUDE_M = 3.0
-# a flight is lost when the load is so far away, or the vehicle leans by so much
+# a flight is lost when the load is this far from its path, or the cosine of the tilt is below this
 LOST_M, LOST_COSINE = 5.0, -0.5
 TIME, LOAD, ERROR, TILT, SATURATED = 0, slice(1, 4), 4, 5, 6
 COLUMNS = 7
@@ -105,8 +106,8 @@ def cascade(
     filters: thesis.ThesisFilters,
     vehicle: Vehicle,
 ) -> tuple[thesis.ThesisMemory, float, Vec3]:
-    """The load position mode, composed of the laws that fly, with a choice of what the errors are taken
-    from."""
+    """The load position mode, composed of the functions that fly, with a choice of the commands from which
+    the errors are computed."""
     x = filter_step(memory.reference, x_raw, filters.reference)
     position = load_position_force(
         state.x_load,
@@ -155,7 +156,7 @@ def cascade(
 
 @kernel
 def state_of(plant: PlantState, R: Mat3) -> State:
-    """What the laws are told: the truth."""
+    """The state given to the laws: the true one."""
     return State(
         plant.x_load,
         plant.v_load,
@@ -184,8 +185,8 @@ def run(
     dt: float,
     out: NDArray[np.float64],
 ) -> int:
-    """Flies the signals about where the load hangs and fills a row of `out` a tick; returns the rows before
-    the flight was lost, or all of them."""
+    """Flies the signals about the initial position of the load and fills a row of `out` at each tick; returns
+    the number of rows before the flight was lost, or of all rows."""
     anchor = plant.x_load
     memory = thesis.start(state_of(plant, rotation_from_quat(plant.quat_wxyz)), anchor, ZERO)
     for k in range(out.shape[0]):

@@ -1,15 +1,15 @@
-"""Whether a change of the code changed a flight: shipped missions flown, and hashed.
+"""Checks whether a change of the code has changed a flight: flies shipped missions and hashes the results.
 
-    python benchmarks/yardstick.py                # fly all, compare with what was recorded
+    python benchmarks/yardstick.py                # fly all, compare with the record
     python benchmarks/yardstick.py --record       # fly all, and record
     python benchmarks/yardstick.py case-b         # only the flights whose name contains this
     python benchmarks/yardstick.py --lanes case-b # three seeds of these, together and each alone
 
-Each flight goes over the byte queues of `gcs.closed_loop`; its telemetry is hashed, texts apart from the
-rest, so that a reworded STATUSTEXT does not hide a changed flight; parameters are not hashed. The same
-flights are swept, and every true state and figure hashed. The hashes hold for one kind of machine: linear
-algebra libraries choose their instructions by the processor. Record before a change on the machine on which
-you compare after it.
+Each flight goes over the byte queues of `gcs.closed_loop`; its telemetry is hashed, texts separately, so that
+a reworded STATUSTEXT does not hide a changed flight; parameters are not hashed. The same flights are also
+flown as in a sweep, and all true states and figures are hashed. The hashes are valid for one kind of machine:
+linear algebra libraries choose their instructions by the processor. Record before a change, on the machine on
+which you compare after it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from missions.fileformat import load_mission
 RECORD = Path(__file__).with_name("yardstick.json")
 MOST_TICKS = 60_000
 TEXTS = {mavlink.MAVLINK_MSG_ID_STATUSTEXT}
-# of the parameters that there are, which are no part of a flight
+# messages about the parameters, which are no part of a flight
 UNCOUNTED = {mavlink.MAVLINK_MSG_ID_PARAM_VALUE, mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST}
 THESIS, LQR = {"CTL_LAW": 0.0}, {"CTL_LAW": 1.0}
 
@@ -69,13 +69,13 @@ FLIGHTS: dict[str, tuple[str, Conditions]] = {
 
 
 class Hasher:
-    """A log that keeps of its frames two hashes: of what was flown, and of what was said."""
+    """A log that keeps two hashes of its frames: of the flight, and of the texts."""
 
     def __init__(self) -> None:
         self.flown, self.said = sha256(), sha256()
 
     def write(self, unix_us: int, *frames: bytes) -> None:
-        """Take records in."""
+        """Add frames to the hashes."""
         for one in decode(b"".join(frames))[0]:
             message = one.message
             kind = message.get_msgId()
@@ -111,7 +111,7 @@ def measured(name: str) -> dict[str, str]:
 
 
 def lanes_measured(name: str) -> dict[str, str]:
-    """Whether three seeds of a flight find together what each finds alone."""
+    """Whether three seeds of a flight give the same results together as each alone."""
     mission_name, conditions = FLIGHTS[name]
     mission = load_mission(mission_name)
     try:
@@ -136,7 +136,7 @@ def _hash(data: bytes | np.ndarray) -> str:
 
 
 def compare_lanes(only: str) -> int:
-    """Fly in lanes; 1 if a flight is another there."""
+    """Fly in lanes; returns 1 if a flight differs there."""
     differ = 0
     for name in FLIGHTS:
         if only in name:

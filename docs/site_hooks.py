@@ -1,4 +1,4 @@
-"""What mkdocs leaves undone: links from notebooks to pages, which it only follows in Markdown."""
+"""Links from notebooks to pages of the site, which mkdocs itself converts in Markdown only."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import re
 from typing import Any
 
 _LINK = re.compile(r'href="(?![a-z]+:)([^"#]+\.md)(#[^"]*)?"')
-_log = logging.getLogger("mkdocs.plugins.site_hooks")  # where a warning fails a strict build
+_log = logging.getLogger("mkdocs.plugins.site_hooks")  # its warnings fail a strict build
 
 
 def on_page_content(html: str, *, page: Any, config: Any, files: Any) -> str:
-    """A notebook with its links to `page.md` made links to the page of the site; mkdocs calls this."""
+    """Convert the links of a notebook to `page.md` into links to pages of the site; mkdocs calls this."""
     if not page.file.src_uri.endswith(".ipynb"):
         return html
 

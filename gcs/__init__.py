@@ -1,1 +1,1 @@
-"""The ground station: what a person types, what is captured, and the report."""
+"""The ground station: command line, capture of telemetry, and reports."""

@@ -1,6 +1,6 @@
-"""The command line: which commands there are, and how their errors end.
+"""The command line: the list of commands, and the handling of their errors.
 
-A command's module is loaded when the command is called, so that `gcs --help` needs nothing but click.
+A command's module is loaded only when the command is called, so that `gcs --help` needs nothing but click.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ COMMANDS = {
 
 
 class Gcs(click.Group):
-    """Loads commands when they are called; a known error is one line on stderr and its exit code."""
+    """Loads commands when they are called; reports a known error in one line on stderr and by exit code."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -145,10 +145,10 @@ def gcs(signing_key: bytes | None) -> None:
     """Plumbline's ground station: fly missions that command the load on the cable.
 
     gcs fly case-b starts a simulator and an autopilot, flies a shipped mission and writes a report.
-    gcs upload, arm, start, status, param and the like command a vehicle that is running already (sitl and
-    autopilot, or gcs fly --speed 1).
+    gcs upload, arm, start, status, param and similar commands are for a vehicle that is already running (sitl
+    and autopilot, or gcs fly --speed 1).
 
     Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong input,
-    3 flown, but the mission was not completed, 4 flown, but not as --require asks, 130 stopped by
+    3 flown, but the mission was not completed, 4 flown, but a --require condition failed, 130 stopped by
     Ctrl-C.
     """

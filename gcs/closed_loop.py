@@ -1,7 +1,7 @@
 """A whole flight in one process: simulator, autopilot and ground station joined by byte queues.
 
-The same cores that the three programs run, in the same order of exchange, so that a flight flown here and one
-flown over UDP in lockstep leave the same log, byte for byte. This is the one module that joins the rooms.
+The cores are those of the three programs and exchange data in the same order, so that a flight flown here and
+one flown over UDP in lockstep give the same log, byte for byte. Only this module joins the three.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ _GROUND = "ground"
 
 @dataclass(frozen=True)
 class Conditions:
-    """What is flown, but for the mission."""
+    """The conditions of a flight, except the mission."""
 
     vehicle: str = "bebop"
     sensors: str = "lab"
     seed: int = 1
     settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
-    own: Own = NOTHING_OWN  # what somebody has brought, as it is named; with a law CTL_LAW is this one's
+    own: Own = NOTHING_OWN  # references to custom code; a law in it determines CTL_LAW
 
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
-    """An autopilot under these conditions."""
+    """An autopilot for these conditions."""
     table = parameters_for(load_belief(conditions.vehicle), conditions.own)
     apply_settings(table, conditions.settings.items())
     table.freeze()
@@ -50,7 +50,7 @@ def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | N
 
 
 def build_simulator(conditions: Conditions, home: Home, lockstep: bool = True) -> HilSimulator:
-    """A world under these conditions."""
+    """A simulator for these conditions."""
     return HilSimulator.build(
         conditions.vehicle, conditions.sensors, conditions.seed, conditions.settings, home, lockstep
     )
@@ -67,11 +67,11 @@ def fly(
     client: FlightClient | None = None,
     shown: Callable[[], None] = lambda: None,
 ) -> Outcome:
-    """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes.
+    """Fly a mission from take-off to landing; the log receives what `gcs fly --lockstep` writes.
 
-    `watch` is shown the cores at every tick, before the world moves on; False from it ends the flight. Where
-    nobody watches, ticks at which nothing is decided are flown in machine code. `client` is the ground
-    station's side of it, if it is not to be as usual; `shown` is called when it has had its turn.
+    `watch` is called with the cores at every tick, before the world advances; if it returns False, the flight
+    ends. Without `watch`, ticks at which nothing is to be decided are flown in machine code. `client`
+    replaces the usual ground station client; `shown` is called after each of its turns.
     """
     home = Home()
     onboard = build_onboard(conditions, home)
@@ -81,16 +81,16 @@ def fly(
     capture = Capture(log)
     turns = LockstepTurns()
     ticks = ClosedTicks(onboard, simulator) if watch is None else None
-    told: list[bytes] = []  # truth of the window that is open
-    said: list[bytes] = []  # by the vehicle, in it
-    silent_until_us = 0  # as the ground station has promised
+    told: list[bytes] = []  # truth of the open window
+    said: list[bytes] = []  # datagrams of the vehicle in the open window
+    silent_until_us = 0  # until when the ground station has promised to send nothing
 
     def turn(now_us: int) -> None:
-        """The ground station's, at the end of a window; the vehicle hears what it says."""
+        """The ground station's turn at the end of a window; the vehicle receives what it sends."""
         nonlocal silent_until_us
         for datagram in ground_turn(client, capture, told, said, now_us):
             onboard.receive_ground(datagram, _GROUND)
-        if now_us >= silent_until_us:  # before, nobody waits for an answer
+        if now_us >= silent_until_us:  # before that, the vehicle does not wait for an answer
             onboard.receive_ground(turns.answer(now_us * 1000, client.silent_until_us), _GROUND)
             silent_until_us = client.silent_until_us
         told.clear()

@@ -1,7 +1,7 @@
 """Simulator and autopilot in one process, tick after tick in machine code, as the programs fly in lockstep.
 
-`fly_on` hands the sensors of each tick to the autopilot and its answer to the world, until something is to be
-done that machine code does not do. What the ground station is to hear of it is kept, window by window.
+`fly_on` passes the sensors of each tick to the autopilot and its answer to the world, until something must be
+done that machine code does not do. The data for the ground station are stored, window by window.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ from sitl.running import Running as Moving
 from sitl.ticks import TRUTH_OF_A_TICK, move_on, put_sensors_next, put_truth_due
 from sitl.ticks import goes_on as world_goes_on
 
-# why `fly_on` returns, beside HEARD and DECIDE: the tick is to be flown in Python; its answer is to be taken
-# there; or the world stands at a tick of which nothing is told yet
+# why `fly_on` returns, besides HEARD and DECIDE: Python must fly the tick; Python must pass its answer to the
+# world; or the world has advanced to a tick of which nothing has been sent yet
 UNTIL, ANSWERED, MOVED = 4, 5, 6
 _TRUTH_ROOM = 262_144  # bytes
 _LARGEST = 65_535  # bytes of a datagram of sensors
 
 
 class Between(NamedTuple):
-    """What lies between the two, and the truth for the ground station."""
+    """The data passed between the two, and the truth for the ground station."""
 
     sensors: Bytes  # of the first tick
     truth: Bytes
-    ends: Ints  # of each of the autopilot's windows that is over: how far it goes there, and when it ends, us
+    ends: Ints  # of each window of the autopilot that has ended: where it ends in `truth`, and its time, us
     sizes: Ints  # bytes of `sensors`, and of `truth`
 
 
 class Window(NamedTuple):
-    """What the ground station hears of a window of time: truth, and what the vehicle says."""
+    """What the ground station receives for a window of time: the truth, and the datagrams of the vehicle."""
 
     truth: bytes
     said: bytes
-    ends_us: int = 0  # with a question; 0: it is open
+    ends_us: int = 0  # the time of the question that ends it; 0: the window is open
 
 
 class Flown(NamedTuple):
-    """What has been flown in machine code; the last window is the open one."""
+    """The result of ticks flown in machine code; the last window is the open one."""
 
     windows: tuple[Window, ...] = ()
-    moved: bool = False  # the world stands at a tick of which nothing is told yet
-    decide: Tick | None = None  # the tick is begun, and to be decided upon
+    moved: bool = False  # the world has advanced to a tick of which nothing has been sent yet
+    decide: Tick | None = None  # the tick that has begun and needs a decision of the supervisor
 
 
 NOTHING = Flown()
@@ -61,7 +61,8 @@ NOTHING = Flown()
 
 @kernel
 def fly_on(between: Between, flying: Flying, moving: Moving) -> int:
-    """Fly ticks until one is near that is none of these; the world stands where the last sensors are of."""
+    """Fly ticks until the next step requires Python; return the reason. Except after MOVED, the world is then
+    at the tick of the last sensors."""
     numbers, sizes = flying.numbers, between.sizes
     address, size = between.sensors.ctypes.data, sizes[0]
     while autopilot_goes_on(flying) and numbers[ASKED] < numbers[MOST_ASKED]:
@@ -83,7 +84,7 @@ def fly_on(between: Between, flying: Flying, moving: Moving) -> int:
 
 
 class ClosedTicks:
-    """Runs `fly_on` where it can be run."""
+    """Runs `fly_on` at times when that is possible."""
 
     def __init__(self, onboard: Onboard, simulator: HilSimulator) -> None:
         self._onboard, self._simulator = onboard, simulator
@@ -93,12 +94,12 @@ class ClosedTicks:
             np.zeros((MOST_WINDOWS, 2), np.int64),
             np.zeros(2, np.int64),
         )
-        self._fly_on: Any = None  # machine code, once it was asked for
+        self._fly_on: Any = None  # machine code, once it was needed
 
     def run(self, said: bytes, silent_until_us: int) -> Flown:
-        """Fly what can be flown so from where the truth of the world's tick is told and its sensors are not.
-        `said`: what the vehicle has said in the window that is open; before `silent_until_us` the ground
-        station says nothing."""
+        """Fly as many ticks as possible in machine code. At the start, the truth of the world's present tick
+        has been sent and its sensors have not. `said`: the datagrams of the vehicle in the open window; the
+        ground station sends nothing before `silent_until_us`."""
         onboard, simulator, between = self._onboard, self._simulator, self._between
         moving = simulator.running()
         if moving is None:
@@ -122,7 +123,7 @@ class ClosedTicks:
         return Flown((*windows, Window(truth[begin:], last)), why == MOVED, decide)
 
     def rehearse(self) -> None:
-        """Have the machine code ready, if it can be used."""
+        """Load or compile the machine code now, if it can be used."""
         moving = self._simulator.running()
         if moving is not None:
             self._ready(self._onboard.rehearsed_running(), moving)

@@ -1,4 +1,4 @@
-"""What can go wrong at the ground station, and the exit code that says so."""
+"""The known errors of the ground station, and their exit codes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from missions.toml_files import FileError
 
 EXIT_DONE = 0
-EXIT_ERROR = 1  # a known error, told in one line
-EXIT_USAGE = 2  # the command line is wrong, or a file that it names
+EXIT_ERROR = 1  # a known error, reported in one line
+EXIT_USAGE = 2  # the command line, or a file that it names, is wrong
 EXIT_NOT_MET = 3  # flown, but the mission was not completed
 EXIT_REQUIRED = 4  # a requirement of --require was not met
-EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
+EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, the code that shells use
 
 
 class GcsError(Exception):
-    """A known error. Its text is the one line that a person reads; `lines` has one for each mistake."""
+    """A known error. Its text is one line for display; `lines` has a line for each problem."""
 
     exit_code = EXIT_ERROR
 
@@ -28,33 +28,33 @@ class GcsError(Exception):
 
 
 def from_clone(extra: str) -> str:
-    """What pip is to install where only some need it: from the clone, as PyPI's `plumbline` is another
-    project."""
+    """The arguments of `pip install` for an optional extra: from the clone, because PyPI's `plumbline` is
+    another project."""
     return f"-e '.[{extra}]' in the clone of Plumbline"
 
 
 class InputError(GcsError):
-    """The command line names something that there is not, or a value or a file that cannot be."""
+    """The command line names something that does not exist, or an invalid value or file."""
 
     exit_code = EXIT_USAGE
 
 
 class NoVehicleError(GcsError):
-    """Nobody answered, or somebody stopped answering."""
+    """No vehicle answered, or it stopped answering."""
 
 
 class StoppedError(GcsError):
-    """Somebody stopped it before there was anything to show."""
+    """The user stopped the command before it had a result."""
 
     exit_code = EXIT_INTERRUPTED
 
 
 class RefusedError(GcsError):
-    """The vehicle answered no."""
+    """The vehicle refused a request."""
 
 
 def input_error(error: FileError) -> GcsError:
-    """What is wrong with a file that the command line names, or with the name."""
+    """The error for a problem with a file that the command line names, or with its name."""
     return InputError(*error.problems)
 
 
@@ -63,7 +63,7 @@ _DISK = (*_FULL, errno.EIO, errno.EROFS)
 
 
 def disk_trouble(error: BaseException | None) -> str:
-    """What the disk did not take, and why, if that is what the error says; else nothing."""
+    """The file, if known, and the reason, if the error is a failure of the disk; else empty."""
     if not isinstance(error, OSError) or error.errno not in _DISK:
         return ""
     where = f"{error.filename}: " if error.filename else ""
@@ -71,13 +71,13 @@ def disk_trouble(error: BaseException | None) -> str:
 
 
 def reason(error: OSError) -> str:
-    """Why, in the system's words; libraries (Arrow) wrap them into sentences of their own."""
+    """The reason in the system's words, which libraries (Arrow) wrap into their own sentences."""
     return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
 
 
 def not_written(error: OSError, told: object, kind: str = "folder", by: str = "--out") -> GcsError:
-    """That `told` cannot be written: with a full disk a known error, else wrong input, as another folder (or
-    other `kind`) is to be named, `by` an option if there is one."""
+    """The error that `told` cannot be written: a GcsError if the disk is full, else an InputError. The text
+    asks for another folder (or other `kind`), `by` an option if there is one."""
     other = f"name another {kind}{f' by {by}' if by else ''}"
     if error.errno in _FULL:
         return GcsError(f"{told}: {reason(error)}; free some space, or {other}")

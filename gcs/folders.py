@@ -14,13 +14,14 @@ from gcs.errors import InputError, not_written, reason
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
-LOCK_FILE = ".lock"  # of a folder that several flights are written into
-# of these three one lies in every folder that holds the results of one thing
+LOCK_FILE = ".lock"  # of a folder into which several flights are written
+# every folder of results contains exactly one of these three files, which identifies its kind
 _HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
 
 def fresh_folder(name: str) -> Path:
-    """`flights/NAME-TIME`, made now and nobody else's: of two that begin in one second the later has `-2`."""
+    """Create `flights/NAME-TIME`, which no other process uses. If it exists, because another flight began in
+    the same second, `-2` (or the next free number) is appended."""
     parent, stem = Path("flights"), f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     make_folder(parent)
     folder, ordinal = parent / stem, 1
@@ -35,9 +36,9 @@ def fresh_folder(name: str) -> Path:
 
 
 def make_folder(path: Path, told: Path | None = None) -> None:
-    """Make a folder, with those above it, unless it is there.
+    """Create a folder and its parents, unless it exists.
 
-    GcsError, which names it or `told`, if it cannot be made or nothing can be written into it.
+    GcsError, which names it or `told`, if it cannot be created or nothing can be written into it.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -49,9 +50,10 @@ def make_folder(path: Path, told: Path | None = None) -> None:
 
 @contextmanager
 def reserved(path: Path, what: str) -> Iterator[None]:
-    """Keep others from writing into a folder meanwhile; InputError if another does already, `what` it makes.
+    """Lock a folder against other writers; InputError if another process holds the lock. `what` names the
+    result that is written, for the error.
 
-    The lock goes with the process, however it ends.
+    The lock ends with the process, however that ends.
     """
     from filelock import FileLock, Timeout
 
@@ -70,9 +72,9 @@ def reserved(path: Path, what: str) -> Iterator[None]:
 
 
 def check_writable(path: Path, is_folder: bool, told: str) -> None:
-    """InputError, which calls it `told`, unless a file can be written there, or files into a folder there.
+    """InputError, which names the path as `told`, unless the file, or files in the folder, can be written.
 
-    It is tried, as permissions do not tell all (/proc), and what was made for it is taken away again.
+    Writing is tried, because permissions are not sufficient (/proc); what is created for it is removed.
     """
     try:
         if is_folder or not path.parent.is_dir():
@@ -85,7 +87,7 @@ def check_writable(path: Path, is_folder: bool, told: str) -> None:
 
 
 def _try_folder(path: Path) -> None:
-    """Make something in the nearest folder that is there."""
+    """Create and remove a folder in the nearest existing folder."""
     there = next(one for one in (path, *path.absolute().parents) if one.exists())
     if not there.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
@@ -93,7 +95,7 @@ def _try_folder(path: Path) -> None:
 
 
 def _try_file(path: Path) -> None:
-    """Open it without a change to what is in it; a pipe is left alone, which may wait for its reader."""
+    """Open the file without changing its content; a pipe is not opened, as that may wait for its reader."""
     is_new = not path.exists()
     if not (is_new or path.is_file()):
         return
@@ -103,8 +105,8 @@ def _try_file(path: Path) -> None:
 
 
 def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:
-    """A folder holds the results of one thing: InputError if this one holds those of another `kind`, by name
-    of the file that tells, or before it holds ours a file under a name that is `written`."""
+    """InputError if a folder contains results of another kind than `kind` (the name of the identifying file)
+    or, if it contains none of this kind yet, a file with one of the names in `written`."""
     for mark, what in _HOLDS.items():
         if mark != kind and (path / mark).exists():
             raise InputError(f"{path}: holds {what}; name another folder by --out")

@@ -1,4 +1,4 @@
-"""A mission as the items that are uploaded. What the vehicle would refuse of it is an error of its file."""
+"""A mission as the items that are uploaded. What the vehicle would refuse is an error of the mission file."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from autopilot.wire.items import MissionItemError, WireItem, encode_mission, ste
 from gcs.errors import InputError
 from missions.model import KINDS, Mission
 
-# "item 2 of 3" counts the items of the upload, and says so
+# not "item 2 of 3", which clearly counts the items of the upload
 _ITEM = re.compile(r"\bitem (\d+)\b(?! of \d)", re.IGNORECASE)
 
 
 def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
-    """The items; InputError names the item of the file that the vehicle would refuse."""
+    """The items of a mission; InputError names an item of the file that the vehicle would refuse."""
     try:
         return encode_mission(mission, home)
     except MissionItemError as error:
@@ -24,8 +24,8 @@ def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
 
 
 def of_mission(said: str, mission: Mission) -> str:
-    """What the vehicle says of its items, which it counts as they are uploaded: where the mission counts
-    them in another way, for signals are uploaded as several items, with its number beside."""
+    """A text of the vehicle, which counts uploaded items. Where the mission file counts differently, because
+    signals are uploaded as several items, the number in the file is added."""
 
     def named(found: re.Match[str]) -> str:
         at = step_of(int(found[1]), mission.steps)

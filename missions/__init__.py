@@ -1,1 +1,1 @@
-"""Load-position missions: the file format, the trajectory mathematics, and the shipped files."""
+"""Load-position missions: their records, the schema, the file format, and the shipped files."""

@@ -1,4 +1,4 @@
-"""Mission files: TOML in, `Mission` out, and one clear line for whatever is wrong with them.
+"""Mission files: TOML in, `Mission` out, and one clear line for each error in them.
 
 `docs/missions.md` describes the format; `missions.schema` holds the keys and bounds.
 """
@@ -19,10 +19,10 @@ from missions.toml_files import FileError, TomlFiles, problems, shown
 
 
 class MissionFileError(FileError):
-    """A mission file is missing or wrong: the fault of whoever wrote or named it."""
+    """A mission file is missing or wrong: a mistake in the file or in the name given for it."""
 
 
-# tables that belong within others, at the top of a file
+# tables that belong inside others, found at the top of a file
 _MISPLACED = {
     "terms": 'not a key of the file; write [[items.terms]] behind an item of type "signals"',
     "factors": "not a key of the file; write [[items.terms.factors]] behind its [[items.terms]]",
@@ -52,8 +52,8 @@ def parse_mission(text: str, name: str, where: str) -> Mission:
 def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") -> Mission:
     """The mission of these keys and values. `where` begins each line of a MissionFileError.
 
-    `text` is the file that has them, if there is one: what is wrong in an item is told with the line of its
-    [[items]].
+    `text` is the content of the file, if there is one: errors in an item are then reported with the line of
+    its [[items]].
     """
     misplaced = [f"{where}: {key}: {says}" for key, says in _MISPLACED.items() if key in table]
     if isinstance(table.get("items"), Mapping):
@@ -89,14 +89,14 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
 
 
 def _is_misnamed_item(key: str, value: Any) -> bool:
-    """Whether a key at the top of a file has tables that are rather items: [[item]], [[waypoint]]."""
+    """Whether a key at the top of a file has tables that are probably items: [[item]], [[waypoint]]."""
     tables = value if isinstance(value, list) and value else [value]
     has_tables = all(isinstance(one, Mapping) for one in tables)
     return has_tables and key.isprintable() and bool(nearest(key, ("items", *ITEMS)))
 
 
 def _places(text: str, where: str, count: int) -> list[str]:
-    """`FILE:LINE` of each item, by the lines that are `[[items]]`; `where` alone if they are not so many."""
+    """`FILE:LINE` of each item, from the `[[items]]` lines; `where` alone if their number is not `count`."""
     lines = [number for number, line in enumerate(text.split("\n"), 1) if _HEADER.match(line)]
     return [f"{where}:{line}" for line in lines] if len(lines) == count else [where] * count
 
@@ -112,7 +112,7 @@ def _kind_problem(table: Mapping[str, Any]) -> str:
 
 
 def _order_problems(kinds: Sequence[str], places: Sequence[str]) -> list[str]:
-    """The rules between items: the flight begins on the ground with a take-off and ends with a landing."""
+    """The rules between items: the first is a take-off, the last a landing; some need a load not released."""
     last = len(kinds) - 1
     wrong = []
     for index, kind in enumerate(kinds):

@@ -1,26 +1,26 @@
-"""Limits of what a mission may ask for, each in one place.
+"""Limits of the values in a mission, each in one place.
 
 The mission file (`missions.schema`) and the items on the wire (`autopilot.wire.items.limits`) use them.
 
-Where the two differ, the file is the narrower one: whatever a file may hold, the vehicle accepts.
+Where the two differ, the file is narrower: the vehicle accepts every value that a file may have.
 """
 
-# least values, alike in a file and on the wire
+# least values, the same in a file and on the wire
 LOWEST_M = 0.01  # height of the load above home
 SLOWEST_M_S = 0.01  # transfers
 SHORTEST_RUN_S = 1e-3  # signals and delays; times travel in milliseconds
 # The vehicle evaluates its path every few milliseconds: a faster wave or a steeper edge is a typing mistake.
 SHORTEST_EDGE_S = 0.1
 SHORTEST_PERIOD_S = 0.1
-LEAST_REELED_M = 0.3  # height at which a winch leaves the load
+LEAST_REELED_M = 0.3  # height of the load after a winch item
 
-# greatest values, alike in a file and on the wire
+# greatest values, the same in a file and on the wire
 FASTEST_REEL_M_S = 1.0
 LONGEST_CABLE_M = 100.0
 MOST_TERMS = 32  # of signals
 MOST_FACTORS = 3  # of a term
 
-# of a file alone: what is beyond them is rather a typing mistake than meant
+# of a file only: a value beyond them is probably a typing mistake
 LONGEST_S = 3600.0
 LONGEST_PERIOD_S = 2000.0
 FARTHEST_M = 1000.0

@@ -1,7 +1,7 @@
 """What a mission is: a list of steps for the load, in world ENU (x east, y north, z up), SI units, from home.
 
 Plain data without behaviour: the file format (`missions.fileformat`), the mission items on the wire, the
-autopilot and the feasibility check all speak of these records. A step is flown when the one before is done.
+autopilot and the feasibility check all use these records. A step begins when the one before is done.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class ReturnHome:
-    """Carry the load over its home, at the height it has."""
+    """Carry the load to the point above its home, at its present height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +56,14 @@ class Land:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Let the load go. What the items after it say of the load is said of the vehicle, which flies alone."""
+    """Release the load. Items after it that command the load then command the vehicle, which flies alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Winch:
     """Make the cable longer by `length_m` (negative: shorter): the vehicle stays, the load sinks or rises.
 
-    `speed_m_s` is the peak rate of the winch; None: what it is set to.
+    `speed_m_s` is the peak rate of the winch; None: the rate for which it is configured.
     """
 
     length_m: float
@@ -80,7 +80,7 @@ class Sine:
 
 
 def _no_rise() -> float:
-    """A field behind one with a default needs a default too."""
+    """Raise TypeError: a field after one with a default needs a default too, but must be given here."""
     raise TypeError("Term() misses the argument 'rise_s'")
 
 
@@ -92,8 +92,8 @@ class Term:
     for ever), and falls back to 0 along half a cosine in `fall_s`. A rise or fall of 0 s is a jump. `rise_s`
     must be given.
 
-    `rise_90_by_s` (None: as the envelope has it) asks that nine tenths of the rise be made so many seconds
-    after `start_s` at the latest: a path that is shaped for the vehicle keeps to it. Only without factors.
+    `rise_90_by_s` (None: no such requirement) is the time after `start_s` by which nine tenths of the rise
+    must be completed, also on a path that is shaped for the vehicle. Only without factors.
     """
 
     axis: Axis
@@ -119,8 +119,8 @@ class AttitudeRun:
     """Swing an attitude out and back: angle(t) = tilt * sin^2(pi t / duration_s), t from 0 to `duration_s`.
 
     `controlled` is the vehicle (its thrust axis leans) or the load (the line from load to vehicle leans). A
-    positive tilt leans towards north or east, and so pulls the load that way; both together lean by the
-    root of the sum of their squares. `autopilot.trajectory.swing` has the direction and its derivatives.
+    positive tilt leans towards north or east, and so pulls the load in that direction; both together lean by
+    the root of the sum of their squares. `autopilot.trajectory.swing` has the direction and its derivatives.
     """
 
     controlled: Controlled
@@ -142,15 +142,15 @@ class TurnNose:
 
 @dataclass(frozen=True, slots=True)
 class LookAt:
-    """Keep the nose turned to a place, ENU from home; None: no more."""
+    """Keep the nose pointed at a place, ENU from home; None: stop doing so."""
 
     east_m: float | None
     north_m: float | None
 
 
-NoseAim = TurnNose | LookAt  # asked for on the way, beside the steps
+NoseAim = TurnNose | LookAt  # items between steps, which take effect as the next step begins
 Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
-KINDS: dict[type[Step], str] = {  # as files call them
+KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",
     Waypoint: "waypoint",
     Speed: "speed",

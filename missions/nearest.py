@@ -1,4 +1,4 @@
-"""Which of the known names somebody may have meant who wrote another."""
+"""The known name that the user probably meant by an unknown one."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ LIKENESS = 0.6  # 0: nothing in common, 1: the same letters
 
 
 def nearest(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:
-    """The known name that is most like `word`, whatever is upper and lower case; empty if none is.
+    """The known name that is most like `word`, regardless of case; empty if none is similar.
 
-    `likeness` is the least that counts, as `difflib.SequenceMatcher.ratio` has it.
+    `likeness` is the least similarity that counts, as defined by `difflib.SequenceMatcher.ratio`.
     """
     return next(iter(nearest_few(word, known, likeness, most=1)), "")
 
@@ -23,6 +23,6 @@ def nearest_few(word: str, known: Iterable[str], likeness: float = LIKENESS, mos
 
 
 def did_you_mean(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:
-    """`did you mean NAME? `, to be put before what is told next; empty if no name is near."""
+    """`did you mean NAME? `, to precede the rest of a message; empty if no name is near."""
     name = nearest(word, known, likeness)
     return f"did you mean {name}? " if name else ""

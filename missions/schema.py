@@ -1,4 +1,4 @@
-"""The keys of a mission file, their units and bounds, and the steps they stand for.
+"""The keys of a mission file, their units and bounds, and the steps that they define.
 
 Every number is finite, every key known. A key ends in its unit. `Field.description` says in a few words what
 the value is; error messages and the documentation quote it.
@@ -31,10 +31,10 @@ class Spec(BaseModel):
 
 
 class Item(Spec):
-    """One [[items]] table; its `type` has been taken off."""
+    """One [[items]] table without its `type`."""
 
     def step(self) -> model.Step:
-        """The step it stands for."""
+        """The step that the item defines."""
         raise NotImplementedError
 
 

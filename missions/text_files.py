@@ -1,11 +1,11 @@
-"""Text files that a user names: read whole, or not at all and with a reason. Imports nothing of Plumbline."""
+"""Text files named by the user: read whole, or refused with a reason. Imports nothing of Plumbline."""
 
 from __future__ import annotations
 
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 
-MOST_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle takes
+MOST_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle accepts
 
 
 class TextFileError(ValueError):
@@ -13,8 +13,8 @@ class TextFileError(ValueError):
 
 
 def text_of(path: Path) -> str:
-    """The text of a file in UTF-8, without the mark at its beginning that some editors set (BOM);
-    TextFileError for what is none, is too long, or would never end."""
+    """The text of a file in UTF-8, without the byte order mark (BOM) that some editors put first;
+    TextFileError if it is not a text file, is too long, or may have no end."""
     try:
         if path.is_dir():
             raise TextFileError("is a folder; must be a file")

@@ -1,7 +1,7 @@
-"""TOML files that a pydantic schema describes: which are shipped, how one is read, and what is wrong with it.
+"""TOML files that a pydantic schema describes: the list of the shipped ones, reading, and error messages.
 
-Missions, vehicles and sensor profiles are such files. This module knows of each but where the shipped ones
-are and a key by which a file is told, so that every room may use it.
+Missions, vehicles and sensor profiles are such files. Of each kind, this module knows only where the shipped
+files are and a key that identifies it, so that every room may use it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _NUMBER_WITH_UNIT = re.compile(
 _DECIMAL_COMMA = re.compile(r"\s*(\w+)\s*=\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
 _CAPITAL_TRUTH = re.compile(r"\s*(\w+)\s*=\s*(?i:true|false)\s*(?:#.*)?$")
 _BARE_TEXT = re.compile(r"\s*(\w+)\s*=\s*([^\W\d][^\"'#\\\x00-\x1f]*?)\s*(?:#.*)?$")
-# what the parser says in its own terms
+# plainer texts for what the parser says in its own terms
 _TWICE = {
     "Cannot overwrite": "{key} is given twice in this table",
     "Cannot declare": "[{key}] stands there twice; each table of a list is written [[{key}]]",
@@ -43,10 +43,10 @@ _TWICE = {
 
 
 class _Kind(NamedTuple):
-    """What is known here of a kind of file."""
+    """What this module knows of a kind of file."""
 
-    package: str  # in which folder the shipped ones are
-    mark: str  # a key that each file has, and those of no other kind: files of the wrong kind are told by it
+    package: str  # folder of the shipped files
+    mark: str  # a key that all files of this kind have and no others: it identifies files of another kind
 
 
 _KINDS = {
@@ -57,7 +57,7 @@ _KINDS = {
 
 
 class FileError(ValueError):
-    """The file or the name given is at fault. `problems` has one line each; str() has them all."""
+    """The given file or name is wrong. `problems` has one line for each error; str() has them all."""
 
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
@@ -66,7 +66,7 @@ class FileError(ValueError):
 
 @dataclass(frozen=True)
 class TomlText:
-    """A file as read: the name it goes by, the beginning of every message about it, and its text."""
+    """A file as read: its name, the beginning of every message about it, and its text."""
 
     name: str
     where: str
@@ -75,10 +75,10 @@ class TomlText:
 
 @dataclass(frozen=True)
 class TomlFiles:
-    """One kind of file, with the shipped ones in the folder of `package`: where they are, unless they are of
-    a kind that everybody knows."""
+    """One kind of file. `package` is the folder of the shipped ones; it may be omitted for the kinds in
+    `_KINDS`."""
 
-    kind: str  # as messages call it
+    kind: str  # its name in messages
     error: type[FileError] = FileError
     package: str = ""
 
@@ -87,17 +87,17 @@ class TomlFiles:
         return _names(self._package)
 
     def choice(self) -> str:
-        """What an option that names such a file may be, for its help: `bebop, heavy, thesis or a file`."""
+        """The values of an option that names such a file, for its help: `bebop, heavy, thesis or a file`."""
         return f"{', '.join(self.names())} or a file"
 
     def read(self, name_or_path: str | PathLike[str]) -> TomlText:
-        """The text of a shipped name or of a file; else an error that lists the names."""
+        """The text of a shipped name or of a file; an error for an unknown name lists the names."""
         given = str(name_or_path)
         if given in self.names():
             text = _folder(self._package).joinpath(given + _SUFFIX).read_text(encoding="utf-8")
             return TomlText(given, "/".join((*self._package.split("."), given + _SUFFIX)), text)
         path = Path(given)
-        if not (given and (path.exists() or path.suffix or given != path.name)):  # a word, and no path
+        if not (given and (path.exists() or path.suffix or given != path.name)):  # a word that is not a path
             shipped = f"{self._hint(given)}shipped: {', '.join(self.names())}"
             raise self.error([f"unknown {self.kind} {given!r}; {shipped}; or the path of a file"])
         if path.suffix == ".py" and path.is_file():
@@ -121,8 +121,8 @@ class TomlFiles:
             raise self.error([f"{where}: nested too deeply"]) from None
 
     def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
-        """The table as `spec` describes it."""
-        from pydantic import ValidationError  # whoever lists names needs no schema
+        """The table as a validated `spec`."""
+        from pydantic import ValidationError  # listing names needs no schema
 
         found = [kind for kind, known in _KINDS.items() if known.mark in table]
         if found and self.kind in _KINDS and self.kind not in found:
@@ -145,7 +145,7 @@ class TomlFiles:
 
 
 def of_another_kind(name: str, kind: str) -> str:
-    """The beginning of a hint if a file of another kind is shipped by that name, or else empty."""
+    """The beginning of a hint if a file of another kind is shipped by that name, otherwise empty."""
     for other, known in _KINDS.items():
         if other != kind and name in _names(known.package):
             return f"{name} is one of the shipped {other.removesuffix('s')}s; "
@@ -158,7 +158,7 @@ def _names(package: str) -> tuple[str, ...]:
 
 
 def _folder(package: str) -> Traversable:
-    """Of a package, or of a folder in one that holds no code."""
+    """The folder of a package, or of a folder without code inside a package."""
     owner, _, folder = package.rpartition(".")
     return files(owner).joinpath(folder) if owner else files(package)
 
@@ -170,11 +170,11 @@ def problems(
     at: str = "",
     given: Mapping[str, Any] | None = None,
 ) -> list[str]:
-    """One line for each finding, unknown keys first; a key missing for being misspelt is not told twice, and
-    what keys a table may have is told once.
+    """One line for each error, unknown keys first. A key that is missing because it is misspelt is not
+    reported twice, and the keys that a table may have are listed once.
 
     `where` names the file, `at` the table within it that was validated against `spec`, and `given` is that
-    table: a key that it has is no near spelling of another one.
+    table: a key that it already has is not suggested for an unknown one.
     """
     unknown, others, meant = [], [], set()
     listed: set[type[BaseModel]] = set()
@@ -212,7 +212,7 @@ def bounds(field: FieldInfo) -> str:
 
 
 def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
-    """`file:line:column: not TOML: what`; the parser says the place within its sentence."""
+    """`file:line:column: not TOML: what`; the parser gives the place inside its message."""
     message = str(error)
     place = re.search(r"\(at line (\d+), column (\d+)\)", message)
     if place:
@@ -229,7 +229,7 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
 
 
 def _toml_hint(line: str) -> str:
-    """What to write instead, for mistakes whose kind the line shows."""
+    """What to write instead, for mistakes that can be recognised from the line."""
     if found := _NUMBER_WITH_UNIT.match(line):
         key, number = found.groups()
         return f"; a number is written without its unit, which the key names: {key} = {number}"
@@ -284,25 +284,25 @@ def _keys_of(table: Any, location: Sequence[str | int]) -> Collection[str]:
     for part in location:
         try:
             table = table[part]
-        except (KeyError, IndexError, TypeError):  # the location names more than the table holds
+        except (KeyError, IndexError, TypeError):  # the location has more parts than the table
             return ()
     return table if isinstance(table, Mapping) else ()
 
 
 def _meant_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
-    """The key that was meant, or "": the same quantity in another unit, or a near spelling of one that is
-    not given."""
+    """The key that was meant, or "": the same quantity in another unit, or a similar key that is not
+    given."""
     known = list(owner.model_fields)
-    # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
+    # altitude_ft and altitude both mean altitude_m: compare the part before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
-    if "_" not in key and same:  # a word alone, as cable: the keys of a thing stand in order of weight
+    if "_" not in key and same:  # a word alone, such as cable: related keys are listed in order of importance
         return same[0]
     return nearest(key, same, likeness=0.0) or nearest(key, [one for one in known if one not in given])
 
 
 def _unknown_key(near: str, owner: type[BaseModel], listed: bool) -> str:
-    """`listed`: an earlier line tells which keys there are."""
+    """`listed`: an earlier line lists the allowed keys."""
     if near:
         return f"unknown key; write {near}{_unit_note(near)}"
     if listed:
@@ -319,7 +319,7 @@ def _unit_note(key: str) -> str:
 def _allowed(error: dict[str, Any], field: FieldInfo | None) -> str:
     kind, context = error["type"], error.get("ctx", {})
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        # the rules of an element of a tuple or of an optional value are not the field's own
+        # the rules of an element of a tuple or of an optional value are not rules of the field itself
         broken = " and ".join(f"{_SIGNS[name]} {bound:g}" for name, bound in context.items())
         return bounds(field) or broken if field is not None else broken
     fixed = {

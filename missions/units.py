@@ -34,6 +34,6 @@ _UNITS = {
 
 
 def split_unit(key: str) -> tuple[str, Unit | None]:
-    """A key without its unit, and the unit; None if its end is none."""
+    """A key without its unit, and the unit; None if it ends with none."""
     ending = max((one for one in _UNITS if key.endswith(one)), key=len, default="")
     return key.removesuffix(ending), _UNITS.get(ending)

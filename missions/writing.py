@@ -1,4 +1,4 @@
-"""Files written: a mission as the table that `missions.fileformat` reads, and tables as TOML files."""
+"""Writing files: a mission as the table that `missions.fileformat` reads, and tables as TOML files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from missions.toml_files import FileError
 
 
 def write_toml(path: str | PathLike[str], table: Mapping[str, Any]) -> None:
-    """Write a file of these keys and values, over one that is there; a FileError says why it cannot be."""
+    """Write these keys and values to a file and replace an existing one; FileError with the reason if not."""
     import tomli_w
 
     try:
@@ -27,7 +27,7 @@ def write_toml(path: str | PathLike[str], table: Mapping[str, Any]) -> None:
 def mission_table(
     title: str, description: str, assumptions: Sequence[str], steps: Sequence[Step]
 ) -> dict[str, Any]:
-    """The keys and values of the file; whether they may be is for `missions.fileformat` to say."""
+    """The keys and values of the file; `missions.fileformat` checks whether they are allowed."""
     table: dict[str, Any] = {"title": title}
     if description:
         table["description"] = description
@@ -40,7 +40,7 @@ def mission_table(
 
 
 def _keys(record: Any) -> dict[str, Any]:
-    """The keys of a step, a term or a factor; angles are degrees in a file. What is not given is left out."""
+    """The keys of a step, a term or a factor; angles are degrees in a file. Values not given are left out."""
     table: dict[str, Any] = {}
     known = isinstance(record, (*KINDS, Term, Sine))
     for field in fields(record) if known else ():
@@ -57,7 +57,7 @@ def _keys(record: Any) -> dict[str, Any]:
 
 
 def _number(value: Real) -> float:
-    """As a file has it; an integer that no float holds is infinite."""
+    """The value as a float; infinite for an integer beyond the range of floats."""
     try:
         return float(value)
     except OverflowError:
@@ -65,7 +65,7 @@ def _number(value: Real) -> float:
 
 
 def _degrees(angle_rad: float) -> float:
-    """Degrees that are read as just this angle, the shortest of them; where there are none, the nearest."""
+    """Degrees that are read back as exactly this angle, if possible rounded ones; otherwise the nearest."""
     near = degrees(angle_rad)
     for found in (round(near, 10), near, nextafter(near, -inf), nextafter(near, inf)):
         if radians(found) == angle_rad:

@@ -5,12 +5,12 @@
     flight = plumbline.fly("case-b", seed=3, settings={"SIM_ACT_DELAY_MS": 12})
     flight.outcome, flight.summary["load_error_max_m"]
     flight.telemetry()  # a table, a row for each sample of the true load
-    flight.report("out")  # what gcs fly leaves
+    flight.report("out")  # the files of gcs fly, without logs
 
     plumbline.sweep("case-b", vary={"SIM_ACT_DELAY_MS": [0, 12]}, seeds=20)  # a table, a row for each flight
 
-A flight here is the flight of `gcs fly` in lockstep, without processes and sockets: the same bytes of
-telemetry. What is wrong with an argument is told by an `Error` of one line.
+A flight here is the same as with `gcs fly` in lockstep, but without processes and sockets: its telemetry is
+equal byte for byte. An invalid argument raises an `Error` with a message of one line.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ _WHEN_ASKED_FOR = {
 
 
 def __getattr__(name: str) -> Any:
-    """What only some scripts need is loaded when it is asked for: the simulator's sensors, the link."""
+    """Load on first use what only some scripts need: the simulator's sensors, the link to a vehicle."""
     if name not in _WHEN_ASKED_FOR:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_WHEN_ASKED_FOR[name]), name)

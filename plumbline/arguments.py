@@ -1,4 +1,4 @@
-"""What scripts are told of their arguments: in words of Python, not in those of the command line."""
+"""Checks of the arguments of scripts; messages use the terms of Python, not those of the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _LONGEST_SHOWN = 80  # characters of a value
-_PHRASES = (  # of the command line, and what they are in Python
+_PHRASES = (  # phrases of the command line, and their equivalents in Python
     (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
     (r"--force tries", "force=True tries"),
@@ -38,7 +38,7 @@ _PHRASES = (  # of the command line, and what they are in Python
 
 
 def knows_its_arguments(function: Callable[P, R]) -> Callable[P, R]:
-    """The function; a name of an argument that it does not have is a TypeError that tells which was meant."""
+    """The function; an unknown argument name raises a TypeError that suggests the nearest name."""
     names = tuple(signature(function).parameters)
 
     @wraps(function)
@@ -55,7 +55,7 @@ def knows_its_arguments(function: Callable[P, R]) -> Callable[P, R]:
 
 @contextmanager
 def told_in_python() -> Iterator[None]:
-    """An Error meanwhile says what it says without options of the command line."""
+    """Reword an Error raised in this context: without options of the command line."""
     try:
         yield
     except GcsError as error:
@@ -63,7 +63,7 @@ def told_in_python() -> Iterator[None]:
 
 
 def in_python(text: str) -> str:
-    """A text of the command line for scripts."""
+    """A text written for the command line, reworded for scripts."""
     for phrase, instead in _PHRASES:
         text = re.sub(phrase, instead, text)
     return text
@@ -109,7 +109,7 @@ def numbers(name: str, values: Any) -> tuple[float, ...]:
 
 
 def text(name: str, value: Any, example: str) -> str:
-    """A text, or `Error`, which shows one that could be."""
+    """A text, or `Error`, which shows an example."""
     if not isinstance(value, str):
         raise GcsError(f"{name} = {shown(value)}; must be a text, as {example!r}")
     return value
@@ -124,8 +124,8 @@ def file_path(name: str, value: Any) -> Path:
 
 
 def name_or_file(name: str, value: Any) -> str:
-    """The name of a shipped thing, or the path of a file, whether or not there is one; `Error` if it can be
-    neither."""
+    """A name or the path of a file, neither of which need exist; `Error` if the value is no text and no
+    path."""
     path = fspath(value) if isinstance(value, str | PathLike) else None
     if not isinstance(path, str):
         raise GcsError(f"{name} = {shown(value)}; must be a text or a Path")
@@ -135,13 +135,13 @@ def name_or_file(name: str, value: Any) -> str:
 def items(name: str, values: Any, what: str) -> tuple[Any, ...]:
     """The members of a list or of another iterable, or `Error`, which says `what` it must be."""
     if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
-        with suppress(TypeError):  # an array of numpy that has no dimension
+        with suppress(TypeError):  # a numpy array without dimensions
             return tuple(values)
     raise GcsError(f"{name} = {shown(values)}; must be {what}")
 
 
 def by_parameter(name: str, values: Any, example: str) -> Mapping[str, Any]:
-    """What a mapping has by names of parameters, nothing for None; `Error` shows one that could be."""
+    """A mapping whose keys are names of parameters, empty for None; or `Error`, which shows an example."""
     if values is None:
         return {}
     if not isinstance(values, Mapping):
@@ -152,7 +152,7 @@ def by_parameter(name: str, values: Any, example: str) -> Mapping[str, Any]:
 
 
 def parameter_name(where: str, name: Any) -> str:
-    """The name of a parameter, in capitals, whether or not there is one; `Error` if it can be none."""
+    """The name of a parameter, which need not exist, in capitals; `Error` if it cannot be a name."""
     if not isinstance(name, str) or not name.isidentifier():
         raise GcsError(f"{where}: {shown(name)} is no name of a parameter; must be one as 'SIM_WIND_E'")
     return name.upper()
@@ -165,7 +165,7 @@ def setting_words(settings: Any) -> tuple[str, ...]:
 
 
 def shown(value: Any) -> str:
-    """The value as Python writes it, in one line that is not long."""
+    """The value as Python writes it, in one short line."""
     try:
         written = " ".join(repr(value).split())
     except ValueError:  # an integer of thousands of digits

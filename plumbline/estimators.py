@@ -1,4 +1,4 @@
-"""What an estimator of your own is written with: `docs/estimators.md` shows how.
+"""The names with which a custom estimator is written: see `docs/estimators.md`.
 
 World ENU, body FLU, SI.
 """

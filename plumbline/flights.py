@@ -1,4 +1,4 @@
-"""One flight: flown in this process, and what is known of it afterwards."""
+"""One flight: flown in this process, and its results."""
 
 from __future__ import annotations
 
@@ -58,21 +58,22 @@ def fly(
     force: bool = False,
     quiet: bool = True,
 ) -> Flight:
-    """Fly a mission from take-off to landing, as fast as this machine does it.
+    """Fly a mission from take-off to landing, as fast as this machine can.
 
-    `mission`: the name of a shipped one, the path of a file, or a `Mission`. `sensors` and `vehicle`: a
-    shipped name, the path of a file, a `Sensors` or a `Vehicle`. `law`: the name of a shipped one,
-    `FILE.py:CLASS`, `MODULE:CLASS` (docs/laws.md), or the class itself. `estimator` and `planner`: one of
-    your own, named in the same ways (docs/estimators.md, docs/planners.md). `settings`: parameters of the
-    simulator (`SIM_...`) and of the autopilot that are not to be their defaults. `timeout_s`: the flight is
-    given up after so many seconds of its own clock; by default one and a half times what is expected, and a
-    minute.
-    `force`: fly even what the vehicle cannot do. `quiet=False` shows progress on stderr, also of compiling,
-    which takes a minute or more before the first flight. A setting that may not be meant so is a warning.
+    `mission`: the name of a shipped mission, the path of a file, or a `Mission`. `sensors` and `vehicle`: a
+    shipped name, the path of a file, a `Sensors` or a `Vehicle`. `law`: the name of a shipped law,
+    `FILE.py:CLASS`, `MODULE:CLASS` (docs/laws.md), or the class itself. `estimator` and `planner`: a custom
+    estimator or path planner, given in the same ways (docs/estimators.md, docs/planners.md). `settings`:
+    parameters of the simulator (`SIM_...`) and of the autopilot that differ from their defaults. `seed`:
+    seed of all noise. `timeout_s`: time limit of the flight in seconds of the vehicle's clock; by default one
+    and a half times the expected duration plus a minute.
+    `force`: fly the mission even if it exceeds the limits of the vehicle. `quiet=False` shows progress on
+    stderr, including compilation, which takes a minute or more before the first flight. A setting that may
+    be unintended causes a warning.
 
     A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
-    profile, law, estimator, planner or parameter, if a value is no number or out of its range, if what you
-    have brought fails before it flies, or if the vehicle cannot fly the mission.
+    profile, law, estimator, planner or parameter, if a value is not a number or out of its range, if a custom
+    law, estimator or planner fails before the flight, or if the vehicle cannot fly the mission.
     """
     from autopilot.shell.options import MOST_SEED
     from gcs.workflows.flight_here import fly_here
@@ -106,15 +107,15 @@ def fly(
 
 
 def _doubt(line: str) -> None:
-    """What can be flown, but may not be meant so: a warning at the line that called `fly`."""
+    """Warn, at the line that called `fly`, of an option that is possible but may be unintended."""
     warnings.warn(in_python(line), stacklevel=5)
 
 
 class Flight:
-    """A flight that is over: flown by `fly`, or read by `load`.
+    """A finished flight: flown by `fly`, or read by `load`.
 
-    `mission` is what was flown, None in a flight that was read; `tlog` is its telemetry as the bytes of a
-    `.tlog`, those of `gcs fly`.
+    `mission` is the mission that was flown, or None for a flight that was read; `tlog` is the telemetry as
+    the bytes of a `.tlog`, the same as those of `gcs fly`.
     """
 
     def __init__(self, tlog: bytes, meta: FlightMeta, mission: model.Mission | None = None) -> None:
@@ -124,9 +125,9 @@ class Flight:
 
     @classmethod
     def load(cls, path: str | Path) -> Flight:
-        """A recorded flight: the directory that `gcs fly` or `report` left, or a `.tlog` of `gcs capture` or
-        of another ground station. What telemetry does not say is read from meta.json beside it, if there is
-        one.
+        """Read a recorded flight: a directory written by `gcs fly` or `report`, or a `.tlog` of `gcs capture`
+        or of another ground station. Data that the telemetry lacks is read from meta.json beside it, if
+        that file exists.
 
         `Error` if there is no telemetry.
         """
@@ -138,13 +139,13 @@ class Flight:
 
     @property
     def outcome(self) -> str:
-        """`completed`, `diverged`, `timeout` or `refused`; of a flight that was read also what its telemetry
-        tells (docs/report.md)."""
+        """`completed`, `diverged`, `timeout` or `refused`; for a flight that was read also an outcome derived
+        from its telemetry (docs/report.md)."""
         return self._meta.outcome or str(self.summary["outcome"])
 
     @property
     def reason(self) -> str:
-        """Why it was not completed; an empty text if it was, or if nobody knows."""
+        """Why the flight was not completed; an empty text if it was, or if the reason is unknown."""
         return self._meta.reason or ""
 
     @cached_property
@@ -155,8 +156,8 @@ class Flight:
         return flight_record(self._received, self._meta, self._samples)
 
     def telemetry(self, kind: Literal["pandas", "polars", "arrow"] = "pandas") -> Any:
-        """The table of flight.parquet (docs/report.md), a row for each sample of the true load, units in the
-        names of the columns; as a DataFrame of pandas or polars, or a table of Arrow."""
+        """The table of flight.parquet (docs/report.md): a row for each sample of the true load, with units in
+        the column names; as a pandas or polars DataFrame, or as an Arrow table."""
         from gcs.analysis.parquet import flight_table
 
         return as_frame(flight_table(self._received, self._samples, self._meta.to_json()), kind)
@@ -179,11 +180,11 @@ class Flight:
     def report(
         self, out: str | Path, quiet: bool = True, pictures: bool = False, *, overwrite: bool = False
     ) -> Path:
-        """Write what `gcs fly` leaves into the directory `out`, but for the logs of its programs; the path of
-        the page. With `pictures` also those that `gcs fly --pictures` draws.
+        """Write the files of `gcs fly`, without the logs of its programs, into the directory `out`; returns
+        the path of the page. With `pictures` also write the pictures that `gcs fly --pictures` draws.
 
-        `Error` if the directory holds another flight, unless `overwrite`, which replaces it; this flight may
-        be written there again.
+        `Error` if the directory holds another flight, unless `overwrite=True`, which replaces that flight.
+        The same flight may be written again.
         """
         from gcs.workflows.own_vehicle import LOGS
         from gcs.workflows.report import make_report
@@ -225,7 +226,7 @@ class Flight:
 
 
 def _holds_another(file: Path, tlog: bytes) -> bool:
-    """Whether the file is there, not empty, and of another flight than this telemetry."""
+    """Whether the file exists, is not empty, and holds other telemetry than this."""
     try:
         return file.exists() and file.read_bytes() not in (b"", tlog)
     except OSError as error:
@@ -239,7 +240,7 @@ class Picture:
         self.png = png
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file, x.png; one that is there is replaced."""
+        """Write it to a PNG file; an existing file is replaced."""
         file = file_path("path", path)
         if file.suffix.lower() not in ("", ".png"):
             raise GcsError(f"{file}: a picture is written as PNG alone; name it {file.stem}.png")

@@ -1,4 +1,4 @@
-"""Tables as the libraries of those who ask for them have them."""
+"""Tables in the form of the requested library: pandas, polars or Arrow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gcs.errors import GcsError, from_clone
 
 
 def check_kind(kind: str) -> None:
-    """`Error` unless there is such a kind of table, and the library for it: told before anything is flown."""
+    """`Error` if there is no such kind of table, or if its library is missing; called before any flight."""
     if kind not in ("pandas", "polars", "arrow"):
         raise GcsError(f"kind={kind!r}: there is none; must be pandas, polars or arrow")
     if kind != "arrow" and find_spec(kind) is None:
@@ -18,7 +18,7 @@ def check_kind(kind: str) -> None:
 
 
 def as_frame(table: Any, kind: str) -> Any:
-    """An Arrow table as a DataFrame of pandas or polars, or as it is; `Error` where that is not installed."""
+    """An Arrow table as a pandas or polars DataFrame, or unchanged; `Error` if that library is missing."""
     check_kind(kind)
     if kind == "pandas":
         return table.to_pandas()

@@ -1,4 +1,4 @@
-"""What a custom control law is written with: `docs/laws.md` shows how.
+"""The names with which a custom control law is written: see `docs/laws.md`.
 
 World ENU, body FLU, SI.
 """

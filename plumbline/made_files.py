@@ -1,8 +1,8 @@
-"""What is made in Python, as the file that the programs read.
+"""Missions, vehicles and sensor profiles made in Python, as files that the programs read.
 
-It is kept in the user's cache directory under a hash of its content, so that the same thing is the same path:
-a report finds its vehicle again, the command that a report names flies it again, and a sweep that was
-interrupted knows that it is the same.
+A file is kept in the user's cache directory under a hash of its content, so that the same content has the
+same path: a report finds its vehicle again, the command that a report names flies it again, and an
+interrupted sweep recognises its inputs.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Savable(Protocol):
 
 
 def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
-    """A name or a path as the argument gives it; of a thing made in Python the path of its file, which has
-    its name, or that of the argument."""
+    """A given name or path, unchanged; for an object made in Python the path of its file, which is named
+    after the object, or after the argument if the object has no name."""
     if isinstance(given, str | PathLike):
         return name_or_file(argument, given)
     kind = argument.capitalize()
@@ -46,5 +46,5 @@ def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
         kept = folder / hashlib.sha256(new.read_bytes()).hexdigest()[:16]
         kept.mkdir(exist_ok=True)
         path = kept / (re.sub(r"[^\w-]", "-", name)[:64] + ".toml")
-        new.replace(path)  # whole, whoever else does the same at this moment
+        new.replace(path)  # atomic, even if another process does the same at this moment
     return str(path)

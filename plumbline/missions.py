@@ -17,16 +17,16 @@ from plumbline.arguments import file_path, items, name_or_file, shown, text
 
 
 class Mission(model.Mission):
-    """Where the load goes: steps one after another, from a take-off to a landing.
+    """A sequence of steps, from a take-off to a landing, that says where the load goes.
 
     ```python
     Mission("there", [Takeoff(1.0), Waypoint(2.0, 0.0, 1.0, hold_s=2.0), Land()])
     ```
 
-    `name` is what it goes by, `title` one line for lists and reports. `assumptions`: a sentence for each
-    value that was chosen without a source. A Mission is within the bounds of a mission file
-    (docs/missions.md), or there is none: `Error` says which step is wrong. It keeps angles as a file does, in
-    degrees, so an angle in radians may differ by a rounding.
+    `name` is its short name, `title` one line for lists and reports. `assumptions`: a sentence for each
+    value that was chosen without a source. A Mission is checked when it is created, by the rules of mission
+    files (docs/missions.md): `Error` says which step is wrong. It keeps angles as a file does, in degrees, so
+    an angle given in radians may differ by a rounding.
     """
 
     __slots__ = ()
@@ -57,7 +57,7 @@ class Mission(model.Mission):
 
     @classmethod
     def load(cls, name_or_path: str | PathLike[str]) -> Mission:
-        """A shipped mission by its name, or that of a file, which goes by the name of the file."""
+        """A shipped mission by its name, or the mission in a file, which is then named after the file."""
         try:
             found = load_mission(name_or_file("mission", name_or_path))
         except MissionFileError as error:
@@ -65,7 +65,7 @@ class Mission(model.Mission):
         return cls(found.name, found.steps, found.title, found.description, found.assumptions)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the mission file, which `load` and every command read; one that is there is replaced."""
+        """Write the mission as a file, which `load` and every command read; an existing file is replaced."""
         table = mission_table(self.title, self.description, self.assumptions, self.steps)
         try:
             write_toml(file_path("path", path), table)
@@ -74,7 +74,7 @@ class Mission(model.Mission):
 
 
 def _mistakes(steps: Iterable[Any]) -> Iterator[str]:
-    """What can be wrong with steps in Python, and not with the items of a file."""
+    """Mistakes that are possible in steps written in Python, but not in the items of a file."""
     for index, step in enumerate(steps):
         at = f"items[{index}]"
         if isinstance(step, type) and step in KINDS:

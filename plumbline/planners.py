@@ -1,4 +1,4 @@
-"""What a path planner of your own is written with: `docs/planners.md` shows how.
+"""The names with which a custom path planner is written: see `docs/planners.md`.
 
 World ENU from home, SI.
 """

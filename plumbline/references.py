@@ -1,4 +1,4 @@
-"""What somebody has brought, as scripts name it: by a name, by file and class, or by the class itself."""
+"""Custom laws, estimators and planners as scripts give them: by name, file and class, or the class itself."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from gcs.errors import GcsError
 
 
 def law_reference(law: str | type) -> str:
-    """The law as the command line names it; `Error` if there is none of that name, or if it can be none."""
+    """The law as the command line names it; `Error` if no law has that name, or if the class is no law."""
     return law if law in LAWS else _reference("law", law, load_law)
 
 
 def estimator_reference(estimator: str | type | None) -> str:
-    """The same of an estimator; None is the built-in one."""
+    """The same for an estimator; None is the built-in one."""
     return "" if estimator is None else _reference("estimator", estimator, load_estimator)
 
 
 def planner_reference(planner: str | type | None) -> str:
-    """The same of a path planner."""
+    """The same for a path planner."""
     return "" if planner is None else _reference("planner", planner, load_planner)
 
 
@@ -40,7 +40,7 @@ def _reference(what: str, given: str | type, load: Callable[[str], object]) -> s
 
 
 def _place(kind: type) -> str:
-    """Where a class is found again: in its file, or, of a notebook, in this process alone."""
+    """Where a class is found again: in its file, or, for a class of a notebook, in this process only."""
     if kind.__module__ == "__main__" and (place := getattr(sys.modules["__main__"], "__file__", None)):
         return f"{place}:{kind.__qualname__}"
     return f"{kind.__module__}:{kind.__qualname__}"

@@ -1,7 +1,7 @@
-"""A vehicle that is running already: commanded, waited for and listened to over MAVLink.
+"""A vehicle that is already running: commands to it, waiting for it, and its state, over MAVLink.
 
-The link is that of `gcs`. A thread of its own keeps it, so that the vehicle hears its ground station, and its
-state stays the newest, whatever the script does meanwhile.
+The link is that of `gcs`. A separate thread maintains it, so that the vehicle hears its ground station, and
+the state stays current, while the script does other work.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ from plumbline.vehicles import Vehicle
 Value = TypeVar("Value")
 Condition = Callable[[State], bool]
 
-_LOAD_STATE_US = 50_000  # by the vehicle's clock
-_STILL_S = 60.0  # so long its clock may stand still while its heartbeats go on
+_LOAD_STATE_US = 50_000  # interval of the load's state, by the vehicle's clock
+_STILL_S = 60.0  # how long the vehicle's clock may stand still while its heartbeats continue
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
@@ -66,11 +66,11 @@ _WORDS: dict[str, Condition] = {
 def connect(
     address: str = "udpin:127.0.0.1:14550", *, timeout_s: float = 10.0, signing_key: bytes | None = None
 ) -> RunningVehicle:
-    """Meet a vehicle that is running: `sitl` and `autopilot` started by hand, `gcs fly --speed 1`, any other.
+    """Connect to a running vehicle: `sitl` and `autopilot` started by hand, `gcs fly --speed 1`, any other.
 
-    `address`: `udpin:HOST:PORT`, `HOST:PORT` or `PORT` to wait there for it, `udpout:HOST:PORT` to speak
-    first. `timeout_s`: how long it may be silent, now and later, by the clock of this machine. `signing_key`:
-    32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
+    `address`: `udpin:HOST:PORT`, `HOST:PORT` or `PORT` to wait there for the vehicle, `udpout:HOST:PORT` to
+    send first. `timeout_s`: how long the vehicle may be silent, now and later, by the clock of this machine.
+    `signing_key`: 32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
     """
     limit_s = positive("timeout_s", timeout_s)
     if signing_key is not None and not (isinstance(signing_key, bytes) and len(signing_key) == KEY_BYTES):
@@ -82,12 +82,12 @@ def connect(
 
 
 class RunningVehicle:
-    """A running vehicle; `connect` makes it. Use it in a `with` block, or `close` it.
+    """A running vehicle, as `connect` returns it. Use it in a `with` block, or `close` it.
 
-    A command returns when the vehicle has accepted it; a refusal is an `Error` with the vehicle's reason.
-    `takeoff`, `goto` and `land` also wait until it is done, unless `wait=False`. Time limits of waiting are
-    seconds of the vehicle's clock, so that they hold at any speed of simulation and on a busy machine. Places
-    are those of the load: metres east, north and up from home.
+    A command returns when the vehicle has accepted it; a refusal raises an `Error` with the vehicle's reason.
+    `takeoff`, `goto` and `land` also wait until the manoeuvre is finished, unless `wait=False`. Time limits
+    of waiting are in seconds of the vehicle's clock, so that they mean the same at any simulation speed and
+    on a busy machine. Positions are those of the load: metres east, north and up from home.
     """
 
     def __init__(self, session: Session, timeout_s: float) -> None:
@@ -108,35 +108,36 @@ class RunningVehicle:
             self.close()
             raise
 
-    # ---- what it tells
+    # ---- what it reports
 
     @property
     def state(self) -> State:
-        """The newest that it has told."""
+        """The latest state that the vehicle has reported."""
         return state_of(self._session.view)
 
     @property
     def texts(self) -> list[str]:
-        """What it has told the operators since `connect`, the oldest first."""
+        """The vehicle's messages to the operators since `connect`, the oldest first."""
         return [text.text for text in self._session.view.texts]
 
     # ---- commands
 
     def arm(self, *, force: bool = False, timeout_s: float = 30.0) -> None:
-        """Start the rotors. A vehicle that is not ready yet is waited for; then it refuses, and says why."""
+        """Start the rotors. Unless `force`, wait until the vehicle is ready; a vehicle that is not ready in
+        time refuses, with the reason."""
         limit_s = positive("timeout_s", timeout_s)
         if not force and self.state.ready_to_arm is not True:
-            with suppress(NoVehicleError):  # the refusal says why it is not
+            with suppress(NoVehicleError):  # the refusal gives the reason
                 self.wait("ready", limit_s)
         self._command(lambda session: command.arm(session.target, force))
         self.wait(lambda state: state.armed is True, limit_s)
 
     def disarm(self, *, force: bool = False) -> None:
-        """Stop the rotors; in the air only by force: it falls."""
+        """Stop the rotors. In the air this requires `force`, and the vehicle falls."""
         self._command(lambda session: command.disarm(session.target, force))
 
     def takeoff(self, up_m: float | None = None, *, wait: bool = True, timeout_s: float = 180.0) -> None:
-        """Lift the load to a height and hold it there, by default that of MIS_TAKEOFF_ALT.
+        """Lift the load to a height and hold it there; the default height is MIS_TAKEOFF_ALT.
 
         The vehicle must be armed.
         """
@@ -163,9 +164,10 @@ class RunningVehicle:
         wait: bool = True,
         timeout_s: float = 300.0,
     ) -> None:
-        """Take the load to a place and hold it there, by default at the height that it has.
+        """Fly the load to a position and hold it there; without `up_m` at its present height.
 
-        It has arrived when it is within 0.1 m and slower than 0.1 m/s. A mission that is being flown ends.
+        The load has arrived when it is within 0.1 m of the position and slower than 0.1 m/s. A mission that
+        is being flown ends.
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
@@ -179,7 +181,7 @@ class RunningVehicle:
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
         """Set the load down, and the vehicle beside it.
 
-        With a disarmed vehicle it returns at once; a take-off or mission that waits for arming is taken back.
+        On a disarmed vehicle it returns immediately, and cancels a take-off or mission that waits for arming.
         """
         limit_s = positive("timeout_s", timeout_s)
         self._command(lambda session: command.land(session.target))
@@ -193,9 +195,9 @@ class RunningVehicle:
         vehicle: str | PathLike[str] | Vehicle = "bebop",
         force: bool = False,
     ) -> None:
-        """Put a mission on the vehicle: a shipped name, a file (also .plan and .waypoints), or a `Mission`.
+        """Upload a mission to the vehicle: a shipped name, a file (.toml, .plan, .waypoints), or a `Mission`.
 
-        It is checked against `vehicle` before, unless `force`.
+        The mission is first checked against the limits of `vehicle`, unless `force`.
         """
         if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
             mission = Mission(mission.name, mission.steps, mission.title)
@@ -213,7 +215,7 @@ class RunningVehicle:
         self._command(lambda session: command.pause(session.target))
 
     def resume(self) -> None:
-        """Go on with a paused mission."""
+        """Continue a paused mission."""
         self._command(lambda session: command.resume(session.target))
 
     def mode(self, name: str) -> None:
@@ -237,18 +239,18 @@ class RunningVehicle:
         return self._patiently(read)
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter, and see that it was stored."""
+        """Set a parameter, and check that it was stored."""
         asked, wanted = parameter_name("parameter", name), number(name, value)
         self._patiently(lambda: exchange(self._session, ParameterSet(self._session.target, asked, wanted)))
 
     # ---- waiting
 
     def wait(self, until: str | float | Condition = "landed", timeout_s: float = 600.0) -> State:
-        """Wait until something is so; the state in which it was.
+        """Wait until a condition holds, and return the state in which it held.
 
         `until`: one of `ready`, `holding`, `mission complete` and `landed` (disarmed), a function of the
-        state, or so many seconds of the vehicle's clock. `Error` if it is not so within `timeout_s` of the
-        vehicle's clock, if the vehicle is disarmed before, or falls silent.
+        state, or a number of seconds of the vehicle's clock. `Error` if the condition does not hold within
+        `timeout_s` seconds of the vehicle's clock, or if the vehicle is disarmed or falls silent before.
         """
         condition, what = self._condition(until)
         limit_s = math.inf if isinstance(until, int | float) else positive("timeout_s", timeout_s)
@@ -268,7 +270,7 @@ class RunningVehicle:
         return until, "what was asked for"
 
     def _watch(self, condition: Condition, what: str, timeout_s: float) -> State:
-        """In the thread of the link."""
+        """Wait for a condition, in the thread of the link."""
         session, clock = self._session, _Clock()
         was_armed, texts_before = self.state.armed, len(session.view.texts)
         found: list[State] = []
@@ -302,7 +304,7 @@ class RunningVehicle:
         while not self._closing.is_set():
             try:
                 self._session.watch(lambda: self._closing.is_set() or not self._jobs.empty(), None)
-            except GcsError:  # whatever is asked for next meets the same, and tells it
+            except GcsError:  # the next request meets the same error and reports it
                 self._closing.wait(_RETRY_S)
             while not self._jobs.empty():
                 self._jobs.get()()
@@ -322,7 +324,7 @@ class RunningVehicle:
         return future.result()
 
     def _patiently(self, work: Callable[[], Value]) -> Value:
-        """An exchange, begun anew while the vehicle does not answer, as long as it may be silent."""
+        """An exchange, repeated while the vehicle does not answer, for as long as it may be silent."""
         until_us = monotonic_us() + round(self._timeout_s * 1e6)
         while True:
             try:
@@ -335,7 +337,7 @@ class RunningVehicle:
         self._patiently(lambda: self._session.run(make(self._session)))
 
     def _ask_for_load(self) -> None:
-        """The load's state often; a vehicle that has none is as welcome."""
+        """Request frequent messages of the load's state; a vehicle that has none is accepted too."""
         number = mavlink.MAVLINK_MSG_ID_LOAD_STATE
         session = self._session
         with suppress(RefusedError, NoVehicleError):
@@ -347,7 +349,7 @@ class RunningVehicle:
             raise GcsError(f"{what}: the vehicle is not armed; arm() first")
 
     def close(self) -> None:
-        """End the link; the vehicle goes on with what it does."""
+        """Close the link; the vehicle continues with what it is doing."""
         self._closing.set()
         self._thread.join()
         self._session.close()
@@ -366,7 +368,7 @@ class RunningVehicle:
 
 
 class _Clock:
-    """Time passed by the vehicle's clock, which may begin anew; and how long that has stood still."""
+    """Time elapsed by the vehicle's clock, which may restart, and how long that clock has stood still."""
 
     def __init__(self) -> None:
         self._passed_s = 0.0
@@ -374,7 +376,7 @@ class _Clock:
         self._moved_us = monotonic_us()
 
     def passed_s(self, state: State) -> float:
-        """Up to this state."""
+        """Time elapsed up to this state."""
         now_s = state.time_s
         if now_s is not None and now_s != self._last_s:
             if self._last_s is not None:
@@ -384,7 +386,7 @@ class _Clock:
 
     @property
     def still_s(self) -> float:
-        """By our clock."""
+        """How long the vehicle's clock has stood still, by the clock of this machine."""
         return (monotonic_us() - self._moved_us) * 1e-6
 
 

@@ -11,7 +11,7 @@ from sitl.sensors.shipped import PROFILES
 
 
 class Sensors(Table, Profile):
-    """What the vehicle senses with: a table for each sensor, keys as in a profile's file (docs/sensors.md).
+    """A sensor profile: a table for each sensor, with the keys of a profile file (docs/sensors.md).
 
     ```python
     slow = Sensors.load("lab").replace(mocap={"rate_hz": 50.0, "latency_ms": 20.0})

@@ -1,4 +1,4 @@
-"""What a running vehicle is known to do at this moment."""
+"""The latest known state of a running vehicle."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from gcs.workflows.status import status_record
 
 @dataclass(frozen=True)
 class State:
-    """The newest that the vehicle has told; None for what it has not told yet, or never tells.
+    """The latest values that the vehicle has reported; None for a value not reported yet, or never reported.
 
-    The load's place is that of the vehicle's own estimate, from home.
+    The position of the load is the vehicle's own estimate, relative to home.
     """
 
     mode: str | None  # in plain words: hold, mission, land ...
@@ -29,14 +29,14 @@ class State:
     load_up_m: float | None
     cable_tension_n: float | None
     cable_taut: bool | None
-    load_error_m: float | None  # from where the load is meant to be, as the autopilot sees it
-    rotor_use: float | None  # the greatest rotor force over its limit
+    load_error_m: float | None  # distance from the desired position, as the autopilot estimates it
+    rotor_use: float | None  # the greatest rotor force, divided by its limit
     battery_v: float | None
     load_speed_m_s: float | None
 
     @property
     def load_m(self) -> tuple[float, float, float] | None:
-        """The load: east, north and up from home."""
+        """Position of the load: east, north and up from home, m."""
         if self.load_east_m is None or self.load_north_m is None or self.load_up_m is None:
             return None
         return (self.load_east_m, self.load_north_m, self.load_up_m)
@@ -46,7 +46,7 @@ _NAMES = {field.name for field in fields(State)}
 
 
 def state_of(view: VehicleView) -> State:
-    """The state that the newest messages tell."""
+    """The state according to the latest messages."""
     record = {name: value for name, value in status_record(view).items() if name in _NAMES}
     load = view.latest.get("LOAD_STATE")
     speed = None if load is None else float((load.vx**2 + load.vy**2 + load.vz**2) ** 0.5)

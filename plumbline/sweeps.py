@@ -1,4 +1,4 @@
-"""Thousands of flights: `gcs sweep`, whose table is what comes back."""
+"""Thousands of flights: runs `gcs sweep` and returns its table."""
 
 from __future__ import annotations
 
@@ -55,26 +55,26 @@ def sweep(
     quiet: bool = True,
     kind: str = "pandas",
 ) -> Any:
-    """Fly a mission under every value of what is varied, with every law and the seeds 1 ... `seeds`.
+    """Fly a mission with every combination of the varied values, every law, and the seeds 1 ... `seeds`.
 
-    `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or one made in Python. `vary`:
-    values by the name of a parameter of simulator or autopilot, in a list or in a text as of `gcs sweep
-    --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings (Latin hypercube)
-    instead of all of the grid. `settings`: parameters that are the same for all flights. `estimator` and
-    `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs` flights are flown at a time, by
-    default one on each core; `scheduler` is the address of a Dask scheduler, or a Dask client, that flies
-    them instead. `out`: the directory that keeps table and page (docs/cli.md), from which a sweep that was
-    interrupted goes on; by default nothing is kept. `quiet=False` shows progress on stderr.
+    `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or an object made in Python.
+    `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
+    of `gcs sweep --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings
+    (Latin hypercube) instead of the whole grid. `settings`: parameters that are the same in all flights.
+    `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
+    the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
+    that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
+    which an interrupted sweep continues; by default nothing is kept. `quiet=False` shows progress on stderr.
 
-    A table with a row for each flight, its columns those of flights.parquet (docs/cli.md): a DataFrame of
-    pandas, or of polars, or a table of Arrow, as `kind` says. The flights are flown by a program of their
-    own, so a script needs no guard around what it does. `Error` if the sweep cannot be flown.
+    Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
+    polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script
+    needs no `if __name__ == "__main__"`. `Error` if the sweep cannot be flown.
     """
     with ExitStack() as stack:
         words = []
         if out is None:
             out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
-            words += ["--table-only"]  # nobody would see the page
+            words += ["--table-only"]  # the page would be deleted with the folder
         folder = file_path("out", out)
         words += [
             name_or_path("mission", mission),
@@ -106,7 +106,7 @@ def sweep(
 
 
 def _values(name: str, values: Any) -> str:
-    """Those that a parameter takes, as the command line writes them."""
+    """The values of a varied parameter, as the command line writes them."""
     if isinstance(values, str):
         return values
     return ",".join(map(repr, numbers(f"vary[{name!r}]", values)))
@@ -120,7 +120,7 @@ def _laws(laws: Sequence[str]) -> Sequence[str]:
 
 
 def _address(scheduler: Any) -> str:
-    """Of a Dask client, or as it was given."""
+    """The address of a Dask client's scheduler, or the given address."""
     found = getattr(getattr(scheduler, "scheduler", None), "address", scheduler)
     if not isinstance(found, str) or not found:
         raise GcsError(
@@ -130,8 +130,8 @@ def _address(scheduler: Any) -> str:
 
 
 def _run(words: list[str], quiet: bool) -> None:
-    """Run `gcs sweep`; its progress goes to our stderr, and its last word, if it fails, into the error. So
-    does what a law prints that flies there, however quiet."""
+    """Run `gcs sweep`. Its progress goes to our stderr, and so does, even if `quiet`, all that a law prints.
+    If the sweep fails, its last message becomes the text of the error."""
     command = [sys.executable, "-P", "-m", "gcs", "sweep", *words, *(["--quiet"] if quiet else [])]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
         assert program.stderr is not None
@@ -146,7 +146,7 @@ def _run(words: list[str], quiet: bool) -> None:
             if len(said) > 1 and not quiet:
                 sys.stderr.write(said[-2])
     last = said[-1] if said else ""
-    # without progress, all that is said is what is wrong; a program that breaks down says it in its own way
+    # without progress, each message is an error; a program that crashes leaves a last line of its traceback
     told = (said if quiet else [last]) if said else others[-1:]
     if program.returncode == 0:
         if not quiet:

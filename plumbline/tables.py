@@ -1,4 +1,4 @@
-"""What vehicles and sensor profiles made in Python have in common: read, changed, checked and saved."""
+"""The base class of vehicles and sensor profiles made in Python: loading, changing, checking, saving."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from missions.toml_files import FileError, TomlFiles, problems
 from missions.writing import write_toml
 from plumbline.arguments import file_path, name_or_file
 
-_EVERY_TICK = "tick"  # in a file; a record holds a rate of 0
+_EVERY_TICK = "tick"  # rate_hz in a file; a record has a rate of 0 instead
 
 
 class Table(BaseModel):
-    """A record that is a TOML file: within its bounds, or there is none (`Error`)."""
+    """A record with the keys of a TOML file, checked when it is created: `Error` if a value is invalid."""
 
     files: ClassVar[TomlFiles]
 
@@ -30,7 +30,7 @@ class Table(BaseModel):
 
     @classmethod
     def load(cls, name_or_path: str | PathLike[str]) -> Self:
-        """A shipped one by its name, or that of a file."""
+        """A shipped record by its name, or the record in a file."""
         try:
             found = cls.files.read(name_or_file(cls.files.kind, name_or_path))
             return cls(**cls.files.table(found.text, found.where))
@@ -38,8 +38,8 @@ class Table(BaseModel):
             raise input_error(error) from None
 
     def replace(self, **changes: Any) -> Self:
-        """Another one with some keys changed. Of a table within it only the keys that are given change; None
-        takes a key or a table away."""
+        """A copy with some keys changed. In a nested table only the given keys change; None removes a key or
+        a table."""
         keys = self.keys()
         for name, value in changes.items():
             if isinstance(value, Mapping) and isinstance(keys.get(name), dict):
@@ -49,14 +49,14 @@ class Table(BaseModel):
         return type(self)(**_without_none(keys))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the file, which `load` and every command read; one that is there is replaced."""
+        """Write the record as a file, which `load` and every command read; an existing file is replaced."""
         try:
             write_toml(file_path("path", path), self.keys())
         except FileError as error:
             raise input_error(error) from None
 
     def keys(self) -> dict[str, Any]:
-        """Keys and values as the file has them, but for those that were not given."""
+        """Keys and values as in a file, without those that were not given."""
         found = self.model_dump(exclude_unset=True, exclude_none=True)
         for table in found.values():
             if isinstance(table, dict) and table.get("rate_hz") == 0.0:

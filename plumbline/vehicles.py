@@ -26,7 +26,8 @@ class Vehicle(Table, model.Vehicle):
 
     @classmethod
     def load(cls, name_or_path: str | PathLike[str]) -> Self:
-        """A shipped one by its name, or that of a file; with a `believed`, what it leaves out is as there."""
+        """A shipped vehicle by its name, or the vehicle in a file. If the file names another vehicle in
+        `believed`, the keys that it leaves out are those of that vehicle."""
         try:
             keys, _ = vehicle_keys(name_or_file("vehicle", name_or_path))
         except FileError as error:

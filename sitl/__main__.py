@@ -141,9 +141,9 @@ def main(
 ) -> None:
     """Simulate a quadrotor with a load on a cable, and its sensors.
 
-    Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP (the
-    third-party autopilots as they want it). The world waits for the answer to every tick: on a busy machine
-    its clock is slower, and nothing is lost.
+    Waits for an autopilot, sends it sensor readings and receives rotor commands, by MAVLink over UDP (with
+    third-party autopilots by their own protocols). The world waits for the answer to every tick: on a busy
+    machine its clock is slower, and nothing is lost.
     """
     if lockstep and real_time:
         raise click.UsageError("--lockstep and --real-time exclude each other")
@@ -174,14 +174,14 @@ def main(
         if not quiet:
             print(f"sitl: {text}", flush=True)
 
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to bring to an end
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to end in order
     link: Link | None = None
     factor = 1.0 if speed is None else speed
     unlimited = lockstep and speed is None
     pacing = Pacing(factor)
     simulator: HilSimulator | None = None
     try:
-        # first, so that nothing is said into the void while kernels are compiled
+        # first, so that no message of an autopilot is lost while kernels are compiled
         link = Link(listen, truth, say)
 
         def build() -> HilSimulator:
@@ -209,7 +209,7 @@ def main(
         simulator = build()
         if cpu is not None:
             _run_on(cpu)
-        # where it would wait spinning for most of the time, it would keep others from their work
+        # not if it would spin for most of the time, which would keep other programs from running
         be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
         mode = "in lockstep" if unlimited else f"at {factor:g} x real time, slower on a busy machine"
         if real_time:

@@ -1,7 +1,7 @@
 """The simulator's end of the simulator link: datagrams in, datagrams out, no socket and no clock.
 
 A tick: `sensor_datagram()` goes to the autopilot, `receive()` takes its answer, `advance()` moves the world.
-docs/sensors.md describes the link for those who connect an autopilot of their own.
+docs/sensors.md describes the link, for connecting another autopilot.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 from sitl.world import rotors_of
 
-_STATUS_PERIOD_US = 200_000  # in real time; in lockstep nobody waits for a status
+_STATUS_PERIOD_US = 200_000  # in real time; in lockstep one a second is enough
 _BATTERY_PERIOD_US = 200_000
-_BOOT_PERIOD_US = SECOND_US  # of SIM_BOOT, beside the sensors
+_BOOT_PERIOD_US = SECOND_US  # of SIM_BOOT, sent with the sensors
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
-LEAST_SNAP = 1e-3  # m/s, closing speed from which a cable that comes taut is told of
+LEAST_SNAP = 1e-3  # m/s, closing speed above which a cable that comes taut is reported
 
 _DIVERGED = mavlink.MAVLink_statustext_message(
     mavlink.MAV_SEVERITY_CRITICAL, b"Simulation stopped: outside its model"
@@ -79,7 +79,7 @@ def _asks_reboot(message: Any) -> bool:
 
 
 class PacingFigures(NamedTuple):
-    """What the shell measured of its own timeliness, for SIM_STATUS; all 0 without a wall clock."""
+    """The shell's measurement of its own punctuality, for SIM_STATUS; all 0 without a wall clock."""
 
     speed_factor: float = 0.0
     rate_hz: float = 0.0
@@ -103,9 +103,9 @@ class HilSimulator:
         boot_id: int = 0,
         layout: Layout = PLUS,
     ) -> None:
-        """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight.
+        """`truth` as in the vehicle file; `table` holds the SIM_* parameters, which may change in flight.
 
-        `boot_id`: number of this run of the world, one that no other has; a reboot begins the next.
+        `boot_id`: unique number of this run of the world; a reboot begins the run with the next number.
         """
         self.pacing = PacingFigures()
         self._file_truth = truth
@@ -118,7 +118,7 @@ class HilSimulator:
         self._status_us = SECOND_US if lockstep else _STATUS_PERIOD_US
         self._truth_every = truth_every
         self._boot_id = boot_id
-        # machine code, once it was asked for
+        # machine code, after its first use
         self._put_sensors: Callable[..., tuple[int, int]] | None = None
         self._put_truth: Callable[..., int] | None = None
         self._answer_in: Callable[..., Answer] | None = None
@@ -127,19 +127,19 @@ class HilSimulator:
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._dialect_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
         self._runner = Runner(Writers(self._sensor_writer, self._truth_writer, self._dialect_writer))
-        # a count of its own: it is not recorded, and the frames that are must be numbered without a gap
+        # a separate sequence counter: its frames are not recorded, and the recorded ones must have no gap
         self._run_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
         self._begin()
 
     def _begin(self) -> None:
-        """The world at time 0, with the parameters in force."""
+        """Put the world to time 0, with the parameters in force."""
         table = self.parameters.table
         settings = settings_of(table)
         truth = apply_parameters(self._file_truth, table)
         core = SimCore(truth, self._profile, settings, self._seed, self._layout)
         self.missed = 0  # ticks without an answer in time
         self.rejected = 0  # controls that were not numbers
-        self.answered = False  # the present tick was
+        self.answered = False  # whether the present tick was
         self.core = core
         self._statement = self._stating(settings)
         self._stopped = self._command = (0.0,) * len(self._layout)
@@ -150,16 +150,16 @@ class HilSimulator:
         height = BarometerReading(core.state.x_quad[2])
         self._newest = packed(NOTHING_NEW._replace(height=height))
         sensors, waiting, _ = core.rows.queue.shape
-        # a frame of each reading that can be on its way, of four rotors, and HIL_SENSOR
+        # room for a frame of each reading that can be on its way, of the rotors, and HIL_SENSOR
         frames = sensors * waiting + len(self._layout) + 1
         self._buffer = np.zeros(frames * FRAME_ROOM, np.uint8)
         self._written = self._buffer.data
-        self._introduced = False  # at the next tick too
+        self._introduced = False  # whether SIM_BOOT is sent at the next tick too
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
         self._wind_told = settings.wind, ZERO
-        self._reboot = False  # asked for
+        self._reboot = False  # whether one was requested
         self._snap_mass()  # compiled before the first tick, not at the first snap
 
     @classmethod
@@ -174,10 +174,10 @@ class HilSimulator:
         truth_every: int = 2,
         boot_id: int = 0,
     ) -> HilSimulator:
-        """From the command line's options.
+        """A simulator built from the options of the command line.
 
-        Of `settings` the SIM_* are taken, but for SIM_LOSS_PCT, which belongs to the autopilot's ground link.
-        Raises ValueError with one line on what is wrong.
+        Of `settings` those named SIM_* are used, except SIM_LOSS_PCT, which belongs to the autopilot's ground
+        link. Raises ValueError with one line on what is wrong.
         """
         file = load_vehicle(vehicle)
         truth = truth_of(file)
@@ -201,43 +201,43 @@ class HilSimulator:
 
     @property
     def diverged(self) -> bool:
-        """The plant left the domain of its model and stands still."""
+        """Whether the plant has left the domain of its model and stands still."""
         return self.core.state.diverged > 0.0
 
     def sensor_datagram(self) -> bytes:
-        """What the sensors give at this tick, HIL_SENSOR last; the same bytes until `advance`."""
+        """The readings that arrive at this tick, HIL_SENSOR last; the same bytes until `advance`."""
         return self._sensors
 
     def truth_datagram(self) -> bytes | None:
-        """Truth telemetry of this tick; None on the ticks between. Made when first asked for."""
+        """Truth telemetry of this tick; None on the ticks between. Made when first requested."""
         if not self._truth_made:
             self._truth = self._truth_frames()
             self._truth_made = True
         return self._truth
 
     def run_datagram(self) -> bytes | None:
-        """Whose truth it is: SIM_BOOT, as the autopilot hears it; None on the ticks that do not tell."""
+        """SIM_BOOT, which states to which run the truth belongs; None on ticks at which it is not due."""
         due = self.core.now_us % self._status_us == 0
         return self._run_writer.frame(self._boot()) if due else None
 
     def greets(self, datagram: bytes) -> bool:
-        """Is this a HEARTBEAT of the vehicle's autopilot? It asks to be served, from wherever it came."""
+        """Whether the datagram holds a HEARTBEAT of the vehicle's autopilot, which asks to be served."""
         return any(
             one.system == VEHICLE_SYSTEM and one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
             for one in decode(datagram)[0]
         )
 
     def introduce(self) -> None:
-        """Say with the sensors of this tick and the next which run of the world this is."""
+        """Send SIM_BOOT, the number of this run of the world, with the sensors of this tick and the next."""
         if not self._introduced:
             self._introduced = True
             self._sensors = self._sensor_writer.frame(self._boot()) + self._sensors
 
     def receive(self, datagram: bytes) -> bool:
-        """Take the command out of a datagram; True if the present tick has its answer now.
+        """Take the command out of a datagram; True if the present tick is answered now.
 
-        Beside the answer PARAM_REQUEST_LIST and PARAM_SET are heeded; whatever else a datagram may hold is
-        ignored: other messages, systems and ticks, rubbish.
+        With an answer PARAM_REQUEST_LIST, PARAM_SET and a command to reboot are obeyed; anything else in a
+        datagram is ignored: other messages, systems and ticks, noise.
         In real time a late command is still the newest one, and is used.
         """
         if self._answer_in is None:
@@ -265,7 +265,7 @@ class HilSimulator:
         return self.answered
 
     def _take(self, time_us: int, forces: Forces, armed: bool, gripper_open: bool, reel_rate: float) -> None:
-        """Take an answer, if it is the one of this tick or, in real time, the newest of those before."""
+        """Take an answer if it is that to this tick or, in real time, the newest to an earlier tick."""
         now_us = self.core.now_us
         if time_us == now_us:
             if self.answered:
@@ -284,17 +284,17 @@ class HilSimulator:
         self._command_us = time_us
 
     def obey(self, forces: Forces, armed: bool, gripper_open: bool = False) -> None:
-        """The answer to the present tick, of an autopilot that speaks another language than MAVLink."""
+        """Take the answer to the present tick from an autopilot whose messages `receive` does not read."""
         self._take(self.core.now_us, forces, armed, gripper_open, 0.0)
 
     @property
     def inertial(self) -> ImuReading:
-        """What the inertial unit has read last, body FLU."""
+        """The last reading of the inertial unit, body FLU."""
         return unpack(Newest, self._newest, 0).inertial
 
     @property
     def navigates(self) -> bool:
-        """Whether it has what autopilots navigate by outdoors: GNSS, barometer and magnetometer."""
+        """Whether it has the sensors for outdoor navigation: GNSS, barometer and magnetometer."""
         profile = self._profile
         return None not in (profile.gnss, profile.barometer, profile.magnetometer)
 
@@ -305,19 +305,19 @@ class HilSimulator:
 
     @property
     def frame(self) -> Frame:
-        """The vehicle as firmwares know it; ValueError if it is none that they fly."""
+        """The vehicle as third-party firmwares define it; ValueError if they cannot fly it."""
         return frame_of(self._layout, self.core.truth.rotor_min, self.core.truth.rotor_max)
 
     def begin_anew(self) -> None:
-        """The world at time 0 again, with the parameters in force: another run."""
+        """Put the world to time 0 again, with the parameters in force: another run."""
         self._boot_id += 1
         self._begin()
 
     def _retune(self) -> None:
-        """A parameter has changed."""
+        """Apply a changed parameter."""
         table = self.parameters.table
         if table["SIM_GUST_NOW"] > 0.0:
-            # the truth of this tick may be told already
+            # not at this tick, whose truth may have been sent already
             self.parameters.tell("SIM_GUST_AT_S", (self.core.now_us + self.tick_us) / SECOND_US)
             self.parameters.tell("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
@@ -338,7 +338,7 @@ class HilSimulator:
         )
 
     def advance(self) -> None:
-        """Move the world to the next tick under the last command, or back to its beginning if so asked."""
+        """Move the world to the next tick under the last command, or to its beginning if so requested."""
         if self._reboot:
             self.begin_anew()
             return
@@ -355,8 +355,9 @@ class HilSimulator:
         self._truth_made = False
 
     def running(self) -> Running | None:
-        """With what, and until when, machine code can move the world on by itself, from this tick, whose
-        sensors and truth are told; None: not from this one, which somebody has answered or has more to say.
+        """The data with which, and the time until which, machine code can move the world on without Python
+        from this tick, whose sensors and truth are sent. None if it cannot, for example because this tick is
+        answered already or more must be sent.
         """
         core = self.core
         now_us, tick_us = core.now_us, core.settings.tick_us
@@ -371,7 +372,7 @@ class HilSimulator:
 
     @property
     def _speaks_us(self) -> int:
-        """When more is to be said next than sensors and truth, whatever happens."""
+        """Time of the next tick at which more than sensors and truth must be sent in any case."""
         core, now_us = self.core, self.core.now_us
         periods_us = [self._status_us, _BOOT_PERIOD_US]
         if core.truth.drive.battery > 0.0:
@@ -379,8 +380,8 @@ class HilSimulator:
         return min(core.pulse_changes_us, *(next_multiple(now_us, each_us) for each_us in periods_us))
 
     def ran(self, framed: bool) -> None:
-        """Take over what machine code has made of `running`; `framed`: the sensors of the tick at which the
-        world stands now are in the buffer and its truth is told, else both are still to be made."""
+        """Take over the state to which machine code has moved the world. `framed`: the sensors of the present
+        tick are in the buffer and its truth is sent; otherwise both are still to be made."""
         ran = self._runner.ran()
         if ran is None:
             return
@@ -392,7 +393,7 @@ class HilSimulator:
         self.answered = False
         if framed:
             self._sensors = self._written[: ran.framed].tobytes()
-            self._truth, self._truth_made = None, True  # it has been told
+            self._truth, self._truth_made = None, True  # it has been sent
         else:
             self._sensors = self._sensor_frames()
             self._truth_made = False
@@ -405,7 +406,7 @@ class HilSimulator:
             aside.append(self._boot())
         if core.truth.drive.battery > 0.0 and core.now_us % _BATTERY_PERIOD_US == 0:
             aside.append(self._battery())
-        if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
+        if not self._lockstep and core.now_us % SECOND_US == 0:  # for the autopilot: how punctual the run is
             aside.append(self._status())
         first = b"".join(map(writer.frame, aside)) if aside else b""
         room = (self._buffer, self._payload)
@@ -442,11 +443,11 @@ class HilSimulator:
 
     @property
     def _wind(self) -> tuple[Vec3, Vec3]:
-        """Mean and gust pulse."""
+        """Mean wind and gust pulse."""
         return self.core.settings.wind, self.core.pulse
 
     def _events(self, wind_due: bool, snapped: bool, status_due: bool) -> list[Any]:
-        """What is told now and then beside the state."""
+        """The messages that are sent besides the state when they are due."""
         core, now_us = self.core, self.core.now_us
         messages: list[Any] = []
         if wind_due:
@@ -460,7 +461,7 @@ class HilSimulator:
         return messages
 
     def _boot(self) -> Any:
-        """Which run of the world this is, and what an autopilot finds that starts now."""
+        """SIM_BOOT: which run of the world this is, and the state that an autopilot finds that starts now."""
         core = self.core
         reeled_m = core.cable_length - core.truth.cable_length
         forces = padded(self._command)
@@ -475,12 +476,12 @@ class HilSimulator:
         )
 
     def _snap_mass(self) -> float:
-        """The mass that a cable feels that comes taut now, kg."""
+        """The effective mass of vehicle and load along a cable that comes taut now, kg."""
         state = self.core.state
         return effective_mass(state.q_cable, rotation_from_quat(state.quat_wxyz), self.core.truth)
 
     def _battery(self) -> Any:
-        """What a power module measures."""
+        """BATTERY_STATUS, as a power module measures it."""
         drive, supply = self.core.truth.drive, self.core.world.supply
         left = max(0.0, drive.charge - supply.used_as / drive.capacity_as)
         voltage = supply.voltage if self.core.tick_count else drive.cells * open_voltage(drive.charge)

@@ -1,4 +1,5 @@
-"""The datagrams of a tick in machine code: what leaves the sensors, and the truth, as frames in a buffer."""
+"""The datagrams of a tick in machine code: readings that leave the sensors, and the truth, as frames in a
+buffer."""
 
 from __future__ import annotations
 
@@ -67,11 +68,11 @@ from sitl.world import MAG as MAGNETOMETER
 
 VEHICLE_SYSTEM = 1
 SIMULATOR_COMPONENT = 26
-# that says the messages of our dialect: tools that do not know these would take their numbers for lost ones
+# sends the messages of our dialect: tools that do not know them would count their sequence numbers as losses
 DIALECT_COMPONENT = 27
 TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
-DIALECT_FRAMES = 2  # that `put_truth` writes, behind one of the common dialect
-SPEEDS_US = 20_000  # at ticks of this period the speed controllers tell the speeds of the rotors
+DIALECT_FRAMES = 2  # frames of our dialect that `put_truth` writes, after one of the common dialect
+SPEEDS_US = 20_000  # period of the ticks at which the speed controllers report the speeds of the rotors
 _TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
 _FLOAT, _NO_FIX = mavlink.GPS_FIX_TYPE_RTK_FLOAT, mavlink.GPS_FIX_TYPE_NO_FIX
 _UNKNOWN_M = 655.35  # UINT16_MAX cm: unknown
@@ -79,7 +80,7 @@ _NAN3: Vec3 = (nan, nan, nan)
 
 
 class Statement(NamedTuple):
-    """What the messages say beside the readings."""
+    """The contents of the messages besides the readings."""
 
     stated: Stated
     home: Home
@@ -89,7 +90,7 @@ class Statement(NamedTuple):
 
 
 class Newest(NamedTuple):
-    """The last readings of what HIL_SENSOR repeats at every tick."""
+    """The last readings of the sensors that HIL_SENSOR repeats at every tick."""
 
     inertial: ImuReading
     field: MagnetometerReading
@@ -98,7 +99,7 @@ class Newest(NamedTuple):
 
 @kernel
 def pressure_pa(altitude_m: float) -> float:
-    """International standard atmosphere below 11 km; altitude above mean sea level."""
+    """Pressure of the international standard atmosphere below 11 km; altitude above mean sea level."""
     pressure: float = 101_325.0 * max(1.0 - 2.25577e-5 * altitude_m, 0.0) ** 5.25588
     return pressure
 
@@ -110,7 +111,7 @@ def _put(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, sequenc
 
 @kernel
 def rotor_speed(rows: WorldRows, i: int) -> float:
-    """What the speed controller of a rotor measures, rpm; 0 where there is no such rotor."""
+    """The speed that the speed controller of a rotor measures, rpm; 0 if there is no such rotor."""
     rotors = rotors_of(rows)
     if i >= rotors.table.shape[0]:
         return 0.0
@@ -133,10 +134,11 @@ def _speeds(rows: WorldRows, first: int, now_us: int) -> Any:
 def put_sensors(
     rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
 ) -> tuple[int, int]:
-    """Take out of the queues what has left the sensors by now, and write its frames, HIL_SENSOR last.
+    """Take the readings that have left the sensors by now out of the queues, and write their frames,
+    HIL_SENSOR last.
 
-    Returns how many bytes they have and the sequence number of the next frame. `newest` is a `Newest`, which
-    is brought up to date, `statement` a `Statement`; `payload` has PAYLOAD_ROOM bytes to work with.
+    Returns the number of bytes and the sequence number of the next frame. `newest` is a `Newest`, which is
+    updated, `statement` a `Statement`; `payload` is scratch of PAYLOAD_ROOM bytes.
     """
     said = unpack(Statement, statement, 0)
     stated = said.stated
@@ -266,9 +268,10 @@ def put_truth(
     sequence: int,
     dialect_sequence: int,
 ) -> int:
-    """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; how many bytes they have.
+    """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; returns the number of bytes.
 
-    The first has the number `sequence` of the one component, the others follow in that of the other.
+    The first has the sequence number `sequence` of SIMULATOR_COMPONENT; those of the others begin at
+    `dialect_sequence`, of DIALECT_COMPONENT.
     """
     world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
     state, home = world.plant, unpack(Statement, statement, 0).home

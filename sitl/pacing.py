@@ -1,4 +1,4 @@
-"""How punctual a real-time run is: lateness of each tick and achieved rate, from times passed in."""
+"""How punctual a real-time run is: lateness of each tick and achieved rate, from times given as arguments."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LARGEST_US = 2**32 - 1
 
 
 def percentile(ascending: Sequence[int], share: float) -> int:
-    """The smallest value that at least `share` of the values do not exceed; 0 of no values."""
+    """The smallest value that at least `share` of the values do not exceed; 0 if there are no values."""
     if not ascending:
         return 0
     rank = -int(-share * len(ascending) // 1)  # ceiling
@@ -20,11 +20,11 @@ def percentile(ascending: Sequence[int], share: float) -> int:
 
 
 class Pacing:
-    """Lateness of the ticks of one run; `figures` is that of the last full second."""
+    """Lateness of the ticks of one run; `figures` are those of the last full second."""
 
     def __init__(self, speed: float) -> None:
         self.figures = PacingFigures(speed_factor=speed)
-        self.speed = speed  # simulated seconds per second that are wanted
+        self.speed = speed  # requested simulated seconds per second
         self._late_us = array("L")
         self._window_start = 0
         self._window_first = 0  # index of its first tick
@@ -32,7 +32,7 @@ class Pacing:
         self._stalls = 0  # ticks that began a whole tick late or later
 
     def record(self, due_ns: int, now_ns: int) -> None:
-        """A tick that was due at `due_ns` began at `now_ns`."""
+        """Record that a tick that was due at `due_ns` began at `now_ns`."""
         if self._first_ns < 0:
             self._first_ns = self._window_start = now_ns
         self._last_ns = now_ns
@@ -54,7 +54,7 @@ class Pacing:
         self._late_us.append(min(max(now_ns - due_ns, 0) // 1000, _LARGEST_US))
 
     def pause(self, duration_ns: int) -> None:
-        """Somebody else kept the clock waiting for so long: that says nothing of the machine."""
+        """Leave out a time in which the clock waited for an autopilot: it is no measure of the machine."""
         self._first_ns += duration_ns
         self._window_start = self._last_ns + duration_ns
         self._window_first = len(self._late_us)

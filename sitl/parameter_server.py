@@ -1,7 +1,7 @@
 """The SIM_* parameters on the simulator link: listed and set by the autopilot, which shows them as its own.
 
-The parameter protocol in its plainest form: PARAM_REQUEST_LIST and PARAM_SET come in beside the answer to a
-tick, PARAM_VALUE goes out beside the sensors, a few with each tick.
+The parameter protocol in its simplest form: PARAM_REQUEST_LIST and PARAM_SET arrive with the answer to a
+tick, PARAM_VALUE is sent with the sensors, a few with each tick.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class ParameterServer:
         self._waiting: deque[Any] = deque()
 
     def receive(self, message: Any) -> bool:
-        """Take a message in; True if it changed a value."""
+        """Process a message; True if it changed a value."""
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
                 self._waiting.clear()
@@ -35,21 +35,21 @@ class ParameterServer:
 
     @property
     def speaks(self) -> bool:
-        """Whether a message waits to go out."""
+        """Whether a message waits to be sent."""
         return bool(self._waiting)
 
     def take(self) -> list[Any]:
-        """The messages that go out with this tick."""
+        """The messages that are sent with this tick."""
         waiting = self._waiting
         return [waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(waiting)))] if waiting else []
 
     def tell(self, name: str, value: float) -> None:
-        """Change a value ourselves, and say so."""
+        """Change a value on the simulator's side, and report it."""
         self.table.set(name, value)
         self._waiting.append(self._value(name))
 
     def say(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
-        """A text for whoever flies the vehicle."""
+        """Send a text to the operators of the vehicle."""
         line = text.encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
         self._waiting.append(mavlink.MAVLink_statustext_message(severity, line))
 

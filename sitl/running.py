@@ -1,8 +1,9 @@
-"""Ticks of the world that machine code can move on by itself: what it needs for that, and what comes of it.
+"""Ticks of the world that machine code can run without Python: the data for them, and their results.
 
-Most ticks are alike: an answer comes, the world moves, frames of sensors and truth go out. `HilSimulator`
-says until when that is all there is (`running`), a loop in machine code does it (`sitl.shell.tick_loop`),
-and `HilSimulator.ran` takes over what has become of the world. All else is left to `HilSimulator`.
+Most ticks are alike: an answer comes, the world moves, frames of sensors and truth are sent. `HilSimulator`
+determines until when nothing else is due (`running`), a loop in machine code runs these ticks
+(`sitl.shell.tick_loop`), and `HilSimulator.ran` takes over the resulting state of the world. Everything else
+is left to `HilSimulator`.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from sitl.world import WorldRows, rotors_of, world_tick
 
 Ints = NDArray[np.int64]
 
-# what `Running.numbers` are
+# entries of `Running.numbers`
 NOW_US, TICKS, TICK_US, UNTIL_US, TRUTH_EVERY = range(5)
 SEQUENCE, TRUTH_SEQUENCE, DIALECT_SEQUENCE = range(5, 8)  # of the next frames of the three components
 LENGTH = 8  # bytes of the sensors' frames in the buffer
-RAN = 9  # ticks that were moved on in this call
+RAN = 9  # ticks that were run in this call
 ARMED, GRIPPER_OPEN = 10, 11  # of the last answer
 _NUMBERS = 12
 
@@ -55,10 +56,10 @@ class Code(NamedTuple):
 
 
 class Running(NamedTuple):
-    """What the ticks to come work with, until `numbers[UNTIL_US]`: that one is not such a tick any more."""
+    """The data of the next ticks, up to but without the tick at `numbers[UNTIL_US]`, which needs Python."""
 
     numbers: Ints
-    command: Row  # of the last answer: forces of as many rotors as there can be (N), rate of the winch (m/s)
+    command: Row  # of the last answer: forces of the greatest number of rotors (N), rate of the winch (m/s)
     rows: WorldRows
     chain: Any
     newest: Row
@@ -69,7 +70,7 @@ class Running(NamedTuple):
 
 
 class Writers(NamedTuple):
-    """Who writes the frames of a tick."""
+    """The writers of the frames of a tick."""
 
     sensors: FrameWriter
     truth: FrameWriter
@@ -77,7 +78,7 @@ class Writers(NamedTuple):
 
 
 class Room(NamedTuple):
-    """What the frames of a tick are written from and to."""
+    """The arrays from which and to which the frames of a tick are written."""
 
     newest: Row
     statement: Row
@@ -86,31 +87,31 @@ class Room(NamedTuple):
 
 
 class Ran(NamedTuple):
-    """Where the world stands, and what the last answer said."""
+    """The present tick of the world, and the contents of the last answer."""
 
     now_us: int
     ticks: int
-    forces: list[float]  # N, of as many rotors as there can be
+    forces: list[float]  # N, of the greatest number of rotors
     reel_rate: float  # m/s
     armed: bool
     gripper_open: bool
-    framed: int  # bytes of the sensors' frames of the last tick that was told of
+    framed: int  # bytes of the sensors' frames of the last tick that was sent
 
 
 class Runner:
-    """Puts `Running` together, and takes apart what has become of it."""
+    """Assembles `Running`, and reads the results from it."""
 
     def __init__(self, writers: Writers) -> None:
         self._writers = writers
         self._numbers, self._command = np.zeros(_NUMBERS, np.int64), np.zeros(MOST + 1)
-        self._code: Code | None = None  # once it was asked for
+        self._code: Code | None = None  # after its first use
 
     def running(
         self, times: tuple[int, int, int, int, int], rows: WorldRows, chain: Any, room: Room
     ) -> Running | None:
-        """What the next ticks work with; `times`: the time now (us), the number of this tick, how long one
-        lasts (us), when the first comes that is left to Python (us), and each how many-th has its truth told.
-        None where nothing is compiled."""
+        """The data of the next ticks. `times`: the time now (us), the number of this tick, the duration of a
+        tick (us), the time of the first tick that is left to Python (us), and the number of ticks from one
+        truth to the next. None where nothing is compiled."""
         self._code = self._code or code_of(rows, chain, room)
         if self._code is None:
             return None
@@ -118,7 +119,7 @@ class Runner:
         return Running(self._numbers, self._command, rows, chain, *room, self._code)
 
     def ran(self) -> Ran | None:
-        """What has become of it; None: there were no ticks. The writers are brought up to date."""
+        """The results; None: there were no ticks. The sequence counters of the writers are updated."""
         if self._numbers[RAN] == 0:
             return None
         numbers, forces = self._numbers.tolist(), self._command.tolist()
@@ -129,7 +130,7 @@ class Runner:
 
 
 def code_of(rows: WorldRows, chain: Any, room: Room) -> Code | None:
-    """The kernels for such a world, compiled or loaded where need be; None where nothing is compiled."""
+    """The kernels for such a world, compiled or loaded if necessary; None where nothing is compiled."""
     if not hasattr(world_tick, "overloads"):
         return None
     newest, statement, buffer, payload = room

@@ -1,4 +1,4 @@
-"""What the SIM_* parameters mean to the world."""
+"""The settings of the world that follow from the SIM_* parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SECOND_US = 1_000_000
 
 
 class Settings(NamedTuple):
-    """Rates, delays, losses, wind, and what of the sensors is not as their profile says."""
+    """Rates, delays, losses, wind, and the values that replace those of the sensor profile."""
 
     tick_us: int
     actuator_delay_us: int
@@ -23,13 +23,13 @@ class Settings(NamedTuple):
     wind: Vec3  # mean, ENU, m/s
     gust_std: float  # m/s, each axis
     gust_tau_s: float
-    pulse: Vec3  # ENU, m/s, added to the wind for a while
+    pulse: Vec3  # ENU, m/s, added to the wind for `pulse_for_us`
     pulse_at_us: int  # when it begins; negative: never
     pulse_for_us: int
     failing_rotors: int = 0  # bit i: rotor i+1
-    failing_share: float = 0.0  # of its command that such a rotor gives
+    failing_share: float = 0.0  # share of its command that a failing rotor gives
     rotors_fail_at_us: int = 0
-    stamp_offset_us: int = 0  # added to the times that the readings of trackers, camera and receiver carry
+    stamp_offset_us: int = 0  # added to the time stamps of the readings of trackers, camera and receiver
     chosen: Chosen = ()
 
     def rotor_shares(self, count: int) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
-"""The simulated world as an object: a tick at a time, and its true state as records.
+"""The simulated world as an object: one tick at a time, and its true state as records.
 
-The work is done by `sitl.world.world_tick`, on flat arrays. What has left the sensors waits there, in
-`rows.queue`, until it is taken out (`sitl.messages`).
+The work is done by `sitl.world.world_tick`, on flat arrays. Readings wait there, in `rows.queue`, until they
+have left the sensors and are taken out (`sitl.messages`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from sitl.world import (
     world_tick,
 )
 
-Forces = tuple[float, ...]  # N, one of each rotor
-SNAP_SPEED = width(World) - 1  # where it stands among the numbers of the world
+Forces = tuple[float, ...]  # N, one for each rotor
+SNAP_SPEED = width(World) - 1  # its index among the numbers of the world
 NEVER_US = 2**62  # later than any flight lasts
 
 
@@ -47,7 +47,7 @@ class SimCore:
         self._pulse_at_us = settings.pulse_at_us
         self.rows = new_world(truth, profile, settings, seed, layout)
         self.chain = new_chain(truth, self.state)
-        self._tick: Callable[..., None] | None = None  # the tick's machine code, once it was run
+        self._tick: Callable[..., None] | None = None  # the tick's machine code, after its first use
         self.now_us = 0  # simulated time of this tick
         self.tick_count = 0  # ticks so far
 
@@ -72,12 +72,12 @@ class SimCore:
 
     @property
     def command(self) -> Forces:
-        """Forces that the rotors are asked for, N."""
+        """Commanded forces of the rotors, N."""
         return tuple(self.rows.rotors[COMMAND].tolist()[: len(self._layout)])
 
     @property
     def rotor_force(self) -> Forces:
-        """Forces that the rotors give, N."""
+        """True forces of the rotors, N."""
         return tuple(self.rows.rotors[FORCE].tolist()[: len(self._layout)])
 
     @property
@@ -97,7 +97,7 @@ class SimCore:
 
     @property
     def cable_length(self) -> float:
-        """Length of the cable in m, held or not."""
+        """Length of the cable in m, whether the gripper holds it or not."""
         return self.world.cable_length
 
     @property
@@ -109,7 +109,7 @@ class SimCore:
 
     @property
     def pulse_changes_us(self) -> int:
-        """When the gust pulse will begin to blow, or cease to; NEVER_US where it will not."""
+        """When the gust pulse will next begin or end; NEVER_US if it will not."""
         begins_us = self._pulse_at_us
         if begins_us < 0:
             return NEVER_US
@@ -117,12 +117,12 @@ class SimCore:
         return min((at_us for at_us in changes if at_us > self.now_us), default=NEVER_US)
 
     def came_to(self, now_us: int, tick_count: int) -> None:
-        """The rows have been moved on to this tick by whoever called `world_tick`."""
+        """Note that the caller has moved the rows on to this tick by `world_tick`."""
         self._world = None
         self.now_us, self.tick_count = now_us, tick_count
 
     def tick(self, command: Forces, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
-        """Integrate to the next tick; see `world_tick`. Rotors that `command` does not name stand still."""
+        """Integrate to the next tick; see `world_tick`. Rotors beyond those of `command` stand still."""
         asked = self.rows.rotors[ASKED]
         asked[:] = 0.0
         asked[: len(command)] = command
@@ -134,7 +134,7 @@ class SimCore:
         self.tick_count += 1
 
     def retune(self, truth: Truth, settings: Settings) -> None:
-        """Go on under another truth and other settings; tick, latency and cable length stay as they were.
+        """Continue with another truth and other settings; tick, latency and cable length stay as they were.
 
         A gust pulse whose time is moved to a tick that has begun does not blow.
         """
@@ -145,7 +145,7 @@ class SimCore:
         rows = self.rows
         pack(model_of(truth, self._profile, settings, self._pulse_at_us), rows.model, 0)
         rows.fate[:] = fates(self._profile, settings)
-        # the commands on their way, oldest first, with room for those to come
+        # the commands on their way, oldest first, with room for later ones
         head, length = rows.command_ring
         waiting = np.roll(rows.commands, -head, axis=0)[:length]
         commands = np.zeros((length + command_room(settings), waiting.shape[1]))

@@ -1,7 +1,8 @@
-"""A tick of the simulated world in machine code. How its answer comes and its frames go is up to others.
+"""A tick of the simulated world in machine code. The callers receive its answer and send its frames.
 
 `move_on` takes an answer and moves the world to the next tick, whose truth (`put_truth_due`) and sensors
-(`put_sensors_next`) can then be told, unless more is to be said of it (`goes_on`): see `sitl.running`.
+(`put_sensors_next`) can then be written, unless more must be sent at that tick (`goes_on`): see
+`sitl.running`.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ TRUTH_OF_A_TICK = (1 + DIALECT_FRAMES) * FRAME_ROOM  # bytes
 
 @kernel
 def move_on(run: Running, address: int, size: int) -> bool:
-    """Move the world under the answer in the `size` bytes at an address; False: they are not the plain answer
-    to this tick."""
+    """Move the world on with the answer in the `size` bytes at `address`; False if these are not the plain
+    answer to this tick."""
     numbers, rows, code = run.numbers, run.rows, run.code
     asked, rotors = rows.rotors[ASKED], rows.rotor_table.shape[0]
     said = ask_answer(code.answer_in, (bytes_at(address, size), VEHICLE_SYSTEM, run.payload))
@@ -67,13 +68,13 @@ def move_on(run: Running, address: int, size: int) -> bool:
 
 @kernel
 def goes_on(run: Running) -> bool:
-    """Whether nothing but sensors and truth is to be told of this tick."""
+    """Whether nothing but sensors and truth must be sent at this tick."""
     return bool(run.numbers[NOW_US] < run.numbers[UNTIL_US] and run.rows.world[SNAP_SPEED] <= LEAST_SNAP)
 
 
 @kernel
 def put_truth_due(run: Running, room: Bytes) -> int:
-    """Write the truth of this tick, if it is due; how many bytes there are of it."""
+    """Write the truth of this tick if it is due; returns its number of bytes."""
     numbers, rows = run.numbers, run.rows
     if numbers[TICKS] % numbers[TRUTH_EVERY] != 0:
         return 0
@@ -86,7 +87,7 @@ def put_truth_due(run: Running, room: Bytes) -> int:
 
 @kernel
 def put_sensors_next(run: Running) -> int:
-    """Write the sensors of this tick into `run.buffer`; how many bytes there are of them."""
+    """Write the sensors of this tick into `run.buffer`; returns their number of bytes."""
     numbers = run.numbers
     length, sequence = ask_sensors(
         run.code.put_sensors,

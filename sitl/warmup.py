@@ -6,7 +6,7 @@ from autopilot.shell.compiling import name_what_is_compiled
 
 
 def main() -> None:
-    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    """Compile the simulator, or find it compiled; prints the names of the kernels that are compiled."""
     name_what_is_compiled()
     # only now: the import itself compiles the first ones
     from sitl.hil import HilSimulator

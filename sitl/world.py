@@ -1,12 +1,12 @@
 """One tick of the world as one compiled function: plant, sensors, and all delays between them.
 
 Between two ticks the plant is integrated from event to event: a command that takes effect, a sensor that
-measures. Both are exact to the microsecond, whatever the tick rate. All that is carried from tick to tick
-lies in `WorldRows`, flat arrays that `world_tick` reads and writes: the simulator's process calls it once a
+measures. Both are exact to the microsecond, whatever the tick rate. Everything that is kept from tick to tick
+is in `WorldRows`, flat arrays that `world_tick` reads and writes: the simulator's process calls it once a
 tick (`sitl.sim_core`), a sweep in a loop.
 
-Every sample of a sensor is taken and moves the sensor's drift, even if its reading is then lost: so losses
-change neither the noise nor the drift of the readings that come through.
+Every sample of a sensor is taken and advances the sensor's drift, even if its reading is then lost. Losses
+therefore change neither the noise nor the drift of the readings that arrive.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from sitl.sensors.room import Room
 from sitl.sensors.vibration import VibrationConfig, draw_phases, shaking
 from sitl.settings import SECOND_US, Settings
 
-# rows of the arrays, one a sensor
+# rows of the arrays, one per sensor
 IMU, MOCAP, LOAD, CABLE, GNSS, BARO, MAG = range(7)
 SENSORS = 7
 # noise streams: fixed, so that fitting one sensor leaves the others as they were
@@ -50,7 +50,7 @@ GUSTS = 8
 FITTED, COUNT, NOMINAL, DUE, OUTAGE_END, HEAD, LENGTH, LATENCY, LEAD = range(9)
 # columns of `fate`
 RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET = range(7)  # the last three: us
-# columns of `queue`: leaves at (us), shows (us), then the reading
+# columns of `queue`: when the reading leaves the sensor (us), its time stamp (us), then the reading
 LEAVES, SHOWS, READING = 0, 1, 2
 _COLUMNS = 15
 _FATE_BLOCK, _OUTAGE_BLOCK, _JITTER_BLOCK = 15, 14, 13  # noise blocks; the sensors use those below
@@ -63,7 +63,7 @@ Ints = NDArray[np.int64]
 
 
 class WorldModel(NamedTuple):
-    """What only parameters change."""
+    """The values that only parameters change."""
 
     truth: Truth
     imu: imu.ImuConfig
@@ -95,7 +95,7 @@ class World(NamedTuple):
     now_us: int
     gust: Vec3
     wind: Vec3  # of the last tick, ENU, m/s
-    cable_length: float  # m, as the winch has it, held or not
+    cable_length: float  # m, as set by the winch, held or not
     reel_rate: float  # m/s
     reel_accel: float  # m/s^2
     released: bool  # the gripper has let the cable go
@@ -127,7 +127,7 @@ def rotors_of(rows: WorldRows) -> RotorRows:
 
 @kernel
 def nominal_us(rate_hz: float, tick_us: int, lead_us: int, n: int) -> int:
-    """Instant of measurement n, n / rate - lead, before it is cut at 0; rate 0: one a tick."""
+    """Time (us) of measurement n, n / rate - lead, before it is limited to at least 0; rate 0: one a tick."""
     if rate_hz > 0.0:
         return int(np.rint(n * 1000000 / rate_hz)) - lead_us
     return n * tick_us - lead_us
@@ -202,8 +202,8 @@ def _delivers(clock: Ints, fate: Floats, noise: Noise) -> bool:
 
 @kernel
 def _overtake(queue: Floats, head: int, last: int) -> None:
-    """Put the reading in place `last` behind the head where it belongs by the time at which it leaves: before
-    those that it overtakes."""
+    """Sort the reading at place `last` behind the head into the queue by the time at which it leaves: before
+    the readings that it overtakes."""
     capacity = queue.shape[0]
     while last > 0:
         later, own = queue[(head + last - 1) % capacity], queue[(head + last) % capacity]
@@ -243,7 +243,7 @@ def measure(plant: PlantState, now_us: int, model: WorldModel, rows: WorldRows) 
 
 @kernel
 def arrived(sensor: int, now_us: int, rows: WorldRows) -> int:
-    """Row of the queue with the sensor's next reading that has left by now, taken out of it; or -1."""
+    """Row of the sensor's next reading that has left by now, which is taken out of the queue; or -1."""
     clock = rows.clock[sensor]
     head = clock[HEAD]
     if clock[LENGTH] == 0 or rows.queue[sensor, head, LEAVES] > now_us:
@@ -264,7 +264,7 @@ def pulse_at(model: WorldModel, now_us: int) -> Vec3:
 
 @kernel
 def held_truth(model: WorldModel, world: World) -> Truth:
-    """The truth of this instant: with the cable as the winch has it, or without one."""
+    """The truth of this instant: with the cable as set by the winch, or without one."""
     supplied = with_field(model.truth, "supply", world.supply.share)
     if world.released:
         return without_cable(supplied)
@@ -274,22 +274,21 @@ def held_truth(model: WorldModel, world: World) -> Truth:
 
 @kernel
 def _with_winch(world: World, truth: Truth) -> World:
-    """The world with its winch as this truth has it."""
+    """The world with its winch in the state of this truth."""
     reeled = with_field(world, "cable_length", truth.cable_length)
     return with_field(with_field(reeled, "reel_rate", truth.reel_rate), "reel_accel", truth.reel_accel)
 
 
 @kernel
 def _as_wound(model: WorldModel, world: World) -> Truth:
-    """The truth with the cable as the winch has it, held or not."""
+    """The truth with the cable as set by the winch, held or not."""
     return held_truth(model, with_field(world, "released", False))
 
 
 @kernel
 def _gripped(world: World, model: WorldModel, gripper_open: bool) -> World:
-    """The world after the gripper has moved. One that opens lets go at once; one that closes takes hold as
-    soon
-    as the load lies within reach."""
+    """The world after the gripper has moved. A gripper that opens lets go immediately; one that closes takes
+    hold as soon as the load lies within reach."""
     if gripper_open == world.released:
         return world
     if gripper_open:
@@ -301,7 +300,7 @@ def _gripped(world: World, model: WorldModel, gripper_open: bool) -> World:
 
 @kernel
 def _failing(rotors: RotorRows, failing: bool) -> None:
-    """Let each rotor give its share from here on."""
+    """Set the share of its command that each rotor gives: the share in its table if `failing`, else all."""
     for i in range(rotors.table.shape[0]):
         rotors.rows[SHARE, i] = rotors.table[i, LEFT] if failing else 1.0
 
@@ -310,11 +309,11 @@ def _failing(rotors: RotorRows, failing: bool) -> None:
 def world_tick(
     rows: WorldRows, forces: Floats, gripper_open: bool, reel_rate: float, chain: ChainRows | None = None
 ) -> None:
-    """The world at the next tick; `forces` (N), one of each rotor, answer the present one.
+    """Move the world to the next tick; `forces` (N), one for each rotor, are the answer to the present one.
 
     They take effect after the actuator delay; before the first ones the rotors stand still. The winch reaches
-    `reel_rate` (m/s, positive: out) by the next tick; one without a cable stands. `chain` is the memory of a
-    cable of links; without it the cable is massless and taut or slack.
+    `reel_rate` (m/s, positive: out) by the next tick; without a cable it stands still. `chain` is the memory
+    of a cable of links; without it the cable is massless and taut or slack.
     """
     model, world = unpack(WorldModel, rows.model, 0), unpack(World, rows.world, 0)
     world = _gripped(world, model, gripper_open)
@@ -442,11 +441,11 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
 
 
 def fates(profile: Profile, settings: Settings) -> Floats:
-    """(sensors, 7) rate of each sensor, what is lost of its readings, and how late and how wrongly dated they
-    come.
+    """(sensors, 7) rate of each sensor, the losses of its readings, and their additional delay and the error
+    of their time stamps.
 
-    Of a failed sensor all is lost. The inertial unit is wired to the autopilot and is spared what is lost on
-    the way.
+    All readings of a failed sensor are lost. The inertial unit is wired to the autopilot, so the losses of
+    `settings` on the way do not affect it.
     """
     found = np.zeros((SENSORS, 7))
     for sensor, table in enumerate(fitted_sensors(with_chosen(profile, settings.chosen))):
@@ -469,7 +468,7 @@ def fates(profile: Profile, settings: Settings) -> Floats:
 
 
 def command_room(settings: Settings) -> int:
-    """Commands that can be on their way."""
+    """Room for the commands that can be on their way."""
     return settings.actuator_delay_us // settings.tick_us + _SPARE
 
 
@@ -531,9 +530,9 @@ def new_world(
 
 
 def _timing(table: Delivery, settings: Settings) -> tuple[float, int, int]:
-    """(rate in Hz or 0 for one a tick, latency us, lead us) of a sensor.
+    """(rate in Hz or 0 for one reading per tick, latency us, lead us) of a sensor.
 
-    The link carries no time of measurement for the inertial unit: it is read one latency before its tick.
+    The link transmits no time of measurement for the inertial unit: it is read one latency before its tick.
     """
     latency_us = round(table.latency_ms * 1000.0) + settings.sensor_latency_us
     if isinstance(table, Sampled):

@@ -1,7 +1,7 @@
-"""For all tests: examples of hypothesis have no deadline, for the first one may compile a kernel; a failed
-assertion in the shared doubles is explained like one of a test; linear algebra keeps to one thread, for on a
-busy machine several of them wait for each other; a path that was shaped is not shaped again; what was
-collected is no garbage, and is not looked through for any.
+"""For all tests: examples of hypothesis have no deadline, because the first one may compile a kernel; a
+failed assertion in the shared doubles is explained like one of a test; linear algebra uses one thread,
+because on a busy machine several threads wait for each other; a path that was shaped is not shaped again;
+objects that exist after the collection of tests are excluded from garbage collection.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def shaped_once() -> Iterator[None]:
-    """Each path is shaped once, whoever flies or checks it: shaping takes longer than most tests, and the
-    same path leads to the same bits."""
+    """Each path is shaped once for all tests that fly or check it: shaping takes longer than most tests, and
+    the same path gives the same bits."""
     from autopilot.trajectory import prepare
 
     shape = cache(prepare.shape)

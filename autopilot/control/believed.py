@@ -1,4 +1,4 @@
-"""What the parameters say of the vehicle, its rotors and the air: the records that laws and observer take."""
+"""The assumed vehicle, rotors and air, from the parameters: the records that laws and observer take."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rotors import allocate, sizes
 from autopilot.wire.parameter_table import ParameterTable
 
-# A rotor that is asked for its full force shows nothing of it until delay and lag are over, and is judged by
-# three speeds, 60 ms. In this time what is expected of it may rise by less than the tenth of the full force
-# from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
+# A rotor that is commanded its full force shows nothing of it until delay and lag have passed, and is judged
+# by three speeds, 60 ms. In this time t, the force expected of it may rise by less than a tenth of the full
+# force, from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
 SPEEDS_S, ROTOR_PATIENCE = 0.06, 10.0
-GREATEST_PUSH = 0.7  # of the weight: more wind than that is not believed
+GREATEST_PUSH = 0.7  # of the weight: bound of the estimated wind force
 
 
 def believed_vehicle(table: AutopilotParameters) -> Vehicle:
@@ -49,19 +49,19 @@ def believed_actuation(table: ParameterTable) -> ActuationConstants:
 
 
 def believed_delay(table: ParameterTable) -> float:
-    """From the instant that an estimate is of to the one at which the command for it is in force, s."""
+    """Time from the instant that an estimate applies to until its command takes effect, s."""
     return 1e-3 * (table["VEH_ACT_DELAY"] + table["VEH_IMU_DELAY"])
 
 
 def believed_rotor_watch(table: ParameterTable) -> float:
-    """Share of a period in the time for which a rotor must have been asked for a force to be judged by it."""
+    """Share of a period in the time for which a rotor must have been commanded a force to be judged by it."""
     period = 1.0 / table["CTL_RATE_HZ"]
     silent = believed_delay(table) + 1e-3 * table["VEH_ROTOR_TAU"] + SPEEDS_S
     return period / (ROTOR_PATIENCE * silent + period)
 
 
 def believed_factor_share(table: ParameterTable) -> float:
-    """Share of a period in the time constant with which the speeds of the rotors tell their thrust factor."""
+    """Share of a period in the time constant with which the rotor speeds change the thrust factor."""
     return share_of(1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"])
 
 
@@ -85,7 +85,7 @@ def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
 
 
 def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConstants:
-    """How fast disturbances are learned."""
+    """Constants of the observer: how fast disturbances are learned, and bounds."""
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     return observer_constants(
         table["PLB_T_MASS"],

@@ -12,11 +12,11 @@
 
 The printed (4-2) lacks the `x_2` after `-2 zeta omega_n`; the transfer function (4-3) has it.
 
-Discretised exactly for a command that runs straight from one sample to the next (first-order hold): the
+Discretised exactly for a command that changes linearly from one sample to the next (first-order hold): the
 output at a sample is then the output of the continuous filter. A zero-order hold would add half a period of
-lag, which the attitude loop cannot spare. Along a ramp of slope s the filter's own steady motion is u - 2
-zeta s / omega_n; what is left decays freely by the matrix exponential, whose four entries are computed
-once, outside the loop.
+lag, which the attitude loop cannot afford. Along a ramp of slope s the steady motion of the filter is
+u - 2 zeta s / omega_n; the difference from it decays by the matrix exponential, whose four entries are
+computed once, outside the loop.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def filter_constants(omega_n: float, zeta: float, dt: float) -> FilterConstants:
     decay = zeta * omega_n
     turn = omega_n * sqrt(abs(1.0 - zeta * zeta))
     angle = turn * dt
-    # below 1e-6 rad the series' second term is lost in rounding, and zeta = 1 needs no case of its own
+    # below 1e-6 rad the series' second term is lost in rounding, and zeta = 1 needs no separate case
     if angle < 1e-6:
         c, s = 1.0, dt
     elif zeta < 1.0:
@@ -87,7 +87,7 @@ def filter_start(x: Vec3, x_dot: Vec3) -> FilterState:
 
 @kernel
 def filter_step(state: FilterState, u: Vec3, constants: FilterConstants) -> FilterState:
-    """The memory one period later, when the command has gone straight from the last one to `u`."""
+    """The memory one period later, when the command has changed linearly to `u`."""
     slope = scale(constants.rate, sub(u, state.u))
     # h: distance from the steady motion along the ramp
     h1 = sub(state.x1, axpy(-constants.ramp_lag, slope, state.u))

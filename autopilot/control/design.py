@@ -1,19 +1,19 @@
-"""The gains of the law `plumbline`, computed from what is believed of the vehicle.
+"""The gains of the law `plumbline`, computed from the assumed vehicle.
 
 | symbol | code name | frame | unit | equation |
 |---|---|---|---|---|
 | omega_x, omega_q, omega_R | omega_x, omega_q, omega_R | | rad/s | of load, cable, vehicle |
-| omega_i | omega_i | | rad/s | in which the load's steady error fades |
-| zeta | zeta | | | of the three |
+| omega_i | omega_i | | rad/s | at which the load's steady error fades |
+| zeta | zeta | | | damping ratio of the three |
 | J, m_Q, m_L, L | vehicle | | | Table 4-1 |
 | k_x | k_x | I | N/m | m (omega_x^2 + 2 zeta omega_x omega_i), m = m_Q + m_L |
 | k_v | k_v | I | N s/m | m (2 zeta omega_x + omega_i) |
 | k_i | k_i | I | N/m/s | m omega_x^2 omega_i |
 | k_q, k_w | k_q, k_omega | | N, N s | m_Q L omega_q^2, 2 zeta omega_q m_Q L |
 | k_R, k_Omega | k_R, k_Omega | B | N m, N m s | J omega_R^2, 2 zeta omega_R J |
-| d, delta | delay, tolerance | | s | delay believed; unknown delay to survive |
-| tau_a, T | lag, period | | s | lag that the rotors show; of the control law |
-| tau_d | torque_time | | s | in which a torque on the vehicle is learned (`disturbance_observer`) |
+| d, delta | delay, tolerance | | s | assumed delay; unknown delay to tolerate |
+| tau_a, T | lag, period | | s | lag that the rotors show; period of the control law |
+| tau_d | torque_time | | s | time constant of the estimate of a torque on the vehicle (`torque_observer`) |
 | K, A, b | K, A, b | | | below |
 
 Near hover the law is u = -K x on the chain e_i, x_L, v_L, q, q', theta, Omega of one level axis,
@@ -27,12 +27,13 @@ holds for every delay between d - delta and d + delta, by the small-gain theorem
     S(s) = K exp(A d) G (1 - Q exp(-s d)) / (1 + K G) + Q,
     G(s) = (s - A)^-1 b exp(-s T / 2),    Q(s) = 1 / (1 + s tau_d)
 
-S is what the rotors are asked for against a torque: once it has moved the vehicle, and as it is learned.
+S is the response of the commanded moment to a torque: by the feedback after the torque has moved the vehicle,
+and by the estimate of the torque.
 
-What is wanted is delta. The ratios of the bandwidths are given; all three are as high as two conditions
-allow: the tolerance is kept, and three standard deviations of each rotor's command, for the noise that the
-estimate is believed to have, fit between hover and the nearest limit of a rotor, and 1.5 of them into the
-share of the range that paths leave to control: what noise takes of it, gusts do not have.
+delta is specified, and the ratios of the bandwidths are given. All three bandwidths are as high as three
+conditions allow: the loop tolerates delta; three standard deviations of each rotor's command, for the assumed
+noise of the estimate, fit between hover and the nearest limit of a rotor; and 1.5 of them fit into the share
+of the range that paths leave to control, because gusts cannot use what noise takes of this share.
 """
 
 from __future__ import annotations
@@ -52,17 +53,18 @@ from autopilot.vehicle.rotors import ROTOR_MARGIN
 
 Array = NDArray[np.float64]
 
-# what an estimator over motion capture leaves, white from tick to tick, of e_i, x_L, v_L, q, q', theta, Omega
+# standard deviations of e_i, x_L, v_L, q, q', theta, Omega, white from tick to tick, from an estimator with
+# motion capture
 NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
 SIGMAS, SIGMAS_RESERVED = 3.0, 1.5
-# of omega_R, rad/s, within which the greatest is looked for
+# rad/s, range of omega_R in which the greatest is searched
 _SLOWEST, _FASTEST = 0.5, 200.0
-_LEAST_LAG = 1e-4  # s; rotors without lag are taken for so fast ones
+_LEAST_LAG = 1e-4  # s; rotors without lag are treated as rotors of this lag
 _STATES = 7
 
 
 class Wanted(NamedTuple):
-    """What is asked of the design."""
+    """The requirements of the design."""
 
     tolerance: float  # s, of delay
     integral_ratio: float  # omega_i / omega_x
@@ -73,17 +75,17 @@ class Wanted(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """What is believed of the way from a command to its force; seconds."""
+    """Assumed times between a command and its force; seconds."""
 
     delay: float
-    lag: float  # as it is
-    lag_shown: float  # as it is made to look
+    lag: float  # of the rotors
+    lag_shown: float  # after lag compensation
     period: float
-    torque_time: float = 0.0  # in which a torque is learned; 0: it is not
+    torque_time: float = 0.0  # time constant of the torque estimate; 0: none
 
 
 class Design(NamedTuple):
-    """Gains, and what they were computed to hold."""
+    """Gains, with the bandwidths and margins they were computed for."""
 
     gains: PlumblineGains
     omega_i: float  # rad/s
@@ -95,8 +97,8 @@ class Design(NamedTuple):
 
 
 def yaw_share(vehicle: Vehicle) -> float:
-    """Bandwidth of yaw over that of roll and pitch, with which an error of either asks for the same share of
-    what the rotors can give about its axis. About the thrust axis they turn the vehicle by their drag alone.
+    """Ratio of the bandwidth of yaw to that of roll and pitch at which equal errors demand the same share of
+    what the rotors can give about the axis. About the thrust axis they turn the vehicle by their drag alone.
     """
     level = vehicle.level * vehicle.arm / max(vehicle.inertia[0], vehicle.inertia[1])
     return min(1.0, math.sqrt(vehicle.lift * vehicle.torque_ratio / vehicle.inertia[2] / level))
@@ -125,7 +127,7 @@ def gains_of(
 
 
 def level_axis(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
-    """(A, b) of e_i, x_L, v_L, q, q', theta, Omega, M along a level axis; u, N m, is the moment asked."""
+    """(A, b) of e_i, x_L, v_L, q, q', theta, Omega, M along a level axis; u, N m, is the commanded moment."""
     stiffness = (
         (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / (vehicle.quad_mass * vehicle.cable_length)
     )
@@ -151,7 +153,7 @@ def response(vehicle: Vehicle, J: float, lag: float, period: float, omegas: Arra
 
 
 def feedback(A: Array, J: float, polynomial: Array) -> Array:
-    """K that gives the chain, rotors taken for immediate, this polynomial of poles (Ackermann)."""
+    """K that gives the chain this polynomial of poles if the rotors have no lag (Ackermann)."""
     n = _STATES
     chain, b = A[:n, :n], np.zeros(n)
     b[n - 1] = 1.0 / J
@@ -174,7 +176,7 @@ def judged(
     timing: Timing,
     vehicle: Vehicle,
 ) -> tuple[float, float]:
-    """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) where unstable."""
+    """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) if unstable."""
     lag, T = max(_LEAST_LAG, timing.lag_shown), timing.period
     J = min(vehicle.inertia[0], vehicle.inertia[1])
     A, b = level_axis(vehicle, J, lag)
@@ -202,7 +204,7 @@ def judged(
     W[:_STATES, :_STATES] = np.diag((noise * np.array(NOISE)) ** 2)
     drive = float(ahead @ W @ ahead)
     with warnings.catch_warnings():
-        # the integral of a position beside angular rates: great ratios, and of P only K P K' is used
+        # badly scaled: the integral of a position beside angular rates; only K P K' of P is used
         warnings.simplefilter("ignore", LinAlgWarning)
         P = solve_discrete_lyapunov(closed, drive * np.outer(b_d, b_d))
     moment = math.sqrt(float(K @ P @ K) + drive)
@@ -212,7 +214,7 @@ def judged(
 
 @lru_cache(maxsize=16)
 def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
-    """The fastest gains that keep what is wanted; the slowest looked at where none does."""
+    """The fastest gains that meet the requirements; the slowest of the searched range if none do."""
     hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.lift
     room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
     reserved = ROTOR_MARGIN * (vehicle.rotor_max - vehicle.rotor_min)

@@ -16,26 +16,25 @@
     A'  = -k_i e_x - k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
     A'' = -k_i e_v - k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
 
-What the errors ask for, k_i e_i + k_x e_x + k_v e_v, is bounded smoothly by half the weight (`saturated`).
+The feedback, k_i e_i + k_x e_x + k_v e_v, is bounded smoothly by half the weight (`saturated`).
 
-The load moves as (2-31) has it under the pull T that is asked for, not the one that the rotors happen to
-give:
+The derivatives are those of a load that moves by (2-31) under the commanded pull T, not under the pull that
+the rotors give at this instant:
 
     m (e_a + x_d'' + g e_3) = T q    m (e_j + x_d''') = T' q + T q'
 
-and the cable swings as the reference has it: s' = 2 q_d' . q_d'', s'' = 2 q_d'' . q_d'' (the part with
-q_d''' is left out), and of q'' in A'' the part across the cable. On the reference, and across the cable
-wherever the load is, this is exact.
+and the swing is that of the reference: s' = 2 q_d' . q_d'', s'' = 2 q_d'' . q_d'' (the part with q_d''' is
+left out). Of q'' in A'' only the part across the cable is used. On the reference this is exact, and across
+the cable it is exact wherever the load is.
 
-Pull and swing as they are would be exact everywhere, and are no good. Where the vehicle leans against the
-cable, in wind or far from its path, T' is f times lean times body rate, and with an error of the direction
-the commanded attitude becomes a function of the body rate: at 17 deg of lean and 0.1 rad of error it takes
-away all of the inertia that the attitude's loop reckons with, and the vehicle chases an attitude that runs
-from it.
+With the actual pull and swing all derivatives would be exact, but the loop would fail. Where the vehicle
+leans against the cable, in wind or far from its path, T' is f times lean times body rate. With an error of
+the direction, the commanded attitude then becomes a function of the body rate: at 17 deg of lean and 0.1 rad
+of error this cancels all of the inertia that the attitude loop assumes, and the vehicle chases a commanded
+attitude that runs away from it.
 
-The derivatives of q_c = -A/|A| follow exactly. The thesis passes q_c through a filter for them; and to take
-the derivatives of the reference alone, leaving out those of the errors, makes the cascade unstable with its
-gains.
+The derivatives of q_c = -A/|A| follow exactly. The thesis obtains them by a filter. With the derivatives of
+the reference alone, without those of the errors, the cascade is unstable with the gains of the thesis.
 """
 
 from __future__ import annotations
@@ -51,19 +50,19 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add, add3, axpy, dot, norm, scale, sub, times
 from autopilot.geometry.s2 import tangent, unit_derivatives
 
-# of the weight: what the errors may ask for, however great they are
+# of the weight: bound of the feedback, however great the errors are
 GREATEST_FEEDBACK = 0.5
-# of the weight: an upward part of A beyond _UPRIGHT is left alone, beneath _FALLING it is the mean of both: a
-# vehicle that falls with its load could not turn, and noise would decide where a short A points
+# of the weight: an upward part of A above _UPRIGHT is unchanged, below _FALLING it is set to the mean of the
+# two: a vehicle that falls with its load could not turn, and noise would decide where a short A points
 _UPRIGHT, _FALLING = 0.4, 0.1
 _LEAST_UPWARD = 0.5 * (_UPRIGHT + _FALLING)
 _BETWEEN = _UPRIGHT - _FALLING
-# N; a shorter A has no direction to follow
+# N; a smaller A has no direction to follow
 _LEAST_FORCE = 1e-3
 
 
 class PositionJet(NamedTuple):
-    """The force A of (3-43) with two derivatives, and the errors that it closes; world frame."""
+    """The force A of (3-43) with two derivatives, and the errors that it corrects; world frame."""
 
     A: Vec3  # N
     A_dot: Vec3  # N/s
@@ -87,8 +86,8 @@ def saturated(v: Vec3, v_dot: Vec3, v_ddot: Vec3, limit: float) -> tuple[Vec3, V
 
 @kernel
 def held_up(A: Vec3, A_dot: Vec3, A_ddot: Vec3, weight: float) -> tuple[Vec3, Vec3, Vec3]:
-    """A force (N) whose upward part is a quarter of the weight (N) at least, with its derivatives: A itself
-    where that is 0.4 of the weight, with three steady derivatives in between."""
+    """A with an upward part of at least a quarter of the weight (N), and its derivatives: A itself where the
+    upward part is at least 0.4 of the weight, else less steep, with three continuous derivatives."""
     share = (A[2] - _FALLING * weight) / (_BETWEEN * weight)
     if share >= 1.0:
         return A, A_dot, A_ddot
@@ -124,9 +123,9 @@ def position_jet(
     k_v: Vec3,
     vehicle: Vehicle,
 ) -> PositionJet:
-    """A, A', A'' as the load moves under the pull that A asks for; gains are diagonals in the world frame.
+    """A, A', A'' for a load that moves under the pull of A itself; gains are diagonals in the world frame.
 
-    With k_i = 0 and small errors it is (3-43), but where that lets the load fall (`held_up`).
+    With k_i = 0 and small errors A is that of (3-43), except where that lets the load fall (`held_up`).
     """
     q, q_dot = state.q_cable, state.q_cable_dot
     at = load_position_force(
@@ -174,7 +173,7 @@ def position_jet(
 
 @kernel
 def direction_jet(position: PositionJet, state: State) -> DirectionCommand:
-    """q_c = -A/|A| with q_c' and q_c''; the present direction at rest where A vanishes."""
+    """q_c = -A/|A| with q_c' and q_c''; if A vanishes, the present direction at rest."""
     if norm(position.A) < _LEAST_FORCE:
         zero: Vec3 = (0.0, 0.0, 0.0)
         return DirectionCommand(state.q_cable, zero, zero)

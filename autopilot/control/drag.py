@@ -7,8 +7,8 @@ from typing import NamedTuple
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, scale
 
-# 1/sqrt(s), by which what the wind does wanders, of itself: gusts are a fifth of the wind and last for 2 s,
-# and the drag, c u^2, changes by 2 c u times theirs, 2 * 0.2 * sqrt(2 / 2 s)
+# 1/sqrt(s), random walk of the wind's force, as a share of this force: gusts are a fifth of the wind and last
+# for 2 s, and the drag, c u^2, changes by 2 c u times the gust: 2 * 0.2 * sqrt(2 / 2 s)
 GUSTY = 0.4
 
 

@@ -1,8 +1,9 @@
-"""Where a custom control law and the compiled tick meet: a row of numbers, and functions at addresses.
+"""The interface between a custom control law and the compiled tick: a row of numbers, and functions at
+addresses.
 
 The tick writes what the law is given (`Now`) to the front of the row, calls the function of the present mode
-with the row's address, and reads what it asks for (`Asked`) from behind it. What lies behind that is the
-law's own. So the tick is compiled once, whatever law is flown.
+with the row's address, and reads the command of the law (`Asked`) from the place behind `Now`. The rest of
+the row belongs to the law. The tick is therefore compiled only once for all custom laws.
 
 World ENU, body FLU, SI.
 """
@@ -18,32 +19,32 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, Mat3, Vec3
 from autopilot.geometry.packed import pack, unpack, width
 
-# what a law asks for
+# kinds of command
 WRENCH, FORCE, ATTITUDE, RATES = 0, 1, 2, 3
 
 
 class Believed(NamedTuple):
-    """What the autopilot believes of the vehicle, its load and the air, by its parameters and by what it has
-    observed in this flight."""
+    """The vehicle, its load and the air as the autopilot assumes them, from its parameters and from what it
+    has observed in this flight."""
 
     quad_mass: float  # m_Q, kg, without the load
-    load_mass: float  # m_L, kg, as the cable's pull tells it
+    load_mass: float  # m_L, kg, estimated from the cable's pull
     inertia: Vec3  # diagonal of J, kg m^2, body
     gravity: float  # g, m/s^2
-    push: Vec3  # N, world: what the wind does to the vehicle, besides drag in still air
+    push: Vec3  # N, world: force of the wind on the vehicle, besides drag in still air
     rotor_thrust: float  # N: what the rotors give at this tick
     rotor_moment: Vec3  # N m, body
     load_lies: bool  # the load is on the ground
-    stands: bool  # the vehicle is
+    stands: bool  # the vehicle is on the ground
 
 
 class Held(NamedTuple):
-    """What the two attitude modes are to hold; in the other modes what is there."""
+    """The setpoints of the two attitude modes; in the other modes the present direction and attitude."""
 
     q_d: Vec3  # load_attitude: direction of the cable from vehicle to load, unit vector, world
-    pull: float  # N, of the cable meanwhile
+    pull: float  # N, of the cable, in load_attitude
     R_d: Mat3  # quad_attitude: body to world
-    thrust: float  # N, meanwhile
+    thrust: float  # N, in quad_attitude
 
 
 class Now(NamedTuple):
@@ -53,14 +54,14 @@ class Now(NamedTuple):
     time_s: float  # since the mode began
     period_s: float  # from tick to tick
     state: State  # the estimate
-    reference: Reference  # what is asked for: of the load in load_position, of the vehicle in quad_position
-    held: Held  # what is asked for in the attitude modes
-    cable: Cable  # length, rate and acceleration, as the winch has it
+    reference: Reference  # the setpoint: of the load in load_position, of the vehicle in quad_position
+    held: Held  # the setpoints of the attitude modes
+    cable: Cable  # length, rate and acceleration, as set by the winch
     believed: Believed
 
 
 class Asked(NamedTuple):
-    """What a law asks for, by its kind: thrust and moment (WRENCH), a force (FORCE), attitude and thrust
+    """The command of a law, by its kind: thrust and moment (WRENCH), a force (FORCE), attitude and thrust
     (ATTITUDE), or body rates and thrust (RATES)."""
 
     kind: int
@@ -70,10 +71,10 @@ class Asked(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Addresses; a mode whose function is 0 is not the law's."""
+    """Addresses; the law does not define a mode whose function is 0."""
 
     desk: int
-    alarm: int  # called where what the law asks for is no number
+    alarm: int  # called if the law's command is not a number
     load_position: int
     quad_position: int
     load_attitude: int
@@ -82,13 +83,13 @@ class Link(NamedTuple):
 
 UNLINKED = Link(0, 0, 0, 0, 0, 0)
 UNASKED = Asked(WRENCH, nan, (nan, nan, nan), IDENTITY)
-ASKED = width(Now)  # where it lies on the desk
-OWN = ASKED + width(Asked)  # what lies from here on is the law's
+ASKED = width(Now)  # place of `Asked` in the row
+OWN = ASKED + width(Asked)  # from here on the row belongs to the law
 
 
 @kernel
 def is_sound(asked: Asked) -> bool:
-    """Whether all of it are numbers."""
+    """Whether the kind is a known one and all numbers are finite."""
     v, R = asked.vector, asked.attitude
     rows = R[0][0] + R[0][1] + R[0][2] + R[1][0] + R[1][1] + R[1][2] + R[2][0] + R[2][1] + R[2][2]
     return WRENCH <= asked.kind <= RATES and isfinite(asked.thrust + v[0] + v[1] + v[2] + rows)
@@ -96,7 +97,7 @@ def is_sound(asked: Asked) -> bool:
 
 @kernel
 def ask(function: int, address: int, now: Now) -> Asked:
-    """What the C function `void f(double *)` at an address asks for, given the address of a desk."""
+    """The command of the C function `void f(double *)` at an address, called with the address of a row."""
     desk = numbers_at(address, OWN)
     pack(now, desk, 0)
     pack(UNASKED, desk, ASKED)

@@ -11,7 +11,7 @@
 The coordinates are x, y, z of the vehicle, its roll, pitch and yaw, R = Rz(psi) Ry(theta) Rx(phi), and the
 two angles of the cable, phi_L = atan2(q_y, -q_z) and theta_L = atan2(q_x, -q_z): positive where the load is
 to the left (y) and ahead (x) of the vehicle. The source prints neither this convention nor M1 ... M3; with
-this one the signs of all its gains come out.
+this convention the signs of all its gains are reproduced.
 
 To the second order of small coordinates x_L = x_Q + L (theta_L, phi_L, -1 + (theta_L^2 + phi_L^2)/2), so the
 energies in (2-29) are
@@ -76,12 +76,12 @@ def load_state_space(vehicle: Vehicle) -> tuple[Matrix, Matrix]:
     To first order x_L = x_Q + L (theta_L, phi_L, -1) and q = (theta_L, phi_L, -1).
     """
     L = vehicle.cable_length
-    to_load = np.eye(8)  # (x_L, y_L, z_L, phi, theta, psi, q_y, q_x) of the eight coordinates
+    to_load = np.eye(8)  # (x_L, y_L, z_L, phi, theta, psi, q_y, q_x) from the eight coordinates
     to_load[X, THETA_L] = to_load[Y, PHI_L] = L
-    from_load = 2.0 * np.eye(8) - to_load  # its inverse: to_load - I squared is zero
+    from_load = 2.0 * np.eye(8) - to_load  # its inverse: (to_load - I) squared is zero
     A, B = state_space(vehicle)
     stiffness, input_gain = to_load @ A[8:, :8] @ from_load, to_load @ B[8:]
-    # places of (x_L ... q_x) and of their rates among the states
+    # indices of (x_L ... q_x) and of their rates among the states
     position, velocity = np.r_[0:3, 10:13, 7, 6], np.r_[3:6, 13:16, 9, 8]
     A_L, B_L = np.zeros((LOAD_STATES, LOAD_STATES)), np.zeros((LOAD_STATES, 4))
     A_L[position, velocity] = 1.0

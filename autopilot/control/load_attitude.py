@@ -17,10 +17,10 @@
 | m_Q, L      | quad_mass, cable_length|       | kg, m      | (2-36)         |
 
 Why the signs of (3-31) are what they are: (2-36) says that across the cable m_Q L q'' = -F, for q x (q x F)
-is minus the part of F normal to q. The direction error e_q = q x (q x q_d) points away from q_d. So the
-cable wants m_Q L q'' = -k_q e_q - k_w e_q' + (feed-forward) = F_pd + F_ff, and the vehicle must push the
-other way: F = F_n - F_pd - F_ff. The feed-forward is the part of e_q'' that the laws of motion leave, and
-the printed (3-34) is right: with w_d = q_d x q_d', (w_d x q)' across q is (q . w_d)(q x q') + w_d' x q.
+is minus the part of F normal to q. The direction error e_q = q x (q x q_d) points away from q_d. To follow,
+the cable needs m_Q L q'' = -k_q e_q - k_w e_q' + (feed-forward) = F_pd + F_ff, and the vehicle must push the
+other way: F = F_n - F_pd - F_ff. The feed-forward cancels the part of e_q'' besides q'', and the printed
+(3-34) is right: with w_d = q_d x q_d', (w_d x q)' across q is (q . w_d)(q x q') + w_d' x q.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class DirectionCommand(NamedTuple):
 
 
 class DirectionResult(NamedTuple):
-    """The force the vehicle should exert, and the errors it closes; world frame."""
+    """The force that the vehicle should exert, and the errors that it corrects; world frame."""
 
     F: Vec3  # N
     e_q: Vec3
@@ -80,8 +80,8 @@ def normal_force_held(q_cable: Vec3, q_c: Vec3, pull: float) -> Vec3:
     """F_n of (3-32), for the load attitude mode: -(q_d . q) q, times a pull in N.
 
     The printed formula has no unit: as it stands it is a force of 1 N, which lets a vehicle of 4.9 N fall.
-    The pull is what the vehicle has to lift (`height.cable_pull`), so that the mode may last; 1.0 gives the
-    printed law.
+    The pull is what the vehicle has to lift (`height.cable_pull`), so that the mode can be held; 1.0 gives
+    the printed law.
     """
     return scale(-pull * dot(q_c, q_cable), q_cable)
 
@@ -94,6 +94,6 @@ def normal_force_tracking(q_cable: Vec3, A: Vec3) -> Vec3:
 
 @kernel
 def thrust_along(F: Vec3, R: Mat3) -> float:
-    """f of (3-35): F . R e_3. Negative when the vehicle is upside down to the force; the mixer decides
-    then."""
+    """f of (3-35): F . R e_3. Negative if the vehicle is upside down relative to the force; the mixer
+    then limits it."""
     return dot(F, column(R, 2))

@@ -1,5 +1,4 @@
-"""How the load and its cable move under the present thrust: what (2-31) and (2-36) say, and once more
-differentiated.
+"""The motion of load and cable under the present thrust: (2-31), (2-36) and their time derivatives.
 
 | symbol       | code name                | frame | unit    | equation |
 |--------------|--------------------------|-------|---------|----------|
@@ -21,9 +20,9 @@ which is a hundredth of the rest, F' = f' R e_3 + W x f R e_3. Then
     (2-31)    m (x_L'' + g e_3) = T q           m x_L''' = T' q + T q'
     (2-36)    m_Q L q'' = p q - F - m_Q L s q   m_Q L q''' = p' q + p q' - F' - m_Q L (s' q + s q')
 
-with p' = q'.F + q.F', s' = 2 q'.q'', T' = p' - m_Q L s'. A cable that would have to push does nothing: T =
-0. Model: the cable is massless, inextensible, taut and attached at the centre of mass; the air is at rest
-and does not hold the load.
+with p' = q'.F + q.F', s' = 2 q'.q'', T' = p' - m_Q L s'. A cable that would have to push does nothing:
+T = 0. Model: the cable is massless, inextensible, taut and attached at the centre of mass; the air is at rest
+and exerts no force on the load.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from autopilot.geometry.linear import Vec3, add, apply, axpy, column, cross, dot
 
 
 class LoadMotion(NamedTuple):
-    """Derivatives that are no part of the state, world frame."""
+    """Derivatives that are not part of the state, world frame."""
 
     a_load: Vec3  # m/s^2
     j_load: Vec3  # m/s^3
@@ -46,7 +45,7 @@ class LoadMotion(NamedTuple):
 
 @kernel
 def load_motion(state: State, thrust: float, thrust_rate: float, air: Vec3, vehicle: Vehicle) -> LoadMotion:
-    """The motion that the thrust f (N), changing by f' (N/s) while the body turns, gives load and cable."""
+    """The motion of load and cable under the thrust f (N), which changes by f' (N/s) while the body turns."""
     q, q_dot, b3 = state.q_cable, state.q_cable_dot, column(state.R, 2)
     reach = vehicle.quad_mass * vehicle.cable_length
     mass = vehicle.quad_mass + vehicle.load_mass

@@ -1,4 +1,4 @@
-"""Load position: the cable direction that drives the load to its place, (3-40)-(3-44).
+"""Load position: the cable direction that drives the load to its reference, (3-40)-(3-44).
 
 | symbol     | code name             | frame | unit     | equation |
 |------------|-----------------------|-------|----------|----------|
@@ -10,9 +10,9 @@
 | A          | A                     | I     | N        | (3-43)   |
 | q_c        | q_c                   | I     |          | (3-42)   |
 
-A is what the vehicle must exert along the cable for the pair (2-31): hence q_c = -A/|A|, the cable points
-from the vehicle down to the load. The term m_Q L (q'.q') q has the sign of (2-31) brought to the other
-side; both printed formulas agree with it.
+A is the force that the vehicle must exert along the cable to move vehicle and load by (2-31): hence
+q_c = -A/|A|, the cable points from the vehicle down to the load. The term m_Q L (q'.q') q has the sign that
+it gets in (2-31) when moved to the other side; both printed formulas agree with this sign.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from autopilot.geometry.linear import Vec3, add, dot, norm, scale, sub, times
 
 
 class PositionResult(NamedTuple):
-    """The force A and the errors it closes; world frame."""
+    """The force A and the errors that it corrects; world frame."""
 
     A: Vec3  # N
     e_x: Vec3  # m
@@ -59,5 +59,5 @@ def load_position_force(
 
 @kernel
 def computed_direction(A: Vec3) -> Vec3:
-    """q_c of (3-42): -A/|A|; nan where A vanishes, that is where the load is asked to fall freely."""
+    """q_c of (3-42): -A/|A|; nan where A vanishes, that is where the load is commanded to fall freely."""
     return scale(-1.0 / norm(A), A)

@@ -7,14 +7,14 @@
 | u0        | f0         | body          | N                            | (A-4)    |
 | Q, R      | LqrWeights |               |                              | A-2      |
 
-u = u0 - K (x - x_ref). The vehicle, not the load, is what is steered: x_ref is the load's reference one cable
-length higher, at rest and level, its load hanging straight down. Nothing of the reference's derivatives is
+u = u0 - K (x - x_ref). The law steers the vehicle, not the load: x_ref is the load's reference one cable
+length higher, at rest and level, with the cable straight down. No derivative of the reference position is
 used.
 
 The angles of (4-6) and their rates are the exact ones of R and q, in the conventions of `linear_model`. They
-have no meaning for a vehicle on edge (theta = 90 deg) and for a level cable; their rates are bounded there.
-The linear model holds for a heading along x; for any other heading, positions and directions are first
-turned into the frame that looks along it.
+are undefined for a vehicle on edge (theta = 90 deg) and for a level cable; their rates are bounded there. The
+linear model holds for a heading along x; for any other heading, positions and directions are first rotated
+into the frame of this heading.
 """
 
 from __future__ import annotations
@@ -91,13 +91,13 @@ class Lqr(NamedTuple):
     K: Gain
     f0: float  # N
     cable_length: float  # m
-    ramp_lag: float  # s, by which the vehicle is behind a reference that rises or sinks steadily
+    ramp_lag: float  # s, lag of the vehicle behind a reference that rises or sinks steadily
 
 
 @lru_cache(maxsize=8)
 def lqr(vehicle: Vehicle, weights: LqrWeights = LQR_WEIGHTS) -> Lqr:
     """The regulator of this vehicle: its gain minimises (4-7)."""
-    from control import lqr as solve_lqr  # a second to import, which other laws need not pay
+    from control import lqr as solve_lqr  # takes a second to import; other laws do not need it
 
     w = weights
     Q = np.diag([w.position] * 3 + [w.tilt] * 2 + [w.yaw] + [w.swing] * 2 + [w.rate] * 8)
@@ -125,7 +125,7 @@ def attitude_angles(R: Mat3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
     sine = min(1.0, max(-1.0, -R[2][0]))
     cosine = max(_LEAST_COSINE, sqrt(1.0 - sine * sine))
     phi, psi = atan2(R[2][1], R[2][2]), atan2(R[1][0], R[0][0])
-    # sine and cosine of phi, as they stand in R
+    # sine and cosine of phi, from the elements of R
     s_phi, c_phi = R[2][1] / cosine, R[2][2] / cosine
     about_level = s_phi * omega_body[1] + c_phi * omega_body[2]
     psi_dot = about_level / cosine
@@ -143,8 +143,8 @@ def swing_angle(sideways: float, up: float, sideways_dot: float, up_dot: float) 
 
 @kernel
 def state_error(state: State, x_ref: Vec3, b1_d: Vec3, turning: float) -> Row:
-    """x - x_ref of (4-6), for a vehicle that is to rest at x_ref with its nose along b1_d, which turns at
-    `turning` rad/s about the vertical."""
+    """x - x_ref of (4-6), for a vehicle that is to rest at x_ref with its nose along b1_d, a heading that
+    turns at `turning` rad/s about the vertical."""
     H = heading_frame(b1_d)
     x = apply_transposed(H, sub(state.x_quad, x_ref))
     v = apply_transposed(H, state.v_quad)
@@ -184,11 +184,11 @@ def feedback(row: Row, error: Row) -> float:
 
 @kernel
 def load_position(state: State, reference: Reference, regulator: Lqr) -> Command:
-    """The vehicle is steered to a cable length above the reference of the load.
+    """The vehicle is steered to a point one cable length above the load's reference.
 
-    In the command e_x and e_v are still the errors of the load, against the reference and its first
-    derivative; e_q, e_q_dot and Psi_q compare the cable with straight down, e_R, e_Omega and Psi_R the
-    vehicle with level and at rest, nose along b1_d; so q_c and R_c do not move.
+    In the command, e_x and e_v are the errors of the load against the reference and its first derivative.
+    e_q, e_q_dot and Psi_q compare the cable with q_c, straight down and at rest; e_R, e_Omega and Psi_R
+    compare the vehicle with R_c, level with the nose along b1_d, and at rest.
     """
     x_d, v_d = reference.jet[0], reference.jet[1]
     b1_d, b1_d_dot = reference.b1_d, reference.b1_d_dot

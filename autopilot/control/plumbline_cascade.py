@@ -15,21 +15,21 @@
 
 What the thesis filters is computed here:
 
-* e_x, e_v and all that follows are taken from the reference itself, with its derivatives up to the sixth.
-* q_c' and q_c'' are those of (3-42) along the motion of the load under the pull that is asked for
-  (`direction_jet`), feedback and all.
+* e_x, e_v and all that follows are computed from the reference itself, with its derivatives up to the sixth.
+* q_c' and q_c'' are those of (3-42) along the motion of the load under the commanded pull
+  (`direction_jet`), including the feedback.
 * F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
-  give now, whose own second derivative is left out: on the path F hardly depends on it. Near hover F depends
-  on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of the
-  three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
-* The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
-  count.
+  give now. The second derivative of this thrust is left out: on the path F hardly depends on it. Near hover F
+  depends on load and cable alone, F' also on the attitude, F'' also on the body rate; the poles are therefore
+  those of the three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
+* The rotors are commanded F - D, which cancels the air's force D on the vehicle as far as it is known.
 * While the load is lifted, it is followed more slowly: the bandwidths of load and cable are multiplied by
   `pace`.
-* f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
+* f' is the derivative of f = F . R e_3, computed at the tick before: f' = F' . R e_3 + F . (W x R e_3) with
+  W = R Omega.
 
-Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
-caller knows better than the law: `autopilot.control.actuators.rotor_model`.
+Memory is passed in and returned. `thrust` of `load_position` is what the rotors give at this instant, which
+the caller takes from `autopilot.control.actuators.rotor_model`.
 """
 
 from __future__ import annotations
@@ -73,18 +73,18 @@ STEP = 2e-3  # s, of the differences along the motion: truncation and rounding b
 
 GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
 
-# N; a shorter force has no direction to follow, and a load falling freely no cable direction
+# N; a smaller force has no direction to follow, and a freely falling load has no cable direction
 _LEAST_FORCE = 1e-3
 # sine of the least angle between heading and thrust axis at which R_c is differentiated
 _LEAST_SINE = 1e-2
 # tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
 _GREATEST_LEAN = 2.7
 _LEAST_LIFT = 0.2
-# of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
+# of the pull along the cable: the greatest force across it for errors, besides that for the reference
 _GREATEST_ACROSS = 0.7
 _GREATEST_RATE = 15.0  # rad/s
-_HASTENING_TIME = 0.3  # s, in which load and cable come from a standstill to their full pace
-_FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
+_HASTENING_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
+_FULL_RANGE_TIME = 0.1  # s, shortest time in which the thrust is assumed to pass through its whole range
 
 
 class PlumblineGains(NamedTuple):
@@ -104,7 +104,7 @@ class PlumblineMemory(NamedTuple):
 
     thrust_rate: float  # f', N/s
     integral: Vec3  # e_i, of e_x, m s
-    pace: float  # at which load and cable are followed; 1: as designed
+    pace: float  # factor on the bandwidths of load and cable; 1: as designed
 
 
 class WantedForce(NamedTuple):
@@ -129,13 +129,13 @@ PLUMBLINE_GAINS = PlumblineGains(
 
 @kernel
 def start() -> PlumblineMemory:
-    """Memory of a law that begins now: the thrust is taken for steady."""
+    """Memory of a law that begins now: the thrust is assumed to be steady."""
     return PlumblineMemory(0.0, (0.0, 0.0, 0.0), 1.0)
 
 
 @kernel
 def gently(v: Vec3, greatest: float) -> Vec3:
-    """v, never longer than `greatest`: smooth, and 0.2 % shorter than v where v is 0.3 times that."""
+    """v, shortened smoothly to less than `greatest`: by 0.2 % where v is 0.3 times as long as that."""
     share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
     return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
 
@@ -149,7 +149,7 @@ def no_longer(v: Vec3, greatest: float) -> Vec3:
 
 @kernel
 def paced(gains: PlumblineGains, pace: float) -> PlumblineGains:
-    """The gains whose loops of load and cable have so many times the bandwidth."""
+    """The gains with `pace` times the bandwidth in the loops of load and cable."""
     square = pace * pace
     return PlumblineGains(
         gains.k_R,
@@ -168,7 +168,7 @@ def commanded_attitude(
 ) -> AttitudeCommand:
     """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
 
-    Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
+    Without the rates where F vanishes, lies along the heading or leans more than the vehicle may.
     """
     zero: Vec3 = (0.0, 0.0, 0.0)
     b1_d = reference.b1_d
@@ -196,7 +196,7 @@ def commanded_attitude(
 
 @kernel
 def shifted_jet(jet: Jet, h: float) -> Jet:
-    """The reference h seconds later, as far as its six derivatives say."""
+    """The reference h seconds later, extrapolated from its six derivatives."""
     h2, h3, h4 = 0.5 * h * h, h * h * h / 6.0, h * h * h * h / 24.0
     x, v, a, j, s, c, p = jet
     return (
@@ -234,7 +234,7 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
 
 @kernel
 def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
-    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight."""
+    """The force across the cable that the reference itself needs, N: -m_Q L q_d'', at most the weight."""
     mass = vehicle.quad_mass + vehicle.load_mass
     # q_d = -lift / |lift|
     lift, jerk, snap = held_up(
@@ -255,7 +255,7 @@ def wanted_force(
     gains: PlumblineGains,
     vehicle: Vehicle,
 ) -> WantedForce:
-    """F of (3-31), drag and wind made up for, and what it is made from."""
+    """F of (3-31), with drag and wind compensated, and what it is made from."""
     position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
     q_c = direction_jet(position, state)
     direction = load_attitude_force(
@@ -314,8 +314,8 @@ def load_position(
 ) -> tuple[PlumblineMemory, Command]:
     """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
 
-    `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: what the air does
-    to the vehicle besides drag in still air; `period`, s, is that of the law.
+    `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: force of the
+    air on the vehicle besides drag in still air; `period`, s, is that of the law.
     """
     jet = reference.jet
     gains = paced(gains, memory.pace)

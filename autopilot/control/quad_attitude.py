@@ -17,7 +17,7 @@
 | M            | M            | B     | N m     | (3-21), (3-36) |
 | b_1d         | b1_d         | I     |         | (3-29)         |
 
-Two forms of the feed-forward moment are in use. This is the thesis's,
+Two forms of the feed-forward moment are common. This file uses that of the thesis,
 
     Omega x J Omega - J (hat(Omega) R^T R_c Omega_c - R^T R_c Omega_c')
 
@@ -51,7 +51,7 @@ from autopilot.geometry.linear import (
 from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import vee
 
-# sine of the least angle between heading and thrust axis that (3-29) is trusted with
+# sine of the least angle between heading and thrust axis for which (3-29) is used
 _LEAST_SINE = 1e-3
 
 
@@ -64,7 +64,7 @@ class AttitudeCommand(NamedTuple):
 
 
 class AttitudeResult(NamedTuple):
-    """The moment and the errors it closes, all in the body frame."""
+    """The moment and the errors that it corrects, all in the body frame."""
 
     moment: Vec3  # N m
     e_R: Vec3
@@ -76,8 +76,8 @@ class AttitudeResult(NamedTuple):
 def attitude_moment(
     R: Mat3, omega_body: Vec3, command: AttitudeCommand, k_R: Vec3, k_Omega: Vec3, epsilon: float, J: Vec3
 ) -> AttitudeResult:
-    """M of (3-21), (3-36). The gains are diagonals: with k_R of unequal entries e_R is that of (3-3)
-    still."""
+    """M of (3-21), (3-36). The gains are diagonals; e_R is that of (3-3) even if the entries of k_R
+    differ."""
     relative = mul_transposed(command.R_c, R)  # R_c^T R takes body to commanded frame
     e_R = vee(relative)
     psi_R = 0.5 * (3.0 - trace(relative))
@@ -100,8 +100,8 @@ def heading_axis(b3_c: Vec3, b1_d: Vec3) -> Vec3:
     """b_1c of (3-29): the horizontal heading b1_d projected on the plane normal to the unit vector b3_c,
     normalised.
 
-    (3-29) does not exist where b3_c is parallel to b1_d, pitched by 90 deg. Within 0.06 deg of that its
-    limit along a pure pitch is used: the nose straight down, or straight up.
+    (3-29) is undefined where b3_c is parallel to b1_d, at a pitch of 90 deg. Within 0.06 deg of that, its
+    limit for a pure pitch is used: the nose straight down, or straight up.
     """
     normal = cross(b3_c, b1_d)
     n = norm(normal)
@@ -116,7 +116,7 @@ def heading_axis(b3_c: Vec3, b1_d: Vec3) -> Vec3:
 def attitude_from_axes(
     b3: Vec3, b3_dot: Vec3, b3_ddot: Vec3, b1: Vec3, b1_dot: Vec3, b1_ddot: Vec3
 ) -> AttitudeCommand:
-    """R_c (3-27) with Omega_c (3-28) and Omega_c' (3-18), from a thrust direction and a heading that move.
+    """R_c (3-27) with Omega_c (3-28) and Omega_c' (3-18), from a moving thrust direction and heading.
 
     Arguments: two vectors in the world frame, of any length, with two derivatives each. The third column of
     R_c is b3 normalised, the first is b1 without its part along b3, normalised (3-29); derivatives are
@@ -128,7 +128,7 @@ def attitude_from_axes(
     s_dot = dot(c3_dot, b1) + dot(c3, b1_dot)
     p = axpy(-s, c3, b1)
     p_dot = axpy(-s_dot, c3, axpy(-s, c3_dot, b1_dot))
-    # the part of p'' along c3 is left out: of c1'' only the part along c2 is used
+    # the part of p'' along c3 is left out, because only the part of c1'' along c2 is used
     p_ddot = axpy(-2.0 * s_dot, c3_dot, axpy(-s, c3_ddot, b1_ddot))
     c1, c1_dot, c1_ddot = unit_derivatives(p, p_dot, p_ddot)
     c2 = cross(c3, c1)
@@ -147,8 +147,8 @@ def attitude_from_axes(
 def attitude_from_rates(R_c: Mat3, R_c_dot: Mat3, R_c_ddot: Mat3) -> AttitudeCommand:
     """R_c with Omega_c = vee(R_c^T R_c') (3-28) and Omega_c' = vee(R_c^T R_c'') (3-18).
 
-    R_c' (1/s) and R_c'' (1/s^2) are element by element, and may be estimates: what is symmetric in the
-    products is dropped. Of exact derivatives that is nothing in the first, hat(Omega_c)^2 in the second.
+    R_c' (1/s) and R_c'' (1/s^2) are derivatives of the elements and may be estimates: the symmetric part of
+    the products is dropped. For exact derivatives it is zero in the first, hat(Omega_c)^2 in the second.
     """
     return AttitudeCommand(R_c, vee(mul_transposed(R_c, R_c_dot)), vee(mul_transposed(R_c, R_c_ddot)))
 

@@ -30,7 +30,7 @@ from autopilot.control.thesis_cascade import (
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 
-# tan 35 deg: the slack phases are no place for aggressive tilt
+# tan 35 deg: the slack phases need no greater tilt
 _TILT_TANGENT = 0.7
 # least and greatest upward force, in weights
 _LEAST_LIFT = 0.2
@@ -88,8 +88,8 @@ def quad_position(
     """x_Q follows the reference, whose velocity and acceleration are used as given.
 
     `carried_mass`, kg, is what hangs on the vehicle: 0 while the cable is slack, the load's mass when it is
-    not; `push`, N, world, is what the wind does to the vehicle by belief. e_x, e_v of the command are
-    errors of the vehicle. Of the memory only the attitude filters are used.
+    not; `push`, N, world, is the assumed force of the wind on the vehicle. e_x, e_v of the command are
+    errors of the vehicle. Only the attitude filters of the memory are used.
     """
     x_d, v_d, a_d = reference.jet[0], reference.jet[1], reference.jet[2]
     mass = vehicle.quad_mass + carried_mass

@@ -1,6 +1,6 @@
-"""The records that travel between the laws: NamedTuples, because kernels take and return them.
+"""The records that the laws take and return: NamedTuples, because kernels can take and return those.
 
-SI units, world ENU, body FLU. Whatever a field name does not say is in the world frame.
+SI units, world ENU, body FLU. A field whose name states no frame is in the world frame.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ Jet = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
 
 
 class Vehicle(NamedTuple):
-    """What the autopilot believes of the vehicle (Table 4-1). Assumptions: principal axes are the body axes,
-    the cable is massless and inextensible. The laws take it for attached at the centre of mass; what becomes
-    of another `attachment` is in `autopilot.core.attachment`."""
+    """The vehicle as the autopilot assumes it (Table 4-1). Assumptions: principal axes are the body axes, the
+    cable is massless and inextensible. The laws assume that it is attached at the centre of mass;
+    `autopilot.core.attachment` accounts for any other `attachment`."""
 
     quad_mass: float  # m_Q, kg, without the load
     load_mass: float  # m_L, kg
@@ -29,15 +29,15 @@ class Vehicle(NamedTuple):
     torque_ratio: float  # c = d/b, m: drag torque for each newton of thrust
     rotor_min: float  # N, one rotor
     rotor_max: float  # N, one rotor; inf if unlimited
-    lift: float = 4.0  # thrust when the first rotor of strength 1 reaches a force, of that force
-    level: float = 2.0  # the same of a moment about a level axis, of that force times `arm`
+    lift: float = 4.0  # thrust when the first rotor of strength 1 reaches a force, divided by that force
+    level: float = 2.0  # the same for a moment about a level axis, divided by that force times `arm`
     attachment: Vec3 = (0.0, 0.0, 0.0)  # m, of the cable, from the centre of mass, body
 
 
 class Cable(NamedTuple):
-    """The cable at this tick, as the winch has it."""
+    """The cable at this tick, as set by the winch."""
 
-    length: float  # L, m, from vehicle to load; infinite where nothing ties the load to the vehicle
+    length: float  # L, m, from vehicle to load; infinite if the load is not tied to the vehicle
     rate: float = 0.0  # L', m/s
     accel: float = 0.0  # L'', m/s^2
 
@@ -53,7 +53,7 @@ class State(NamedTuple):
     v_quad: Vec3  # m/s
     R: Mat3  # body to world
     omega_body: Vec3  # Omega, rad/s, body
-    a_quad: Vec3 = (0.0, 0.0, 0.0)  # x_Q'', m/s^2, by the accelerometer
+    a_quad: Vec3 = (0.0, 0.0, 0.0)  # x_Q'', m/s^2, from the accelerometer
 
 
 class Reference(NamedTuple):
@@ -74,8 +74,8 @@ class Nose(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What goes to the mixer, and the errors it was made from. Errors that a flight mode does not close are
-    zero, so is a Psi that it does not define."""
+    """What goes to the mixer, and the errors it was made from. Errors that a flight mode does not control are
+    zero, as is a Psi that it does not define."""
 
     thrust: float  # f, N, along the thrust axis
     moment: Vec3  # M, N m, body
@@ -87,8 +87,8 @@ class Command(NamedTuple):
     e_Omega: Vec3  # rad/s, (3-6), body
     psi_R: float  # (3-1), 0 ... 2
     psi_q: float  # (3-8), 0 ... 2
-    q_c: Vec3  # the cable direction asked for: computed (3-42) or desired
-    R_c: Mat3  # the attitude asked for: computed (3-27) or desired
+    q_c: Vec3  # the commanded cable direction: computed (3-42) or desired
+    R_c: Mat3  # the commanded attitude: computed (3-27) or desired
 
 
 @kernel

@@ -16,16 +16,16 @@
 | omega_n of x_d  | reference       | 25             | rad/s      | (4-3)    |
 | zeta            |                 | 0.98           |            | (4-3)    |
 
-What the filters feed decides how the cascade flies, and the thesis leaves part of it open. Here:
+How the filtered values are used decides how the cascade flies, and the thesis leaves part of it open. Here:
 
 * The errors e_x, e_v, e_q, e_q' are taken from the filtered commands, x_1 and x_2 of (4-2), as in Figure 4-5.
   The filtered q_c is normalised, q_c' and q_c'' are the exact derivatives of the normalised vector.
-* The errors e_R and Psi_R are taken from R_c itself (3-27): nine filtered numbers are no rotation. Of the
-  filters only R_c' and R_c'' are used, as 4-3 says, in (3-28) and (3-18): Omega_c = vee(R_c^T R_c').
+* The errors e_R and Psi_R are taken from R_c itself (3-27): nine filtered numbers are not a rotation. The
+  filters give only R_c' and R_c'', as 4-3 says, for (3-28) and (3-18): Omega_c = vee(R_c^T R_c').
 
-With these the printed step response of Case A is met; benchmarks/thesis_assumptions.py has the other choices.
+This gives the printed step response of Case A; benchmarks/thesis_assumptions.py has the other choices.
 
-Memory comes in and goes out. A mode starts from `start`, at the present motion, so that no command jumps.
+Memory is passed in and returned. A mode starts from `start`, at the present motion, so that no command jumps.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ OMEGA_DIRECTION = 25.0
 OMEGA_REFERENCE = 25.0
 ZETA = 0.98
 
-# A filtered unit vector shrinks while its command turns fast; below these lengths its direction means nothing
+# A filtered unit vector shrinks while its command turns fast; below this length its direction means nothing
 _LEAST_LENGTH = 0.1
-# N; a shorter force has no direction to follow
+# N; a smaller force has no direction to follow
 _LEAST_FORCE = 1e-3
 
 
@@ -147,10 +147,10 @@ def start(state: State, x_d: Vec3, v_d: Vec3) -> ThesisMemory:
 def filtered_direction(
     memory: FilterState, q_raw: Vec3, constants: FilterConstants
 ) -> tuple[FilterState, DirectionCommand]:
-    """The cable direction asked for, passed through its filter, with two derivatives."""
+    """The commanded cable direction, passed through its filter, with two derivatives."""
     memory = filter_step(memory, q_raw, constants)
     if norm(memory.x1) < _LEAST_LENGTH:
-        # the command has turned by nearly half a turn at once: begin again from it
+        # the command has jumped by nearly half a turn: begin again from it
         memory = filter_start(q_raw, (0.0, 0.0, 0.0))
     q_c, q_c_dot, q_c_ddot = unit_derivatives(memory.x1, memory.x2, filter_acceleration(memory, constants))
     return memory, DirectionCommand(q_c, q_c_dot, q_c_ddot)
@@ -160,7 +160,7 @@ def filtered_direction(
 def filtered_rates(
     memory: ThesisMemory, R_c: Mat3, constants: FilterConstants
 ) -> tuple[ThesisMemory, AttitudeCommand]:
-    """The attitude asked for, with the rate and acceleration that its filter gives, element by element."""
+    """The commanded attitude, with the rate and acceleration that its filter gives, element by element."""
     b1 = filter_step(memory.b1, column(R_c, 0), constants)
     b2 = filter_step(memory.b2, column(R_c, 1), constants)
     b3 = filter_step(memory.b3, column(R_c, 2), constants)
@@ -194,9 +194,9 @@ def quad_attitude(
     filters: ThesisFilters,
     vehicle: Vehicle,
 ) -> tuple[ThesisMemory, Command]:
-    """Vehicle attitude mode: R follows R_d (3-21). The thrust, N, is whatever the caller wants of it.
+    """Vehicle attitude mode: R follows R_d (3-21). The caller gives the thrust, N.
 
-    Also the innermost loop of the other modes, which hand it their R_c: then this is (3-36).
+    Also the innermost loop of the other modes, which pass it their R_c: the moment is then (3-36).
     """
     memory, attitude = filtered_rates(memory, R_d, filters.attitude)
     result = attitude_moment(
@@ -277,7 +277,7 @@ def load_position(
 ) -> tuple[ThesisMemory, Command]:
     """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
 
-    Of the reference only the position is used: as in the thesis its derivatives come from the filter.
+    Only the position of the reference is used: as in the thesis, its derivatives come from the filter.
     """
     x = filter_step(memory.reference, reference.jet[0], filters.reference)
     position = load_position_force(

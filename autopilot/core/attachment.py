@@ -1,19 +1,19 @@
-"""A cable that is attached away from the vehicle's centre of mass, as VEH_ATT_ tells.
+"""A cable that is attached away from the vehicle's centre of mass, by the parameters VEH_ATT_.
 
-Estimator and laws go on thinking of a cable at the place of the vehicle: what tells where the vehicle is, is
-made to tell where the cable is attached, and that is what is then known, flown and told as its place. What
-the cable's pull does to the attitude is what the rotors' moments are chosen to undo.
+Estimator and laws assume a cable attached at the vehicle's position. Therefore the readings of this position
+are shifted to the point of attachment, and that point is estimated, flown and reported as the vehicle's
+position. The moment of the cable's pull is compensated by the rotors' moments.
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
 | rho | attachment | body, m | from the centre of mass |
-| f | thrust | B, N | that the rotors are believed to give |
+| f | thrust | B, N | assumed of the rotors |
 | T | tension | N | mu (L q'.q' - q . f R e_3 / m_Q), (2-31) |
 | M_T | | body, N m | rho x R^T T q |
 
-Left out: what the attitude's acceleration adds to that of the attachment, rho Omega' (0.1 m/s^2 for 1 cm and
-10 rad/s^2), which the inertial unit does not feel, and what the turning vehicle adds to mu. The plant has
-both.
+Left out are the acceleration of the attachment by the angular acceleration, rho Omega' (0.1 m/s^2 for 1 cm
+and 10 rad/s^2), which the inertial unit does not measure, and the effect of the turning vehicle on mu. The
+plant has both.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from autopilot.geometry.so3 import rotation_from_quat
 
 @kernel
 def off_centre(vehicle: Vehicle) -> bool:
-    """Whether the cable is believed to be attached away from the centre of mass."""
+    """Whether the cable is assumed to be attached away from the centre of mass."""
     rho = vehicle.attachment
     return rho[0] != 0.0 or rho[1] != 0.0 or rho[2] != 0.0
 
 
 @kernel
 def tell_attachment(inbox: Array, count: int, estimator: EstimatorState, attachment: Vec3) -> None:
-    """Let the readings of the vehicle's place, in the inbox, be of where the cable is attached."""
+    """Shift the readings of the vehicle's position and velocity, in the inbox, to the cable's attachment."""
     omega = estimator.vehicle.omega_body
     arm = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), attachment)
     beside = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), cross(omega, attachment))
@@ -58,7 +58,7 @@ def tell_attachment(inbox: Array, count: int, estimator: EstimatorState, attachm
 
 @kernel
 def cable_moment(state: State, thrust: float, load_mass: float, length: float, vehicle: Vehicle) -> Vec3:
-    """M_T of a taut cable, that carries a load of this mass (kg) and is so long (m)."""
+    """M_T of a taut cable of this length (m), which carries a load of this mass (kg)."""
     reduced_mass = load_mass * vehicle.quad_mass / (load_mass + vehicle.quad_mass)
     q = state.q_cable
     lifted = thrust / vehicle.quad_mass * dot(q, column(state.R, 2))

@@ -1,11 +1,10 @@
-"""Where an estimator that somebody has brought takes its place in the tick.
+"""The place of a custom estimator in the tick.
 
-Once the tick has made the built-in estimate it calls `take_turn`, which is compiled once for all estimators.
-That gathers what has been sensed on the estimator's desk, calls the estimator with the address of the desk,
-and puts what it gives where the laws, the supervisor and telemetry look: into `Seen.state`. All else that is
-seen stays the built-in filter's: whether the cable is taut, tilt, pull, and what keeps the estimate from
-being flown on. An estimator that fails is not called again: from that very tick on the built-in estimate is
-there instead.
+After the built-in estimate, the tick calls `take_turn`, which is compiled once for all estimators. It writes
+the readings to the estimator's desk, calls the estimator with the address of the desk, and writes the result
+to `Seen.state`, where the laws, the supervisor and telemetry read it. Everything else in `Seen` stays that of
+the built-in filter: whether the cable is taut, tilt, pull, and the complaints about the estimate. An
+estimator that fails is not called again: from that same tick on, the built-in estimate is used instead.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
 class Turn(NamedTuple):
-    """The seat: what the tick says, and addresses."""
+    """The seat: arguments of the tick, and addresses."""
 
     readings: int  # in the inbox
     now_us: int
@@ -61,7 +60,7 @@ class Turn(NamedTuple):
     shown: int  # `EstimatorState` as telemetry shows it
     desk: int
     estimate: int  # the estimator, a C function of the desk's address
-    alarm: int  # a C function that is called where the estimate is of no use
+    alarm: int  # a C function that is called if the estimate cannot be used
 
 
 _SEAT = width(Turn)
@@ -71,7 +70,7 @@ _CONSTANTS, _ESTIMATOR = width(CoreConstants), width(EstimatorState)
 
 @kernel
 def gather(turn: Turn, inbox: Array, f: Row, seen: Seen, desk: Row) -> None:
-    """Put what is sensed at this tick on the desk; `f` are the forces of the rotors."""
+    """Write what is sensed at this tick to the desk; `f` are the forces of the rotors."""
     constants = unpack(CoreConstants, numbers_at(turn.constants, _CONSTANTS), 0)
     pilot = unpack(Pilot, numbers_at(turn.pilot, _PILOT), 0)
     winch = unpack(Winch, numbers_at(turn.winch, _WINCH), 0)
@@ -87,7 +86,7 @@ def gather(turn: Turn, inbox: Array, f: Row, seen: Seen, desk: Row) -> None:
 
 @kernel
 def show(estimate: Estimate, seen: Row, shown: Row) -> None:
-    """Put a sound estimate where all look."""
+    """Write a sound estimate to `seen` and `shown`, from which it is read."""
     told, state = unpack(Seen, seen, 0), estimate.state
     if isnan(state.a_quad[0]):
         state = with_field(state, "a_quad", told.state.a_quad)
@@ -117,7 +116,7 @@ def take_turn(address: int) -> None:
     was_known = unpack(Estimate, desk, GIVEN).known and desk[0] == 0.0
     pack(UNGIVEN, desk, GIVEN)
     call_at(turn.estimate, turn.desk)
-    desk[0] = 0.0  # what begins has begun
+    desk[0] = 0.0  # `Sensed.begins`: the first tick has passed
     estimate = unpack(Estimate, desk, GIVEN)
     for i in range(_ESTIMATOR):
         shown[i] = estimator[i]
@@ -131,7 +130,7 @@ def take_turn(address: int) -> None:
 
 
 class Seat:
-    """The place of one flight's estimator. `alarmed` is called, amid a tick, when it has failed."""
+    """The place of one flight's estimator. `alarmed` is called, during a tick, when it has failed."""
 
     def __init__(self, estimator: OwnEstimator, rows: CoreRows, alarmed: Callable[[], None]) -> None:
         self.host = EstimatorHost(estimator, alarmed)
@@ -143,7 +142,7 @@ class Seat:
 
     @property
     def fault(self) -> str:
-        """Why it does not fly any more; empty while it does."""
+        """Why the estimator is no longer used; empty while it is."""
         return self.host.guard.fault
 
     @property
@@ -153,11 +152,12 @@ class Seat:
 
     @property
     def link(self) -> tuple[int, int]:
-        """What the tick calls, and with which address; zeros where nothing is to be called."""
+        """Addresses of the function that the tick calls and of its argument; zeros if nothing is to be
+        called."""
         return (0, 0) if self.fault else (_address(self._turn), self._seat.ctypes.data)
 
     def bind(self, rows: CoreRows) -> None:
-        """Let it estimate by these rows, whose arrays must live as long as the seat."""
+        """Connect the seat to these rows, whose arrays must live as long as the seat."""
         self._rows = rows
         turn = Turn(
             readings=0,
@@ -178,7 +178,7 @@ class Seat:
         pack(turn, self._seat, 0)
 
     def make(self, values: Mapping[str, float]) -> None:
-        """Make it with these parameters; what it remembers is kept."""
+        """Make the estimator with these parameters; what it remembers is kept."""
         self.host.make(values)
         self.bind(self._rows)
 
@@ -189,5 +189,5 @@ def _turn() -> Any:
 
 
 def _address(function: Any) -> int:
-    """Of a C function: of Python, or the address itself."""
+    """The address of a C function, given as a function of Python or as the address itself."""
     return function if isinstance(function, int) else int(ctypes.cast(function, ctypes.c_void_p).value or 0)

@@ -1,8 +1,9 @@
-"""The flight software around its compiled tick: the supervisor where it may have something to decide.
+"""The flight software around its compiled tick; the supervisor runs only where it may have to decide.
 
 `FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs a tick,
-`decide` is the supervisor's part of one that a sweep's loop flies. The cable as the winch has it enters the
-tick as `Winch`, what is flown and until when as `Stretch` with its setpoints laid out.
+`decide` is the supervisor's part of a tick that a sweep's loop flies. The tick receives the state of the
+cable from the winch as `Winch`, and what is flown and until when as `Stretch`, with the setpoints computed in
+advance.
 """
 
 from __future__ import annotations
@@ -65,9 +66,9 @@ from autopilot.supervisor.state import Flight, Report, Text, View, carries, leg_
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.vehicle.rotors import allocate, sizes
 
-LAID_OUT = 250  # setpoints that are laid out at once, a second of them: it must not cost a tick
+LAID_OUT = 250  # setpoints computed in one call, a second of them: this must not delay a tick
 LAID_OUT_WAITING = 4000  # where the clock waits, as in lockstep and in a sweep
-LAID_OUT_BRAKING = 50  # of a stop, which takes 20 us each: whoever commands one must not cost a tick
+LAID_OUT_BRAKING = 50  # of a stop, which takes 20 us each: a commanded stop must not delay a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
 
@@ -88,18 +89,18 @@ class Setup:
     layout: Layout = PLUS
     rotor_watch: float = 1.0  # as of `believed_rotor_watch`
     factor_share: float = 0.0  # as of `believed_factor_share`
-    own: OwnSetup | None = None  # the law that somebody has brought, if it is the one that flies
-    estimator: OwnSetup | None = None  # the estimator that somebody has brought
-    planner: OwnSetup | None = None  # the same of paths through waypoints
+    own: OwnSetup | None = None  # the custom law, if it is the one that flies
+    estimator: OwnSetup | None = None  # the custom estimator
+    planner: OwnSetup | None = None  # the custom planner of paths through waypoints
 
     @property
     def preview_s(self) -> float:
-        """How much later than now the law wants to know its reference."""
+        """Time in s by which the law requires its reference in advance."""
         return law_of(self.law).preview_s(self.law)
 
 
 class LaidOut(NamedTuple):
-    """Which setpoints lie in `CoreRows.targets`: of the first of these legs, from a tick on."""
+    """The setpoints in `CoreRows.targets`: those of the first of these legs, from a tick on."""
 
     legs: tuple[Leg, ...]
     leg_start_us: int
@@ -114,16 +115,16 @@ class FlightCore:
     def __init__(self, setup: Setup, laid_out: int = LAID_OUT) -> None:
         self.setup = setup
         self.flight = Flight()
-        self.settings = setup.settings  # with the cable as it is
+        self.settings = setup.settings  # with the present cable
         self._laid_out = laid_out
         self._lost = 0  # rotors that are known to be lost: bits
-        self._cable_m: float | None = None  # that `settings` were made for
-        self._dirty = True  # the flight has changed since the winch was told
+        self._cable_m: float | None = None  # length for which `settings` were made
+        self._dirty = True  # the flight has changed since `rows.winch` was written
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
         self._host: Host | None = None
         self._seat: Seat | None = None
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
-        self._law: Any = None  # `law`, once it was asked for
+        self._law: Any = None  # `law`, once it was needed
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
@@ -148,7 +149,7 @@ class FlightCore:
             self._seat.make(setup.estimator.values)
             self._relieve()
 
-    # ---- what there is
+    # ---- the present state
 
     @property
     def estimator(self) -> EstimatorState:
@@ -157,7 +158,7 @@ class FlightCore:
 
     @property
     def told_rpm(self) -> tuple[float, ...]:
-        """Speeds that the speed controllers told last, rpm, one of each rotor."""
+        """Speeds that the speed controllers reported last, rpm, one of each rotor."""
         return tuple(self.rows.rotors[TOLD, : len(self.setup.layout)].tolist())
 
     @property
@@ -167,13 +168,13 @@ class FlightCore:
 
     @property
     def shown_estimator(self) -> Array:
-        """`EstimatorState` as telemetry shows it: with what an estimator of somebody's own gives."""
+        """`EstimatorState` as telemetry shows it: with the results of a custom estimator, if one is used."""
         return self.rows.estimator if self._seat is None or self._seat.fault else self._seat.shown
 
     @property
     def built_in(self) -> tuple[Vec3, Vec3, Vec3] | None:
-        """Load (position, velocity) and vehicle as the built-in filter has them beside an estimator of
-        somebody's own; None where that does not fly."""
+        """Load (position, velocity) and vehicle (position) as the built-in filter estimates them beside a
+        custom estimator; None if no custom estimator is used."""
         if self._seat is None or self._seat.fault:
             return None
         state = self._seat.built_in
@@ -181,13 +182,13 @@ class FlightCore:
 
     @property
     def force_row(self) -> Array:
-        """What the rotors are to give, N; zeros for those that there are not."""
+        """Commanded forces of the rotors, N; zeros for rotors that do not exist."""
         row: Array = self.rows.rotors[FORCE]
         return row
 
     @property
     def forces(self) -> tuple[float, ...]:
-        """What each rotor is to give, N."""
+        """Commanded force of each rotor, N."""
         return tuple(self.force_row[: len(self.setup.layout)].tolist())
 
     @property
@@ -204,7 +205,7 @@ class FlightCore:
         return self._reeling[1]
 
     def view(self, now_us: int, pulls: bool = False) -> View:
-        """What the supervisor sees; of the cable's pull only during a tick."""
+        """What the supervisor sees; the cable's pull only during a tick (`pulls`)."""
         seen = unpack(Seen, self.rows.seen, 0)
         carried = carries(self.flight)
         found: tuple[str, ...] = ()
@@ -240,7 +241,7 @@ class FlightCore:
     # ---- from tick to tick
 
     def take_inbox(self, inbox: Array) -> None:
-        """A larger inbox."""
+        """Use a larger inbox."""
         self.rows = self.rows._replace(inbox=inbox)
         if self._seat is not None:
             self._seat.bind(self.rows)
@@ -262,7 +263,7 @@ class FlightCore:
         return self._law
 
     def compile(self) -> Callable[..., int]:
-        """Have that machine code of a tick ready that is the same with all laws."""
+        """Prepare the machine code of a tick that is the same with all laws."""
         self._fly = entry_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
         return self._fly
 
@@ -277,7 +278,7 @@ class FlightCore:
         return report
 
     def complete(self, count: int, now_us: int, tick: int, dt: float) -> Report:
-        """The rest of a tick that is estimated, and is to be decided upon."""
+        """The rest of a tick after its estimate: the supervisor decides, then the law flies."""
         report = self.decide(now_us, round(dt * 1e6))
         fly = self._fly or self.compile()
         fly(self.rows, self.law, count, now_us, tick, dt, True)
@@ -286,25 +287,26 @@ class FlightCore:
 
     @property
     def runs(self) -> bool:
-        """Whether machine code can fly the next tick, but for what the supervisor is to decide; a law that
-        somebody has brought is called by it."""
+        """Whether machine code can fly the next tick, apart from decisions of the supervisor; it also calls a
+        custom law."""
         return self._seat is None and not self._dirty and not self.reels
 
     def address_of_tick(self) -> int:
-        """The address of `fly_tick`, compiled or loaded where need be; 0 where nothing is compiled."""
+        """The address of `fly_tick`, compiled or loaded if necessary; 0 where nothing is compiled."""
         if not hasattr(fly_tick, "overloads"):
             return 0
         return native_address_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
 
     def raise_interruption(self) -> None:
-        """Raise what has interrupted law or estimator amid the tick and is not its fault, as Ctrl-C."""
+        """Raise what interrupted law or estimator during the tick without being their fault, such as
+        Ctrl-C."""
         if self._host is not None:
             self._host.guard.raise_interruption()
         if self._seat is not None:
             self._seat.host.guard.raise_interruption()
 
     def decide(self, now_us: int, period_us: int) -> Report:
-        """The supervisor's part of a tick that is estimated already; the law's is still to come."""
+        """The supervisor's part of a tick, after the estimate and before the law."""
         self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
         self._dirty = True
         self._lay_out(now_us, period_us)
@@ -312,7 +314,7 @@ class FlightCore:
         return report
 
     def _use_rotors(self) -> None:
-        """Mix for the rotors that are not lost, where these can carry the vehicle."""
+        """Use the mixer's table for the rotors that are not lost, if these can fly the vehicle."""
         lost = self.flight.rotors_lost
         if lost != self._lost:
             self._lost = lost
@@ -320,7 +322,7 @@ class FlightCore:
             pack(self._constants(), self.rows.constants, 0)
 
     def _table(self) -> Array:
-        """Of the mixer, for the rotors that are left if these can fly the vehicle."""
+        """The mixer's table, for the remaining rotors if these can fly the vehicle, otherwise for all."""
         left = self.setup.settings.rotors.can_fly_without(self._lost)
         layout = self.setup.layout
         return with_lags(allocate(layout, self._lost if left else 0), layout, self.setup.actuation)
@@ -344,7 +346,7 @@ class FlightCore:
         )
 
     def move_cable(self, now_us: int) -> None:
-        """Let the cable be as the winch has it at this instant."""
+        """Set the cable to the winch's state at this instant."""
         flight = self.flight
         if not (self._dirty or self.reels):
             return
@@ -355,7 +357,7 @@ class FlightCore:
         grown = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
         cable = Cable(length, winch.reel_rate, winch.reel_accel)
         pack(Winch(cable, grown, winch.released), self.rows.winch, 0)
-        # what has grown is told once
+        # the growth is passed on once
         self._dirty = grown != 0.0
         self._follow_cable()
 
@@ -370,7 +372,7 @@ class FlightCore:
         self.settings = settings
 
     def _lay_out(self, now_us: int, period_us: int) -> None:
-        """The stretch that begins with this tick, and its setpoints."""
+        """Compute the stretch that begins with this tick, and its setpoints."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
         self.laid = None
@@ -393,7 +395,7 @@ class FlightCore:
             targets = references = jets_ahead(legs, times)
             if preview_s != 0.0:
                 references = jets_ahead(legs, times + preview_s)
-            # the rest of them are of legs that follow
+            # the remaining setpoints are those of legs that follow
             own = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
             self.laid = LaidOut(flight.legs, flight.leg_start_us, now_us, stretch.period_us, times[:own])
         stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
@@ -401,21 +403,22 @@ class FlightCore:
         self.rows = self.rows._replace(targets=targets, references=references)
 
     def setpoints_until_us(self, period_us: int) -> int:
-        """When `setpoint_row` has no row any more for ticks of this period; 0: it has none now."""
+        """The time from which `setpoint_row` has no row for ticks of this period; 0: it has none now."""
         laid, flight = self.laid, self.flight
         if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
             return 0
         return laid.first_us + period_us * len(laid.times_s) if laid.period_us == period_us else 0
 
     def setpoint_row(self, now_us: int) -> int:
-        """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: none has it."""
+        """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: there is
+        none."""
         laid, flight = self.laid, self.flight
         if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
             return -1
         at, off = divmod(now_us - laid.first_us, laid.period_us)
         return at if off == 0 and 0 <= at < len(laid.times_s) else -1
 
-    # ---- what comes between two ticks
+    # ---- between two ticks
 
     def ask(self, request: object, now_us: int) -> Verdict:
         """The supervisor's verdict on a request, which may change the flight."""
@@ -424,21 +427,21 @@ class FlightCore:
         return verdict
 
     def change(self, flight: Flight) -> None:
-        """Another flight; the next tick is decided upon."""
+        """Replace the flight; the supervisor runs at the next tick."""
         if flight is not self.flight:
             self.flight = flight
             self._dirty = True
             self.interrupt()
 
     def take_up(self, found: Found, now_us: int) -> None:
-        """Go on with a flight that is under way."""
+        """Continue a flight that is under way."""
         rotors = steady(found.thrust_n, len(self.rows.commands))
         self.rows.commands[:] = rotors.queue
         pack(self.pilot._replace(thrust=rotors.thrust), self.rows.pilot, 0)
         self.change(take_up(self.flight, found, self.view(now_us), self.settings))
 
     def begin_anew(self, why: str, now_us: int) -> tuple[Text, ...]:
-        """Forget the estimate, and end a flight, which could not be controlled; the texts about it."""
+        """Discard the estimate, and end a flight, which could not be controlled; the texts about it."""
         flight, texts = broken_off(self.flight, why, self.view(now_us), self.settings)
         self.change(flight)
         pack(blank_state(), self.rows.estimator, 0)
@@ -449,7 +452,7 @@ class FlightCore:
         return texts
 
     def _rows_of_law(self, setup: Setup) -> Any:
-        """Rows of the law; one that somebody has brought is called from them."""
+        """Rows of the law; a custom law is called from them."""
         rows = new_rows(setup.law)
         if setup.own is not None:
             if self._host is None:
@@ -458,17 +461,17 @@ class FlightCore:
         return rows
 
     def _relieve(self) -> None:
-        """Let the tick call the estimator that somebody has brought, as long as it has not failed."""
+        """Let the tick call the custom estimator, as long as it has not failed."""
         pack(self._constants(), self.rows.constants, 0)
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Let the supervisor look at the next tick."""
+        """Let the supervisor run at the next tick."""
         stretch = unpack(Stretch, self.rows.stretch, 0)
         pack(stretch._replace(stop_us=0), self.rows.stretch, 0)
 
     def follow(self, setup: Setup) -> None:
-        """Other parameters, from the next tick on."""
+        """Use other parameters from the next tick on."""
         before, self.setup = self.setup, setup
         self._cable_m, self.settings = None, setup.settings
         self._dirty = True
@@ -478,7 +481,7 @@ class FlightCore:
         commands = np.zeros((rows_of(setup.actuation), 4))
         kept = min(len(commands), len(self.rows.commands))
         commands[:kept] = self.rows.commands[:kept]
-        # a longer delay asks for more than is remembered: before, they were asked for about the same
+        # a longer delay requires older commands than are stored: the oldest stored command replaces them
         commands[kept:] = self.rows.commands[-1]
         self.rows = self.rows._replace(commands=commands, table=self._table())
         rows = self._rows_of_law(setup)
@@ -494,7 +497,7 @@ class FlightCore:
 
 
 def with_cable_now(flight: Flight, now_us: int) -> Flight:
-    """The flight with its cable as the winch has it at this instant: L, L' and L'' of the leg that reels."""
+    """The flight with its cable as reeled at this instant: L, L' and L'' of the leg that reels."""
     top = top_of(flight.legs[0]) if flight.legs else None
     if top is None:
         if flight.cable.reel_rate == 0.0 and flight.cable.reel_accel == 0.0:

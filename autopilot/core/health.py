@@ -1,9 +1,9 @@
-"""Condition of the vehicle that telemetry shows and nothing flies by: sensors heard, vibration, battery.
+"""Condition of the vehicle, shown in telemetry and not used for flight: sensors, vibration, battery.
 
-Where no sensor tells of the battery, charge, current and voltage are those of a model,
+Where no sensor measures the battery, charge, current and voltage are those of a model,
 `autopilot.vehicle.battery`, in which rotors that carry the bare vehicle draw BAT_HOVER_W.
 
-Vibration is what ArduPilot calls so: the acceleration less its mean below 5 Hz, squared, averaged below 2 Hz,
+Vibration is defined as in ArduPilot: the acceleration less its mean below 5 Hz, squared, averaged below 2 Hz,
 square root.
 """
 
@@ -29,7 +29,7 @@ from autopilot.vehicle.battery import (
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
 
-_FRESH_US = 500_000  # a sensor is healthy while its last word is no older
+_FRESH_US = 500_000  # a sensor is healthy while its last reading is no older
 _MEAN_HZ, _SQUARE_HZ = 5.0, 2.0
 _FIELDS = (
     (ACCEL, snapshot.ACCEL),
@@ -41,9 +41,9 @@ _NEVER = (-1, -1, -1, -1)
 
 
 class Condition(NamedTuple):
-    """All that is carried from tick to tick."""
+    """The data carried from tick to tick."""
 
-    heard_us: tuple[int, int, int, int] = _NEVER  # when each of _FIELDS was heard last
+    heard_us: tuple[int, int, int, int] = _NEVER  # when each of _FIELDS was read last
     fix_us: int = -1
     mean: Vec3 = ZERO  # m/s^2, body
     square: Vec3 = ZERO
@@ -52,7 +52,7 @@ class Condition(NamedTuple):
 
 
 def battery_constants(table: AutopilotParameters) -> Battery:
-    """From the parameters."""
+    """The constants of the battery, from the parameters."""
     rotors = len(table.layout)
     return Battery(
         table["BAT_CAPACITY"] * 3.6,
@@ -68,7 +68,7 @@ def remaining(condition: Condition, battery: Battery) -> float:
 
 
 def voltage(condition: Condition, battery: Battery) -> float:
-    """V at the terminals."""
+    """Voltage at the terminals, V."""
     return terminal_voltage(condition.used_as, condition.current, battery)
 
 
@@ -81,10 +81,10 @@ def _last(heard_us: int, now_us: int, fields: int, field: int) -> int:
 def follow(
     condition: Row, imu: Row, forces: Row, battery: Row, fields: int, fixed: bool, now_us: int, dt: float
 ) -> None:
-    """Bring a `Condition` to the next tick, `dt` seconds later.
+    """Advance a `Condition` to the next tick, `dt` seconds later.
 
-    `imu` is the `ImuReading` of this tick, `forces` what the rotors give (N), `battery` the
-    `Battery`; `fields` says what HIL_SENSOR brought, `fixed` whether there was a HIL_GPS.
+    `imu` is the `ImuReading` of this tick, `forces` what the rotors give (N), `battery` the `Battery`;
+    `fields` is HIL_SENSOR.fields_updated, `fixed` whether there was a HIL_GPS.
     """
     before, sample = unpack(Condition, condition, 0), unpack(ImuReading, imu, 0)
     heard = (
@@ -116,13 +116,13 @@ def follow(
 
 
 def vibration(condition: Condition) -> Vec3:
-    """m/s^2 along the body axes."""
+    """Vibration along the body axes, m/s^2."""
     x, y, z = condition.square
     return sqrt(x), sqrt(y), sqrt(z)
 
 
 def sensors(condition: Condition, now_us: int) -> tuple[int, int]:
-    """Sensors present (ever heard) and healthy (heard of late), as bits of SYS_STATUS."""
+    """Sensors present (ever read) and healthy (read recently), as bits of SYS_STATUS."""
     present = healthy = 0
     heard = (*condition.heard_us, condition.fix_us)
     for last_us, bit in zip(heard, (*(bit for _, bit in _FIELDS), snapshot.GPS), strict=True):

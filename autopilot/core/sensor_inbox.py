@@ -57,7 +57,7 @@ from autopilot.wire.convert.simulator import (
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.simulator_frames import ESC_STATUS, HIL_GPS, HIL_SENSOR, LOAD_SENSOR, ODOMETRY
 
-# what `_read` makes of a datagram, instead of a number of readings
+# results of `_read` in place of a number of readings
 _NOT_PLAIN = -1  # it holds more than whole, plain frames of the sensors
 _NO_TICK = -2  # no HIL_SENSOR
 
@@ -68,11 +68,11 @@ _SENSORS = (
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
     mavlink.MAVLINK_MSG_ID_ESC_STATUS,
 )
-INERTIAL = ACCEL | GYRO  # of HIL_SENSOR.fields_updated: a sample that is new
+INERTIAL = ACCEL | GYRO  # of HIL_SENSOR.fields_updated: the bits of a new sample
 
 
 class SlowSensors(NamedTuple):
-    """Of HIL_SENSOR what is not new at each tick, as it was read last; zeros: never."""
+    """The fields of HIL_SENSOR that are not new at each tick, as last read; zeros: never."""
 
     field_gauss: Vec3 = ZERO
     pressure_pa: float = 0.0
@@ -85,18 +85,18 @@ _NO_FIX = HilGps(0, 0, ZERO, ZERO, 0.0, 0.0, 0)
 
 
 class Tick(NamedTuple):
-    """What one datagram of the simulator said, but for the readings, which are in the inbox."""
+    """The contents of one datagram of the simulator, except for the readings, which are in the inbox."""
 
     now_us: int
     readings: int  # how many
     fields_updated: int  # of HIL_SENSOR
     fixed: bool  # there was a HIL_GPS
-    aside: tuple[Any, ...]  # messages that are no sensor's
+    aside: tuple[Any, ...]  # messages that are not from sensors
 
 
 @kernel
 def _put(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> int:
-    """Write a reading's record into a row, if there is one left; the next row."""
+    """Write a reading's record into a row, if there is one left; returns the next row."""
     if at < inbox.shape[0]:
         inbox[at, KIND], inbox[at, SHOWS] = kind, shows_us
         pack(reading, inbox[at], READING)
@@ -105,7 +105,7 @@ def _put(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> int:
 
 @kernel
 def _put_vector(inbox: Array, at: int, kind: int, vector: Vec3) -> int:
-    """Write a reading of this instant into a row, if there is one left; the next row."""
+    """Write a reading of this instant into a row, if there is one left; returns the next row."""
     if at < inbox.shape[0]:
         inbox[at, KIND] = kind
         for i in range(3):
@@ -143,7 +143,8 @@ def _put_load(inbox: Array, at: int, m: Any) -> int:
 
 @kernel
 def _put_speeds(inbox: Array, at: int, m: Any) -> int:
-    """Write what the speed controllers of four rotors say into a row, if there is one left; the next row."""
+    """Write the speeds that the controllers of four rotors report into a row, if there is one left; returns
+    the next row."""
     if at < inbox.shape[0]:
         inbox[at, KIND], inbox[at, READING] = SPEEDS, m.index
         for i in range(4):
@@ -164,10 +165,10 @@ def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
 def _read(
     datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, slow: Row, fix: Row, payload: Bytes
 ) -> tuple[int, int, int, bool]:
-    """The number of readings that a datagram holds, its time, HIL_SENSOR.fields_updated, and whether there
-    was a HIL_GPS. As many readings as there is room for go into the inbox, in the order in which they are
-    absorbed; the inertial sample also into `imu`, `SlowSensors` into `slow` and the HIL_GPS into `fix`, if
-    the tick is later than `since_us`.
+    """The number of readings in a datagram, its time, HIL_SENSOR.fields_updated, and whether there was a
+    HIL_GPS. As many readings as there is room for are written into the inbox, in the order in which they are
+    absorbed. If the tick is later than `since_us`, the inertial sample is also written into `imu`,
+    `SlowSensors` into `slow` and the HIL_GPS into `fix`.
     """
     place = unpack(Home, home, 0)
     sensor, gps = _NO_SENSOR, _NO_FIX
@@ -218,7 +219,7 @@ def _read(
 
 
 def address_of_read(inbox: SensorInbox) -> int:
-    """The address of the kernel by which this inbox reads datagrams, compiled or loaded where need be."""
+    """The address of the kernel that reads datagrams for this inbox, compiled or loaded if necessary."""
     return native_address_of(_read, b"", *inbox.kept(0))
 
 
@@ -234,18 +235,18 @@ class SensorInbox:
         self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
         self._entry: Callable[..., tuple[int, int, int, bool]] | None = (
-            None  # machine code, once it was asked for
+            None  # machine code, once it was needed
         )
 
     def kept(self, since_us: int) -> Any:
-        """What `_read` is given beside a datagram."""
+        """The arguments of `_read` besides the datagram."""
         return (self.home, since_us, self.rows, self.imu, self.slow, self.fix, self.payload)
 
     def read(self, datagram: bytes, since_us: int) -> Tick | None:
-        """The tick in a datagram, or None where there is none (garbage, another message).
+        """The tick in a datagram, or None if there is none (garbage, another message).
 
-        Its readings are in the first of `rows`, of which there may be more than before. Only of a tick later
-        than `since_us` the sample and the fix are kept.
+        Its readings are in the first rows of `rows`, which may have grown. The sample and the fix are kept
+        only of a tick later than `since_us`.
         """
         aside: tuple[Any, ...] = ()
         kept = self.kept(since_us)

@@ -1,12 +1,13 @@
-"""One tick of the flight software: THE function that flies, in the processes and in a sweep.
+"""One tick of the flight software: the one function that flies, in the processes and in a sweep.
 
-readings -> estimate -> (may the supervisor have something to decide?) -> law -> mixer -> rotors
+readings -> estimate -> (may the supervisor have to decide?) -> law -> mixer -> rotors
 
-All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes. The
-law's half of it, `control_tick`, is compiled for each law, which the compiler sees by the type of the law's
-rows, and called by its address: what is common to all laws is compiled once. Where the supervisor may have
-something to decide the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it
-decide, in Python, and calls again for the rest of the tick. No clock, no socket, no hidden state.
+The data carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes. The law's
+half of the tick, `control_tick`, is compiled for each law, which the compiler distinguishes by the type of
+the law's rows, and is called by its address, so that the part common to all laws is compiled once. Where the
+supervisor may have to decide, the tick stops after the estimate and returns TO_DECIDE:
+`autopilot.core.flight_core` then lets the supervisor decide, in Python, and calls again for the rest of the
+tick. No clock, no socket, no hidden state.
 """
 
 from __future__ import annotations
@@ -66,20 +67,20 @@ from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide
 from autopilot.vehicle.rotors import STRENGTH
 from autopilot.wire.convert.simulator import force_at
 
-HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
+HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 over the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
 NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
 STOPPED = MixerResult(0, 0.0, ZERO)
-# a rotor is lost that gives less than this share of what it has long been asked for (but for this share of
-# the greatest force), as this many of its speeds show in turn
+# a rotor is lost if LOST_SPEEDS of its reported speeds in a row show that it gives less than LOST_SHARE of
+# the force that has long been commanded, reduced by UNTOLD_SHARE of its greatest force
 LOST_SHARE, UNTOLD_SHARE, LOST_SPEEDS = 0.3, 0.03, 3
 
-# what became of a tick
+# results of a tick
 ESTIMATED, FLOWN, TO_DECIDE = 0, 1, 2
 
 
 class CoreConstants(NamedTuple):
-    """Everything derived from parameters, but for the law's constants."""
+    """Everything derived from parameters, except for the law's constants."""
 
     tuning: EstimatorTuning
     vehicle: Vehicle
@@ -88,12 +89,12 @@ class CoreConstants(NamedTuple):
     observer: ObserverConstants
     drag: Drag
     control_every: int  # ticks
-    sensor_age_s: float  # greatest age of a reading to fly by
-    rotor_watch: float  # share of a period in the time for which a rotor must have been asked to give a force
-    factor_share: float  # of a period in the time constant of the thrust factor
-    nose_free: bool  # yaw is given up: the nose points where it points
-    estimator: int  # address of what lets somebody's own estimate take the place of ours; 0: nothing does
-    seat: int  # address that it is called with (`autopilot.core.estimator_seat`)
+    sensor_age_s: float  # greatest age of a reading that is good enough for flight
+    rotor_watch: float  # period over the time after which a rotor must give the force commanded of it
+    factor_share: float  # period over the time constant of the thrust factor
+    nose_free: bool  # yaw is not controlled: the nose may point anywhere
+    estimator: int  # address of the function that runs a custom estimator; 0: there is none
+    seat: int  # address of its argument (`autopilot.core.estimator_seat`)
 
 
 class Winch(NamedTuple):
@@ -109,11 +110,11 @@ class Pilot(NamedTuple):
 
     command: Command
     mixed: MixerResult
-    factor: float  # what the rotors give, of what they are asked for
-    thrust: float  # N, that the rotors are believed to give
+    factor: float  # force that the rotors give over the commanded force
+    thrust: float  # N, assumed of the rotors
     moment: Vec3  # N m
     observed: Observed
-    control_mode: int  # that the law's memory was made for; RESTING: it has none
+    control_mode: int  # for which the law's memory was made; RESTING: there is no memory
     slack_events: Each
     was_taut: bool
 
@@ -124,12 +125,12 @@ class Seen(NamedTuple):
     state: State
     taut: bool
     tilt_rad: float
-    pull_n: float  # of the cable on the vehicle, as the accelerometer tells
-    height_std: float  # m, of heights over home, where a receiver tells them
+    pull_n: float  # of the cable on the vehicle, as measured by the accelerometer
+    height_std: float  # m, of heights above home, where a receiver measures them
     vehicle_complaint: int
     load_complaint: int
     inertial_age: float  # s, since the last new sample of the inertial unit
-    rotors_lost: int  # bit i: rotor i+1 does not do what it is asked for
+    rotors_lost: int  # bit i: rotor i+1 does not follow its commands
 
 
 class CoreRows(NamedTuple):
@@ -144,14 +145,14 @@ class CoreRows(NamedTuple):
     constants: Row  # CoreConstants
     winch: Row  # Winch
     stretch: Row  # Stretch
-    targets: Array  # (ticks, 21) where load or vehicle are to be, from the stretch's first tick on
-    references: Array  # the same as the law is told it: later by its preview
-    rotors: Array  # (7, MOST) forces of the rotors and what they are watched by, rows as in the mixer
+    targets: Array  # (ticks, 21) setpoints of load or vehicle, from the stretch's first tick on
+    references: Array  # the same for the law: later by its preview
+    rotors: Array  # (7, MOST) forces of the rotors and the data that watch them, rows as in the mixer
     table: Array  # (rotors + 1, 10) of the mixer, and what makes the rotors alike
 
 
 class LawAt(NamedTuple):
-    """The rows of any law, and where the machine code of `control_tick` for it is."""
+    """The rows of any law, and the address of the machine code of `control_tick` for it."""
 
     constants: Row
     memory: Row
@@ -160,7 +161,7 @@ class LawAt(NamedTuple):
 
 @kernel
 def row_at(stretch: Stretch, now_us: int) -> int:
-    """The row of the stretch's setpoints that is for this tick."""
+    """The row of the stretch's setpoints for this tick."""
     return (now_us - stretch.first_us) // stretch.period_us
 
 
@@ -185,7 +186,7 @@ def _jet(table: Array, at: int) -> Jet:
 
 @kernel
 def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
-    """Pull of the cable on the vehicle (N): what moves it besides weight, rotors, drag and wind."""
+    """Pull of the cable on the vehicle (N): the force on it besides weight, rotors, drag and wind."""
     vehicle, a = constants.vehicle, state.a_quad
     felt = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(pilot.thrust, column(state.R, 2), air_force(state.v_quad, constants.drag))
@@ -195,8 +196,8 @@ def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
 
 @kernel
 def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
-    """The rotors whose speeds, in the inbox, say time and again that they do not do what they are asked for;
-    and those that are known to be lost."""
+    """The rotors (as bits) whose reported speeds, in the inbox, show repeatedly that they do not follow their
+    commands, and those that are known to be lost."""
     table, rotors = rows.table, rows.rotors
     for i in range(count):
         if rows.inbox[i, KIND] != SPEEDS:
@@ -217,7 +218,7 @@ def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
 
 @kernel
 def expect(rows: CoreRows, share: float) -> None:
-    """What each rotor has been asked for at least, for so long that it must give it."""
+    """Update the least force commanded of each rotor for so long that the rotor must give it."""
     rotors = rows.rotors
     for j in range(rows.table.shape[0] - 1):
         asked, before = rotors[FORCE, j], rotors[EXPECTED, j]
@@ -226,7 +227,7 @@ def expect(rows: CoreRows, share: float) -> None:
 
 @kernel
 def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
-    """The estimate `dt` seconds later, after the first `count` readings of the inbox, and what is seen."""
+    """Advance the estimate by `dt` seconds and the first `count` readings of the inbox, and update `Seen`."""
     constants = unpack(CoreConstants, rows.constants, 0)
     winch, pilot = unpack(Winch, rows.winch, 0), unpack(Pilot, rows.pilot, 0)
     if off_centre(constants.vehicle):
@@ -288,11 +289,11 @@ def held_height(state: State, anchor_height: float, vehicle: Vehicle) -> float:
 
 @kernel
 def reeled(observed: Observed, state: State, accel: float, quad_mass: float) -> Observed:
-    """What is believed to push the vehicle, with what the winch's acceleration amounts to.
+    """The observed push on the vehicle, plus the force to which the winch's acceleration is equivalent.
 
-    In the motion of load and cable L'' is the same as a force m_Q L'' q on the vehicle, for
-    T = mu (q . (F_L / m_L - F_Q / m_Q) + L |q'|^2 - L''). Left out is 2 L' / L q' in q'': with L' up to 1 m/s
-    it is small beside the damping of the cable's loop.
+    In the motion of load and cable, L'' has the same effect as a force m_Q L'' q on the vehicle, because
+    T = mu (q . (F_L / m_L - F_Q / m_Q) + L |q'|^2 - L''). The term 2 L' / L q' in q'' is left out: with L' up
+    to 1 m/s it is small beside the damping of the cable's loop.
     """
     if accel == 0.0:
         return observed
@@ -311,7 +312,7 @@ def fly_law(
     cable: Cable,
     vehicle: Vehicle,
 ) -> Any:
-    """The law in the mode that the stretch asks for: its memory and its command."""
+    """Run the law in the mode that the stretch requests; returns its memory and its command."""
     kernels = kernels_of(law)
     nose = stretch.nose
     reference = Reference(jet, nose.b1_d, nose.b1_d_dot, nose.b1_d_ddot)
@@ -406,7 +407,7 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
 
 
 def law_at(rows: CoreRows, law_rows: Any) -> Any:
-    """A law's rows as `fly_tick` takes them: with its machine code, compiled or loaded where need be. Where
+    """A law's rows as `fly_tick` takes them: with its machine code, compiled or loaded if necessary. Where
     nothing is compiled, the rows themselves."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
@@ -415,7 +416,7 @@ def law_at(rows: CoreRows, law_rows: Any) -> Any:
 
 
 def any_law(law_rows: Any) -> Any:
-    """The same of no law in particular, to compile for; it cannot be flown."""
+    """The same for no particular law, to compile `fly_tick` for; it cannot be flown."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
     return LawAt(law_rows.constants, law_rows.memory, 0)
@@ -452,7 +453,7 @@ def _to_decide(rows: CoreRows, now_us: int) -> bool:
 
 @kernel
 def estimate_instead(constants: CoreConstants, count: int, now_us: int, dt: float) -> None:
-    """Let somebody's own estimator write into what is seen, if there is one."""
+    """Let a custom estimator, if there is one, write its estimate into `Seen`."""
     if constants.estimator != 0:
         seat = numbers_at(constants.seat, 3)
         seat[0], seat[1], seat[2] = count, now_us, dt
@@ -463,9 +464,9 @@ def estimate_instead(constants: CoreConstants, count: int, now_us: int, dt: floa
 def fly_tick(
     rows: CoreRows, law_rows: Any, count: int, now_us: int, tick: int, dt: float, decided: bool
 ) -> int:
-    """One tick, `dt` seconds after the last: ESTIMATED, FLOWN, or TO_DECIDE before the law has its turn.
+    """One tick, `dt` seconds after the last: ESTIMATED, FLOWN, or TO_DECIDE before the law is run.
 
-    `decided`: of a tick that was to be decided upon, what is left.
+    `decided`: run the rest of a tick for which TO_DECIDE was returned.
     """
     if not decided:
         sense(rows, count, now_us, dt)

@@ -21,12 +21,12 @@ from missions.model import Signals, Sine, Term, Waypoint
 
 
 def rehearse_tick(setup: Setup) -> None:
-    """What is the same with all laws."""
+    """Compile what is the same with all laws."""
     FlightCore(setup).compile()
 
 
 def rehearse_law(setup: Setup) -> None:
-    """The law's half of a tick."""
+    """Compile the law's half of a tick."""
     core = FlightCore(setup)
     law_at(core.rows, core.law_rows)
 
@@ -60,6 +60,6 @@ PARTS = {"tick": rehearse_tick, "law": rehearse_law, "paths": rehearse_paths}
 
 
 def rehearse(setup: Setup) -> None:
-    """All of it."""
+    """Run all parts."""
     for part in PARTS.values():
         part(setup)

@@ -1,8 +1,8 @@
-"""What the air does to the load: a wind that stays, and drag that follows the load's speed.
+"""Acceleration of the load by the air: a steady wind, and drag that depends on the load's speed.
 
-The error state has what the pendulum lacks, d, as a walk. Drag is learned beside it: the least-squares fit
-of d to the load's velocity, of both what differs from their means of some seconds. With it d follows the
-speed at once.
+The error state contains the acceleration d that the pendulum leaves out, as a random walk. Drag is learned
+beside it, by the least-squares fit of d to the load's velocity, both less their means over some seconds. With
+this fit, d follows the speed immediately.
 """
 
 from __future__ import annotations
@@ -15,21 +15,22 @@ from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
 
-DRAG_TIME_S = 0.15  # for which a change of drag goes on
-# m/s^2, of wind that a camera cannot tell from its own mounting and from the slow error of a receiver
+DRAG_TIME_S = 0.15  # for which a change of drag lasts
+# m/s^2, by a wind that a camera cannot distinguish from its own mounting and the slow error of a receiver
 HIDDEN = 0.17
 LEARNING_S = 4.0
-# drag is learned by motion faster than this, m/s, and is at most so much, 1/s
+# drag is learned from motion faster than SLOW, m/s, and is at most GREATEST_DRAG, 1/s
 SLOW, GREATEST_DRAG = 0.2, 2.0
 
 
 @kernel
 def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: EstimatorTuning) -> float:
-    """How fast what the air does to the load may change, m/s^2 per square root of a second.
+    """How fast the load's acceleration by the air may change, m/s^2 per square root of a second.
 
-    As it is told; as in gusts, which are the greater the stronger the wind is, or may be where no tracker
-    tells of the load; and as drag does, c u^2, when the speed changes: by 2 c u times the acceleration, of a
-    wind that c u^2 tells of.
+    The root of the sum of squares of three parts: the configured walk; gusts, which grow with the wind, or
+    with the wind that may be hidden where no tracker measures the load; and the change of drag, c u^2, with
+    the speed, 2 c u times the acceleration, where u^2 includes the wind that the acceleration c u^2
+    indicates.
     """
     still, c = tuning.air_walk, tuning.load_drag
     wind2 = air.load[0] * air.load[0] + air.load[1] * air.load[1]
@@ -47,7 +48,7 @@ def _nearer(mean: tuple[float, float], to: tuple[float, float], share: float) ->
 def predict_air(
     air: AirEstimate, before: LoadEstimate, load: LoadEstimate, tuning: EstimatorTuning, dt: float
 ) -> AirEstimate:
-    """What the air does dt seconds on, `load` being that of then."""
+    """The accelerations by the air dt seconds later; `load` is the load at that time."""
     calm, still = kept(tuning.air_std, tuning.air_walk, dt), kept(tuning.push_std, tuning.push_walk, dt)
     pushed = (still * air.vehicle[0], still * air.vehicle[1])
     d = (calm * air.load[0], calm * air.load[1])

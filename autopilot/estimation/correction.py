@@ -1,16 +1,17 @@
-"""What all corrections share: the past a reading speaks of, entries of its Jacobian, and the state moved.
+"""The parts of all corrections: the past state of a reading, entries of its Jacobian, correcting the state.
 
-A reading of `age` ago is a function of the errors of *then*; a Jacobian wants them in errors of *now*. Errors
-move by x' = F x, and back over the age
+A reading that is `age` old is a function of the errors of *then*; its Jacobian is needed for the errors of
+*now*. Errors propagate by x' = F x, and backwards over the age
 
     attitude(then)  = attitude + age R gyro bias
     velocity(then)  = velocity - attitude x S + age R accel bias
     position(then)  = position - age velocity + attitude x D - age^2/2 R accel bias
     direction(then) = (1 + age^2 k / 2) direction - age rate,    k = q . f / L
 
-with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow
-from the velocities and positions of then and now in the ring. Left out: the noise that came in since, the
-turn of R within the age, and in the cable's direction what attitude and bias drive within the age.
+where f is the specific force in the world, S its integral since then, and D the integral of (s - then) f. S
+and D follow from the velocities and positions of then and now in the ring. Left out are the noise that
+entered since then, the rotation of R within the age, and, for the cable's direction, the effect of attitude
+and bias within the age.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, quat_normalise
 
 
 class Past(NamedTuple):
-    """The state when a reading was taken, and what ties its errors to those of now."""
+    """The state when a reading was taken, and the relation of its errors to those of now."""
 
     age: float
     x_quad: Vec3
@@ -122,7 +123,7 @@ def _attitude_cross(history: History, k: int, i: int, s: float, v: Vec3) -> None
 
 @kernel
 def enter_position(history: History, k: int, past: Past, i: int) -> None:
-    """Component i of the vehicle's position then."""
+    """Enter component i of the vehicle's position then."""
     enter(history, k, POSITION + i, 1.0)
     enter(history, k, VELOCITY + i, -past.age)
     _attitude_cross(history, k, i, 1.0, past.moved)
@@ -133,7 +134,7 @@ def enter_position(history: History, k: int, past: Past, i: int) -> None:
 
 @kernel
 def enter_velocity(history: History, k: int, past: Past, i: int) -> None:
-    """Component i of the vehicle's velocity then."""
+    """Enter component i of the vehicle's velocity then."""
     enter(history, k, VELOCITY + i, 1.0)
     _attitude_cross(history, k, i, -1.0, past.gained)
     for j in range(3):
@@ -142,7 +143,7 @@ def enter_velocity(history: History, k: int, past: Past, i: int) -> None:
 
 @kernel
 def enter_attitude(history: History, k: int, past: Past, axis: Vec3) -> None:
-    """The attitude error then about a world axis."""
+    """Enter the attitude error then about a world axis."""
     for i in range(3):
         enter(history, k, ATTITUDE + i, axis[i])
         about = axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
@@ -151,7 +152,7 @@ def enter_attitude(history: History, k: int, past: Past, axis: Vec3) -> None:
 
 @kernel
 def enter_direction(history: History, k: int, past: Past, first: float, second: float) -> None:
-    """`first`, `second` times the two components of the cable's direction then."""
+    """Enter `first` and `second` times the two components of the cable's direction then."""
     enter(history, k, DIRECTION, past.bend * first)
     enter(history, k, DIRECTION + 1, past.bend * second)
     enter(history, k, RATE, -past.age * first)
@@ -178,7 +179,8 @@ def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
 
 @kernel
 def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
-    """The state with its ring corrected as far back as `age` from now on, and at least `size` errors."""
+    """The state whose ring is corrected at least as far back as `age` from now on, with at least `size`
+    errors in use."""
     state = with_field(state, "memory_s", max(state.memory_s, age))
     return with_field(state, "size", max(state.size, size))
 
@@ -224,7 +226,7 @@ def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) ->
 
 @kernel
 def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, plain: float) -> LoadEstimate:
-    """The cable moved by the correction in `error`; while taut the load is where it ends."""
+    """The load and its cable corrected by `error`; while the cable is taut, the load is at its end."""
     e = history.error[0]
     along = cross(load.q_cable, load.across)
     off = add(scale(e[DIRECTION], load.across), scale(e[DIRECTION + 1], along))
@@ -238,7 +240,8 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, p
         x_load = axpy(length, q, vehicle.x_quad)
         v_load = axpy(length, q_dot, vehicle.v_quad)
     elif load.source == CAMERA and plain > 0.0:
-        # where it lies is known from the vehicle, which a plain receiver places no better than the load
+        # the load's position is known relative to the vehicle, whose position a plain receiver measures no
+        # better
         x_load = add(x_load, (e[POSITION], e[POSITION + 1], 0.0))
     return LoadEstimate(
         x_load,
@@ -261,7 +264,7 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, p
 
 @kernel
 def inject(state: EstimatorState, history: History) -> EstimatorState:
-    """The state moved by the correction in `error`, and the ring with it."""
+    """The state corrected by `error`, and the ring with it."""
     e, v, a = history.error[0], state.vehicle, state.aids
     turned = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
     moved = (e[POSITION], e[POSITION + 1], e[POSITION + 2])

@@ -1,11 +1,11 @@
-"""The covariance of the error state: moved in time by its known sparsity, narrowed by some scalars at a time.
+"""The covariance of the error state: propagated by its known sparsity, updated by several scalars at once.
 
 An error x of the state obeys x' = F x + noise. `transit` applies Phi = I + F dt to the rows of P, transposes
 and applies it again, Phi (Phi P)^T = Phi P Phi^T, so that each of the two passes runs along rows.
 
-What a reading measures are scalars y_k = h_k x + noise of variance r_k, each independent of the others. They
-are absorbed one after the other, but P is moved once: row k of H P loses what it shares with the scalars
-before it, and P the sum of the squares of these rows over their variances.
+A reading measures scalars y_k = h_k x + noise of variance r_k, whose noises are independent. They are
+absorbed one after the other, but P is updated only once: row k of H P is reduced by what it shares with the
+scalars before it, and P by the sum of the squares of these rows over their variances.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from autopilot.geometry.wide_rows import (
 
 
 class Transit(NamedTuple):
-    """What the error's motion depends on: specific force (world), attitude, and the cable's frame."""
+    """What the propagation of the error depends on: specific force (world), attitude, the cable's frame."""
 
     force: Vec3
     R: Mat3
@@ -61,16 +61,16 @@ class Transit(NamedTuple):
     taut: float
     horizontal_slow: float
     vertical_slow: float
-    reversion: float  # of the receiver's slow error, in units of the rate at which it changes
+    reversion: float  # return of the receiver's slow error to zero, in units of the rate at which it changes
     accel_var: float  # (m/s^2)^2, of a sample
     gyro_var: float  # (rad/s)^2
-    air_walk: float  # m/s^2 per square root of a second, of the air on the load
+    air_walk: float  # m/s^2 per square root of a second, of the load's acceleration by the air
     cable_accel_std: float  # rad/s^2
-    parting_std: float  # m/s, at which the ends of the cable part
+    parting_std: float  # m/s, speed at which the ends of the cable move apart
 
 
 class CableDrive(NamedTuple):
-    """What drives the rate of the cable's direction along one of its axes, over a step."""
+    """How the errors change the rate of the cable's direction along one of its axes during a step."""
 
     attitude: Vec3
     bias: Vec3  # of the accelerometer
@@ -81,14 +81,14 @@ class CableDrive(NamedTuple):
 
 @kernel
 def _cable_drive(to: Transit, dt: float, i: int) -> CableDrive:
-    """The part of Phi in the row of RATE + i."""
+    """The entries of Phi in the row of RATE + i."""
     f = to.force
     axis = to.across if i == 0 else to.along
     rates = (dot(to.across, to.q_cable_dot), dot(to.along, to.q_cable_dot))
     speed2 = rates[0] * rates[0] + rates[1] * rates[1]
     stiff = dot(to.q_cable, f) / to.length - speed2
     s = dt / to.length
-    # two neighbouring paths on the sphere draw together: |q'|^2 across the motion
+    # two neighbouring paths on the sphere converge: |q'|^2 across the motion
     own, other = dt * (stiff + rates[i] * rates[i]), dt * rates[0] * rates[1]
     return CableDrive(
         scale(-s, cross(f, axis)),
@@ -103,8 +103,9 @@ def _cable_drive(to: Transit, dt: float, i: int) -> CableDrive:
 def _move_rows(
     P: Array, to: Transit, first: CableDrive, second: CableDrive, dt: float, n: int, cable_from: int
 ) -> None:
-    """P becomes Phi P, eight columns at a time: half a step of position and direction with their present
-    rates, then the rates and the attitude, then the other half. The cable's rows only from a column on."""
+    """Replace P by Phi P, eight columns at a time: half a step of position and direction with their present
+    rates, then the rates and the attitude, then the other half step. The cable's rows are computed only from
+    column `cable_from` on."""
     half, step = 0.5 * dt, columns_at_once(P)
     f, R = scale(dt, to.force), to.R
     for j in range(0, n, step):
@@ -151,7 +152,7 @@ def _move_rows(
 
 @kernel
 def _fade(P: Array, first: int, last: int, keep: float, n: int) -> None:
-    """The rows from `first` to before `last`, of whose errors a share is kept."""
+    """Multiply the rows from `first` to before `last` by `keep`, the share of their errors that is left."""
     step = columns_at_once(P)
     for i in range(first, last):
         for j in range(0, n, step):
@@ -160,8 +161,8 @@ def _fade(P: Array, first: int, last: int, keep: float, n: int) -> None:
 
 @kernel
 def _forget_slow(P: Array, slow: float, tuning: EstimatorTuning, dt: float, n: int) -> None:
-    """What returns to zero: the air's doings, and the receiver's slow error, of which the share `slow` is
-    kept."""
+    """Let errors return to zero: those of the accelerations by the air, and the receiver's slow error, of
+    which the share `slow` is kept."""
     _fade(P, AIR, AIR + 2, kept(tuning.air_std, tuning.air_walk, dt), n)
     if n >= AIDED_SIZE:
         _fade(P, GNSS, GNSS + 3, slow, n)
@@ -171,13 +172,13 @@ def _forget_slow(P: Array, slow: float, tuning: EstimatorTuning, dt: float, n: i
 
 @kernel
 def kept(std: float, walk: float, dt: float) -> float:
-    """The share of an error that is left after dt (s), so that with this walk it stays of this deviation."""
+    """The share of an error that is left after dt (s), such that with this walk its deviation stays `std`."""
     return 1.0 - 0.5 * dt * walk * walk / (std * std)
 
 
 @kernel
 def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n: int) -> None:
-    """The covariance dt seconds on, in place, with the noise of one sample."""
+    """Propagate the covariance by dt seconds, in place, with the noise of one sample."""
     before = history.covariance
     forget = dt / tuning.gnss_time
     keep = 1.0 - forget * to.reversion
@@ -186,7 +187,7 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
     _forget_slow(before, keep, tuning, dt, n)
     transpose(before, n)
     P = turned(before)
-    # what lies below the diagonal is written over in the end
+    # what lies below the diagonal is overwritten in the end
     _move_rows(P, to, first, second, dt, n, DIRECTION)
     _forget_slow(P, keep, tuning, dt, n)
 
@@ -234,7 +235,7 @@ def forget(P: Array, first: int, count: int) -> None:
 
 @kernel
 def _clear(array: Array, row: int) -> None:
-    """Zero a row, also of what is no number: a multiple of that would stay."""
+    """Zero a row by assignment: a NaN would survive a multiplication by zero."""
     for j in range(array.shape[1]):
         array[row, j] = 0.0
 
@@ -254,7 +255,7 @@ def scalar(history: History, k: int, innovation: float, variance: float) -> None
 
 @kernel
 def enter(history: History, k: int, column: int, share: float) -> None:
-    """Add to the Jacobian of scalar k: it grows by `share` times the error in `column`."""
+    """Add an entry to the Jacobian of scalar k: `share` times the error in `column`."""
     if share != 0.0:
         at = history.columns[k, 0] + 1
         history.columns[k, 0] = at
@@ -263,14 +264,14 @@ def enter(history: History, k: int, column: int, share: float) -> None:
 
 @kernel
 def gather(history: History, first: int, last: int, n: int) -> None:
-    """The rows of H P of the scalars from `first` to before `last`."""
+    """Compute the rows of H P of the scalars from `first` to before `last`."""
     for k in range(first, last):
         combine(history.gain, k, history.covariance, history.columns, history.shares, n)
 
 
 @kernel
 def shared(history: History, k: int, other: int) -> float:
-    """What two scalars have in common: the Jacobian of scalar k times the gathered row of `other`."""
+    """Covariance of two scalars by the state: the Jacobian of scalar k times the gathered row of `other`."""
     total = 0.0
     for entry in range(1, history.columns[k, 0] + 1):
         total += history.shares[k, entry] * history.gain[other, history.columns[k, entry]]
@@ -279,8 +280,8 @@ def shared(history: History, k: int, other: int) -> float:
 
 @kernel
 def farness(history: History, count: int) -> float:
-    """The sum over the first scalars, gathered, of their squared innovations over their variances, each by
-    itself."""
+    """The sum of the squared innovations over their variances of the first `count` scalars, whose rows are
+    gathered; each scalar is taken by itself."""
     total = 0.0
     for k in range(count):
         off = history.scalars[k, INNOVATION]
@@ -290,9 +291,9 @@ def farness(history: History, count: int) -> float:
 
 @kernel
 def absorb(history: History, count: int, n: int) -> float:
-    """Absorb the first scalars, gathered: P narrows, `error` gathers what the state is to be moved by.
+    """Absorb the first `count` scalars, whose rows are gathered: reduce P, collect the correction in `error`.
 
-    Returns the sum of their innovations squared over their variances, each given those before it.
+    Returns the sum of their squared innovations over their variances, each given the scalars before it.
     """
     gain, scalars = history.gain, history.scalars
     lanes = columns_at_once(gain) == 1
@@ -307,9 +308,9 @@ def absorb(history: History, count: int, n: int) -> float:
 
 @kernel
 def _alone(history: History, count: int, n: int) -> float:
-    """What is left of each scalar given those before it: its row; in place of innovation and variance, by
-    what its row is multiplied to move the state, and to have the root of what P loses. Returns the sum of
-    their squared innovations over their variances."""
+    """Reduce each scalar to what it adds to the scalars before it. In place of innovation and variance, leave
+    the two factors of its row: that for the correction of the state, and that for the square root of what P
+    loses. Returns the sum of the squared innovations over their variances."""
     gain, scalars = history.gain, history.scalars
     nis = 0.0
     for k in range(count):
@@ -326,7 +327,7 @@ def _alone(history: History, count: int, n: int) -> float:
 
 @kernel
 def _alone_in_lanes(history: History, count: int, n: int) -> float:
-    """The same, row by row: what a row loses to those before it is taken at once."""
+    """The same, row by row: what a row loses to the rows before it is subtracted in one pass."""
     gain, shares, scalars = history.gain, history.shares, history.scalars
     nis = 0.0
     for m in range(count):

@@ -1,7 +1,7 @@
-"""What an estimator of your own is given at a tick, and what it gives: records, and how they are filled.
+"""Records that a custom estimator receives and returns at a tick, and how they are filled.
 
-World ENU, body FLU, SI. Times are on the vehicle's clock; an estimate is of the instant that the inertial
-unit shows.
+World ENU, body FLU, SI. Times are on the vehicle's clock; an estimate is that of the instant that the
+inertial unit shows.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from autopilot.geometry.packed import unpack, width, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.layout import MOST
 
-NEVER = -inf  # when a sensor was heard that never was
-UNTOLD: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not have
+NEVER = -inf  # time of the last reading of a sensor that never sent one
+UNTOLD: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not contain
 UNIT_TOLERANCE = 0.02  # of the square of a length that must be 1
 
-Forces = tuple[  # of each rotor, N; zeros for those that there are not
+Forces = tuple[  # of each rotor, N; zeros for rotors that do not exist
     float, float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
 NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -51,7 +51,7 @@ class InertialSample(NamedTuple):
     """The inertial unit's last sample."""
 
     new: bool  # at this tick
-    time_s: float  # of the instant that it shows; -inf: there was none yet
+    time_s: float  # of the instant that it shows; -inf: there was no sample yet
     gyro: Vec3  # rad/s, body
     accel: Vec3  # specific force, m/s^2, body
 
@@ -81,7 +81,7 @@ class LoadSample(NamedTuple):
 
 
 class DirectionSample(NamedTuple):
-    """What the cable sensor (camera or encoder) saw last."""
+    """The last reading of the cable sensor (camera or encoder)."""
 
     new: bool
     time_s: float
@@ -118,20 +118,20 @@ class HeightSample(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """What the rotors were asked for at the last tick, and what they are believed to give at this one."""
+    """Commands to the rotors at the last tick, and what the rotors are assumed to give at this tick."""
 
-    thrust: float  # N along the thrust axis, asked for
-    moment: Vec3  # N m, body, asked for
-    forces: Forces  # N, of each rotor, asked for
-    given_thrust: float  # N, believed, by delay and lag of the rotors
+    thrust: float  # N along the thrust axis, commanded
+    moment: Vec3  # N m, body, commanded
+    forces: Forces  # N, of each rotor, commanded
+    given_thrust: float  # N, assumed, after delay and lag of the rotors
     given_moment: Vec3  # N m
 
 
 class Sensed(NamedTuple):
-    """What an estimator is given at a tick."""
+    """Input of an estimator at a tick."""
 
-    begins: bool  # the first tick, or the first after a time without any
-    time_s: float  # of the instant that the estimate is to be of
+    begins: bool  # the first tick, or the first after a time without ticks
+    time_s: float  # the instant for which the estimate is required
     period_s: float  # since the last tick; 0 at the first
     inertial: InertialSample
     pose: PoseSample
@@ -141,18 +141,18 @@ class Sensed(NamedTuple):
     field: FieldSample
     height: HeightSample
     driven: Driven
-    cable: Cable  # length, rate and acceleration, as the winch has it
-    taut: bool  # the built-in filter believes that the cable pulls
-    built_in: State  # its estimate
+    cable: Cable  # length, rate and acceleration, according to the winch
+    taut: bool  # the cable is taut according to the built-in filter
+    built_in: State  # the built-in filter's estimate
 
 
 class Estimate(NamedTuple):
-    """What an estimator gives."""
+    """Output of an estimator."""
 
-    known: bool  # False: there is none yet
+    known: bool  # False: there is no estimate yet
     state: State  # a_quad may be UNTOLD
-    tension: float  # N of the cable; NaN: untold
-    horizontal_std: float  # m, of the vehicle's position, each axis; NaN: untold
+    tension: float  # N of the cable; NaN: not given
+    horizontal_std: float  # m, of the vehicle's position, each axis; NaN: not given
     vertical_std: float
 
 
@@ -174,16 +174,16 @@ NOTHING_SENSED = Sensed(
     False,
     REST,
 )
-GIVEN = width(Sensed)  # where an estimate lies on the desk
-OWN = GIVEN + width(Estimate)  # what lies from here on is the estimator's
+GIVEN = width(Sensed)  # where the estimate begins on the desk
+OWN = GIVEN + width(Estimate)  # from here on, the desk holds the estimator's own data
 
 
 @kernel
 def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning: EstimatorTuning) -> Sensed:
-    """What was sensed before, with the first `count` readings of the inbox.
+    """`sensed`, updated with the first `count` readings of the inbox.
 
-    Those that the built-in filter would drop are dropped here too; of two readings of one sensor at one tick
-    the later row stays.
+    Readings that the built-in filter would drop are dropped here too; of two readings of one sensor at one
+    tick, the later row is used.
     """
     time_s = now_us * 1e-6 - tuning.imu_age
     inertial = with_field(sensed.inertial, "new", False)
@@ -260,7 +260,7 @@ def _is_unit(v: Vec3) -> bool:
 
 @kernel
 def flaw(estimate: Estimate) -> int:
-    """What is wrong with an estimate that is known: SOUND if nothing is."""
+    """What is wrong with a known estimate: SOUND if nothing is."""
     s = estimate.state
     numbers = _is_number(s.x_load) and _is_number(s.v_load) and _is_number(s.x_quad) and _is_number(s.v_quad)
     numbers = numbers and _is_number(s.omega_body) and _is_number(s.q_cable_dot) and _is_number(s.q_cable)
@@ -277,7 +277,7 @@ def flaw(estimate: Estimate) -> int:
 
 
 def told_of(estimate: Estimate, found: int) -> str:
-    """What is wrong with it, in words."""
+    """What is wrong with an estimate, in words."""
     state = estimate.state
     if found == FORGOTTEN:
         return "gives no estimate any more"

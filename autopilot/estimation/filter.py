@@ -1,7 +1,7 @@
-"""The estimator as the core sees it: one call for each tick's readings.
+"""The estimator as the core uses it: one call for each tick's readings.
 
-`control_state` is the state passed to the control laws; `complaints` says what keeps the estimate from
-being flown on, `loss` what keeps it from being landed on.
+`control_state` is the state passed to the control laws; `complaints` states why the estimate is not good
+enough for flight, `loss` why it is not even good enough for a landing.
 """
 
 from __future__ import annotations
@@ -57,27 +57,27 @@ from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.parameter_table import ParameterTable
 
 POSITION_STD_TO_FLY = 0.05  # m, with trackers
-FIX_STD_TO_FLY = 0.15  # m, beyond what a receiver promises: so far it may coast, or float
+FIX_STD_TO_FLY = 0.15  # m, beyond the deviation that a receiver states: margin for coasting or a float fix
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
-LOAD_STD_TO_FLY = 0.1  # m from the vehicle, of a load that a camera sees
+LOAD_STD_TO_FLY = 0.1  # m relative to the vehicle, of a load that a camera sees
 PROMISE = 1.2  # times the deviation that the receiver states
-COASTING_S = 2.0  # that the IMU bridges between fixes
-SWINGING_S = 1.0  # that the pendulum bridges between sights of the load
-# That it bridges between a tracker's readings, whose velocity starts it better: hidden for 5 s, the load is
-# 2 mm off in calm air and 8 mm in wind of 5 m/s with gusts of 1 m/s, and the covariance says so. For as long
-# a load whose cable is slack is taken to lie still.
+COASTING_S = 2.0  # for which the IMU bridges a gap between fixes
+SWINGING_S = 1.0  # for which the pendulum bridges a gap between sights of the load
+# For which the pendulum bridges a gap between a tracker's readings, whose velocity starts it better: a load
+# hidden for 5 s is 2 mm off in calm air and 8 mm in wind of 5 m/s with gusts of 1 m/s, as its covariance
+# states. For the same time, a load whose cable is slack is assumed to lie still.
 HIDDEN_S = 2.0
-FRESH_S = 0.1  # in which a tracker's last reading still says how well it knows a load that nothing holds
+FRESH_S = 0.1  # up to this age of a tracker's reading, the accuracy of a load on a slack cable is checked
 TILT_STD_TO_LAND = 0.2  # rad
 POSITION_STD_TO_LAND = 10.0  # m
-UNSEEN_S = 0.5  # after which a load of which no tracker has told is taken for one that none will tell of
-TELLING_S = 1.0  # in which the direction of a cable that came taut shows in its pull
-INERTIAL_S = 0.1  # for which an inertial sample stands for those that are missing
+UNSEEN_S = 0.5  # after this time without a tracker reading, the load is assumed to have no tracker
+TELLING_S = 1.0  # in which the pull of a cable that came taut shows its direction
+INERTIAL_S = 0.1  # for which an inertial sample replaces missing ones
 
 
 def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
-    """The estimator's beliefs from the VEH_ and EST_ parameters."""
+    """The estimator's assumptions, from the parameters VEH_, EST_ and PLB_DRAG."""
     length = table["VEH_CABLE_LEN"]
     return EstimatorTuning(
         cable_length=length,
@@ -124,7 +124,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
 
 @kernel
 def lengthened(state: EstimatorState, grown: float) -> EstimatorState:
-    """The estimate with a cable that has grown by so many metres; a slack one has no length to speak of."""
+    """The estimate with a cable that has grown by `grown` metres; unchanged while the cable is slack."""
     load = state.load
     if grown == 0.0 or load.taut == 0.0:
         return state
@@ -148,9 +148,9 @@ def estimate(
     """The state after `dt` seconds and the first `count` readings of the inbox. `history` is written in
     place.
 
-    `thrust` (N) and `moment` (N m, body) are what the rotors are believed to give; the cable has grown by
-    `grown` (m) since the last tick. The estimator knows a cable of one length: the winch's speed is taken
-    from what the load tracker measures, v_L = v_Q + L q' + L' q.
+    `thrust` (N) and `moment` (N m, body) are those that the rotors are assumed to give; the cable has grown
+    by `grown` (m) since the last tick. The estimator models a cable of constant length: the winch's speed is
+    subtracted from the velocity that the load tracker measures, v_L = v_Q + L q' + L' q.
     """
     state = lengthened(state, grown)
     tuning = with_field(tuning, "cable_length", cable.length)
@@ -210,8 +210,9 @@ def estimate(
 def control_state(state: EstimatorState, cable: Cable) -> State:
     """State passed to the control laws.
 
-    A plain receiver places the vehicle by metres, and every correction of its velocity moves the place by
-    decimetres at once: those are passed on over seconds, so that the load is not sent after them.
+    A plain receiver measures the position to metres, and each correction of the velocity moves the estimated
+    position by decimetres at once. These corrections are passed on over seconds, so that the laws do not make
+    the load follow them.
     """
     vehicle, load, debt = state.vehicle, state.load, state.aids.debt
     v_load = load.v_load
@@ -230,7 +231,7 @@ def control_state(state: EstimatorState, cable: Cable) -> State:
     )
 
 
-# what keeps the estimate from being flown on; 0 nothing
+# why the estimate is not good enough for flight; 0: it is
 NO_POSE, NO_FIX, POSITION_VAGUE, FIX_VAGUE, ATTITUDE_VAGUE, HEADING_VAGUE = 1, 2, 3, 4, 5, 6
 NO_LOAD, NO_SIGHT, LOAD_VAGUE = 7, 8, 9
 NO_INERTIAL = 10
@@ -250,13 +251,14 @@ _COMPLAINTS = {
 
 @kernel
 def inertial_complaint(silent_s: float) -> int:
-    """What is wrong with the inertial unit, whose last new sample is so old; 0 if nothing is."""
+    """What is wrong with the inertial unit, whose last new sample is `silent_s` old; 0 if nothing is."""
     return 0 if silent_s <= INERTIAL_S else NO_INERTIAL
 
 
 @kernel
 def vehicle_complaint(state: EstimatorState, oldest_s: float) -> int:
-    """What is wrong with the estimate of the vehicle; 0 if nothing is. Each is written so that NaN tells."""
+    """What is wrong with the estimate of the vehicle; 0 if nothing is. The comparisons are written so that
+    NaN is a complaint."""
     vehicle, doubt = state.vehicle, state.doubt
     if vehicle.source == RECEIVER:
         level = FIX_STD_TO_FLY + PROMISE * state.aids.horizontal_slow
@@ -291,7 +293,7 @@ def load_complaint(state: EstimatorState, oldest_s: float) -> int:
     if not load.age_s <= max(oldest_s, HIDDEN_S):
         return NO_LOAD
     if load.taut == 0.0:
-        # what it might do unseen, fall or be kicked, is no reason to land: its age limits that
+        # what the load may do unseen (fall, be kicked) is no reason to land: the limit of its age covers that
         seen = load.age_s <= FRESH_S
         return LOAD_VAGUE if seen and not sqrt(load.covariance[0]) <= POSITION_STD_TO_FLY else 0
     return 0 if doubt.load <= POSITION_STD_TO_FLY else LOAD_VAGUE
@@ -300,9 +302,9 @@ def load_complaint(state: EstimatorState, oldest_s: float) -> int:
 def complaints(
     state: EstimatorState, oldest_s: float, carries: bool = True, silent_s: float = 0.0
 ) -> tuple[str, ...]:
-    """What keeps the estimate from being flown on, in words for the operator; empty if nothing does.
+    """Why the estimate is not good enough for flight, in words for the operator; empty if it is.
 
-    Where nothing is carried the load need not be known. `silent_s`: age of the last new inertial sample.
+    Where no load is carried, it need not be known. `silent_s`: age of the last new inertial sample.
     """
     found = [inertial_complaint(silent_s) or vehicle_complaint(state, oldest_s)]
     if carries:
@@ -311,8 +313,8 @@ def complaints(
 
 
 def loss(state: EstimatorState, silent_s: float) -> str:
-    """Why not even a landing is possible by the estimate, in words; empty if one is. Written so that NaN
-    tells."""
+    """Why the estimate is not even good enough for a landing, in words; empty if it is. Written so that NaN
+    is a loss."""
     doubt = state.doubt
     if inertial_complaint(silent_s):
         return _COMPLAINTS[NO_INERTIAL]

@@ -1,8 +1,8 @@
-"""Looking back: a reading is compared with the state at the time it was taken.
+"""Past states: a reading is compared with the state at the time it was taken.
 
-The ring holds past states. A correction of the present is carried back to all of them that a reading may yet
-ask for: an error dx, dv of now was dx - tau dv at tau before, so the next reading, perhaps of a moment
-before this correction, is not corrected for the same error again.
+The ring holds past states. A correction of the present state is also applied to all past states to which a
+later reading may refer: a present error dx, dv was dx - tau dv at the time tau earlier. The next reading,
+perhaps taken before this correction, therefore does not correct the same error again.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ NEVER = -float("inf")
 
 @kernel
 def reading_age(elapsed_us: float, imu_age: float) -> float:
-    """Age (s) of a reading by the clock of the estimate, which is of the instant the inertial unit shows.
+    """Age (s) of a reading, counted from the instant of the estimate, which the inertial unit shows.
 
-    No reading overtakes the inertial unit: one that seems to is of the same instant.
+    No reading overtakes the inertial unit: a reading that seems to is treated as of the same instant.
     """
     return max(0.0, elapsed_us * 1e-6 - imu_age)
 
@@ -100,7 +100,8 @@ def past4(ring: Array, row: int, share: float, first: int) -> Quat:
 
 @kernel
 def carry_back(head: int, history: History, memory_s: float) -> None:
-    """Carry the correction in `error` to every row back to `memory_s` before now and the one before that."""
+    """Apply the correction in `error` to every row back to `memory_s` before now, and to the row before
+    that."""
     ring, e = history.ring, history.error[0]
     turn = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
     now = ring[head, 0]
@@ -132,9 +133,9 @@ def carry_back(head: int, history: History, memory_s: float) -> None:
 
 @kernel
 def renew(history: History, first: int, count: int, value: Quat) -> None:
-    """Set `count` columns of every row: all that was thought before a new start is forgotten.
+    """Set `count` columns of every row: at a new start, all past estimates are forgotten.
 
-    Else readings older than the start would be held against it, for as long as the sensor's latency.
+    Otherwise readings older than the start would be compared with them, for as long as the sensor's latency.
     """
     for row in range(RING_LENGTH):
         for i in range(count):

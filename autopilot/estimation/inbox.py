@@ -1,9 +1,9 @@
-"""The readings of one tick as rows of an array, and which of them are believed.
+"""The readings of one tick as rows of an array, and which of them are accepted.
 
 A row is (kind, instant that it shows in us, the reading's numbers as in its record). The age of a reading is
-made here, by the clock of the estimate. A reading that is no number, beyond any sensor's range, of the future
-or too old is dropped, and a sensor that claims to be perfect is believed to no more than the least deviations
-below.
+computed here, by the clock of the estimate. A reading that is not a number, beyond any sensor's range, from
+the future or too old is dropped. Stated deviations are raised to the least deviations below, for a sensor
+that claims to be perfect.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from autopilot.geometry.so3 import Quat
 
 KIND, SHOWS, READING = 0, 1, 2  # columns
 COLUMNS = 16
-IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION, SPEEDS = range(8)  # the last: of rotors, not of the estimate
+IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION, SPEEDS = range(8)  # the last: of rotors, not for the estimate
 ROOM = 16  # rows of a new inbox
 
-# so that the filter stays conditioned
+# so that the filter stays well conditioned
 LEAST_POSITION_STD_M = 2e-5
 LEAST_ANGLE_STD_RAD = 2e-5
 LEAST_VELOCITY_STD_M_S = 2e-4
 LEAST_FIX_STD_M = 2e-3
 LEAST_DIRECTION_STD_RAD = 1e-4
-OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
+OLDEST_READING_S = 0.3  # older ones are dropped: corrections go back no further in the ring of past states
 # beyond any sensor's range
 GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
 FARTHEST_M, FASTEST_M_S = 1e6, 1e4
-GREATEST_STD = 1e4  # m, m/s, rad: who states more has measured nothing
+GREATEST_STD = 1e4  # m, m/s, rad: a sensor that states more has measured nothing
 UNIT_TOLERANCE = 0.02  # of the square of a quaternion's length
 NOT_MEASURED = -1.0  # deviation of a velocity that was not measured
-LONG_AGO = -1  # what an inertial sample shows that is only the last one again
+LONG_AGO = -1  # instant of an inertial sample that only repeats the last one
 
 
 def new_inbox(rows: int = ROOM) -> Array:
-    """An inbox for so many readings."""
+    """An inbox with room for this many readings."""
     return np.zeros((rows, COLUMNS))
 
 
@@ -68,13 +68,13 @@ def put_vector(inbox: Array, at: int, kind: int, vector: tuple[float, ...]) -> N
 
 @kernel
 def within(v: Vec3, most: float) -> bool:
-    """Whether a vector is shorter than `most`; what is no number is not."""
+    """Whether a vector is shorter than `most`; False for NaN."""
     return norm(v) < most
 
 
 @kernel
 def is_unit(q: Quat) -> bool:
-    """Whether a quaternion is a rotation, but for rounding."""
+    """Whether a quaternion is a rotation, apart from rounding."""
     return abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) < UNIT_TOLERANCE
 
 
@@ -92,7 +92,7 @@ def is_sane(imu: ImuReading) -> bool:
 
 @kernel
 def age_of(row: Array, now_us: int, imu_age: float) -> float:
-    """Age of a reading, s; NaN where it is of the future or too old."""
+    """Age of a reading, s; NaN if it is from the future or too old."""
     age = reading_age(now_us - row[SHOWS], imu_age)
     if row[SHOWS] <= now_us and age <= OLDEST_READING_S:
         return age
@@ -101,7 +101,7 @@ def age_of(row: Array, now_us: int, imu_age: float) -> float:
 
 @kernel
 def pose_in(row: Array, age_s: float) -> tuple[bool, PoseReading]:
-    """Whether the row's pose is believed, and the pose."""
+    """Whether the row's pose is accepted, and the pose."""
     raw = unpack(PoseReading, row, READING)
     measured = not raw.velocity_std < 0.0
     q = raw.quat_wxyz
@@ -121,7 +121,7 @@ def pose_in(row: Array, age_s: float) -> tuple[bool, PoseReading]:
 
 @kernel
 def load_in(row: Array, age_s: float) -> tuple[bool, LoadReading]:
-    """Whether the row's place of the load is believed, and the reading."""
+    """Whether the row's position of the load is accepted, and the reading."""
     raw = unpack(LoadReading, row, READING)
     measured = not raw.velocity_std < 0.0
     load = LoadReading(
@@ -138,7 +138,7 @@ def load_in(row: Array, age_s: float) -> tuple[bool, LoadReading]:
 
 @kernel
 def fix_in(row: Array, age_s: float) -> tuple[bool, GnssReading]:
-    """Whether the row's fix is believed, and the fix."""
+    """Whether the row's fix is accepted, and the fix."""
     raw = unpack(GnssReading, row, READING)
     fix = GnssReading(
         age_s,
@@ -155,7 +155,7 @@ def fix_in(row: Array, age_s: float) -> tuple[bool, GnssReading]:
 
 @kernel
 def direction_in(row: Array, age_s: float) -> tuple[bool, DirectionReading]:
-    """Whether the row's direction to the load is believed, and the reading."""
+    """Whether the row's direction to the load is accepted, and the reading."""
     raw = unpack(DirectionReading, row, READING)
     length = norm(raw.direction_body)
     sight = DirectionReading(

@@ -1,12 +1,12 @@
 """Prediction over one IMU sample: strapdown for the vehicle, a driven pendulum for the cable.
 
-The pendulum needs neither thrust nor masses: while the cable is taut the load feels gravity and the cable
-alone, so that the direction q from vehicle to load obeys
+The pendulum needs neither thrust nor masses: while the cable is taut, only gravity, cable and air act on the
+load, so that the direction q from vehicle to load obeys
 
     L q'' = -P_q (x_Q'' + g e3 - d) - L |q'|^2 q,        P_q = I - q q^T,
 
-where x_Q'' + g e3 = R a is what the accelerometer reads, and d, which is estimated, what the air does to the
-load: drag and wind by the load's mass, level.
+where x_Q'' + g e3 = R a is the reading of the accelerometer, and d, which is estimated, is the horizontal
+acceleration of the load by the air: drag and wind divided by the load's mass.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, 
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
-SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
-# rad/s^2, error of the pendulum model of a cable that does not carry its load, and of one that is tracked
+SLACK_ACCEL_STD = 10.0  # m/s^2, of a tracked load: whether it falls freely or rests on the ground is unknown
+# rad/s^2, error of the pendulum model of a cable that does not carry its load; the same of a tracked load
 LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.5
-PARTING_STD = 0.3  # m/s, at which a tracked load and the vehicle part until the cable carries
-DEBT_TIME_S = 4.0  # in which a plain receiver's corrections are passed on
+PARTING_STD = 0.3  # m/s, speed at which a tracked load and the vehicle move apart until the cable carries
+DEBT_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on
 SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
 
@@ -69,8 +69,8 @@ def _mean(a: Vec3, b: Vec3) -> Vec3:
 def turn_rate(
     vehicle: VehicleEstimate, gyro: Vec3, moment: Vec3, gyro_var: float, tuning: EstimatorTuning, dt: float
 ) -> Vec3:
-    """Body rate (rad/s): as the rotors' moment (N m) turns the vehicle, corrected by the gyroscope as far as
-    its noise is small beside the error of that."""
+    """Body rate (rad/s): propagated by the rotors' moment (N m), and corrected by the gyroscope as far as its
+    noise is small beside the error of this propagation."""
     W, J = vehicle.omega_body, tuning.inertia
     torque = sub(moment, cross(W, times(J, W)))
     ahead = axpy(dt, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), W)
@@ -90,7 +90,7 @@ def predict_vehicle(
     tuning: EstimatorTuning,
     dt: float,
 ) -> tuple[VehicleEstimate, Mat3]:
-    """Strapdown integration by the trapezoidal rule over the last two samples; also R of half way."""
+    """Strapdown integration by the trapezoidal rule over the last two samples; also R at half a step."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
     accel = sub(_mean(imu.accel, last.accel), vehicle.accel_bias)
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
@@ -119,7 +119,7 @@ def predict_taut(
     q, q_dot, d = load.q_cable, load.q_cable_dot, air.load
     accel_quad = vehicle.accel_quad
     force = (accel_quad[0] - d[0], accel_quad[1] - d[1], accel_quad[2] + tuning.gravity)
-    half = normalise(axpy(0.5 * dt, q_dot, q))  # as `force` is of half way
+    half = normalise(axpy(0.5 * dt, q_dot, q))  # since `force` is that of half a step
     q_ddot = axpy(-dot(q_dot, q_dot), half, scale(-1.0 / load.length, tangent(half, force)))
     tension = max(0.0, -tuning.load_mass * (load.length * dot(half, q_ddot) + dot(half, force)))
     q_next = normalise(axpy(0.5 * dt * dt, q_ddot, axpy(dt, q_dot, q)))
@@ -145,9 +145,10 @@ def predict_taut(
 
 @kernel
 def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History, dt: float) -> LoadEstimate:
-    """A load by itself: it goes on as it did if it is tracked, else it lies where it was laid.
+    """A load on a slack cable: a tracked load continues at its velocity, any other lies where it was laid.
 
-    The covariance of a lying load is that of its place seen from the vehicle, which a wrong velocity shifts.
+    The covariance of a lying load is that of its position relative to the vehicle, which the error of the
+    vehicle's velocity shifts.
     """
     x_load, v_load, covariance = load.x_load, load.v_load, load.covariance
     if load.source == TRACKER:
@@ -161,7 +162,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
     separation = sub(x_load, vehicle.x_quad)
     distance = norm(separation)
     q, across, q_dot = load.q_cable, load.across, load.q_cable_dot
-    # the load may be where the vehicle is for all one knows: the direction is then kept
+    # the estimates of load and vehicle may coincide: the direction is then kept
     if distance > 0.01:
         q = scale(1.0 / distance, separation)
         across = frame(q, across)
@@ -187,7 +188,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
 
 @kernel
 def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
-    """Standard deviations of what the covariance says."""
+    """Standard deviations by the covariance."""
     P = history.covariance
     level = 0.5 * (P[POSITION, POSITION] + P[POSITION + 1, POSITION + 1])
     relative = level
@@ -227,7 +228,7 @@ def predict(
     thrust: float,
     moment: Vec3,
 ) -> EstimatorState:
-    """The state dt seconds on; `thrust` (N) and `moment` (N m, body): what the rotors are thought to give."""
+    """The state dt seconds later; the rotors are assumed to give `thrust` (N) and `moment` (N m, body)."""
     load, aids, air = state.load, state.aids, state.air
     vibration = shaken(state.vibration, imu, state.last_imu, tuning, dt)
     accel_var = accel_noise(vibration, tuning)

@@ -1,4 +1,4 @@
-"""What the estimator keeps, believes of its sensors, and is given."""
+"""Records of the estimator: its state, its assumptions about the sensors, and its readings."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 
 Array = NDArray[np.float64]
 
-# The error state, all but the biases in world axes: position, velocity and attitude of the vehicle
-# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own
-# two axes: direction, rate, and its length; and what the air does to the load, level. Flights with trackers
-# alone need no more.
+# The error state, all but the biases in world axes: position, velocity and attitude of the vehicle (R =
+# exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own two
+# axes: direction, rate, and its length; and the horizontal acceleration of the load by the air. Flights with
+# only trackers need no more.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
 DIRECTION, RATE, LENGTH, AIR = 15, 17, 19, 20
 TRACKED_SIZE = 22
 # mounting of the camera (about the body's forward and left axes), magnetic heading, barometer, receiver
 MOUNTING, HEADING, BAROMETER, GNSS = 22, 24, 25, 26
 AIDED_SIZE = 29
-# what the air does to the vehicle, level: only where the load is known by its pull alone
+# horizontal acceleration of the vehicle by the air: only where the load is known by its pull alone
 PUSH = 29
 SIZE = 31
 
-ROOM = 32  # whole eights
-SCALARS, ENTRIES = 9, 13  # of one reading; of a scalar's Jacobian, behind their number
+ROOM = 32  # a multiple of eight
+SCALARS, ENTRIES = 9, 13  # of one reading; of a scalar's Jacobian, with their number in column 0
 INNOVATION, VARIANCE = 0, 1  # columns of `History.scalars`
 
-# columns of the ring of past states: time, then as named
+# columns of the ring of past states: column 0 is the time, then as named
 RING_LENGTH = 512
 X_QUAD, V_QUAD, QUAT, Q_CABLE, ACROSS, Q_RATE = 1, 4, 7, 11, 14, 17
 RING_COLUMNS = 20
@@ -41,9 +41,10 @@ RING_COLUMNS = 20
 POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST, PULL = 0, 1, 2, 3, 4, 5, 6, 7
 SENSORS = 8
 
-NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what tells the vehicle where it is
+NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what measures the position of the vehicle
 PLAIN, RTK_FLOAT, RTK_FIXED = 0.0, 1.0, 2.0  # GnssReading.rtk: what is known of the carrier's whole waves
-# what tells where the load is, beside NOBODY and TRACKER: a camera, or what the load does to the vehicle
+# what measures the position of the load, beside NOBODY and TRACKER: a camera, or the load's pull on the
+# vehicle
 CAMERA = 2.0
 
 Covariance2 = tuple[float, float, float]  # (aa, ab, bb)
@@ -54,8 +55,8 @@ class History(NamedTuple):
 
     ring: Array  # past states, RING_LENGTH x RING_COLUMNS
     covariance: Array  # of the error state, symmetric to the bit; ROOM x ROOM, of which SIZE x SIZE are used
-    error: Array  # 1 x ROOM: the correction being gathered
-    columns: NDArray[np.int64]  # SCALARS x ENTRIES: how many entries a scalar's Jacobian has, then where
+    error: Array  # 1 x ROOM: the correction being collected
+    columns: NDArray[np.int64]  # SCALARS x ENTRIES: how many entries its Jacobian has, then their columns
     shares: Array  # SCALARS x ENTRIES: the entries, from column 1 on
     gain: Array  # SCALARS x ROOM: Jacobian times covariance
     scalars: Array  # SCALARS x 2: innovation and variance
@@ -115,7 +116,7 @@ class DirectionReading(NamedTuple):
 
 
 class EstimatorTuning(NamedTuple):
-    """What the estimator believes. Deviations of IMU and models are of one sample, walks of a second."""
+    """The estimator's assumptions. Deviations of IMU and models are of one sample, walks of one second."""
 
     cable_length: float
     quad_mass: float
@@ -129,20 +130,20 @@ class EstimatorTuning(NamedTuple):
     accel_bias_walk: float  # m/s^2 per square root of a second
     cable_accel_std: float  # rad/s^2, error of the pendulum model while taut
     load_drag: float  # 1/m, drag on the load that the model leaves out: acceleration over square of speed
-    air_std: float  # m/s^2, level, of the air on the load
+    air_std: float  # m/s^2, horizontal, of the load's acceleration by the air
     air_walk: float  # m/s^2 per square root of a second
-    push_std: float  # m/s^2, level, of the air on the vehicle beyond its believed drag
+    push_std: float  # m/s^2, horizontal, of the vehicle's acceleration by the air beyond its assumed drag
     push_walk: float  # m/s^2 per square root of a second
     drag: Drag  # of the vehicle
     inertia: Vec3  # kg m^2, body
     turn_std: float  # rad/s^2, error of the angular acceleration by which the rotors turn the vehicle
-    length_std: float  # m, of the believed length
+    length_std: float  # m, of the assumed length
     gate_sigma: float
-    imu_age: float  # s, of an inertial sample when it comes
+    imu_age: float  # s, of an inertial sample when it arrives
     rtk_white: float  # share of a fix's stated deviation that is new in every fix
     gnss_white: float  # the same without carrier phase
-    gnss_time: float  # s, in which the rest forgets itself
-    rtk_speed_std: float  # m/s, level; climb is 1.7 times as bad
+    gnss_time: float  # s, time constant with which the rest changes
+    rtk_speed_std: float  # m/s, horizontal; the climb has 1.7 times this deviation
     gnss_speed_std: float
     barometer_std: float  # m
     barometer_walk: float  # m per square root of a second
@@ -152,14 +153,14 @@ class EstimatorTuning(NamedTuple):
     magnetic_age: float  # s
     declination: float  # rad, east of north
     mounting_std: float  # rad, of the camera
-    gear_height: float  # m, of the standing vehicle, where its cable is attached
-    load_height: float  # m, of the lying load's centre
+    gear_height: float  # m, height of the standing vehicle at the point where its cable is attached
+    load_height: float  # m, height of the centre of the lying load
     laid_forward: float  # m ahead of the standing vehicle: where the load was laid
     laid_std: float  # m
 
 
 class VehicleEstimate(NamedTuple):
-    """The vehicle."""
+    """Estimate of the vehicle."""
 
     x_quad: Vec3
     v_quad: Vec3
@@ -174,7 +175,8 @@ class VehicleEstimate(NamedTuple):
 
 
 class LoadEstimate(NamedTuple):
-    """Load and cable. While slack, `covariance` is that of load (position, velocity), alike on each axis."""
+    """Load and cable. While the cable is slack, `covariance` is that of the load's position and velocity, the
+    same on each axis."""
 
     x_load: Vec3
     v_load: Vec3
@@ -185,8 +187,8 @@ class LoadEstimate(NamedTuple):
     covariance: Covariance2
     taut: float
     tension: float
-    pull: float  # N along the cable: what the vehicle's acceleration leaves of the believed thrust, smoothed
-    pulled_s: float  # for how long the pull has spoken against `taut`
+    pull: float  # N along the cable: what the vehicle's acceleration shows beyond assumed thrust, smoothed
+    pulled_s: float  # s, how long the pull has contradicted `taut`; how long a tracked load has been carried
     held_s: float  # since the cable came taut or slack
     age_s: float
     rejected: float
@@ -194,7 +196,7 @@ class LoadEstimate(NamedTuple):
 
 
 class AidEstimate(NamedTuple):
-    """Errors of the aids, and how long ago each was heard."""
+    """Errors of the aiding sensors, and the age of the last reading of each."""
 
     mounting: tuple[float, float]  # of the camera, rad about the body's forward and left axes
     heading: float  # of the magnetometer, rad
@@ -203,7 +205,7 @@ class AidEstimate(NamedTuple):
     horizontal_slow: float  # m, its standard deviation as last stated
     vertical_slow: float
     reversion: float  # 1 with carrier phase, else less: see `correct_gnss`
-    debt: Vec3  # m, of late corrections that those who fly by the estimate have yet to be told
+    debt: Vec3  # m, recent corrections of the position that are not yet passed on to the laws
     field: Vec3  # the magnetometer's last reading, body
     magnetic_age: float
     barometer_age: float
@@ -211,26 +213,26 @@ class AidEstimate(NamedTuple):
 
 
 class AirEstimate(NamedTuple):
-    """What the air does beside the models, level, m/s^2: to the load beyond the pendulum, to the vehicle
-    beyond its believed drag."""
+    """Horizontal accelerations by the air that the models leave out, m/s^2: of the load beyond the pendulum,
+    of the vehicle beyond its assumed drag."""
 
     load: tuple[float, float]
     vehicle: tuple[float, float]
-    load_drag: float  # 1/s: how what the air does to the load follows its speed
-    mean_speed: tuple[float, float]  # m/s, level, of the load: of some seconds
-    mean_load: tuple[float, float]  # m/s^2, the same of what the air does to it
-    together: float  # mean of both, each without its mean, m^2/s^3
-    alone: float  # of the speed's square, m^2/s^2
+    load_drag: float  # 1/s: how the load's acceleration by the air changes with the load's speed
+    mean_speed: tuple[float, float]  # m/s, horizontal, of the load: over some seconds
+    mean_load: tuple[float, float]  # m/s^2, the same of the load's acceleration by the air
+    together: float  # m^2/s^3, mean product of both, each less its mean
+    alone: float  # m^2/s^2, mean square of the speed less its mean
 
 
 class Vibration(NamedTuple):
     """The noise of the inertial unit as its samples show it."""
 
     accel_var: float  # (m/s^2)^2, of one sample and axis
-    accel_band_var: float  # (m/s^2)^2, of white noise as strong below the rotors' speeds
+    accel_band_var: float  # (m/s^2)^2, of white noise that is as strong in the band below the rotors' speeds
     gyro_var: float  # (rad/s)^2
-    turning: float  # rad^2/s, by which the gyroscope's noise lets the attitude wander
-    step: ImuReading  # from the last sample but one to the last
+    turning: float  # rad^2/s, growth of the attitude's variance by the gyroscope's noise
+    step: ImuReading  # change from the last sample but one to the last
     low: tuple[Vec3, Vec3, Vec3, Vec3]  # m/s^2, the accelerometer through one to four low-passes
 
 
@@ -246,7 +248,7 @@ class Doubt(NamedTuple):
 
 
 class EstimatorState(NamedTuple):
-    """All the estimator knows, but for what `History` holds."""
+    """The whole state of the estimator, except for what `History` holds."""
 
     time_s: float
     vehicle: VehicleEstimate
@@ -256,15 +258,15 @@ class EstimatorState(NamedTuple):
     doubt: Doubt
     last_imu: ImuReading
     vibration: Vibration
-    unfelt: float  # N, slowly: what the pendulum says of the cable's pull less what is felt of it
+    unfelt: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
     resets: float
-    memory_s: float  # age of the oldest reading so far: so much of the ring follows corrections
+    memory_s: float  # s, age of the oldest reading so far: corrections go back this far in the ring
     head: int  # row of the ring that holds this state
     size: int  # how much of the error state is in use
 
 
 def new_history() -> History:
-    """Arrays of a filter that knows nothing; `predict` and the corrections write them in place."""
+    """Arrays of a filter without readings; `predict` and the corrections write them in place."""
     ring = np.zeros((RING_LENGTH, RING_COLUMNS))
     ring[:, 0] = -np.inf  # the time: long ago
     return History(

@@ -1,4 +1,4 @@
-"""Estimator transition at load release: the load is by itself, and no cable ends in it."""
+"""The estimate when the load is released: the load is estimated separately, and the cable carries nothing."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from autopilot.estimation.tautness import moved, slacken
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import with_field
 
-# The error of a load that hung is a few millimetres and centimetres a second; a falling one is soon seen.
+# A load that hung is known to a few millimetres and centimetres per second; a falling load is soon seen.
 PLACE_STD, SPEED_STD = 0.02, 0.2  # m, m/s
 
 
 @kernel
 def parted(state: EstimatorState, history: History, tuning: EstimatorTuning) -> EstimatorState:
-    """The estimate with the load by itself; the same where it is by itself already.
+    """The estimate with a separate load; unchanged where the cable is slack already.
 
-    A load that no tracker follows is taken to lie on the ground, under where it was let go.
+    A load that no tracker follows is assumed to lie on the ground below the place of its release.
     """
     load = state.load
     if load.taut == 0.0:

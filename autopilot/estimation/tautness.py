@@ -1,8 +1,9 @@
-"""Whether the cable is taut, and what becomes of the error state when it comes taut or slack.
+"""Whether the cable is taut, and how the error state changes when it comes taut or slack.
 
-Taut, the load is where the cable ends and its error that of vehicle and cable; slack, it is tracked or lies
-by itself. A tracked load tells by its distance. Else the pull tells: what the vehicle's acceleration leaves
-of the believed thrust, m_Q (R a) - f R e3, along the cable.
+While the cable is taut, the load is at its end, and the load's error is that of vehicle and cable. While it
+is slack, the load is tracked separately or lies where it is. The distance of a tracked load decides; without
+a tracker, the pull decides: the force along the cable that the vehicle's acceleration shows beyond the
+assumed thrust, m_Q (R a) - f R e3.
 """
 
 from __future__ import annotations
@@ -29,31 +30,34 @@ from autopilot.geometry.linear import Vec3, axpy, column, cross, norm, sub
 from autopilot.geometry.s2 import normalise, pull_of, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
-TAUT_ABOVE = 0.985  # share of the cable length at which a tracked load's slack cable counts as taut
-SLACK_BELOW = 0.965  # and at which a taut one counts as slack
-# A tracked load comes taut once its speed against the vehicle is known to this (m/s), or after a while: the
-# filter is linear in a direction that a wrong speed would soon turn far.
+TAUT_ABOVE = 0.985  # share of the cable length above which a tracked load's slack cable counts as taut
+SLACK_BELOW = 0.965  # and below which a taut one counts as slack
+# The cable of a tracked load counts as taut only once the load's speed relative to the vehicle is known to
+# SPEED_KNOWN (m/s), or KNOWN_S (s) after it came slack: the filter is linear in the direction, which a wrong
+# speed would soon turn far.
 SPEED_KNOWN, KNOWN_S = 0.2, 1.0
-PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt, and that is too little
+PULL_TAUT, PULL_SLACK = 0.8, 0.2  # shares of the load's weight: more pull means taut, less means slack
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
-PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
-PULL_TIME_S = 0.04  # in which the felt pull is smoothed
-# For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
-# lying: pendulum and length then mean little.
+PULL_DISTANCE = 0.75  # share of the cable length below which a pull does not count
+PULL_TIME_S = 0.04  # time constant that smooths the measured pull
+# For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a hanging
+# load is assumed to lie: pendulum and length then get little weight.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
-REFUSED_LOOSE = 4.0  # readings refused in a row that show the same
-# A taut cable whose felt pull is less than this share of the pendulum's does not carry, whatever its length.
+REFUSED_LOOSE = 4.0  # rejected readings in a row that show the same
+# The taut cable of a tracked load does not carry, whatever its length, if its measured pull is less than this
+# share of the pendulum's.
 LOOSE_PULL = 0.4
-UNFELT_S = 2.0  # in which it is learned what of the pull is not felt
-# A cable that begins to pull, at this share of the load's weight, stops vehicle and load along it at once: at
-# about this speed (m/s) their ends part. It is over between two samples of the accelerometer.
+UNFELT_S = 2.0  # time constant with which the missing part of the pull is learned
+# A cable that begins to pull, at JERK_PULL of the load's weight, stops vehicle and load along it at once;
+# before, its ends moved apart at about JERK_SPEED (m/s). This happens between two samples of the
+# accelerometer.
 JERK_PULL, JERK_SPEED = 0.3, 0.2
-JERK_FELT_S = 0.015  # after which it is felt
-# of the air's deviation, that a tracked load begins with: wind soon shows, and a law that lifts the load is
-# spared the search for it
+JERK_FELT_S = 0.015  # time after which the measured pull shows it
+# share of the air's deviation with which a tracked load begins: wind soon shows, and the law that lifts the
+# load is not disturbed while the filter searches for it
 STILL_SHARE = 0.1
-HOP_SPEED = 0.02  # m/s, across the cable, of a load that has begun to be pulled
-SEEN_S = 1.0  # a cable is not taken as taut while a load that is seen has not been for so long
+HOP_SPEED = 0.02  # m/s, across the cable, of a load that the cable has begun to pull
+SEEN_S = 1.0  # no cable comes taut while the last sight of the load is older, unless it was never seen
 
 
 @kernel
@@ -69,8 +73,8 @@ def frame(q: Vec3, across: Vec3) -> Vec3:
 def felt_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, mass: float
 ) -> float:
-    """Force of the cable on the vehicle along q, N, from one sample, as it is felt along the rotors' axis:
-    across that the air drags at rotors and frame, with as much as the load weighs."""
+    """Force of the cable on the vehicle along q, N, from one sample, by its component along the rotors' axis:
+    across this axis, the drag of rotors and frame can be as large as the load's weight."""
     axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
     left = mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
     return pull_of(left, load.q_cable, axis)
@@ -80,9 +84,9 @@ def felt_pull(
 def loosely_tied(load: LoadEstimate, memory_s: float, unfelt: float) -> bool:
     """Whether a cable that counts as taut does not carry its load yet.
 
-    A tracked load counts as tied some per cent of the cable's length before it is, and readings up to
-    `memory_s` old still show that; and as long after it has come to lie. `unfelt` (N) is what of the pull has
-    not been felt for long, by a wrong belief of thrust or mass.
+    The cable of a tracked load counts as taut some per cent of its length before it is, and readings up to
+    `memory_s` old still show that; the same holds for this time after the load has come to lie. `unfelt` (N)
+    is the part of the pull that has been missing for long, because the assumed thrust or mass is wrong.
     """
     if load.source == TRACKER and load.pull + unfelt < LOOSE_PULL * load.tension:
         return True
@@ -97,8 +101,8 @@ def loosely_tied(load: LoadEstimate, memory_s: float, unfelt: float) -> bool:
 def unfelt_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, before: float, tuning: EstimatorTuning, dt: float
 ) -> float:
-    """What of the pull has not been felt for long, N: less than nothing where rotors that give less than they
-    are thought to are taken for a load. A camera's slack cable does not pull while its ends are near."""
+    """Part of the pull that has been missing for long, N: negative where rotors that give less than assumed
+    look like a load. With a camera, a slack cable does not pull while its ends are near each other."""
     if load.source == TRACKER:
         if load.taut == 0.0:
             return 0.0
@@ -113,8 +117,8 @@ def unfelt_pull(
 
 @kernel
 def jerked(load: LoadEstimate, pull_before: float, history: History, tuning: EstimatorTuning) -> None:
-    """Where the cable has begun to pull since the pull was so much (N), the vehicle's velocity along it is
-    less well known."""
+    """Where the cable has begun to pull since the pull was `pull_before` (N), make the vehicle's velocity
+    along it less certain."""
     begins = JERK_PULL * tuning.load_mass * tuning.gravity
     if pull_before >= begins or load.pull < begins:
         return
@@ -152,8 +156,9 @@ def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s:
 
 @kernel
 def _tie(P: Array, first: int, of: int, across: Vec3, along: Vec3, d: float) -> None:
-    """Rows of b_i . (load - vehicle) / d, for a load whose error has nothing in common with the rest: what
-    comes in through the vehicle. `of` lies before `first`, so that the rows' own block finds what was set."""
+    """Set the rows of b_i . (load - vehicle) / d for a load whose error is uncorrelated with the rest: only
+    the part of the vehicle. `of` lies before `first`, so that the block of these rows uses values already
+    set."""
     for j in range(SIZE):
         p0, p1, p2 = P[of, j], P[of + 1, j], P[of + 2, j]
         one = -(across[0] * p0 + across[1] * p1 + across[2] * p2) / d
@@ -164,7 +169,7 @@ def _tie(P: Array, first: int, of: int, across: Vec3, along: Vec3, d: float) -> 
 
 @kernel
 def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length: float) -> LoadEstimate:
-    """Direction and rate of the cable take over from the load's own position and velocity."""
+    """The load on a taut cable: direction and rate of the cable replace its own position and velocity."""
     P = history.covariance
     forget(P, DIRECTION, 5)
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
@@ -189,7 +194,7 @@ def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length
 
 @kernel
 def slacken(load: LoadEstimate, history: History, position_var: float, velocity_var: float) -> LoadEstimate:
-    """The load by itself from now on, known to these variances; the cable's errors are dropped."""
+    """The load tracked separately from now on, with these variances; the cable's errors are dropped."""
     forget(history.covariance, DIRECTION, 5)
     resting = (0.0, 0.0, 0.0)
     return LoadEstimate(
@@ -222,7 +227,7 @@ def watch(
     tuning: EstimatorTuning,
     dt: float,
 ) -> LoadEstimate:
-    """The load with its cable found taut or slack; `unfelt` (N) as `unfelt_pull` has it."""
+    """The load after the decision whether its cable is taut or slack; `unfelt` (N) is from `unfelt_pull`."""
     share = dt / (PULL_TIME_S + dt)
     felt = felt_pull(load, vehicle, imu, thrust, tuning.quad_mass)
     pull = load.pull + share * (felt - load.pull)
@@ -256,7 +261,7 @@ def watch(
 
 @kernel
 def moved(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
-    """The load elsewhere."""
+    """The load at `x_load`."""
     return LoadEstimate(
         x_load,
         load.v_load,

@@ -1,18 +1,18 @@
 """The noise of the inertial unit, learned from its samples.
 
-What moves a vehicle bends little from sample to sample; noise does. The second difference of white noise of
-variance s^2 has the variance 6 s^2, so the mean square of the second differences tells s whatever the motion,
-and whatever is believed of the unit: a vibration that nobody told of is found in half a second. An impact
-shows in it as well, and makes the samples about it worth little.
+The motion of a vehicle is smooth from sample to sample; noise is not. The second difference of white noise of
+variance s^2 has the variance 6 s^2, so the mean square of the second differences gives s whatever the motion,
+and whatever noise is assumed: a vibration that is not configured is found in half a second. An impact shows
+in it as well, and the samples about it then get little weight.
 
 The shaking of rotors is a line at their speed, and far less than white noise of the same size once it is
-integrated to a velocity. So the accelerometer's noise is looked for once more below the rotors' speeds and
+integrated to a velocity. So the accelerometer's noise is measured a second time below the rotors' speeds and
 above the vehicle's motion, in the band
 
     H(s) = (s tau)^2 / (1 + s tau)^4,    1 / tau = 2 pi 20 Hz,
 
-which is three of four low-passes in a row, y_2 - 2 y_3 + y_4. White noise of variance s^2 leaves of it
-`_passed` s^2. What is told of less by the two is the noise that counts.
+which is computed by four low-passes in a row as y_2 - 2 y_3 + y_4. Of white noise of variance s^2 it lets
+through `_passed` s^2. The smaller of the two results is the noise that counts.
 """
 
 from __future__ import annotations
@@ -28,25 +28,26 @@ _BAND_S = 0.008  # tau
 
 @kernel
 def gyro_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
-    """Variance of a sample of the gyroscope, (rad/s)^2: as told, or as it shows."""
+    """Variance of a sample of the gyroscope, (rad/s)^2: the configured or the measured one if greater."""
     return max(tuning.gyro_std * tuning.gyro_std, vibration.gyro_var)
 
 
 @kernel
 def accel_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
-    """Variance of a sample of the accelerometer, (m/s^2)^2: as told, or as it shows."""
+    """Variance of a sample of the accelerometer, (m/s^2)^2: the configured or the measured one if greater."""
     return max(tuning.accel_std * tuning.accel_std, accel_shown(vibration))
 
 
 @kernel
 def accel_shown(vibration: Vibration) -> float:
-    """Variance of a sample of the accelerometer as it shows, (m/s^2)^2, lines of the rotors aside."""
+    """Measured variance of a sample of the accelerometer, (m/s^2)^2, without the lines of the rotors."""
     return min(vibration.accel_var, vibration.accel_band_var)
 
 
 @kernel
 def _passed(share: float) -> float:
-    """Variance that white noise of variance 1 leaves in the band, over the low-passes' share of a sample.
+    """Variance that white noise of variance 1 leaves in the band, divided by `share`, the weight of a sample
+    in the low-passes.
 
     It is the sum of the squares of the band's response to an impulse.
     """
@@ -63,7 +64,7 @@ def _low_passed(to: Vec3, last: Vec3, share: float) -> Vec3:
 def shaken(
     vibration: Vibration, imu: ImuReading, last: ImuReading, tuning: EstimatorTuning, dt: float
 ) -> Vibration:
-    """What is known of the noise after another sample."""
+    """The measured noise after another sample."""
     step = ImuReading(sub(imu.gyro, last.gyro), sub(imu.accel, last.accel))
     gyro, accel = sub(step.gyro, vibration.step.gyro), sub(step.accel, vibration.step.accel)
     share = dt / (LEARNING_S + dt)
@@ -73,7 +74,7 @@ def shaken(
     y3 = _low_passed(y2, vibration.low[2], smooth)
     y4 = _low_passed(y3, vibration.low[3], smooth)
     band = sub(sub(y2, y3), sub(y3, y4))
-    # share / smooth as one quotient, for the first sample, after no time
+    # share / smooth written as one quotient, since both are zero at the first sample
     passed = 3.0 * _passed(smooth) * (LEARNING_S + dt) / (_BAND_S + dt)
     each = 1.0 / (3.0 * _SECOND_DIFFERENCE)
     return Vibration(

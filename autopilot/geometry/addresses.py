@@ -1,14 +1,15 @@
-"""Numbers and functions at addresses: how machine code calls what was compiled, or written, apart from it.
+"""Numbers and functions at addresses: how machine code calls code that was compiled or written separately.
 
-`numbers_at(address, size)` are the numbers (float64) at an address, as an array that nobody owns;
-`call_at(function, address)` calls the C function `void f(void *)` at an address with another address. Both
-work in kernels, and where nothing is compiled in Python.
+`numbers_at(address, size)` returns the numbers (float64) at an address as an array that does not own its
+memory; `call_at(function, address)` calls the C function `void f(void *)` at an address with another address.
+Both work in kernels and, where nothing is compiled, in Python.
 
-`call_kernel_at(address, arguments)` calls a kernel that was compiled apart and returns nothing,
-`ask_kernel_at` one that returns a whole number; `kernel_giving(types)` makes what calls one that returns
-values of these types. Nothing is checked: the arguments, a tuple, must be of the types for which it was
-compiled (`autopilot.geometry.entry.native_address_of`), or the members of its tuples one after another.
-All of them work in kernels alone, as does `bytes_at(address, size)`: the bytes at an address, kept by nobody.
+`call_kernel_at(address, arguments)` calls a separately compiled kernel that returns nothing,
+`ask_kernel_at` one that returns an integer; `kernel_giving(types)` makes a function that calls one that
+returns values of these types. Nothing is checked: the arguments, a tuple, must have the types for which the
+kernel was compiled (`autopilot.geometry.entry.native_address_of`), or be the members of its tuples one after
+another. All of these work only in kernels, as does `bytes_at(address, size)`: the bytes at an address, whose
+memory they do not own.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def _numbers(context: Any, address: Any, size: Any) -> Any:
 
 
 def _calling(returned: Any) -> Any:
-    """Calls a kernel that returns this type by numba's own convention."""
+    """An intrinsic that calls a kernel with this return type by numba's own calling convention."""
 
     def typed(_: Any, address: Any, arguments: Any) -> Any:
         def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -68,7 +69,7 @@ def _calling(returned: Any) -> Any:
 
 
 def kernel_giving(*returned: Any) -> Any:
-    """What calls a kernel at an address that returns a tuple of these types of numba's."""
+    """A function that calls a kernel at an address, which returns a tuple of these numba types."""
     return _calling(types.BaseTuple.from_types(returned))
 
 

@@ -1,10 +1,10 @@
-"""numba's compiler, told apart for kernels that Python calls and for what those call in turn.
+"""numba's compiler in two variants: for kernels that Python calls, and for the functions that kernels call.
 
-Left to itself numba makes machine code, and wrappers for Python, of every function on the way to the one that
-is called, and counts references to every array that is passed on. Here a function inside of a kernel ends as
-intermediate code; the outermost one links all of it once, as functions that none else can call, so that LLVM
-puts most of them where they are used, and optimises the whole. That compiles in less than half the time and
-runs twice as fast. References are not counted: a kernel makes no arrays, and its caller holds those it got.
+By default numba makes machine code and wrappers for Python for every function below the one that is called,
+and counts references to every array that is passed on. Here a function inside a kernel is compiled only to
+intermediate code; the outermost kernel links all of it once, as internal functions, so that LLVM inlines most
+of them and optimises the whole. That compiles in less than half the time and runs twice as fast. References
+are not counted: a kernel creates no arrays, and its caller holds those that it passes.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from autopilot.geometry import resolution  # noqa: F401 - what numba finds is fo
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
-    """Code as numba keeps it, whose intermediate code is read only to be linked into other code: a kernel is
-    found in the cache in half the time."""
+    """numba's code library, whose intermediate code is parsed only when it is linked into other code: loading
+    a kernel from the cache takes half the time."""
 
-    _bitcode: bytes | None = None  # of what was found in the cache
+    _bitcode: bytes | None = None  # of a library loaded from the cache
     _parsed: Any = None
 
     @classmethod
@@ -56,7 +56,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         self._parsed = module
 
     def get_pointer_to_function(self, name: str) -> int:
-        """The address of one of its functions; 0 if there is none by that name."""
+        """The address of one of its functions; 0 if it has no function of that name."""
         if self._bitcode is None:
             return int(super().get_pointer_to_function(name))
         return int(self._codegen._engine.get_function_address(name))
@@ -66,23 +66,23 @@ JITCPUCodegen._library_class = _Library
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """What a function becomes inside of a kernel: intermediate code, of which no machine code is made."""
+    """A function inside a kernel: intermediate code, from which no separate machine code is made."""
 
     def finalize(self) -> None:
-        """Nothing is linked in, or optimised: both is done once, where it ends up."""
+        """Neither link nor optimise: both are done once, in the outermost kernel."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None of its functions has an address."""
+        """0: none of its functions has an address."""
         return 0
 
     def alone(self) -> Any:
-        """Its own functions, without those they call."""
+        """Its own functions, without the functions that they call."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
-        """Its functions with all that they call, for what numba compiles in its own way."""
+        """Its functions with all functions that they call, for code that numba compiles in its usual way."""
         whole = self.alone().clone()
         for library in _needed(self._linking_libraries):
             _link_in(whole, library)
@@ -90,7 +90,7 @@ class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """What Python calls, with all that it calls in turn."""
+    """A kernel that Python calls, with all functions that it calls in turn."""
 
     def finalize(self) -> None:
         """Link everything in, optimise, and make machine code."""
@@ -104,7 +104,7 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                # known to be called from here alone, it may vanish into its caller
+                # LLVM then knows all of its callers and can remove it after inlining
                 function.linkage = llvm.Linkage.internal
         for variable in self._final_module.global_variables:
             if not variable.is_declaration and variable.linkage == llvm.Linkage.linkonce_odr:
@@ -115,8 +115,8 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 def _needed(libraries: list[Any]) -> list[Any]:
-    """These libraries, and those that they need, each once and before any that it needs: of a library LLVM
-    leaves out the functions that nothing linked so far calls."""
+    """These libraries and those that they need, each once and before the libraries that it needs: when LLVM
+    links a library, it leaves out the functions that no code linked so far calls."""
     found: dict[Any, None] = {}
 
     def visit(library: Any) -> None:
@@ -139,12 +139,12 @@ def _link_in(module: Any, library: Any) -> None:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _OuterLowering(NativeLowering):  # type: ignore[misc]
-    """Lowering of what Python calls."""
+    """Lowering of a kernel that Python calls."""
 
     _name = "outer_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Lower into a library that links once."""
+        """Lower into a library that is linked once."""
         state.library = _OuterLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
@@ -152,19 +152,19 @@ class _OuterLowering(NativeLowering):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _InnerLowering(NativeLowering):  # type: ignore[misc]
-    """Lowering of what is inside of a kernel; it ends before machine code."""
+    """Lowering of a function inside a kernel; it stops before machine code."""
 
     _name = "inner_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Lower, and make the result known to those who call it."""
+        """Lower, and register the result for the functions that call it."""
         context = state.targetctx
         state.library = _InnerLibrary(context.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]
         described = lowered.fndesc
-        # a function without an address, as numba looks functions up by an object of this kind
+        # a function without an address, because numba looks functions up by an object of this kind
         key = _dynfunc.make_function(
             described.lookup_module(), described.qualname, "", 0, lowered.env, (state.library,)
         )
@@ -174,7 +174,7 @@ class _InnerLowering(NativeLowering):  # type: ignore[misc]
 
 
 class _Compiler(CompilerBase):  # type: ignore[misc]
-    """numba's own passes with another end."""
+    """numba's own passes with another lowering."""
 
     lowering: Any
 
@@ -197,30 +197,30 @@ class _InnerCompiler(_Compiler):
 
 
 _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
-# of functions that only kernels call, and of those of which less than a call is left
+# `INSIDE` is for functions that only kernels call, `INLINED` for those that are always inlined
 _UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 INSIDE: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler, **_UNWRAPPED}
 INLINED: Any = {**INSIDE, "forceinline": True}
 
 
 def intrinsic(function: Callable[..., Any]) -> Any:
-    """numba's, untyped for type checkers: what comes of it is called without the first argument, which is the
-    compiler's own."""
+    """numba's `intrinsic`, untyped for type checkers: kernels call the result without the first argument,
+    which the compiler supplies."""
     return _intrinsic(function)
 
 
 class _Inner(CPUDispatcher):  # type: ignore[misc]
-    """A kernel as others call it."""
+    """A kernel as other kernels call it."""
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """numba's own, but without a version for each literal number that is passed."""
+        """As numba's own, but without a separate version for each literal number that is passed."""
         plain = {name: types.unliteral(kind) for name, kind in kws.items()}
         return super().get_call_template([types.unliteral(kind) for kind in args], plain)
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function with two faces: one for Python, whose machine code is kept in a cache, and one for
-    other kernels. Most kernels never show the first: their cache is not looked for."""
+    """A compiled function with two interfaces: one for Python, whose machine code is cached, and one for
+    other kernels. Python never calls most kernels: their cache is then not looked up."""
 
     def __init__(self, function: Any, cache_of: Callable[[Any], Any], nogil: bool = False) -> None:
         self._kept: Any = None
@@ -230,12 +230,12 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
 
     @cached_property
     def _inner(self) -> _Inner:
-        """Made only where something is compiled: a few hundred of them take a while."""
+        """The interface for other kernels, made only when something is compiled: a few hundred are slow."""
         inner = dict(_OPTIONS, **_UNWRAPPED)
         return _Inner(self.py_func, targetoptions=inner, pipeline_class=_InnerCompiler)
 
     def compile(self, sig: Any) -> Any:
-        """numba's own, without looking for garbage meanwhile, which takes a tenth of the time."""
+        """As numba's own, but without garbage collection meanwhile, which takes a tenth of the time."""
         collecting = gc.isenabled()
         gc.disable()
         try:
@@ -252,7 +252,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
 
     @_cache.setter
     def _cache(self, blank: Any) -> None:
-        """numba's constructor sets one that keeps nothing."""
+        """Ignore the cache that keeps nothing, which numba's constructor sets."""
 
     @property
     def _numba_type_(self) -> Any:

@@ -1,8 +1,8 @@
 """The machine code of a kernel, called without its dispatcher: from Python, or from other machine code.
 
-At each call numba's dispatcher looks up the types of the arguments. For records of arrays, as the two ticks
-take them, that costs several times what it costs to unpack them. Who always calls with arguments of the same
-types asks for the machine code once.
+At each call numba's dispatcher looks up the types of the arguments. For records of arrays, such as the two
+ticks take, that costs several times as much as unpacking them. A caller whose arguments always have the same
+types gets the machine code once and calls it directly.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ T = TypeVar("T")
 
 
 def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
-    """The machine code of a kernel for arguments of the types of these, compiled or loaded where need be.
+    """The machine code of a kernel for arguments of the same types as these, compiled or loaded if necessary.
 
-    It must be called with arguments of these very types, which are not checked. A function that is not
-    compiled is returned as it is.
+    It must be called with arguments of exactly these types, which are not checked. A plain Python function is
+    returned as it is.
     """
     if not hasattr(kernel, "overloads"):
         return kernel
@@ -30,8 +30,8 @@ def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
 
 
 def native_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
-    """The address at which `autopilot.geometry.addresses.call_kernel_at` finds a kernel for arguments of the
-    types of these, compiled or loaded where need be; it stays there as long as the kernel lives."""
+    """The address by which `autopilot.geometry.addresses.call_kernel_at` calls a kernel with arguments of the
+    same types as these, compiled or loaded if necessary; it is valid as long as the kernel exists."""
     types = tuple(map(typeof, arguments))
     kernel.compile(types)  # type: ignore[attr-defined]
     found = kernel.overloads[types]  # type: ignore[attr-defined]
@@ -39,7 +39,7 @@ def native_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
 
 
 def address_of(kernel: Callable[..., T], *arguments: Any) -> int:
-    """The address of a compiled kernel as a C function of such numbers, compiled or loaded where need be."""
+    """The address of a kernel as a C function of arguments like these, compiled or loaded if necessary."""
     types = tuple(map(typeof, arguments))
     kernel.compile(types)  # type: ignore[attr-defined]
     found = kernel.overloads[types]  # type: ignore[attr-defined]

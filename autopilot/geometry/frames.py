@@ -13,9 +13,9 @@ from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import Quat, quat_multiply
 
 _HALF = sqrt(0.5)
-# takes ENU coordinates to NED coordinates: half a turn about (1, 1, 0)/sqrt(2)
+# converts ENU coordinates to NED coordinates: half a turn about (1, 1, 0)/sqrt(2)
 _NED_ENU: Quat = (0.0, _HALF, _HALF, 0.0)
-# takes FLU coordinates to FRD coordinates: half a turn about x
+# converts FLU coordinates to FRD coordinates: half a turn about x
 _FRD_FLU: Quat = (0.0, 1.0, 0.0, 0.0)
 
 
@@ -45,7 +45,7 @@ def flu_from_frd(v: Vec3) -> Vec3:
 
 @kernel
 def quat_ned_frd_from_enu_flu(quat_wxyz: Quat) -> Quat:
-    """Attitude FLU -> ENU rewritten as attitude FRD -> NED, with w >= 0."""
+    """Attitude FLU -> ENU converted to attitude FRD -> NED, with w >= 0."""
     q = quat_multiply(quat_multiply(_NED_ENU, quat_wxyz), _FRD_FLU)
     if q[0] < 0.0:
         q = (-q[0], -q[1], -q[2], -q[3])
@@ -54,5 +54,6 @@ def quat_ned_frd_from_enu_flu(quat_wxyz: Quat) -> Quat:
 
 @kernel
 def quat_enu_flu_from_ned_frd(quat_wxyz: Quat) -> Quat:
-    """Attitude FRD -> NED rewritten as FLU -> ENU, with w >= 0: both changes of axes are half turns."""
+    """Attitude FRD -> NED converted to FLU -> ENU, with w >= 0: the same map, as both axis changes are half
+    turns."""
     return quat_ned_frd_from_enu_flu(quat_wxyz)

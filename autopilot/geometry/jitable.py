@@ -1,4 +1,4 @@
-"""Plain functions that kernels may call, marked without numba: who calls them as they are need not load it.
+"""Plain functions that kernels may call, marked without loading numba: programs without kernels need none.
 
 numba takes half a second to import, which is most of what a command like `gcs status` would take.
 """
@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_marked: list[Callable[..., Any]] = []  # until numba is there
-_register: list[Callable[[Any], Any]] = []  # numba's own mark, from then on
+_marked: list[Callable[..., Any]] = []  # until numba is loaded
+_register: list[Callable[[Any], Any]] = []  # numba's own decorator, once numba is loaded
 
 
 def jitable(function: F) -> F:
-    """Mark a function that kernels may call; it stays a plain one."""
+    """Mark a function that kernels may call; it stays a plain function."""
     if _register:
         _register[0](function)
     else:
@@ -24,7 +24,7 @@ def jitable(function: F) -> F:
 
 
 def register_with(register: Callable[[Any], Any]) -> None:
-    """Hand all that were marked, and will be, to numba's `register_jitable`."""
+    """Pass all functions marked so far, and all marked later, to numba's `register_jitable`."""
     _register[:] = [register]
     while _marked:
         register(_marked.pop())

@@ -1,8 +1,8 @@
 """How every kernel is compiled, by one process at a time, and how its machine code is found again.
 
-numba keys its disk cache by the file of the *outermost* function alone: after a change in a callee, or of a
-constant from another module, it would go on serving the old machine code. Kernels are therefore kept where
-`autopilot.geometry.machine_code` says, by the content of all that their source file imports.
+numba keys its disk cache only by the file of the *outermost* function: after a change in a callee, or of a
+constant from another module, it would still load the old machine code. Kernels are therefore stored in the
+folder given by `autopilot.geometry.machine_code`, keyed by the content of all that their source file imports.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.jitable import register_with
 from autopilot.geometry.machine_code import ROOT, folder_of, note_use, sources_hash
 
-_LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
+_LONGEST_S = 600.0  # longest wait for another process; then this process compiles the kernel itself
 
-_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of a function that is an argument
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # the address of a function that is an argument
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -34,9 +34,9 @@ def _is_ours(file: str) -> bool:
 
 
 class _ContentLocator:
-    """Tells numba where the machine code of a function is kept: by the content of its sources alone.
+    """Tells numba where the machine code of a function is stored: keyed only by the content of its sources.
 
-    numba's own locators put the directory of the source file into the name: every clone would compile anew.
+    numba's own locators put the directory of the source file into the key: every clone would compile again.
     """
 
     def __init__(self, function: Any, file: str) -> None:
@@ -45,7 +45,7 @@ class _ContentLocator:
 
     @classmethod
     def from_function(cls, function: Any, file: str) -> _ContentLocator | None:
-        """A locator of a function of this project; None for any other, and where nothing can be written."""
+        """A locator for a function of this project; None for others, and if the cache cannot be written."""
         if not Path(file).is_file() or not _is_ours(file):
             return None
         locator = cls(function, file)
@@ -56,7 +56,7 @@ class _ContentLocator:
         return locator
 
     def ensure_cache_path(self) -> None:
-        """Make the directory."""
+        """Create the directory, and note that it is used."""
         path = self.get_cache_path()
         path.mkdir(parents=True, exist_ok=True)
         note_use(path.parent)
@@ -70,27 +70,27 @@ class _ContentLocator:
         return sources_hash(self._path)
 
     def get_disambiguator(self) -> str:
-        """Tells functions of one name in one file apart."""
+        """Distinguishes functions of the same name in one file."""
         return str(self._line)
 
 
 caching.CacheImpl._locator_classes.insert(0, _ContentLocator)
 
-# whose compilation goes on here and its lock, outermost first; None where no lock could be had
+# caches of the functions being compiled in this process, outermost first, and their locks (None: no lock)
 _held: list[tuple[_SharedCache, Any]] = []
 
 
 class _SharedCache(caching.FunctionCache):
     """numba's disk cache, shared by processes that compile at the same time.
 
-    Whoever misses a function compiles it under a lock; who misses it meanwhile waits, and loads. As a
-    function is locked before what it calls, no two processes can wait for each other. The index of a function
-    is written under a lock too: of two processes that add to it at once, numba would lose the entry of one,
-    or serve its machine code for the other's.
+    The first process that does not find a function compiles it under a lock; others that need it meanwhile
+    wait, and load it. Because a function is locked before the functions that it calls, no two processes can
+    wait for each other. The index of a function is written under a lock too: if two processes added to it at
+    the same time, numba would lose the entry of one, or load its machine code for the other's.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compile result, loaded; None: the caller must compile it, and holds the lock."""
+        """The compile result, loaded; None: the caller must compile it, and this process holds the lock."""
         found = self._load(sig, target_context)
         if found is not None:
             return found
@@ -105,11 +105,11 @@ class _SharedCache(caching.FunctionCache):
 
     def _load(self, sig: Any, target_context: Any) -> Any:
         try:
-            # numba would first load all that it can compile with, which takes longer than most kernels do
+            # numba would first load all parts of its compiler, which takes longer than most kernels
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
         except (AttributeError, ImportError):
-            # an index that names types which are no longer where they were
+            # the index names types that have since been moved
             index = self._lock("index")
             self.flush()
             if index is not None:
@@ -117,7 +117,7 @@ class _SharedCache(caching.FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compile result, and let others have it."""
+        """Store a compile result, and release the lock so that other processes can load it."""
         index = self._lock("index")
         try:
             super().save_overload(sig, data)
@@ -138,8 +138,8 @@ class _SharedCache(caching.FunctionCache):
 
 
 def _cache_of(function: Any) -> Any:
-    """The cache of a kernel: of this project none but ours, which keeps nothing where nothing can be written.
-    numba would keep it beside the sources, and go on serving it after these have changed."""
+    """The cache of a kernel: for kernels of this project only the cache by content, or none where it cannot
+    be written. numba would store them beside the sources, and load them even after a change of these."""
     file = function.__code__.co_filename
     if _is_ours(file) and _ContentLocator.from_function(function, file) is None:
         return caching.NullCache()
@@ -147,7 +147,7 @@ def _cache_of(function: Any) -> Any:
 
 
 def _release(cache: Any) -> None:
-    """Give up the lock on the function with this cache, the innermost one that is being compiled."""
+    """Release the lock on the function with this cache if it is the innermost one being compiled."""
     if _held and _held[-1][0] is cache:
         lock = _held.pop()[1]
         if lock is not None:
@@ -155,13 +155,13 @@ def _release(cache: Any) -> None:
 
 
 class _Failures(event.Listener):
-    """Gives up the lock on a function that cannot be compiled for these types; numba then tries others."""
+    """Releases the lock on a function that cannot be compiled for these types; numba then tries others."""
 
     def on_start(self, event: Any) -> None:
-        """Nothing yet."""
+        """Do nothing yet."""
 
     def on_end(self, event: Any) -> None:
-        """Compiled, or not."""
+        """Release the lock if the compilation failed."""
         dispatcher = event.data["dispatcher"]
         if tuple(event.data["args"]) not in dispatcher.overloads:
             _release(dispatcher._cache)
@@ -175,7 +175,7 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile `function` to machine code with strict IEEE arithmetic and a disk cache.
 
     Fast-math stays off, so that CPython and machine code agree to the bit. Division by zero gives inf or nan
-    as IEEE 754 says, in place of an exception. A kernel makes no arrays: it writes those that it is given.
+    as IEEE 754 says, instead of an exception. A kernel creates no arrays: it writes to those it is given.
     """
     if config.DISABLE_JIT:
         return function
@@ -184,9 +184,9 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def threaded(function: Callable[P, T]) -> Callable[P, T]:
-    """A kernel that lets other threads run while it does, for one that works for long at each call.
+    """A kernel that lets other threads run meanwhile (it releases the GIL), for kernels with long calls.
 
-    It must not fly flights in lanes: of what notes that these part there is one for all threads.
+    It must not fly flights in lanes: all threads share one record of the lanes that have parted.
     """
     if config.DISABLE_JIT:
         return function

@@ -1,12 +1,12 @@
-"""Numbers of eight flights at once, for the compiler: a kernel is compiled for these as it is for one number.
+"""Numbers of eight flights at once, as types of the compiler: kernels compile for them as for single numbers.
 
-`WIDE` is a vector of eight doubles, one of each flight, `WHOLE` one of eight whole numbers. Sums, products,
-roots and the like are taken lane by lane with the same rounding as of single numbers, so that each flight
-finds the bits that it finds alone. A number that is the same for all mixes with them.
+`WIDE` is a vector of eight doubles, one for each flight, `WHOLE` one of eight integers. Sums, products,
+roots and the like are computed lane by lane with the same rounding as for single numbers, so that each flight
+gets the same bits as alone. A number that is the same for all flights can be mixed with them.
 
-A kernel has one course. So whatever decides about it (a comparison, `int`, `isfinite`) gives one answer, that
-of lane 0; where another lane would have answered otherwise this is noted, and `lanes.parted` says which: what
-has been computed since then is right for the others.
+A kernel takes one branch for all lanes. So whatever decides on a branch (a comparison, `int`, `isfinite`)
+returns one result, that of lane 0. Lanes whose own result differs are recorded, and `lanes.parted` returns
+them: what has been computed since then is right only for the other lanes.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _FLAG = "plumbline_lanes_parted"
 
 
 class _LaneType(types.Type):
-    """Eight numbers; a plain one becomes eight of itself."""
+    """Eight numbers; a single number is converted to eight copies of it."""
 
     taken: tuple[Any, ...] = ()
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """How numba may turn another type into this one."""
+        """How numba may convert another type to this one."""
         return Conversion.safe if isinstance(other, self.taken) else None
 
 
@@ -66,11 +66,11 @@ class _WholeModel(models.PrimitiveModel):
         super().__init__(manager, kind, WHOLES)  # type: ignore[no-untyped-call]
 
 
-# ---- one course for all
+# ---- one branch for all
 
 
 def flag_of(builder: Any) -> Any:
-    """The variable that notes that the lanes have parted."""
+    """The variable that records which lanes have parted."""
     module = builder.module
     if _FLAG in module.globals:
         return module.globals[_FLAG]
@@ -80,10 +80,10 @@ def flag_of(builder: Any) -> Any:
 
 
 def _agreed(builder: Any, answers: Any) -> Any:
-    """Lane 0's of eight answers; the lanes that answer otherwise are noted."""
+    """Lane 0's of eight truth values; the lanes whose value differs are recorded."""
     bits = builder.bitcast(answers, BITS)
     first = builder.and_(bits, ir.Constant(BITS, 1))
-    others = builder.xor(bits, builder.neg(first))  # of lane 0's answer eight times
+    others = builder.xor(bits, builder.neg(first))  # from lane 0's value in all eight bits
     flag = flag_of(builder)
     builder.store(builder.or_(builder.load(flag), others), flag)
     return builder.extract_element(answers, ir.Constant(INDEX, 0))
@@ -95,9 +95,9 @@ Made = Callable[[Any, Any, Any, Any], Any]  # (context, builder, signature, valu
 
 
 def define(function: Any, made: Made, *signatures: Any) -> None:
-    """Let kernels call `function` with these types."""
+    """Make `function` callable in kernels with these types."""
     template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": signatures})
-    infer_global(function, types.Function(template))  # NumPy 1 does not say where its functions are
+    infer_global(function, types.Function(template))  # functions of NumPy 1 do not name their module
     for one in signatures:
         lower_builtin(function, *one.args)(made)
 
@@ -184,7 +184,7 @@ define(np.rint, _vector_intrinsic("rint"), _ONE)
 
 
 def _lane_by_lane(function: Any) -> Made:
-    """What a library knows of one number only."""
+    """Implementation of a function that the library has for single numbers only."""
 
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         one = signature(types.float64, *[types.float64] * len(given))
@@ -209,7 +209,7 @@ def _answered(test: Callable[[Any, Any], Any]) -> Made:
 
 
 def _is_finite(builder: Any, value: Any) -> Any:
-    # x - x is 0, or no number
+    # x - x is 0, or nan
     gone = builder.fsub(value, value)
     return builder.fcmp_ordered("==", gone, gone)
 
@@ -231,7 +231,7 @@ define(math.isinf, _answered(_is_inf), _PREDICATE)
 
 
 def _common(builder: Any, wholes: Any) -> Any:
-    """Lane 0's of eight whole numbers; the lanes that differ are noted."""
+    """Lane 0's of eight integers; the lanes that differ are recorded."""
     first = builder.extract_element(wholes, ir.Constant(INDEX, 0))
     _agreed(builder, builder.icmp_signed("==", wholes, _splat(builder, first, WHOLES)))
     return first
@@ -255,7 +255,7 @@ define(math.ceil, _to_ceil, signature(types.int64, WIDE))
 
 
 def _extreme(sign: str) -> Made:
-    """As Python's own: of two numbers the first, unless the second is beyond it."""
+    """As in Python: of two numbers the first, unless the second is beyond it."""
 
     def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         found = given[0]
@@ -272,7 +272,7 @@ for function, sign in ((max, ">"), (min, "<")):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
-            """The type of the result, if one of the arguments is of eight lanes."""
+            """The type of the result, if one of the arguments has eight lanes."""
             if WIDE not in args:
                 return None
             return signature(WIDE, *[WIDE] * len(args))
@@ -311,7 +311,7 @@ lower_cast(WHOLE, WIDE)(_as_wide)
 
 
 def _lifted(kind: Any) -> Any:
-    """A type with its numbers of eight lanes."""
+    """The type with each of its floats replaced by eight lanes."""
     if isinstance(kind, types.Float):
         return WIDE
     if isinstance(kind, types.UniTuple):
@@ -323,13 +323,13 @@ def _has_lanes(kind: Any) -> bool:
     return kind == WIDE or (isinstance(kind, types.UniTuple) and _has_lanes(kind.dtype))
 
 
-_numba: Any = types  # whose tuples and records learn to mix one number with eight
+_numba: Any = types  # its tuples and records are extended below to mix one number with eight
 _new_tuple = _numba.Tuple.__new__
 
 
 def _tuple_of(cls: Any, kinds: Sequence[Any]) -> Any:
-    """numba's type of a tuple; plain numbers beside ones of eight lanes become such, so that it may be
-    indexed."""
+    """numba's type of a tuple; single numbers beside numbers of eight lanes become eight lanes too, so that
+    the tuple can be indexed."""
     if any(_has_lanes(kind) for kind in kinds):
         lifted = [_lifted(kind) for kind in kinds]
         if all(kind == lifted[0] for kind in lifted):
@@ -341,7 +341,7 @@ _numba.Tuple.__new__ = _tuple_of
 
 
 def _unified_records(self: Any, context: Any, other: Any) -> Any:
-    """The type of a record that is one of two, field by field."""
+    """The common type of two record types, unified field by field; None if there is none."""
     if not isinstance(other, _numba.BaseNamedTuple) or other.instance_class is not self.instance_class:
         return None
     kinds = [context.unify_pairs(a, b) for a, b in zip(self.types, other.types, strict=True)]

@@ -1,7 +1,7 @@
-"""What kernels do with numbers of eight flights beside arithmetic, and what that means for one flight.
+"""Operations of kernels on the numbers of eight flights, besides arithmetic, and on those of one flight.
 
-A kernel is written for one flight. Where flights in lanes need something else than one, it calls a function
-of this file, which does the plain thing to plain numbers, in Python and in machine code.
+A kernel is written for one flight. Where flights in lanes need something different, it calls a function of
+this file, which does the ordinary thing with single numbers, in Python and in machine code.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SINGLES = ir.VectorType(ir.FloatType(), LANES)
 
 @intrinsic
 def parted(_: Any) -> Any:
-    """In a kernel: which lanes have parted from lane 0 since this was asked last, a bit each."""
+    """In a kernel: the lanes that have parted from lane 0 since the last call, one bit each."""
 
     def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         flag = flag_of(builder)
@@ -41,8 +41,8 @@ def _retyped(kind: Any) -> Any:
 
 @intrinsic
 def in_lanes(_: Any, array: Any) -> Any:
-    """In a kernel: an array whose last axis is the lanes, and begins at whole 64 bytes, as one of `Wide` or
-    `Whole`."""
+    """In a kernel: an array whose last axis is the lanes, and which is aligned to 64 bytes, as an array of
+    `Wide` or `Whole`."""
     lane = _retyped(array)
     if lane is None or array.layout != "C":
         return None
@@ -94,7 +94,7 @@ def _single(value: Any) -> Any:
 
 
 def if_above(value: float, limit: float, then: float, otherwise: float) -> float:
-    """`then` where value > limit, else `otherwise`; in lanes each flight for itself, without a branch."""
+    """`then` if value > limit, else `otherwise`; in lanes for each flight separately, without a branch."""
     return then if value > limit else otherwise
 
 
@@ -119,7 +119,7 @@ def _if_above(value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
 
 
 def each(value: float) -> int:
-    """A whole number that each flight has its own of."""
+    """`value` as an integer; in lanes each flight has its own."""
     return int(value)
 
 
@@ -143,12 +143,12 @@ def _each(value: Any) -> Any:
 
 
 def rows_in(table: Any) -> int:
-    """How many rows a table has; in lanes each flight has its own table."""
+    """Number of rows of a table; in lanes each flight has its own table."""
     return len(table)
 
 
 def taken(table: Any, at: int, column: int) -> float:
-    """The number in a row and column of a table; in lanes of each flight's own row in its own table."""
+    """The number at a row and column of a table; in lanes each flight has its own row and its own table."""
     return float(table[at, column])
 
 
@@ -181,7 +181,7 @@ def _taken_each(_: Any, tables: Any, at: Any, column: Any) -> Any:
             where = ir.Constant(INDEX, lane)
             rows, columns = cgutils.unpack_tuple(builder, held.shape)
             row = builder.extract_element(given[1], where)
-            # a lane that has parted from the others may ask for what is not there
+            # a lane that has parted from the others may request a row that does not exist
             row = builder.select(builder.icmp_unsigned("<", row, rows), row, ir.Constant(row.type, 0))
             place = builder.gep(held.data, [builder.add(builder.mul(row, columns), given[2])])
             found = builder.insert_element(found, builder.load(place), where)
@@ -213,7 +213,7 @@ def _taken(table: Any, at: Any, column: Any) -> Any:
 
 
 def bits_of(value: float) -> int:
-    """The 64 bits of a double as a whole number."""
+    """The 64 bits of a double as an integer."""
     return int(np.float64(value).view(np.int64))
 
 

@@ -1,10 +1,10 @@
-"""Where the machine code of kernels is kept, and whether all of it is there; without numba, which is heavy.
+"""Where the machine code of kernels is stored, and whether it is complete; without numba, which loads slowly.
 
 A directory is named by a hash over a source file and all files of this project that it imports, directly or
-not, so that a stale entry cannot be met and a change recompiles only what it can reach. Where the checkout
-lies does not enter the hash: a second clone of the same source finds the machine code of the first.
+indirectly, so that stale code is never found and a change recompiles only what depends on it. The location of
+the checkout does not enter the hash: a second clone of the same source finds the machine code of the first.
 
-Once a program has compiled all that a flight needs it leaves a mark (`mark_ready`), by which the next one
+When a program has compiled all that a flight needs, it leaves a mark (`mark_ready`). From it the next program
 knows (`is_ready`), before it has loaded anything, whether it will have to compile.
 """
 
@@ -26,11 +26,11 @@ from platformdirs import user_cache_path
 
 ROOT = Path(__file__).resolve().parents[2]
 _DAY_S = 86400.0
-KEPT_S = 90.0 * _DAY_S  # that machine code is kept without being used
+KEPT_S = 90.0 * _DAY_S  # how long unused machine code is kept
 _MARKS = "ready"
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
 _PACKAGES = ("autopilot", "sitl", "missions", "gcs", "plumbline")
-# it begins with letters, which are found fast: what is found in a text too does no harm
+# begins with literal letters, which are searched fast; matches inside a text do no harm
 _IMPORT = re.compile(
     rb"from[ \t]+((?:%b)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)" % "|".join(_PACKAGES).encode()
 )
@@ -51,7 +51,7 @@ def _digest(file: str, root: str) -> bytes:
 
 @cache
 def _files(root: str) -> frozenset[str]:
-    """The source files of the project at `root`, relative to it; in texts, of which a `Path` costs ten."""
+    """The source files of the project at `root`, relative to it; as texts: a `Path` costs as much as ten."""
     walked = (step for package in _PACKAGES for step in os.walk(f"{root}{os.sep}{package}"))
     inside = ((os.path.relpath(folder, root), names) for folder, _, names in walked)
     return frozenset(
@@ -61,7 +61,7 @@ def _files(root: str) -> frozenset[str]:
 
 @cache
 def _named(module: str, root: str) -> frozenset[str]:
-    """The file of a module, and those that make what it lies in packages."""
+    """The file of a module, and the `__init__.py` files of the packages that contain it."""
     base = module.replace(".", os.sep)
     packages = (
         f"{base[:end]}{os.sep}__init__.py" for end, sign in enumerate(base + os.sep) if sign == os.sep
@@ -71,14 +71,14 @@ def _named(module: str, root: str) -> frozenset[str]:
 
 @cache
 def _imported(file: str, root: str) -> frozenset[str]:
-    """The files below `root` that a file imports itself."""
+    """The files below `root` that a file imports directly."""
     found: set[str] = set()
     for module, names in _IMPORT.findall(_source(file, root)):
         base = module.decode()
         found |= _named(base, root)
-        if f"{base.replace('.', os.sep)}.py" not in found:  # a package, of which modules may be named
+        if f"{base.replace('.', os.sep)}.py" not in found:  # a package: the names may be its modules
             found.update(*(_named(f"{base}.{name.decode()}", root) for name in _NAME.findall(names)))
-    if b"iter_modules(__path__)" in _source(file, root):  # a package that finds its modules by itself
+    if b"iter_modules(__path__)" in _source(file, root):  # a package that finds its modules itself
         folder = file.rpartition(os.sep)[0]
         found.update(other for other in _files(root) if other.rpartition(os.sep)[0] == folder)
     return frozenset(found)
@@ -86,7 +86,7 @@ def _imported(file: str, root: str) -> frozenset[str]:
 
 @cache
 def sources_hash(path: Path, root: Path = ROOT) -> str:
-    """Hash of a source file and of all files of the project at `root` that it imports, directly or not."""
+    """Hash of a source file and all files of the project at `root` that it imports, directly or not."""
     first, top = os.path.relpath(path, root), str(root)
     seen, ahead = {first}, [first]
     while ahead:
@@ -100,28 +100,28 @@ def sources_hash(path: Path, root: Path = ROOT) -> str:
 
 
 def _kernels() -> Path:
-    """In the user's cache, or in the folder that NUMBA_CACHE_DIR names."""
+    """The folder of all machine code, in the user's cache or in the folder that NUMBA_CACHE_DIR names."""
     cache = Path(CHOSEN_BY_USER) / "plumbline" if CHOSEN_BY_USER else user_cache_path("plumbline")
     return cache / "kernels"
 
 
 def folder_of(path: Path) -> Path:
-    """Where the machine code of the kernels in this source file is kept."""
+    """The folder in which the machine code of the kernels in this source file is stored."""
     return _kernels() / sources_hash(path)
 
 
 @cache
 def note_use(folder: Path) -> None:
-    """Remember, once a program, that what is kept in this folder is used."""
+    """Record, once per program, that the content of this folder is in use."""
     with suppress(OSError):
         os.utime(folder)
 
 
 def drop_unused(now_s: float) -> None:
-    """Delete what has not been used for so long: most of it is of sources that have changed since.
+    """Delete what has not been used for `KEPT_S`: mostly code of sources that have changed since.
 
-    `now_s` is of the clock by which files are dated. A mark goes before what it promises, which is kept a
-    day longer: no flight finds a mark without the code.
+    `now_s` is the time of the clock that dates files. A mark is deleted before the code that it vouches for,
+    which is kept a day longer: no flight finds a mark without the code.
     """
     with suppress(OSError):
         for mark in (_kernels() / _MARKS).iterdir():
@@ -134,7 +134,7 @@ def drop_unused(now_s: float) -> None:
 
 @cache
 def _machine() -> str:
-    """What machine code depends on beside its sources: processor, interpreter and compiler."""
+    """Hash of what machine code depends on besides its sources: processor, interpreter and compiler."""
     known = [platform.machine(), platform.python_version(), version("numba"), version("llvmlite")]
     known += [os.environ.get(name, "") for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")]
     with suppress(OSError):
@@ -152,7 +152,7 @@ def _mark(source: Path, part: str) -> Path:
 
 
 def why_not_kept() -> str:
-    """Why machine code cannot be kept, so that each program compiles anew; empty where it can."""
+    """Why machine code cannot be stored, so that each program compiles again; empty if it can be stored."""
     try:
         _marks().mkdir(parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=_marks()):
@@ -162,14 +162,14 @@ def why_not_kept() -> str:
 
 
 def is_ready(source: Path, parts: Iterable[str]) -> bool:
-    """True if all kernels of these parts are there, or none is ever compiled; `source` imports them all."""
+    """True if all kernels of these parts are compiled, or compiling is off; `source` imports them all."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return True
     return all(is_marked(source, part) for part in parts)
 
 
 def is_marked(source: Path, part: str) -> bool:
-    """True if `mark_ready` was called for this part with these very sources, on this machine."""
+    """True if `mark_ready` was called for this part with exactly these sources, on this machine."""
     mark = _mark(source, part)
     if not mark.is_file():
         return False
@@ -179,7 +179,7 @@ def is_marked(source: Path, part: str) -> bool:
 
 
 def mark_ready(source: Path, parts: Iterable[str]) -> None:
-    """Say so; where nothing can be written, the next program will look again."""
+    """Mark these parts as compiled; if nothing can be written, the next program checks again."""
     with suppress(OSError):
         for part in parts:
             mark = _mark(source, part)

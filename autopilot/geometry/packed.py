@@ -1,14 +1,14 @@
-"""Records as rows of numbers: what lies between Python and machine code.
+"""Records as rows of numbers: how data passes between Python and machine code.
 
-A compiled function takes an array in a fifth of a microsecond and a nested record in ten. So what is carried
-from tick to tick lies in flat arrays, and kernels take records out of them and put them back:
+Passing an array to a compiled function takes a fifth of a microsecond, a nested record ten microseconds. So
+what is carried from tick to tick lies in flat arrays, and kernels take records out and put them back:
 
     load = unpack(LoadEstimate, row, 40)      # the record whose first number is row[40]
     pack(load, row, 40)
 
-`pack` and `unpack` follow from the annotations of a NamedTuple: floats, ints, bools, tuples of fixed length
-and further NamedTuples, in the order of their fields, a number each. Whole numbers are exact up to 2^53.
-Both work in Python as well, with the same bits. `with_field` is `_replace` for kernels, which know none.
+`pack` and `unpack` follow the annotations of a NamedTuple: floats, ints, bools, tuples of fixed length
+and further NamedTuples, in the order of their fields, one number each. Integers are exact up to 2^53.
+Both also work in Python, with the same bits. `with_field` is `_replace` for kernels, where it does not exist.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from autopilot.geometry.row_moves import is_numbers, is_row, numbers_at, put_num
 
 Row = NDArray[np.float64]
 R = TypeVar("R")
-Each = Annotated[int, "each"]  # where flights are flown in lanes, each has its own
+Each = Annotated[int, "each"]  # an int that differs from flight to flight when flights are flown in lanes
 _NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", Each: "each({})", bool: "{} != 0.0"}
 _COMPILED: dict[Any, Any] = {
     float: types.float64,
     int: types.int64,
     Each: types.int64,
     bool: types.boolean,
-}  # of one flight
+}  # for one flight
 
 
 @cache
@@ -60,19 +60,19 @@ def _parts(kind: Any) -> tuple[Any, ...]:
 
 @cache
 def width(kind: Any) -> int:
-    """How many numbers a record of this type has, or a tuple, or a number. Raises TypeError for others."""
+    """Count of the numbers in a record of this type, a tuple or a number. Raises TypeError for others."""
     return 1 if kind in _NUMBERS else sum(map(width, _parts(kind)))
 
 
 def place_of(record: Any, name: str) -> int:
-    """Where the first number of a field lies in the row of a record."""
+    """Index of a field's first number in the row of a record."""
     names = record._fields[: record._fields.index(name)]
     kinds = dict(_fields(record))
     return sum(width(kinds[before]) for before in names)
 
 
 def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
-    """Source of the expression that takes a `kind` from `row[at + first]`, and where the next one begins."""
+    """Source of the expression that takes a `kind` from `row[at + first]`, and the place of the next one."""
     if kind in _NUMBERS:
         return _NUMBERS[kind].format(f"row[first + {at}]"), at + 1
     parts = []
@@ -81,13 +81,13 @@ def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
         parts.append(text)
     if not _is_record(kind):
         return f"({', '.join(parts)},)", at
-    name = f"{kind.__name__}_{len(known)}"  # two records may have one name
+    name = f"{kind.__name__}_{len(known)}"  # two record types may have the same name
     known[name] = kind
     return f"{name}({', '.join(parts)})", at
 
 
 def _put(kind: Any, value: str, at: int) -> Iterator[tuple[int, str]]:
-    """(place, source of the value) of each number of a `kind` that the expression `value` names."""
+    """(place, source of the value) for each number of the `kind` that the expression `value` names."""
     if kind in _NUMBERS:
         yield at, value
     elif _is_record(kind):
@@ -125,7 +125,7 @@ def unpack(kind: type[R], row: Row, first: int) -> R:
 
 
 def pack(record: Any, row: Row, first: int) -> None:
-    """Write a record's numbers to `row[first]` and behind."""
+    """Write a record's numbers to `row[first]` and onwards."""
     kind: Any = type(record)
     _packer(kind)(record, row, first)
 
@@ -139,12 +139,12 @@ def packed(record: Any) -> Row:
 
 
 def with_field(record: R, name: str, value: Any) -> R:
-    """The record with another value of one field; in kernels `name` is a literal."""
+    """The record with one field replaced; in kernels `name` must be a literal."""
     return record._replace(**{name: value})  # type: ignore[attr-defined,no-any-return]
 
 
 def _compiled_type(kind: Any) -> Any:
-    """numba's type of a record of this type, a tuple or a number, of one flight."""
+    """numba's type for a record of this type, a tuple or a number, for one flight."""
     if kind in _COMPILED:
         return _COMPILED[kind]
     parts = [_compiled_type(part) for part in _parts(kind)]
@@ -173,7 +173,7 @@ def _pack(record: Any, row: Any, first: Any) -> Any:
         return None
     if not (is_row(row) and is_numbers(record)):
         return _packer(kind)
-    width(kind)  # what could not be taken out again is not put in
+    width(kind)  # raises TypeError for what could not be unpacked again
 
     def put(record: Any, row: Any, first: Any) -> Any:
         put_numbers(record, row, first)

@@ -1,7 +1,7 @@
-"""What a call of an operator or of a function of numba's stands for, found once for the same types.
+"""What a call of an operator or of one of numba's functions resolves to, looked up once for the same types.
 
-numba asks some forty candidates at each place where two numbers are added, and puts a text together for each
-that declines: a tenth of what compiling takes.
+numba tries some forty candidates at each place where two numbers are added, and builds a text for each one
+that does not match: a tenth of the compile time.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from numba.core.targetconfig import ConfigStack
 from numba.core.types.functions import BaseFunction
 
 _search = BaseFunction.get_call_type
-# signature and implementation; the function too, so that no other gets its id
+# signature and implementation; also the function, so that its id is not reused
 _found: dict[Any, tuple[Any, Any, Any]] = {}
-_options: dict[int, tuple[Any, str]] = {}  # how a function is compiled, beside all of that as a text
+_options: dict[int, tuple[Any, str]] = {}  # flags of a function being compiled, with their text
 
 
 def _options_now() -> str:
-    """Of the function that is being compiled; numba goes through all of them each time."""
+    """The options of the function being compiled as a text; numba would build it anew each time."""
     flags = ConfigStack.top_or_none()
     if id(flags) not in _options:
         _options[id(flags)] = (flags, repr(flags))
@@ -26,13 +26,13 @@ def _options_now() -> str:
 
 
 def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
-    """numba's `get_call_type`: the signature, with the implementation noted at the function."""
+    """As numba's `get_call_type`: return the signature, and record the implementation in the function."""
     key = (id(function), id(context), args, tuple(kws.items()), _options_now())
     if key not in _found:
         signature = _search(function, context, args, kws)
         _found[key] = (signature, function.get_impl_key(signature), function)
     signature, implementation, _ = _found[key]
-    # which the same call may have set since, in a function that is compiled otherwise
+    # the same call may have set another one since, in a function compiled with other options
     function._impl_keys[signature.args] = implementation
     return signature
 

@@ -1,9 +1,8 @@
 """Machine code that moves the numbers of a record to a row of float64 or to bytes, and back.
 
-`packed` and `compiled` write such moves as source, an assignment for each number, for Python to run. numba
-takes a quarter of a second for each record to compile that; here the same loads, stores and conversions are
-emitted at once. Records whose numbers are those of eight flights, and arrays that are not contiguous, are
-left to the source.
+`packed` and `compiled` write such moves as Python source, an assignment for each number. numba takes a
+quarter of a second per record to compile that source; here the same loads, stores and conversions are emitted
+directly. The source is still used for records of eight flights, and for arrays that are not contiguous.
 """
 
 from __future__ import annotations
@@ -18,17 +17,17 @@ from autopilot.geometry.compiler import intrinsic
 
 
 def is_row(array: Any, of: Any = types.float64) -> bool:
-    """Whether an array, by its numba type, is a contiguous row of such numbers."""
+    """Whether an array, given by its numba type, is a contiguous row of numbers of type `of`."""
     return isinstance(array, types.Array) and (array.dtype, array.ndim, array.layout) == (of, 1, "C")
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:
-    """The types in that of a tuple."""
+    """The types of the elements of a tuple type."""
     return tuple(kind)
 
 
 def is_numbers(kind: Any) -> bool:
-    """Whether a numba type is a number, or a tuple, at any depth, of nothing but numbers."""
+    """Whether a numba type is a number, or a tuple that contains only numbers, at any depth."""
     if isinstance(kind, types.BaseTuple):
         return all(is_numbers(part) for part in _parts(kind))
     return isinstance(types.unliteral(kind), types.Integer | types.Float | types.Boolean)
@@ -45,7 +44,7 @@ def _numbers_of(context: Any, builder: Any, value: Any, kind: Any) -> Iterator[t
 
 
 def _made_of(context: Any, builder: Any, numbers: Iterator[tuple[Any, Any]], kind: Any) -> Any:
-    """The value of this type that is made of the next of some numbers, each given with its own type."""
+    """The value of this type made from the next numbers of an iterator, each given with its own type."""
     if isinstance(kind, types.BaseTuple):
         parts = [_made_of(context, builder, numbers, part) for part in _parts(kind)]
         return context.make_tuple(builder, kind, parts)
@@ -69,7 +68,7 @@ def _places(builder: Any, data: Any, first: Any) -> Iterator[Any]:
 
 @intrinsic
 def put_numbers(_: Any, record: Any, row: Any, first: Any) -> Any:
-    """In a kernel: write the numbers of a record to `row[first]` and behind; `first` is not negative."""
+    """In a kernel: write the numbers of a record to `row[first]` and onwards; `first` is not negative."""
     if not (is_row(row) and is_numbers(record)):
         return None
 
@@ -103,14 +102,14 @@ def numbers_at(_: Any, kind: Any, row: Any, first: Any) -> Any:
 
 
 def _field(builder: Any, data: Any, first: int, size: int, double: bool) -> Any:
-    """The place of a number of so many bytes that begins at this byte."""
+    """Pointer to a number of `size` bytes that begins at byte `first`."""
     number: Any = {4: ir.FloatType(), 8: ir.DoubleType()}[size] if double else ir.IntType(8 * size)
     place = builder.gep(data, [ir.Constant(ir.IntType(64), first)])
     return builder.bitcast(place, number.as_pointer())
 
 
 def _fields(builder: Any, data: Any, layout: Sequence[tuple[int, str]]) -> Iterator[tuple[Any, Any]]:
-    """The place and the type of each number of a layout."""
+    """Pointer and type of each number of a layout."""
     for first, name in layout:
         kind = getattr(types, name)
         yield _field(builder, data, first, kind.bitwidth // 8, isinstance(kind, types.Float)), kind
@@ -119,7 +118,7 @@ def _fields(builder: Any, data: Any, layout: Sequence[tuple[int, str]]) -> Itera
 def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
     """For kernels: put(values, payload) writes the numbers of a tuple to bytes.
 
-    `layout` says of each number the byte that it begins with, and NumPy's name of its type.
+    `layout` gives, for each number, its first byte and NumPy's name of its type.
     """
 
     @intrinsic
@@ -137,7 +136,7 @@ def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
 
 
 def field_taker(layout: Sequence[tuple[int, str]], whole: Any) -> Any:
-    """For kernels: take(payload) is the tuple of the numba type `whole` whose numbers lie so in bytes."""
+    """For kernels: take(payload) reads the tuple of the numba type `whole` from bytes in this layout."""
 
     @intrinsic
     def take(_: Any, payload: Any) -> Any:

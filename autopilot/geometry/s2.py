@@ -7,7 +7,7 @@ from math import sqrt
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, cross, dot, norm, scale, sub
 
-_LEAST_ALONG = 0.5  # of a pull, along the axis: a cable that slants more is taken for this slant
+_LEAST_ALONG = 0.5  # least share of the pull along the axis: a larger slant of the cable counts as this one
 
 
 @kernel
@@ -24,13 +24,13 @@ def tangent(q_cable: Vec3, v: Vec3) -> Vec3:
 
 @kernel
 def pull_of(felt: float, q_cable: Vec3, axis: Vec3) -> float:
-    """The force along q_cable of which so much is felt along an axis that points away from the cable."""
+    """The force along q_cable whose component along `axis`, which points away from the cable, is `felt`."""
     return felt / min(dot(q_cable, axis), -_LEAST_ALONG)
 
 
 @kernel
 def psi_direction(q_cable: Vec3, q_cable_d: Vec3) -> float:
-    """Psi_q = 1 - q_d . q in 0 ... 2, (3-8), as |q - q_d|^2 / 2, which keeps its digits near zero."""
+    """Psi_q = 1 - q_d . q in 0 ... 2, (3-8), as |q - q_d|^2 / 2, which stays accurate near zero."""
     difference = sub(q_cable, q_cable_d)
     return 0.5 * dot(difference, difference)
 

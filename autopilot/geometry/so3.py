@@ -1,7 +1,7 @@
 """The rotation group SO(3): hat and vee (2-8), exponential and logarithm, quaternions, errors (3-1)-(3-6).
 
-A rotation `R` takes body coordinates to world coordinates, `v_world = R v_body`. A quaternion `quat_wxyz` is
-`(w, x, y, z)` of unit length and stands for the same map.
+A rotation `R` converts body coordinates to world coordinates, `v_world = R v_body`. A quaternion `quat_wxyz`
+is `(w, x, y, z)` of unit length and represents the same map.
 """
 
 from __future__ import annotations

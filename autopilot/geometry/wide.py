@@ -1,7 +1,7 @@
-"""Eight numbers that machine code moves, adds and multiplies at once.
+"""Eight numbers that machine code moves, adds and multiplies in one instruction.
 
-LLVM leaves loops over small matrices as they are: it cannot know that their arrays do not overlap. `Wide` is
-a vector of eight doubles with + - *, each number by itself, so that machine code and Python agree to the bit:
+LLVM does not vectorise loops over small matrices: it cannot know that their arrays do not overlap. `Wide` is
+a vector of eight doubles with + - *, element by element, so that machine code and Python agree to the bit:
 
     put_wide(P, i, j, wide_at(P, i, j) + factor * wide_at(P, k, j))      # eight numbers of row i
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 class Wide:
-    """Eight numbers. A number times a `Wide` is that many times each of them."""
+    """Eight numbers. A number times a `Wide` multiplies each of them."""
 
     __slots__ = ("numbers",)
 
@@ -54,28 +54,28 @@ def wide_at(array: Array, i: int, j: int) -> Wide:
 
 
 def put_wide(array: Array, i: int, j: int, wide: Wide) -> None:
-    """Write them to array[i, j] ... array[i, j + 7]."""
+    """Write eight numbers to array[i, j] ... array[i, j + 7]."""
     array[i, j : j + WIDTH] = wide.numbers
 
 
 def columns_at_once(array: Array) -> int:
-    """How many columns `wide_at` takes: eight; of an array in lanes, one."""
+    """Number of columns that `wide_at` takes: eight; from an array in lanes, one."""
     return WIDTH
 
 
 def eight_at(array: Array, i: int, j: int) -> Wide:
-    """The numbers array[i, j] ... array[i, j + 7]; of an array in lanes, eight neighbours too."""
+    """The numbers array[i, j] ... array[i, j + 7]; from an array in lanes eight neighbours as well."""
     return wide_at(array, i, j)
 
 
 def put_eight(array: Array, i: int, j: int, eight: Wide) -> None:
-    """Write them to array[i, j] ... array[i, j + 7]."""
+    """Write eight numbers to array[i, j] ... array[i, j + 7]."""
     put_wide(array, i, j, eight)
 
 
 def turned(array: Array) -> Array:
-    """What `transpose_blocks` has transposed: the array; one in lanes, of which that moves nothing, looked at
-    the other way round."""
+    """The array after `transpose_blocks`; an array in lanes, in which that function moves nothing, as a
+    transposed view."""
     return array
 
 
@@ -87,7 +87,7 @@ def transpose_blocks(array: Array, i: int, j: int) -> None:
 
 
 def mirror_block(array: Array, i: int, j: int) -> None:
-    """Write what lies above the diagonal in the block of 8 x 8 numbers at [i, j], j >= i, to below it."""
+    """Copy the part above the diagonal of the 8 x 8 block at [i, j], j >= i, to its mirror image below."""
     for row in range(i, i + WIDTH):
         for column in range(max(j, row), j + WIDTH):
             array[column, row] = array[row, column]
@@ -100,7 +100,8 @@ _LANE = ir.IntType(32)
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> Any:
-    """Pointer to the eight numbers from array[i, j] on; of an array in lanes, to the one of eight lanes."""
+    """Pointer to the eight numbers from array[i, j] on; in an array in lanes, to the one number of eight
+    lanes."""
     held = context.make_array(kind)(context, builder, array)
     rows, columns = cgutils.unpack_tuple(builder, held.shape)
     at = (builder.mul(i, columns), j) if kind.layout == "C" else (builder.mul(j, rows), i)
@@ -109,13 +110,13 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) 
 
 
 def _shuffled(builder: Any, a: Any, b: Any, lanes: list[int]) -> Any:
-    """Lanes 0-7 of a vector are those of `a`, 8-15 those of `b`."""
+    """A vector of the given lanes: 0-7 are those of `a`, 8-15 those of `b`."""
     mask = ir.Constant(ir.VectorType(_LANE, WIDTH), [ir.Constant(_LANE, lane) for lane in lanes])
     return builder.shuffle_vector(a, b, mask)
 
 
 def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
-    """Eight vectors as the columns of the given eight rows: blocks of 4, 2 and 1 change places."""
+    """The columns of eight given rows as eight vectors: blocks of 4, 2 and 1 are exchanged."""
     rows = list(rows)
     for size in (4, 2, 1):
         for i in (k for k in range(WIDTH) if not k & size):
@@ -255,7 +256,7 @@ def _mirror_block(array: Any, i: Any, j: Any) -> Any:
     return of_lanes if _of_lanes(array) else made
 
 
-# ---- an array in lanes, looked at the other way round
+# ---- a transposed view of an array in lanes
 
 
 @infer_global(turned)
@@ -294,7 +295,7 @@ lower_builtin(turned, types.Array)(_lower_turned)
 
 
 class _EightType(types.Type):
-    """Eight neighbours in a row of an array in lanes: a vector each."""
+    """Eight neighbours in a row of an array in lanes: one vector each."""
 
 
 EIGHT: Any = _EightType("Eight")
@@ -308,7 +309,7 @@ class _EightModel(models.PrimitiveModel):
 
 
 def _neighbours(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> list[Any]:
-    """Pointers to them."""
+    """Pointers to eight neighbours."""
     columns = [builder.add(j, ir.Constant(j.type, k)) for k in range(WIDTH)]
     return [_pointer(context, builder, kind, array, i, column) for column in columns]
 

@@ -1,7 +1,7 @@
-"""Rows of numbers, eight at a time: their sums, and what a covariance does.
+"""Rows of numbers, eight at a time: their sums, and the operations on a covariance.
 
-Each number goes through the same operations, in the same order, for one flight, in lanes and in Python; how
-many of them are done before the next row is looked at differs.
+Each number goes through the same operations in the same order for one flight, in lanes and in Python; only
+how many numbers are processed before the next row differs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from autopilot.geometry.wide import (
 
 @kernel
 def combine(into: Array, k: int, array: Array, rows: Any, shares: Array, n: int) -> None:
-    """Row k of `into` becomes a sum of rows of `array`, of n numbers each: of row rows[k, e] the share
+    """Set row k of `into` to a weighted sum of rows of `array`, of n numbers each: row rows[k, e] times
     shares[k, e], for e from 1 to rows[k, 0]."""
     if columns_at_once(into) == 1:
         for j in range(0, n, WIDTH):
@@ -44,14 +44,14 @@ def combine(into: Array, k: int, array: Array, rows: Any, shares: Array, n: int)
 
 @kernel
 def take_row(array: Array, k: int, share: float, other: int, n: int) -> None:
-    """Take from row k, of n numbers, a share of another one."""
+    """Subtract from row k, of n numbers, `share` times row `other`."""
     for j in range(0, n, WIDTH):
         put_eight(array, k, j, eight_at(array, k, j) - share * eight_at(array, other, j))
 
 
 @kernel
 def take_rows(array: Array, k: int, shares: Array, n: int) -> None:
-    """Take from row k, of n numbers, the share shares[i, 0] of each row i before it."""
+    """Subtract from row k, of n numbers, shares[i, 0] times row i, for each row i before it."""
     for j in range(0, n, WIDTH):
         left = eight_at(array, k, j)
         for i in range(k):
@@ -61,8 +61,8 @@ def take_rows(array: Array, k: int, shares: Array, n: int) -> None:
 
 @kernel
 def weigh(into: Array, array: Array, factors: Array, count: int, n: int) -> None:
-    """Add to the only row of `into` the first rows of `array`, of n numbers, times factors[k, 0]; and
-    multiply each by factors[k, 1]."""
+    """Add to the only row of `into` the first `count` rows of `array`, of n numbers, times factors[k, 0];
+    then multiply each of these rows by factors[k, 1]."""
     for j in range(0, n, WIDTH):
         total = eight_at(into, 0, j)
         for k in range(count):
@@ -74,8 +74,8 @@ def weigh(into: Array, array: Array, factors: Array, count: int, n: int) -> None
 
 @kernel
 def transpose(array: Array, n: int) -> None:
-    """Transpose the first n x n numbers, n made a whole number of eights. What is done with them then wants
-    `turned`."""
+    """Transpose the first n x n numbers, n rounded up to a multiple of eight. The result must be accessed
+    through `turned`."""
     for i in range(0, n, WIDTH):
         for j in range(i, n, WIDTH):
             transpose_blocks(array, i, j)
@@ -83,7 +83,7 @@ def transpose(array: Array, n: int) -> None:
 
 @kernel
 def symmetrise(array: Array, n: int) -> None:
-    """Write what lies above the diagonal of the first n x n numbers to below it."""
+    """Copy the part above the diagonal of the first n x n numbers to below it."""
     step = columns_at_once(array)
     for i in range(0, n, step):
         for j in range(i, n, step):
@@ -92,9 +92,9 @@ def symmetrise(array: Array, n: int) -> None:
 
 @kernel
 def take_squares(array: Array, of: Array, count: int, n: int) -> None:
-    """Take the squares of `count` rows, a multiple of three, from the first n x n numbers of `array`:
-    array[i, j] -= of[k, i] of[k, j], from the diagonal on, for a product has no order. The rest is its
-    mirror."""
+    """Subtract the squares of `count` rows, a multiple of three, from the first n x n numbers of `array`:
+    array[i, j] -= of[k, i] of[k, j], from the diagonal on. The part below is its mirror image, as the product
+    is symmetric."""
     if columns_at_once(array) == 1:
         _take_squares_of_lanes(array, of, count, n)
         return
@@ -107,7 +107,7 @@ def take_squares(array: Array, of: Array, count: int, n: int) -> None:
     symmetrise(array, n)
 
 
-# ---- in lanes: two rows by two columns at a time, so that what is read is used twice
+# ---- in lanes: two rows by two columns at a time, so that each number read is used twice
 
 
 @kernel
@@ -128,9 +128,9 @@ def _take_squares_of_lanes(array: Array, of: Array, count: int, n: int) -> None:
 
 @kernel
 def _put_square(array: Array, i: int, j: int, square: Any) -> None:
-    """Write what is at [i, j] and to the right, below and beside it; and mirror it."""
+    """Write a square of two by two numbers whose first is at [i, j], and its mirror image."""
     p, q, r, s = square
-    # on the diagonal what is above it comes last, and stays
+    # on the diagonal the two overlap: the number above it is written last and stays
     put_wide(array, i + 1, j, r)
     put_wide(array, j, i + 1, r)
     put_wide(array, i, j, p)
@@ -153,7 +153,8 @@ def _take_one(array: Array, of: Array, count: int, i: int, j: int) -> None:
 
 @kernel
 def _three_from(square: Any, of: Array, first: int, j: int, a: Any, b: Any) -> Any:
-    """A square of two by two without what three rows have in common: `a` and `b` are theirs of its rows."""
+    """A square of two by two minus what three rows of `of` contribute; `a` and `b` are the numbers of these
+    rows that belong to the two rows of the square."""
     p, q, r, s = square
     c, d = wide_at(of, first, j), wide_at(of, first, j + 1)
     p, q, r, s = p - a[0] * c, q - a[0] * d, r - b[0] * c, s - b[0] * d

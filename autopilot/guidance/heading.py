@@ -1,15 +1,15 @@
-"""Heading: where the nose points, on its way to where it is asked to point.
+"""Heading: where the nose points, and how it turns to the requested heading.
 
-The heading is an angle from east to north, rad, that counts on past half a turn. It is led to what is asked
-within a rate and an acceleration, and its acceleration follows with a lag, so that angle, rate and
-acceleration never jump:
+The heading is an angle from east to north, rad, that continues to count beyond half a turn. It is led to the
+requested heading within limits of rate and acceleration, and its acceleration follows with a lag, so that
+angle, rate and acceleration never jump:
 
     rate asked = along + s(distance)
     accel asked = K_V (rate asked - rate)
     accel' = W (accel asked - accel)
 
-with s = K_P distance near the aim and the rate from which can be braked far from it. All is zero, and nothing
-is to be decided, where the heading rests at its aim.
+where s is K_P distance near the aim, and far from it the rate from which the heading can still be braked.
+Where the heading rests at its aim, all of this is zero and nothing is to be decided.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from math import atan2, copysign, cos, exp, hypot, inf, nan, pi, remainder, sin,
 from autopilot.control.records import Nose
 from autopilot.geometry.linear import E1, ZERO, Mat3, Vec3
 
-K_P = 2.0  # 1/s, rate asked for each radian that the heading is away
+K_P = 2.0  # 1/s, requested rate per radian of distance from the aim
 K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 LAG_RATE = 25.0  # rad/s, of the acceleration
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned
-LONGEST_STEP_S = 0.1  # of time that passes in one step, whatever the clock says
+LONGEST_STEP_S = 0.1  # longest time that passes in one step, whatever the clock says
 ARRIVED = 1e-5  # rad, rad/s and rad/s^2
-NEAREST_M = 0.5  # from a place at which the nose is not turned any more
+NEAREST_M = 0.5  # distance from a place below which the nose is no longer turned to it
 
 EAST_NOSE = Nose(E1, ZERO, ZERO)
 
@@ -36,13 +36,13 @@ class HeadingLimits:
     """How fast the nose is turned."""
 
     rate: float  # rad/s, towards an angle
-    fastest: float  # rad/s, of a rate that is asked for
+    fastest: float  # rad/s, for a requested rate
     accel: float  # rad/s^2
 
 
 @dataclass(frozen=True, slots=True)
 class Towards:
-    """To an angle (rad), which moves on at `along` (rad/s) from `since_us`."""
+    """Point to an angle (rad), which moves at `along` (rad/s) from `since_us` on."""
 
     angle: float
     along: float = 0.0
@@ -52,14 +52,14 @@ class Towards:
 
 @dataclass(frozen=True, slots=True)
 class Spin:
-    """Round and round at a rate, rad/s, counter-clockwise seen from above."""
+    """Turn continuously at a rate, rad/s, counter-clockwise seen from above."""
 
     rate: float
 
 
 @dataclass(frozen=True, slots=True)
 class Gaze:
-    """To a place, ENU, as long as it is not close by."""
+    """Point to a place, ENU, as long as it is not close by."""
 
     place: Vec3
 
@@ -70,7 +70,7 @@ EAST = Towards(0.0)
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """Angle with two derivatives at an instant, and what is asked for."""
+    """Angle with two derivatives at an instant, and the aim."""
 
     angle: float = 0.0  # rad, from east to north
     rate: float = 0.0  # rad/s
@@ -80,7 +80,7 @@ class Heading:
 
     @property
     def rests(self) -> bool:
-        """Whether it stays as it is until something else is asked."""
+        """Whether the heading stays as it is until another aim is requested."""
         aim = self.aim
         still = self.rate == 0.0 and self.accel == 0.0
         return still and isinstance(aim, Towards) and aim.along == 0.0 and aim.angle == self.angle
@@ -113,7 +113,7 @@ class Heading:
         return self.angle + self.rate / K_P + copysign(_braking(abs(self.rate), limits.accel), self.rate)
 
     def at_rest(self) -> Heading:
-        """The heading at which the vehicle stands."""
+        """The present heading at rest, for a vehicle that stands."""
         return Heading(self.angle, aim=Towards(self.angle))
 
     def onward(self, now_us: int, place: Vec3, velocity: Vec3, limits: HeadingLimits) -> Heading:
@@ -132,14 +132,14 @@ class Heading:
 
     @property
     def has_arrived(self) -> bool:
-        """Whether the heading is at an aim that does not move, but for rounding."""
+        """Whether the heading is at an aim that does not move, apart from rounding."""
         aim = self.aim
         if not isinstance(aim, Towards) or aim.along != 0.0:
             return False
         return max(abs(aim.angle - self.angle), abs(self.rate), abs(self.accel)) < ARRIVED
 
     def at_aim(self) -> Heading:
-        """The heading at rest at the angle it is led to."""
+        """The heading at rest at its aim."""
         assert isinstance(self.aim, Towards)
         return Heading(self.aim.angle, at_us=self.at_us, aim=self.aim)
 
@@ -164,12 +164,12 @@ EASTWARD = Heading()
 
 
 def turn(angle: float) -> float:
-    """The same angle as -pi ... pi."""
+    """The same angle within -pi ... pi."""
     return remainder(angle, 2.0 * pi)
 
 
 def nearest(angle: float, heading: Heading) -> float:
-    """An angle as the heading counts it, half a turn away from it at most."""
+    """The same angle, counted so that it is at most half a turn away from the heading."""
     return heading.angle + turn(angle - heading.angle)
 
 
@@ -185,12 +185,12 @@ def _within(value: float, limit: float) -> float:
 
 
 def _braking(rate: float, accel: float) -> float:
-    """Angle in which a rate beyond K_P's part is taken away."""
+    """Angle in which a rate is braked, beside K_P's part."""
     return 0.5 * rate * rate / (BRAKE_SHARE * accel)
 
 
 def _approach(distance: float, limit: float, accel: float) -> float:
-    """Rate (rad/s) at which an angle is approached that must be reached at rest."""
+    """Rate (rad/s) of approach to an angle at which the heading must come to rest."""
     brake, away = BRAKE_SHARE * accel, abs(distance)
     bend = brake / (K_P * K_P)
     speed = K_P * away if away <= bend else sqrt(2.0 * brake * (away - 0.5 * bend))

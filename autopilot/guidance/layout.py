@@ -1,4 +1,4 @@
-"""What the legs of a flight ask for, laid out tick by tick for a stretch of it."""
+"""The setpoints of the legs of a flight, computed in advance, tick by tick, for a stretch of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
-_KEPT, _WORTH = 3, 500  # evaluated signals that are kept, of at least so many times: what a sweep lays out
+_KEPT, _WORTH = 3, 500  # evaluated signals to keep, each of at least so many times: those of a sweep
 
 
 @kernel
@@ -54,7 +54,7 @@ def _runs(
 
 
 class _Evaluated(NamedTuple):
-    """Signals of a path at some times, from their own origin."""
+    """Signals of a path at some times, relative to their own origin."""
 
     path: Shaped
     times_s: Floats
@@ -66,8 +66,8 @@ _evaluated: deque[_Evaluated] = deque(maxlen=_KEPT)  # the last ones
 
 
 def _signals(path: Shaped, times_s: Floats, asked: bool) -> Floats:
-    """(n, 21) the signals of a path at n times. A sweep wants them as flown and as asked: where these are the
-    same they are evaluated once."""
+    """(n, 21) the signals of a path at n times. A sweep needs the flown and the requested ones: where both
+    are the same, they are evaluated once."""
     asked = asked or not len(path.pieces)
     for one in _evaluated:
         if one.path is path and one.asked == asked and np.array_equal(one.times_s, times_s):
@@ -93,9 +93,9 @@ def _passes(
 
 
 def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
-    """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg): in machine code for the
-    kinds that last."""
-    # by the very type: a leg of another type may mean something else
+    """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg), in machine code for the
+    kinds of legs that last long."""
+    # by the exact type: a leg of a subclass may mean something else
     if type(leg) is Run:
         found = _signals(leg.path, times_s, asked).copy()
         found[:, :3] += leg.anchor
@@ -120,7 +120,7 @@ def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
 def jets_ahead(legs: Sequence[Leg], times_s: Floats) -> Floats:
     """(n, 21) setpoints at n times (s into the first leg), which do not decrease, into the legs that follow.
 
-    Only legs that control the same as the first one follow it for this.
+    Only following legs with the control mode of the first one are used.
     """
     chain = [legs[0]]
     for after in legs[1:]:

@@ -1,6 +1,6 @@
-"""Legs: what load or vehicle is asked to do from one moment to the next, each a function of the time in it.
+"""Legs: the motion requested of load or vehicle for a part of the flight, each a function of the time in it.
 
-A leg is data. The supervisor strings legs together; the flight core asks the present one for its setpoint.
+A leg is data. The supervisor strings legs together; the flight core gets its setpoint from the present one.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
 LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 
-LEAST_SWINGS = 1.2  # a move of the load takes at least so many periods of its pendulum, however short it is
+LEAST_SWINGS = 1.2  # a move of the load takes at least this many periods of its pendulum, however short it is
 CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
 CALM_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
 SHORTEST_RAMP_S = 0.3  # in which the winch comes to its rate
-STEEPEST_LEAN = 0.7  # sine of the cable's lean that a swinging load is asked for at most
+STEEPEST_LEAN = 0.7  # sine of the greatest lean of the cable that is requested of a swinging load
 
 # Taylor coefficients of transfer's s(u): of u^7 ... u^13
 _STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
@@ -43,7 +43,7 @@ def _moved(anchor: Vec3, jet: Jet) -> Jet:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Stay at a point for `duration_s` (infinite: until told otherwise)."""
+    """Stay at a point for `duration_s` (infinite: until another leg replaces this one)."""
 
     position: Vec3
     duration_s: float = inf
@@ -70,10 +70,10 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class Brake:
-    """From motion to rest: the velocity that the motion would go on with fades away.
+    """From motion to rest: the velocity with which the motion would continue fades away.
 
-    x' = (v_0 + a_0 t) (1 - s(t / duration)) with the s of `autopilot.trajectory.transfer`, so that
-    position, velocity and acceleration go on without a jump and every derivative is zero in the end.
+    x' = (v_0 + a_0 t) (1 - s(t / duration)) with the s of `autopilot.trajectory.transfer`, so that position,
+    velocity and acceleration continue without a jump and every derivative is zero in the end.
     """
 
     begin: Vec3
@@ -113,12 +113,11 @@ class Brake:
 
 @dataclass(frozen=True, slots=True)
 class Slow:
-    """A stop along the path of another leg: its time goes on ever more slowly and comes to rest.
+    """A stop along the path of another leg: the time of that leg passes ever more slowly and stops.
 
     x(t) = y(sigma(t)), sigma' = 1 - s(t / stop) with the s of `autopilot.trajectory.transfer`: every
-    derivative goes on without a jump and is zero in the end, the path is that of the leg, and no part of it
-    is flown faster.
-    `elapsed_s` of the stop are over when this leg begins.
+    derivative continues without a jump and is zero in the end, the path is that of the leg, and no part of it
+    is flown faster. When this leg begins, `elapsed_s` of the stop have passed.
     """
 
     leg: Leg
@@ -129,7 +128,7 @@ class Slow:
 
     @property
     def duration_s(self) -> float:
-        """What is left of the stop."""
+        """Remaining time of the stop."""
         return self.stop_s - self.elapsed_s
 
     @property
@@ -185,11 +184,11 @@ class Slow:
 
 @dataclass(frozen=True, slots=True)
 class Catch:
-    """The cable is slack in the air: the vehicle falls with its load and parts from it until it is taut.
+    """The cable is slack in the air: the vehicle falls with its load and moves away from it until it is taut.
 
-    The thrust can only part them faster, never brake that: they part at `closing_m_s`, or as fast as takes up
-    the slack in CATCH_S where that is faster, since meanwhile both fall. What is asked depends on the state
-    and not on time: `meeting`. `anchor` is where the vehicle was.
+    The thrust can only separate them faster, never slow the separation: they separate at `closing_m_s`, or
+    faster if the slack would otherwise not be taken up in CATCH_S, since meanwhile both fall. The requested
+    motion depends on the state and not on time: `meeting`. `anchor` is where the vehicle was.
     """
 
     anchor: Vec3
@@ -203,8 +202,8 @@ class Catch:
         return _rest(self.anchor)
 
     def meeting(self, x_quad: Vec3, v_quad: Vec3, x_load: Vec3, v_load: Vec3, gravity: float) -> Jet:
-        """Motion asked of the vehicle. Only the climb is asked for: with hardly any thrust, turning would
-        need more of it than falling allows."""
+        """Motion requested of the vehicle. Only the climb is requested: there is hardly any thrust, and
+        turning would need more of it than falling allows."""
         cable = sub(x_load, x_quad)
         distance = norm(cable)
         q = scale(1.0 / max(distance, 1e-6), cable)
@@ -231,8 +230,8 @@ class Creep:
 class Reel:
     """The winch lowers the load (raises it: `speed` negative) while the vehicle is held at height `top_m`.
 
-    The cable is as long as the load is below that. The rate rises to `speed` along the s of
-    `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose.
+    The length of the cable is the depth of the load below that height. The rate rises to `speed` along the s
+    of `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose.
     """
 
     begin: Vec3
@@ -249,12 +248,12 @@ class Reel:
 
     @property
     def end(self) -> Vec3:
-        """Where the load is left."""
+        """Where the load comes to rest."""
         x = self.begin
         return (x[0], x[1], x[2] - self.speed * (self.ramp_s + self.cruise_s))
 
     def _ramp(self, t: float) -> tuple[float, ...]:
-        """What the cable grows by in `t` seconds of the first ramp, for a rate of 1, and six derivatives."""
+        """Growth of the cable in `t` seconds of the first ramp, for a rate of 1, and its six derivatives."""
         u = t / self.ramp_s
         grown = sum(c * u ** (power + 1) / (power + 1) for power, c in _STEP)
         return (self.ramp_s * grown, *(w[0] for w in transfer(ZERO, (1.0, 0.0, 0.0), self.ramp_s, t)[:6]))
@@ -296,15 +295,16 @@ class Run:
         return _moved(self.anchor, self.path.jet(t - self.path.lead_s))
 
     def asked(self, t: float) -> Jet:
-        """The same of the path that was asked for."""
+        """The same for the requested path."""
         return _moved(self.anchor, self.path.asked(t - self.path.lead_s))
 
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """A stretch of a path through waypoints, past the last of which it goes on.
+    """A stretch of a path through waypoints; the path continues beyond the end of the stretch.
 
-    `offset` is by how much the load hung beside the beginning of the path; it fades away in `fade_s`.
+    `offset` is the displacement of the load from the beginning of the path when it began; it fades away in
+    `fade_s`.
     """
 
     path: Passage
@@ -344,21 +344,21 @@ class Swing:
     control_mode: int
 
     def jet(self, t: float) -> Jet:
-        """The anchor at rest: of its position the height alone is tracked."""
+        """The anchor at rest: only its height is tracked."""
         return _rest(self.anchor)
 
     def upward(self, t: float) -> Vec3:
-        """Unit vector, ENU: the thrust axis asked for, or the direction from load to vehicle."""
+        """Unit vector, ENU: the requested thrust axis, or the direction from load to vehicle."""
         return swing(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
 
 
 @dataclass(frozen=True, slots=True)
 class Calm:
-    """Take the swing out of the load: the cable's lean goes on as it was and fades away.
+    """Take the swing out of the load: the cable's lean continues as it was and fades away.
 
-    p = (p_0 + p_0' t) (1 - s(t / duration)), p the horizontal part of the unit vector from load to vehicle, s
-    that of `autopilot.trajectory.transfer`. As in a swing only the height of `anchor` is held meanwhile.
-    `ends_step`: the mission step that left the load swinging is over with it.
+    p = (p_0 + p_0' t) (1 - s(t / duration)), where p is the horizontal part of the unit vector from load to
+    vehicle and s that of `autopilot.trajectory.transfer`. As in a swing, only the height of `anchor` is held
+    meanwhile. `ends_step`: with this leg ends the mission step that left the load swinging.
     """
 
     anchor: Vec3
@@ -369,7 +369,7 @@ class Calm:
     control_mode: int = LOAD_ATTITUDE
 
     def jet(self, t: float) -> Jet:
-        """The anchor at rest: of its position the height alone is tracked."""
+        """The anchor at rest: only its height is tracked."""
         return _rest(self.anchor)
 
     def upward(self, t: float) -> Vec3:
@@ -394,7 +394,7 @@ class Steady:
         return _rest(ZERO)
 
     def upward(self, t: float) -> Vec3:
-        """Unit vector, ENU: the thrust axis asked for."""
+        """Unit vector, ENU: the requested thrust axis."""
         return E3
 
 
@@ -417,16 +417,16 @@ Leg = (
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:
-    """What was asked for where the leg flies something near it; else what it flies."""
+    """The requested motion where the leg flies a shaped one; otherwise the motion that it flies."""
     return leg.asked(t) if isinstance(leg, Run) else leg.jet(t)
 
 
 def least_move_s(cable_length: float, gravity: float) -> float:
     """Least duration (s) of a move that carries the load.
 
-    A limit of the acceleration alone lets a short move be quick: 5 cm would take 0.7 s, and its higher
-    derivatives turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at 0.7 m
-    of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
+    With a limit of the acceleration alone, a short move would be quick: 5 cm would take 0.7 s, and its higher
+    derivatives would turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at
+    0.7 m of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
     """
     return LEAST_SWINGS * 2.0 * pi * sqrt(cable_length / gravity)
 
@@ -439,7 +439,7 @@ def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: floa
 
 def slow_leg(leg: Leg, t: float, accel_limit: float, least_s: float) -> Slow:
     """A stop on the path of `leg`, `t` seconds into it, that slows down with no more than about `accel_limit`
-    (m/s^2). Of a stop that is under way: the rest of it."""
+    (m/s^2). If `leg` is itself a stop: the rest of it."""
     if isinstance(leg, Slow):
         return replace(leg, elapsed_s=min(leg.elapsed_s + t, leg.stop_s))
     return Slow(leg, t, max(least_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
@@ -452,10 +452,10 @@ def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mod
 
 
 def reel_leg(begin: Vec3, length: float, wanted: float, speed: float, accel: float) -> Reel:
-    """The winch makes a cable of `length` m `wanted` m long within speed and acceleration given; the load
+    """The winch makes a cable of `length` m `wanted` m long within the speed and acceleration given; the load
     hangs at `begin`, the vehicle stays."""
     longer = abs(wanted - length)
-    # a ramp takes PEAK_SPEED rate / accel and half of that way; short ways do not reach the rate
+    # a ramp takes PEAK_SPEED rate / accel, at half the rate on average; short ways do not reach the rate
     rate = min(speed, sqrt(longer * accel / PEAK_SPEED))
     ramp = max(PEAK_SPEED * rate / accel, SHORTEST_RAMP_S)
     rate = min(rate, longer / ramp)
@@ -471,8 +471,8 @@ def top_of(leg: Leg) -> float | None:
 
 
 def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, least_s: float) -> Transfer:
-    """A transfer of the load within the limits given, and no quicker than `least_s` unless there is no way
-    to go."""
+    """A transfer of the load within the limits given, and no quicker than `least_s` unless the distance is
+    zero."""
     distance = norm(sub(end, begin))
     duration = max(least_s, transfer_duration(distance, speed, accel)) if distance > 0.0 else 0.0
     return Transfer(begin, end, duration, LOAD_POSITION)

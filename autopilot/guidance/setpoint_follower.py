@@ -1,19 +1,20 @@
-"""Following what is asked from moment to moment: setpoints of a stream, a stick, a circle.
+"""Following requests that may change at any moment: setpoints of a stream, a stick, a circle.
 
-Whatever is asked (a jump included) passes two stages. The governor moves a point r towards it within a speed
-and an acceleration; the smoother lets the load follow that point with derivatives up to the sixth that never
-jump:
+Every request (one that jumps included) passes two stages. The governor moves a point r towards it within
+limits of speed and acceleration; the smoother lets the load follow that point with derivatives up to the
+sixth that never jump:
 
     (1 + D/w)^7 x = r,   D = d/dt.
 
 Its response to an impulse is nowhere negative, so the load is no faster and no more accelerated than the
-point, and does not overshoot where the point does not. It lags by 7/w; what moves by itself (a place with a
-velocity, a circle) is therefore aimed at where it will be by then. While r is accelerated constantly,
+point, and does not overshoot where the point does not. It lags by 7/w; for a target that moves by itself (a
+place with a velocity, a circle), the aim is therefore where the target will be by then. While the
+acceleration of r is constant,
 
     x(t) = r - 7 r'/w + 28 r''/w^2 + exp(-w t) sum_k c_k t^k / k!,
 
-with c_k = (D + w)^k of the difference at t = 0: nothing is integrated, and a leg begun anew at any time goes
-on from the jet of the one before.
+with c_k = (D + w)^k of the difference at t = 0: nothing is integrated, and a leg begun anew at any time
+continues from the jet of the one before.
 
 | symbol   | here     | unit  |
 |----------|----------|-------|
@@ -35,17 +36,17 @@ from autopilot.guidance.heading import LONGEST_STEP_S
 from autopilot.wire.dialect import plumbline as mavlink
 
 ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
-K_P = 1.2  # 1/s, speed asked for each metre that the governor's point is away
+K_P = 1.2  # 1/s, requested speed per metre of distance of the governor's point
 K_V = 4.0 * K_P  # 1/s, critically damped with K_P
-BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is for what is not planned
+BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is a reserve
 SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
-FADED = 40.0  # periods 1/w of the smoother, after which it has arrived but for rounding
-STEEPEST_DEG = 60.0  # lean that is asked of the vehicle at most
+FADED = 40.0  # periods 1/w of the smoother, after which it has arrived apart from rounding
+STEEPEST_DEG = 60.0  # greatest lean that is requested of the vehicle
 _LEAST_UP = cos(radians(STEEPEST_DEG))
 FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
-_OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, but for the last
+_OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, except for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
 NEVER_US = 2**62
 NOWHERE: Vec3 = (nan, nan, nan)
@@ -54,10 +55,10 @@ Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint:
-    """What a stream asks of the load, ENU from home; NaN: nothing is asked on this axis.
+    """What a stream requests of the load, ENU from home; NaN: nothing is requested on this axis.
 
-    A position with a velocity moves on with it from `since_us`. On an axis on which an acceleration alone is
-    asked for, nothing holds the load.
+    A position with a velocity moves at that velocity from `since_us` on. On an axis on which only an
+    acceleration is requested, nothing holds the load.
     """
 
     position: Vec3 = NOWHERE
@@ -69,12 +70,12 @@ class PositionSetpoint:
 
     @property
     def is_place(self) -> bool:
-        """Whether it asks for a place that does not move, and for nothing else."""
+        """Whether it requests a place that does not move, and nothing else."""
         moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel, self.turning))
         return not moves and not all(map(isnan, self.position))
 
     def adrift(self, v: Vec3) -> Vec3:
-        """The parts of a vector along the axes on which it asks for an acceleration alone."""
+        """The parts of a vector along the axes on which only an acceleration is requested."""
         x, y, z = (
             v[axis]
             if isnan(self.position[axis]) and isnan(self.velocity[axis]) and not isnan(self.accel[axis])
@@ -112,8 +113,8 @@ class Circle:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSetpoint:
-    """An attitude asked of the vehicle: its thrust axis, ENU, and the thrust in newtons; None: what keeps the
-    height. Or, in place of an attitude, the rates with which it is to turn."""
+    """A requested attitude of the vehicle: its thrust axis, ENU, and the thrust in newtons; None: the thrust
+    that keeps the height. Or, in place of an attitude, requested body rates."""
 
     upward: Vec3
     thrust_n: float | None
@@ -135,14 +136,14 @@ class FollowLimits:
     """Limits of the governor and the rate of the smoother."""
 
     speed: float  # m/s, towards a position
-    fastest: float  # m/s, of a velocity that is asked for
+    fastest: float  # m/s, for a requested velocity
     accel: float  # m/s^2
     rate: float  # rad/s
 
 
 @dataclass(frozen=True, slots=True)
 class Follow:
-    """The load on its way after the governor's point, which goes on at constant acceleration.
+    """The load on its way to the governor's point, which moves at constant acceleration.
 
     `onward` is the same motion begun anew later; until then each moment of it is known.
     """
@@ -192,15 +193,16 @@ class Follow:
         return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
     def coasting(self, t: float, rate: float) -> Follow:
-        """The motion from `t` seconds into this leg on, its point going on at the velocity it has."""
+        """The motion from `t` seconds into this leg on, with its point continuing at its present velocity."""
         x, v, a = self.point
         return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
 
     def stopped(self, t: float, accel: float) -> tuple[tuple[Follow, ...], Vec3]:
-        """From `t` seconds into this leg on to rest, and where that is.
+        """The legs from `t` seconds into this leg on to rest, and the place of that rest.
 
-        The point slows down at `accel` (m/s^2), downwards as fast as keeps it over the floor. The legs last
-        whole microseconds, as the clock has it, and the last one until only rounding is left of the motion.
+        The point slows down at `accel` (m/s^2), and its descent as fast as keeps it above the floor. The legs
+        last whole microseconds, as the clock counts, and the last leg lasts until only rounding is left of
+        the motion.
         """
         x, v, a = self.point
         x, v = axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
@@ -230,7 +232,7 @@ class Follow:
         return (*legs, Follow(jet, (x, ZERO, ZERO), self.rate, _whole_us(FADED / self.rate))), x
 
     def onward(self, t: float, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Follow:
-        """The motion from `t` seconds into this leg on, towards what is asked at `now_us`."""
+        """The motion from `t` seconds into this leg on, towards what is requested at `now_us`."""
         x, v, a = self.point
         point = governed(axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), asked, pace, now_us)
         return Follow(self.jet(t), point, pace.rate)
@@ -245,10 +247,10 @@ def _up_to_us(seconds: float) -> float:
 
 
 def begin_following(jet: Jet, rate: float) -> Follow:
-    """A motion that goes on from `jet` until something is asked.
+    """A motion that continues from `jet` until something is requested.
 
-    The point is where (1 + D/w)^7 x says, as far as the jet tells. A point that disagreed with the jet by no
-    more than its acceleration would throw the load: the smoother answers with ten times as much.
+    The point is at (1 + D/w)^7 x, as far as the jet determines it. A point that disagreed with the jet in its
+    acceleration alone would jerk the load: the smoother answers with ten times as much.
     """
     point = []
     for n in range(3):
@@ -260,8 +262,8 @@ def begin_following(jet: Jet, rate: float) -> Follow:
 
 
 def towards(distance: Vec3, accel: float) -> Vec3:
-    """Velocity (m/s) at which a point is approached that must be reached at rest: K_P of the distance near
-    it, and what a deceleration of `accel` allows far from it."""
+    """Velocity (m/s) of approach to a point that must be reached at rest: K_P times the distance near it, and
+    far from it the velocity that a deceleration of `accel` allows."""
     away = norm(distance)
     bend = accel / (K_P * K_P)
     if away <= bend:
@@ -279,7 +281,7 @@ def _or_zero(v: Vec3) -> Vec3:
 
 
 def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Point:
-    """The governor's point: where it is, how fast, and how it is to be accelerated from now on."""
+    """The governor's point: its position, its velocity, and its acceleration from now on."""
     if isinstance(asked, Circle):
         place, along, push = asked.seen(now_us, pace.rate)
         distance = sub(place, x)
@@ -288,17 +290,17 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
         push = _at_most(_or_zero(asked.accel), pace.accel)
         age = (now_us - asked.since_us) * 1e-6 + ORDER / pace.rate
         aim = axpy(age, along, asked.position)
-        # an axis on which no position is asked for is as near as can be
+        # on an axis without a requested position, the distance is zero
         distance = _or_zero(sub(aim, x))
         if aim[2] < FLOOR_M:
             distance = (distance[0], distance[1], FLOOR_M - x[2])
             along = (along[0], along[1], max(along[2], 0.0))
     wanted = add(along, _at_most(towards(distance, BRAKE_SHARE * pace.accel), pace.speed))
     if isinstance(asked, PositionSetpoint):
-        # what an acceleration alone makes of the velocity in the time in which velocities are reached
+        # the velocity to which an acceleration alone leads in the time in which velocities are reached
         wanted = add(wanted, _at_most(asked.adrift(axpy(1.0 / K_V, push, v)), pace.fastest))
         push = sub(push, asked.adrift(push))
-    # no faster down than stops at the floor
+    # descend no faster than can be stopped at the floor
     height = max(x[2] - FLOOR_M, 0.0)
     slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
     near_floor = min(wanted[2], v[2]) < slowest
@@ -306,7 +308,7 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
     asked_for = axpy(K_V, sub(wanted, v), push)
     if not near_floor:
         return x, v, _at_most(asked_for, pace.accel)
-    # braking over the floor comes first, what is left is for the rest
+    # braking above the floor comes first, the remaining acceleration is for the rest
     lift = max(-pace.accel, min(asked_for[2], pace.accel))
     level = _at_most((asked_for[0], asked_for[1], 0.0), sqrt(pace.accel * pace.accel - lift * lift))
     return x, v, (level[0], level[1], lift)
@@ -316,7 +318,7 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
 class Posture:
     """The vehicle follows an attitude setpoint; the position of the load is uncontrolled.
 
-    Where body rates are asked for, `attitude` is the one that turns with them, as it is at `at_us`.
+    Where body rates are requested, `attitude` is the attitude that turns at these rates, as it is at `at_us`.
     """
 
     lean: AttitudeSetpoint
@@ -327,16 +329,16 @@ class Posture:
     control_mode: int = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 
     def jet(self, t: float) -> Jet:
-        """The anchor at rest: its height is kept where no thrust is asked for."""
+        """The anchor at rest: its height is kept where no thrust is requested."""
         return (self.anchor, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
 
     def upward(self, t: float) -> Vec3:
-        """Unit vector, ENU: the thrust axis asked for."""
+        """Unit vector, ENU: the requested thrust axis."""
         return self.lean.upward if self.attitude is None else column(self.attitude, 2)
 
     def onward(self, lean: AttitudeSetpoint, seen: Mat3, now_us: int) -> Posture:
-        """The same with what is asked at `now_us`, of a vehicle whose attitude is `seen`. Rates do not lean
-        it by more than a setpoint may."""
+        """The leg with what is requested at `now_us`, of a vehicle whose attitude is `seen`. Rates do not
+        lean the vehicle further than a setpoint may."""
         if lean.rates is None:
             return replace(self, lean=lean, attitude=None)
         if self.attitude is None:
@@ -349,13 +351,13 @@ class Posture:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What was heard last of one source, and when."""
+    """The last request of one source, and its time."""
 
     asked: Asked | None = None
     at_us: int = -1
 
     def alive(self, now_us: int, within_us: int) -> bool:
-        """Whether something was heard in that time."""
+        """Whether a request arrived within that time."""
         return self.at_us >= 0 and now_us - self.at_us <= within_us
 
 

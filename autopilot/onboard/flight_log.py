@@ -1,8 +1,8 @@
 """The on-board flight log: from arming until shortly after disarming, as ULog bytes for the shell to store.
 
-The topics bear PX4's names and fields where PX4 has them, so that its tools draw them; those that begin with
-`load_`, `cascade_`, `rotor_` and `estimator_plumbline` are our own. World axes are NED, body axes FRD, units
-SI, as in PX4. The log holds what the autopilot knows: the truth of a simulated flight is not in it.
+The topics have PX4's names and fields where PX4 has them, so that its tools draw them; those that begin with
+`load_`, `cascade_`, `rotor_` and `estimator_plumbline` are specific to Plumbline. World axes are NED, body
+axes FRD, units SI, as in PX4. The log contains what the autopilot knows, not the truth of a simulated flight.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.ulog import UlogWriter
 
-TAIL_US = 1_000_000  # so long the log goes on behind the disarming
+TAIL_US = 1_000_000  # for which the log continues after disarming
 SLOW_US = 1_000_000  # between two records of the slow topics
-MOST_WAITING = 4 * 2**20  # bytes that the shell has not taken; beyond them records are dropped
-TEXTS_BEFORE = 20  # said before arming, the log begins with them
+MOST_WAITING = 4 * 2**20  # bytes that the shell has not taken; beyond that, records are dropped
+TEXTS_BEFORE = 20  # texts sent before arming with which the log begins
 _FLOAT32_MAX = 3.4028234663852886e38
 
 
 class LogChunk(NamedTuple):
-    """Bytes that belong behind those of the same file before; `ended`: nothing follows."""
+    """Bytes to be appended to the previous ones of the same file; `ended`: nothing follows."""
 
     path: Path
     data: bytes
@@ -38,7 +38,7 @@ class LogChunk(NamedTuple):
 
 
 class LogRunning(NamedTuple):
-    """What of the log machine code writes."""
+    """The part of the log that machine code writes."""
 
     due_us: int
     period_us: int
@@ -47,8 +47,8 @@ class LogRunning(NamedTuple):
 
 
 class FlightLog:
-    """Makes one log for each flight. `step` at every tick at which it is `due`, `take` whenever the shell can
-    store."""
+    """Writes one log for each flight. Call `step` at every tick at which it is `due`, and `take` whenever the
+    shell can store."""
 
     def __init__(self, table: ParameterTable, release: str, boot_unix_us: int, home: Home) -> None:
         self._table = table
@@ -56,20 +56,20 @@ class FlightLog:
         self._boot_unix_us = boot_unix_us
         self._writer = UlogWriter(topic for topic, _ in (*FAST, *SLOW))
         self._records = SampleRecords(self._writer, home)
-        self._next_us = 0  # when there is something to do, unless arming or a parameter changes:
+        self._next_us = 0  # when there is something to do, unless one of these two changes:
         self._armed: bool | None = None
         self._stepped = -1  # version of the parameters at the last step
         self._path: Path | None = None  # of the log that is open
         self._due_us = self._slow_us = 0
         self._disarmed_us = -1  # -1: armed
-        self._state: tuple[bool, int] = (False, 0)  # armed, phase: a change is logged at once
+        self._state: tuple[bool, int] = (False, 0)  # armed, phase: a change is logged immediately
         self._chunks: list[bytes] = []
         self._waiting = 0
-        self._dropped_us = -1  # since when records are dropped, -1: none are
+        self._dropped_us = -1  # time since which records are dropped, -1: none are
         self._ended: LogChunk | None = None
         self._parameters: dict[str, float] = {}
         self._version = -1
-        self._lost = False  # that of this flight
+        self._lost = False  # the log of this flight is lost
         self._texts: deque[tuple[int, int, str]] = deque(maxlen=TEXTS_BEFORE)
 
     @property
@@ -78,7 +78,7 @@ class FlightLog:
         return self._path
 
     def say(self, now_us: int, severity: int, text: str) -> None:
-        """A line that the operators were told."""
+        """Record a text that was sent to the operators."""
         if self._path is None:
             self._texts.append((now_us, severity, text))
         else:
@@ -89,8 +89,8 @@ class FlightLog:
         return now_us >= self._next_us or armed is not self._armed or self._table.version != self._stepped
 
     def running(self, now_us: int, armed: bool, phase: int) -> LogRunning | None:
-        """When the fast topics are due, which machine code can write, and when `step` has more to do than
-        that, if nothing changes but the time; None: it has, at the tick `now_us`."""
+        """When the fast topics are due, which machine code can write, and when `step` has more to do, if
+        nothing changes but the time; None: it has more to do at the tick `now_us`."""
         if armed is not self._armed or self._table.version != self._stepped or self._dropped_us >= 0:
             return None
         if self._path is None or not armed:
@@ -101,7 +101,7 @@ class FlightLog:
         return LogRunning(self._due_us, period_us, self._slow_us, self._records)
 
     def wrote(self, records: bytes, due_us: int, now_us: int) -> None:
-        """Machine code has written these records of the fast topics; the next are due then."""
+        """Machine code has written these records of the fast topics; the next are due at `due_us`."""
         self._due_us = self._next_us = due_us
         self._add(records, now_us)
 
@@ -112,7 +112,7 @@ class FlightLog:
         taken: Callable[[], set[str]],
         make: Callable[[], Sample],
     ) -> None:
-        """Begin, go on or end; `taken` tells the names in the log folder, `make` the instant if it is due."""
+        """Begin, continue or end the log; `taken` returns the names in the log folder, `make` the instant."""
         self._armed, self._stepped = armed, self._table.version
         rate_hz = self._table["LOG_RATE_HZ"]
         self._next_us = NEVER_US
@@ -140,7 +140,7 @@ class FlightLog:
             self._next_us = min(self._next_us, self._disarmed_us + TAIL_US)
 
     def end(self) -> None:
-        """Nothing more belongs to the open log."""
+        """End the open log."""
         if self._path is not None:
             self._ended = LogChunk(self._path, b"".join(self._chunks), True)
             self._path = None
@@ -148,7 +148,7 @@ class FlightLog:
             self._waiting = 0
 
     def give_up(self) -> None:
-        """The shell could not store: forget the open log. There is none until the vehicle is armed again."""
+        """Drop the open log, which the shell could not store. The next begins at the next arming."""
         self._path = self._ended = None
         self._lost = True
         self._next_us = NEVER_US
@@ -156,7 +156,7 @@ class FlightLog:
         self._waiting = 0
 
     def take(self, least_bytes: int = 1) -> LogChunk | None:
-        """What is to be stored, once it is so much or the log has ended."""
+        """The part to be stored, if it has `least_bytes` or the log has ended."""
         if self._ended is not None:
             chunk, self._ended = self._ended, None
             return chunk
@@ -208,12 +208,12 @@ class FlightLog:
     def _record(self, topic: int, numbers: Numbers, now_us: int) -> None:
         try:
             record = self._writer.record(topic, now_us, *numbers)
-        except OverflowError:  # a diverged flight has numbers that no float32 holds
+        except OverflowError:  # a diverged flight has numbers beyond the range of float32
             record = self._writer.record(topic, now_us, *map(_within_float32, numbers))
         self._add(record, now_us)
 
     def _add(self, data: bytes, now_us: int) -> None:
-        dropping = self._dropped_us >= 0 and self._waiting > 0  # until the shell has taken what waits
+        dropping = self._dropped_us >= 0 and self._waiting > 0  # until the shell has taken the waiting bytes
         if dropping or self._waiting + len(data) > MOST_WAITING:
             if self._dropped_us < 0:
                 self._dropped_us = now_us
@@ -226,7 +226,7 @@ class FlightLog:
 
 
 def _free_name(unix_us: int, taken: set[str]) -> str:
-    """The UTC time as a file name that no log has."""
+    """The UTC time as an unused file name."""
     name = stem = _utc(unix_us // 1_000_000)
     count = 0
     while name + LOG_ENDING in taken:

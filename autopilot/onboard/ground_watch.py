@@ -1,4 +1,4 @@
-"""What follows when the ground station falls silent in flight: NAV_DLL_ACT, as PX4 knows it."""
+"""The reaction to a ground station that becomes silent in flight: NAV_DLL_ACT, as in PX4."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ _ACTIONS: dict[int, tuple[Any, str]] = {
 
 
 class GroundWatch:
-    """Whether the ground station was heard of late, and what the vehicle is to do where it was not."""
+    """Whether the ground station was heard recently, and what the vehicle is to do if it was not."""
 
     def __init__(self) -> None:
         self._patience_us = NEVER_US
         self._action = 0
-        self.lost = False  # and it was acted upon
+        self.lost = False  # the ground station is lost, and the vehicle has reacted
 
     def follow(self, table: ParameterTable) -> None:
-        """Other parameters."""
+        """Take over changed parameters."""
         self._action = int(table["NAV_DLL_ACT"])
         self._patience_us = round(table["COM_DL_LOSS_T"] * 1e6) if self._action else NEVER_US
 
     def changed(self, now_us: int, heard_us: int) -> bool:
-        """Whether it has become silent, or is heard again."""
+        """Whether the ground station has become silent, or is heard again."""
         return (now_us - heard_us > self._patience_us) != self.lost
 
     def changes_us(self, heard_us: int) -> int:
-        """When it will have become silent, if it was not lost; it is not heard meanwhile."""
+        """When it counts as silent if nothing is heard meanwhile; never if it is already lost."""
         return NEVER_US if self.lost else heard_us + self._patience_us + 1
 
     def request(self, phase: Phase) -> tuple[Any, str] | None:
-        """What to ask of the vehicle, and the word for it; None in a phase that needs nothing."""
+        """The request to the vehicle, and the word for it; None in a phase that needs no reaction."""
         homing = phase in LANDING or phase == Phase.RETURN
         return None if phase not in IN_AIR or homing else _ACTIONS[self._action]

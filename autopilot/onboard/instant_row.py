@@ -1,4 +1,4 @@
-"""An instant of the flight, put together from the rows of the flight core."""
+"""An instant of the flight, assembled from the rows of the flight core."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ESTIMATING = (
 
 @cache
 def _fields(record: Any) -> dict[str, tuple[int, Any]]:
-    """Where in a packed record the numbers of each field begin, and what the field is."""
+    """Where in a packed record the numbers of each field begin, and the type of the field."""
     hints = get_type_hints(record)
     widths = [width(hints[name]) for name in record._fields]
     begins = accumulate(widths[:-1], initial=0)
@@ -53,7 +53,7 @@ def _place(record: Any, path: str) -> int:
 
 
 def _copies(record: Any, paths: dict[str, str]) -> NDArray[np.int64]:
-    """(n, 2) where in an `Instant`, and whence in a record, the numbers of these fields are copied."""
+    """(n, 2): the place in an `Instant`, and the place in a record from which each number is copied."""
     hints = get_type_hints(Instant)
     return np.array(
         [
@@ -131,10 +131,10 @@ def put_instant(
 ) -> None:
     """Write an `Instant` into its row.
 
-    `seen`, `estimator` and `pilot` are those of `CoreRows`, `forces` (14) those of the rotors. The leg in
-    force has this control mode (NO_LEG:
-    there is none); `targets[at]` is its setpoint, as `layout.jets` gives it, and `asked[at]` what the
-    mission asks for. `carrying`: in a phase in which the load is tracked; `carries`: the load must be known.
+    `seen`, `estimator` and `pilot` are those of `CoreRows`, `forces` (14) those of the rotors. The present
+    leg has this control mode (NO_LEG: there is no leg); `targets[at]` is its setpoint, as `layout.jets`
+    returns it, and `asked[at]` the requested path. `carrying`: in a phase in which the load is tracked;
+    `carries`: the load must be known.
     """
     for i in range(_OF_SEEN.shape[0]):
         instant[_OF_SEEN[i, 0]] = seen[_OF_SEEN[i, 1]]
@@ -151,7 +151,7 @@ def put_instant(
     instant[_FLAGS] = 0 if vague else _ESTIMATING
     unseen = seen[_LOAD_COMPLAINT] == NO_LOAD or seen[_LOAD_COMPLAINT] == NO_SIGHT
     if unseen and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
-        # in the air the vehicle feels the pull; on the ground only sight tells that it is over
+        # in the air the accelerometer detects the pull; on the ground only sight shows that it has ended
         instant[_TENSION], instant[_TAUT] = nan, 0.0
     x_load = (instant[_X_LOAD], instant[_X_LOAD + 1], instant[_X_LOAD + 2])
     x_quad = (instant[_X_QUAD], instant[_X_QUAD + 1], instant[_X_QUAD + 2])

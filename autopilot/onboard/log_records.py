@@ -1,7 +1,7 @@
-"""The records of the fast topics of the flight log, in machine code, from an instant's row of numbers.
+"""The records of the fast topics of the flight log, in machine code, from the row of an instant.
 
-`put_sample` copies numbers by a table that follows from the columns of `log_topics`, into records whose
-heads and constants are there already.
+`put_sample` copies numbers according to a table derived from the columns of `log_topics`, into records that
+already contain their heads and constants.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _FLOAT, _DOUBLE = -4, -8  # kinds of numbers; integers: their bytes
 
 @cache
 def _places(record: Any) -> dict[str, range]:
-    """Which numbers of a packed record each field is."""
+    """The numbers of a packed record that belong to each field."""
     hints, places, begin = get_type_hints(record), {}, 0
     for name in record._fields:
         places[name] = range(begin, begin + width(hints[name]))
@@ -45,7 +45,7 @@ def _place(record: Any, name: str) -> int:
     return _places(record)[name].start
 
 
-# the row that is copied from: an `Instant`, a `Derived`, the time
+# the row from which numbers are copied: an `Instant`, a `Derived`, the time
 _DERIVED = width(Instant)
 _TIME = _DERIVED + width(Derived)
 _FORCES, _MOST = _place(Instant, "forces"), _place(Instant, "rotor_max")
@@ -71,8 +71,9 @@ def put_sample(
 ) -> None:
     """Write the numbers of an instant into its records. `imu` and `home`: packed `ImuReading` and `Home`.
 
-    `copies` has a line for each number: where it is in `row`, 1 or -1 by which it is multiplied, its kind,
-    its first byte. `row` and `wide`, eight bytes, are scratch. A float beyond float32 becomes the greatest.
+    `copies` has a line for each number: its place in `row`, its sign (1 or -1), its kind, its first byte.
+    `row` and `wide`, eight bytes, are scratch. A float beyond the range of float32 becomes its largest
+    number.
     """
     for i in range(_DERIVED):
         row[i] = instant[i]
@@ -127,13 +128,13 @@ def _sources(column: Column) -> list[tuple[int, int]]:
     place = _places(record)[column.name]
     first += place.start
     places = range(1, 1 + len(place))
-    # what the axes do to three numbers shows which goes where, and with which sign
+    # applying the axes to three different numbers shows the place and the sign of each
     turned = column.axes(tuple(map(float, places))) if column.axes else places
     return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in turned] * column.times
 
 
 class SampleRecords:
-    """Makes the records of the fast topics."""
+    """Writes the records of the fast topics."""
 
     def __init__(self, writer: UlogWriter, home: Home) -> None:
         copies: list[tuple[int, int, int, int]] = []
@@ -161,15 +162,15 @@ class SampleRecords:
         self.records = np.frombuffer(b"".join(records), np.uint8).copy()
         self.row = np.zeros(_TIME + 1)
         self.wide = np.zeros(8, np.uint8)
-        self._put: Callable[..., None] | None = None  # machine code, once it was asked for
+        self._put: Callable[..., None] | None = None  # machine code, after the first call
 
     def address(self, instant: Row, imu: Row) -> int:
-        """The address of `put_sample`, compiled or loaded where need be."""
+        """The address of `put_sample`, compiled or loaded if necessary."""
         arguments = (instant, imu, self.home, 0, self.row, self.copies, self.wide, self.records)
         return native_address_of(put_sample, *arguments)
 
     def of(self, sample: Sample, now_us: int) -> bytes:
-        """The records of an instant, one behind the other; that of the inertial sample only if it is sane."""
+        """The records of an instant, one after the other; that of the inertial sample only if it is sane."""
         arguments = (sample.instant, sample.imu, self.home, now_us, self.row, self.copies)
         if self._put is None:
             self._put = entry_of(put_sample, *arguments, self.wide, self.records)

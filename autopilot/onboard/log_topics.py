@@ -1,8 +1,8 @@
-"""What the flight log records: topics of PX4's names and fields where PX4 has them, and where they come from.
+"""The topics of the flight log, with PX4's names and fields where PX4 has them, and their sources.
 
 A fast topic is a table of columns, from which `log_records` writes it in machine code: a column is a field of
-an `Instant` or of `Derived`, its axes changed to NED or FRD, or numbers that never change. Slow topics are
-made in Python.
+an `Instant` or of `Derived`, converted to NED or FRD if it has axes, or numbers that never change. Slow
+topics are made in Python.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Sample(NamedTuple):
 
 
 class Derived(NamedTuple):
-    """What the fast topics need besides `Instant`."""
+    """Values that the fast topics need besides `Instant`."""
 
     latitude_deg: float
     longitude_deg: float
@@ -60,12 +60,12 @@ class Derived(NamedTuple):
     valid: bool  # the estimate
     quat_ned: Quat
     quat_c_ned: Quat
-    shares: Forces  # rotor forces between none and the greatest, where there is one
-    pulses: Forces  # the same as most tools expect them
+    shares: Forces  # rotor forces as shares of the maximum, if there is one
+    pulses: Forces  # the same as pulse widths, which most tools expect
 
 
 class Column(NamedTuple):
-    """A field of `Instant` or `Derived`, once or several times over, as seen in other axes."""
+    """A field of `Instant` or `Derived`, converted to other axes (`axes`), repeated `times` times."""
 
     name: str
     axes: Axes | None = None

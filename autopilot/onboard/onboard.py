@@ -1,7 +1,7 @@
 """The whole autopilot without its sockets: datagrams in, datagrams out.
 
-The simulator link drives it: each new tick of sensors runs the flight core once. What ground stations send
-waits until the shell hands it over, between two ticks.
+The simulator link drives it: each new tick of sensors runs the flight core once. Messages of ground stations
+wait until the shell hands them over between two ticks.
 """
 
 from __future__ import annotations
@@ -84,58 +84,58 @@ from autopilot.wire.signing import Signing
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
-# that asks whether the ground has caught up: no log has its messages, and their numbers would be missed
-SIMULATOR_SYSTEM = 1  # our number for the simulator, whatever MAV_SYS_ID ground stations see
+SIMULATOR_SYSTEM = 1  # our system id on the simulator link, whatever MAV_SYS_ID ground stations see
+# asks whether the ground has caught up: separate, since no log has its messages and gaps would be noticed
 LOCKSTEP_COMPONENT = mavlink.MAV_COMP_ID_SYSTEM_CONTROL
 _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-LEAP_US = 5_000_000  # a single tick that lies farther ahead is not believed
-GAP_US = 500_000  # without a tick, in which a vehicle in the air has long been out of control
-FIRST_TICKS = 1  # in which the rate of the ticks is found
-BELIEVED = 3  # ticks in a row that say the same of the clock are
-_SIMULATOR = "simulator"  # as what keeps the vehicle from being armed
-LEAST_THRUST = 0.3  # of the vehicle's weight: rotors that were asked for less did not carry it
+LEAP_US = 5_000_000  # a single tick that lies farther ahead is rejected
+GAP_US = 500_000  # time without a tick after which a vehicle in the air has long been out of control
+FIRST_TICKS = 1  # ticks in which the tick rate is determined
+BELIEVED = 3  # ticks in a row in the past or far ahead, after which the clock is assumed to have changed
+_SIMULATOR = "simulator"  # source of a reason that prevents arming
+LEAST_THRUST = 0.3  # share of the vehicle's weight: rotors commanded to less did not carry it
 
 
 class Gains(NamedTuple):
-    """What is derived from the parameters, the gains of the law above all; for another process, as `Work`."""
+    """Work for another process, as `Work`: what is derived from the parameters, mainly the law's gains."""
 
     parameters: AutopilotParameters
     control_every: int
-    own: Own = NOTHING_OWN  # what somebody has brought, as it was named
+    own: Own = NOTHING_OWN  # user code, by its names
 
     def done(self) -> Setup:
-        """What comes of it; takes up to half a second."""
+        """The result; takes up to half a second."""
         return build_setup(self.parameters, self.control_every, self.own)
 
     def failed(self, why: str) -> None:
-        """What comes of it where it could not be done: nothing."""
+        """The result if the work failed: none."""
 
 
 class Work(NamedTuple):
-    """The paths of a mission, to be prepared; plain data, so that another process can do it."""
+    """Paths of a mission to be prepared, as plain data, so that another process can do it."""
 
     steps: tuple[Step, ...]
     sequence: tuple[int, ...]
     limits: Limits
-    home: Vec3 = ZERO  # where a return leads
-    planner: OwnSetup | None = None  # that somebody has brought
+    home: Vec3 = ZERO  # destination of a return
+    planner: OwnSetup | None = None  # custom planner
 
     def done(self) -> Prepared:
-        """What comes of it; takes from a millisecond to some seconds."""
+        """The result; takes from a millisecond to some seconds."""
         planner = planner_for(self.planner)
         return prepare(self.steps, self.sequence, self.limits, self.home, planner)
 
     def failed(self, why: str) -> Prepared:
-        """What comes of it where it could not be done."""
+        """The result if the work failed."""
         return Prepared(refusal=why, notes=(why,))
 
 
 class Rehearsal(NamedTuple):
-    """Work for nothing, by which a process loads what work needs."""
+    """Work whose result is not used, with which a process loads what real work needs."""
 
     paths: Work
     gains: Gains
@@ -147,8 +147,8 @@ class Rehearsal(NamedTuple):
 
 
 def build_setup(table: AutopilotParameters, control_every: int, own: Own = NOTHING_OWN) -> Setup:
-    """What the flight core is given, from the parameters and the ticks between two runs of the law; `own`
-    names what somebody has brought, of which the law flies if CTL_LAW says so."""
+    """The setup of the flight core from the parameters and the number of ticks between two runs of the law;
+    `own` names user code, of which the law flies if CTL_LAW selects it."""
     kind, law, vehicle = chosen_law(table), build_law(table), believed_vehicle(table)
     return Setup(
         vehicle=vehicle,
@@ -176,8 +176,8 @@ def plan_of(
     return_to: Vec3 = ZERO,
     planner: OwnSetup | None = None,
 ) -> MissionPlan:
-    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet. A
-    return leads to `return_to`; `planner` is one that somebody has brought."""
+    """The steps of a mission as it was uploaded, prepared for a vehicle with these limits; limits None: not
+    prepared yet. A return leads to `return_to`; `planner` is a custom planner."""
     steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
     prepared = PENDING
@@ -189,7 +189,8 @@ def plan_of(
 
 
 class Onboard:
-    """One autopilot. `receive_sensors` moves its clock; nothing else does."""
+    """One autopilot. Its clock advances in `receive_sensors`, and in the ticks that machine code flies
+    (`ran`, `complete`)."""
 
     def __init__(
         self,
@@ -213,7 +214,7 @@ class Onboard:
         )
         self.now_us = 0
         self.tick = -1
-        self.fault = ""  # why the vehicle cannot be flown at all
+        self.fault = ""  # the reason if the vehicle cannot be flown at all
         self._options = options
         self._writer = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT)
         self._answer = b""
@@ -223,26 +224,26 @@ class Onboard:
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
         self._written = self._frame.data
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-        # machine code, once it was asked for
+        # machine code, after the first call
         self._put: Callable[..., tuple[int, bool]] | None = None
-        self._shortest_us = 0  # between two ticks so far
+        self._shortest_us = 0  # shortest time between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
-        self.restarted = False  # the simulator has; this autopilot is of no use any more
-        self._boot_id: int | None = None  # of the simulator, if it has told
+        self.restarted = False  # the simulator has restarted; this autopilot is of no use any more
+        self._boot_id: int | None = None  # of the simulator, if it has reported one
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
         self._punctuality = Punctuality()
         self._ground = GroundWatch()
-        self._world_told = False  # what parameters it has
+        self._world_told = False  # the simulator has reported its parameters
         self.endpoint.expect_parameters()
-        self._reboot = False  # the simulator is asked to begin anew
+        self._reboot = False  # the simulator is requested to restart
         laid_out = LAID_OUT_WAITING if options.clock_waits else LAID_OUT
         self.core = FlightCore(build_setup(parameters, 1, options.own), laid_out)
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
         self._moments = Moments(self.core, options, parameters, self._health, self._sensors)
-        # what waits for `finish`
+        # work that waits for `finish`
         self._paths: Work | None = None
         self._gains: Gains | None = None
         # values of our parameters that are in force, or will be, and the period of the ticks
@@ -250,7 +251,7 @@ class Onboard:
         self._prepared_for = (self.core.setup.settings.limits, self.core.setup.planner)
         self._runner = Runner(self._moments, self._battery_row, self._writer, options.lockstep)
         self._take_plan(self.endpoint.mission)
-        self.logged = False  # since the log was taken last
+        self.logged = False  # something was logged since the log was last taken
         self._log: FlightLog | None = None
         if options.log:
             release = ".".join(map(str, identity.version))
@@ -260,9 +261,9 @@ class Onboard:
     # ---- simulator link
 
     def receive_sensors(self, datagram: bytes) -> bytes | None:
-        """The answer to a datagram of sensors: a new one to a new tick, the same again to a repeated one.
+        """The answer to a datagram of sensors: a new answer to a new tick, the same again to a repeated tick.
 
-        None for anything else: garbage, or a tick that is over.
+        None for anything else: garbage, or a past tick.
         """
         before_us, begun = self.now_us, self.tick >= 0
         tick = self._sensors.read(datagram, before_us if begun else -1)
@@ -276,7 +277,7 @@ class Onboard:
         if late or ahead:
             self.out_of_time += 1
             if late or self.out_of_time < BELIEVED:
-                # a simulator that does not tell its runs apart is known by its clock
+                # the restart of a simulator that sends no SIM_BOOT is recognised by its clock
                 self.restarted = late and self._boot_id is None and self.out_of_time >= BELIEVED
                 return None
         self.out_of_time = 0
@@ -292,12 +293,12 @@ class Onboard:
         return answer
 
     def _is_another_run(self, messages: tuple[Any, ...]) -> bool:
-        """Whether the simulator says that it has started again since it was heard first."""
+        """Whether the simulator reports that it has restarted since it was first heard."""
         runs = [m.boot_id for m in messages if m.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT]
         return self._boot_id is not None and any(run != self._boot_id for run in runs)
 
     def _put_answer(self, tick: Tick, dt: float) -> bytes:
-        """HIL_ACTUATOR_CONTROLS of this tick, to which the vehicle's condition is brought."""
+        """HIL_ACTUATOR_CONTROLS of this tick; also brings the vehicle's condition up to date."""
         core, writer, now_us = self.core, self._writer, tick.now_us
         flight = core.flight
         arguments = (
@@ -320,7 +321,7 @@ class Onboard:
 
     @property
     def tick_us(self) -> int:
-        """How long a tick lasts, by the clock of the simulator; 0 until two have come."""
+        """Duration of a tick by the clock of the simulator; 0 until two ticks have arrived."""
         return self._shortest_us
 
     @property
@@ -329,7 +330,7 @@ class Onboard:
         return self.core.flight.phase not in UNARMED
 
     def _run(self, tick: Tick) -> bytes:
-        """One tick of the flight software; the answer to it."""
+        """One tick of the flight software; returns the answer to it."""
         now_us = tick.now_us
         period_us = now_us - self.now_us if self.tick >= 0 else 0
         self._begin_tick(tick)
@@ -357,7 +358,7 @@ class Onboard:
         return self._end_tick(tick, dt, core.step(tick.readings, now_us, self.tick, dt))
 
     def complete(self, tick: Tick) -> bytes:
-        """The answer to a tick that machine code has begun, and that is to be decided upon."""
+        """Complete a tick that machine code has begun and that needs a decision; returns the answer to it."""
         dt = (tick.now_us - self.now_us) * 1e-6
         self._begin_tick(tick)
         self.out_of_time = 0
@@ -366,14 +367,14 @@ class Onboard:
         return self._answer
 
     def _begin_tick(self, tick: Tick) -> None:
-        """It is this tick from now on."""
+        """Make this tick the present one."""
         self.tick += 1
         self.now_us = tick.now_us
         if tick.fixed:
             self._moments.fixed = True
 
     def _end_tick(self, tick: Tick, dt: float, report: Report) -> bytes:
-        """What comes behind a tick of the flight software; the answer to it."""
+        """What follows a tick of the flight software: texts, completed items, the log; returns the answer."""
         now_us = tick.now_us
         answer = self._put_answer(tick, dt)
         for severity, text in report.texts:
@@ -391,7 +392,7 @@ class Onboard:
     # ---- ticks without Python
 
     def running(self, questions: Questions = NO_QUESTIONS) -> Running | None:
-        """With what, and until when, machine code can fly the ticks that come next; None: not the next."""
+        """With which data, and until when, machine code can fly the next ticks; None: it cannot."""
         now_us, period_us, core = self.now_us, self._shortest_us, self.core
         heard_us = self.endpoint.ground_us
         if (
@@ -423,11 +424,11 @@ class Onboard:
         return self._runner.running(times, known, told.seq, written, log, asked)
 
     def rehearsed_running(self) -> Running:
-        """What `running` gives, to compile for; it cannot be flown."""
+        """What `running` returns, only for compiling; it cannot be flown."""
         return self._runner.rehearsed()
 
     def ran(self) -> bool:
-        """Take over what machine code has made of `running`; whether there were any ticks."""
+        """Take over what machine code has changed in `running`; returns whether it flew any tick."""
         ran = self._runner.ran()
         if ran is None:
             return False
@@ -442,12 +443,12 @@ class Onboard:
 
     @property
     def said(self) -> list[bytes]:
-        """What machine code has not sent to the ground station: each window that ends with a question, and
-        what belongs to the one that is open."""
+        """Messages that machine code has not sent to the ground station: each window that ends with a
+        question, and the messages of the open window."""
         return self._runner.said
 
     def _miss_ground(self) -> None:
-        """Act upon a ground station that fell silent, once the phase allows it; or say that it is back."""
+        """React to a silent ground station as soon as the phase allows it, or report that it is back."""
         if self._ground.lost:
             self._ground.lost = False
             self.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
@@ -459,7 +460,7 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, LOST_TEXT.format(asked[1]))
 
     def _bridge(self, period_us: int) -> None:
-        """Ticks were lost for so long that nothing is known any more, and no command has been given."""
+        """Begin anew after a gap in the ticks so long that the estimate is lost and no command was given."""
         why = f"no tick of the simulator for {period_us * 1e-6:.1f} s"
         for severity, text in self.core.begin_anew(why, self.now_us):
             self.endpoint.say(severity, text)
@@ -485,7 +486,7 @@ class Onboard:
             self.endpoint.parameter_changed(name)
 
     def _find(self, boot: Any) -> None:
-        """Take up a flight that is under way, which this autopilot has begun before it was started again."""
+        """Take over a flight under way, which the autopilot had begun before it was restarted."""
         if boot.rotors == mavlink.PLUMBLINE_ROTORS_DISARMED:
             return
         vehicle, thrust_n = self.core.setup.vehicle, float(sum((*boot.force, *boot.more_force)))
@@ -500,7 +501,7 @@ class Onboard:
     # ---- flight log
 
     def take_log(self, least_bytes: int = 1) -> LogChunk | None:
-        """What is to be stored of the flight log, once it is so much or the log has ended."""
+        """The part of the flight log to be stored, if it has `least_bytes` or the log has ended."""
         self.logged = False
         return None if self._log is None else self._log.take(least_bytes)
 
@@ -523,7 +524,7 @@ class Onboard:
             return set()
 
     def log_sample(self) -> Sample:
-        """What the flight log records at this tick."""
+        """The sample that the flight log records at this tick."""
         moment = self._snapshot()
         return Sample(moment, moment.instant, self._sensors.imu, self._sensed, lambda: moment.estimator)
 
@@ -547,7 +548,7 @@ class Onboard:
         pack(self._moments.battery, self._battery_row, 0)
         values, learned = self.parameters.values(), self.parameters.learned
         followed = {name: value for name, value in values.items() if name not in learned}, self._shortest_us
-        if followed == self._followed:  # the simulator has told more of its own, by which nobody flies
+        if followed == self._followed:  # only parameters of the simulator changed, which do not affect flying
             return
         self._followed = followed
         gains = Gains(self.parameters, every, self._options.own)
@@ -557,7 +558,7 @@ class Onboard:
             self._gains = gains
 
     def _take_setup(self, setup: Setup) -> None:
-        """Fly by other parameters from the next tick on."""
+        """Fly with this setup from the next tick on."""
         self.core.follow(setup)
         # a mission under way keeps the paths that it began with
         wanted = (setup.settings.limits, setup.planner)
@@ -567,12 +568,12 @@ class Onboard:
     # ---- ground
 
     def add_link(self, link: Link, program: bool = False) -> None:
-        """A link that always gets telemetry; `program`: as programs that fly want it, not ground stations."""
+        """Add a link that always receives telemetry; `program`: with the streams for programs instead of
+        those for ground stations."""
         self.endpoint.add_link(link, self.now_us, program)
 
     def receive_ground(self, datagram: bytes, link: Link, program: bool = False) -> list[Event]:
-        """Handle a datagram from a ground station, or from a program; what must be stored comes back as
-        events."""
+        """Handle a datagram from a ground station or a program; what must be stored is returned as events."""
         if self._received_loss.drops(datagram, self.parameters[LOSS_PARAMETER]):
             return []
         events = self.endpoint.receive(datagram, link, self.now_us, self._decide, program)
@@ -585,23 +586,24 @@ class Onboard:
                     self.take_areas(kind, items)
                 case WorldAsked(name, value):
                     self._world.ask(name, value)
-                case WorldSaved(values) if values:  # with what the simulator has not answered yet
+                case WorldSaved(values) if values:  # with values that the simulator has not confirmed yet
                     kept.append(WorldSaved({**values, **self._world.asked}))
                     continue
                 case _:
-                    pass  # the shell waits for it, stores it, or shows it
+                    pass  # for the shell, which waits for it, stores it, or shows it
             if self._outlives(event):
                 kept.append(event)
         return kept
 
     def _outlives(self, event: Event) -> bool:
-        """Whether the shell is to store it: not what is asked of the world, nor the loss of the link."""
+        """Whether the event is returned to the shell: not requests to the simulator, nor parameters that are
+        not stored, such as the loss of the link."""
         if isinstance(event, ParameterChanged):
             return self.parameters.describe(event.name).stored
         return not isinstance(event, WorldAsked)
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
-        """What is due on the ground links at this tick."""
+        """The datagrams due on the ground links at this tick."""
         sent = self.endpoint.poll(self._snapshot, self.now_us)
         if sent and (percent := self.parameters[LOSS_PARAMETER]) > 0.0:
             sent = [
@@ -612,7 +614,7 @@ class Onboard:
     def question(self, link: Link) -> bytes | None:
         """TIMESYNC for a ground station that shares our clock, at the first tick of each window; else None.
 
-        The shell sends it after `ground_datagrams` and lets the clock stand until it is answered.
+        The shell sends it after `ground_datagrams` and does not continue until it is answered.
         """
         if self.now_us < self._next_question_us:
             return None
@@ -620,11 +622,11 @@ class Onboard:
         return self.endpoint.datagram(link, (_TIMESYNC, (0, self.now_us * 1000)), LOCKSTEP_COMPONENT)
 
     def restore_world(self, values: Mapping[str, float]) -> None:
-        """What the simulator's parameters were saved as; it is told when it is there."""
+        """Set the saved values of the simulator's parameters as soon as the simulator is there."""
         self._world.restore(values)
 
     def stranded_heartbeat(self, link: Link) -> bytes:
-        """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
+        """A heartbeat of a vehicle without sensor data, for a shell whose clock stands."""
         snapshot = self._snapshot()
         critical, emergency = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY
         snapshot.system_status = emergency if snapshot.armed else critical
@@ -632,7 +634,7 @@ class Onboard:
 
     @property
     def rehearsal(self) -> Rehearsal:
-        """Work for nothing, by which a process loads what work needs."""
+        """Work whose result is not used, with which a process loads what real work needs."""
         path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
         steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
         paths = Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
@@ -644,7 +646,7 @@ class Onboard:
         self.rehearse_messages()
 
     def rehearse_messages(self) -> None:
-        """Of these the ones of the simulator link, of telemetry and of the flight log."""
+        """Call the kernels of the simulator link, of telemetry and of the flight log once."""
         self._sensors.read(b"", -1)
         rehearse_answer()
         rehearse_telemetry(self.core.setup, self.parameters)
@@ -661,7 +663,7 @@ class Onboard:
         if isinstance(request, Reboot) and not request.shutdown:
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")
-            # the world begins anew, and when its clock does, so does the shell with us
+            # the simulator restarts, and when its clock does, the shell builds a new autopilot
             self._reboot = True
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
@@ -676,8 +678,8 @@ class Onboard:
         return verdict
 
     def _follow_home(self) -> None:
-        """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
-        as it does when a parameter is changed."""
+        """Read and prepare the mission again if it returns to a home that has changed. A mission under way
+        keeps its paths, as when a parameter is changed."""
         flight = self.core.flight
         mission = flight.mission
         if mission.active or not any(isinstance(step, ReturnHome) for step in mission.plan.steps):
@@ -685,14 +687,14 @@ class Onboard:
         plan = plan_of(self.endpoint.mission, self._options.home, None, flight.area.home)
         current, item = mission.step, mission.plan.sequence[mission.step]
         if len(plan.steps) != len(mission.plan.steps):
-            # to land at a place of its own may be two steps by now
+            # landing at another place than home may consist of two steps now
             current = plan.sequence.index(item)
         mission = replace(mission, plan=plan, step=current)
         self.core.change(replace(flight, mission=mission))
         self._prepare()
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
-        """Another fence, other rally points."""
+        """Take over another fence or other rally points."""
         self.endpoint.set_areas(kind, items)
         flight = self.core.flight
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:
@@ -702,19 +704,19 @@ class Onboard:
         self.core.change(replace(flight, area=area))
 
     def take_losses(self, lost: tuple[str, ...]) -> None:
-        """What of the storage cannot be read: the vehicle is not armed until that is made good."""
+        """State what cannot be read from the storage: the vehicle is not armed until this is repaired."""
         self._hinder("storage", lost)
 
     def take_silence(self, silent: bool) -> None:
-        """Whether the simulator has fallen silent: until it is back the vehicle is not armed, and takes no
-        command that is to be flown, and no parameter of the simulator is set."""
+        """State whether the simulator is silent: until it is back, the vehicle is not armed, accepts no
+        command that would be flown, and sets no parameter of the simulator."""
         self.endpoint.world_silent(silent)
         if silent:
             self._world.forget_asked()
         self._hinder(_SIMULATOR, ("the simulator is silent",) if silent else ())
 
     def _hinder(self, source: str, reasons: tuple[str, ...]) -> None:
-        """What this source says keeps the vehicle from being armed."""
+        """Set the reasons for which this source prevents arming."""
         hindrances = self.core.flight.hindrances
         if hindrances.get(source, ()) != reasons:
             self.core.change(replace(self.core.flight, hindrances={**hindrances, source: reasons}))
@@ -729,7 +731,7 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
 
     def _prepare(self) -> None:
-        """Have the paths of the plan made: at once where the clock waits, else by who takes `work`."""
+        """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
         plan, setup = self.core.flight.mission.plan, self.core.setup
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
         home = self.core.flight.area.home
@@ -740,11 +742,11 @@ class Onboard:
 
     @property
     def work(self) -> Work | Gains | None:
-        """What is to be done by another process, and then waits for `finish`."""
+        """Work to be done by another process, whose result is passed to `finish`."""
         return self._gains or self._paths
 
     def finish(self, work: Work | Gains, done: Any) -> None:
-        """Take what came of `work`, unless there is other work of its kind by now."""
+        """Take over the result of `work`, unless there is newer work of its kind."""
         if work is self._gains:
             self._gains = None
             if done is None:
@@ -758,7 +760,7 @@ class Onboard:
             self._take_paths(done)
 
     def _take_paths(self, prepared: Prepared) -> None:
-        """Take the paths of the plan, and begin the mission if it waited for them."""
+        """Take over the paths of the plan, and begin the mission if it waited for them."""
         for note in prepared.notes:
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._have_prepared(prepared)
@@ -766,7 +768,7 @@ class Onboard:
             self._begin_mission()
 
     def _begin_mission(self) -> None:
-        """Begin the mission that waited for its paths, or say why not."""
+        """Begin the mission that waited for its paths, or report why not."""
         verdict = self.core.ask(StartMission(None), self.now_us)
         self.endpoint.state_changed()
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:

@@ -1,4 +1,4 @@
-"""A ground link that loses datagrams, the same ones in every flight with the same seed."""
+"""A ground link that loses datagrams, chosen by their number and thus the same ones in every run."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def _uniform(key: int) -> float:
 
 
 class Loss:
-    """Decides datagram by datagram. Never lost is what keeps the ground in step with the clock, and what sets
-    or tells the loss itself: a link that loses all could not be mended."""
+    """Decides for each datagram whether it is lost. TIMESYNC, which keeps the ground in step with the clock,
+    is never lost, nor are messages that set or report the loss itself, so that any loss can be undone."""
 
     def __init__(self, direction: int) -> None:
         self._direction = direction

@@ -1,20 +1,20 @@
-"""Whether the machine is fast enough to fly in real time, by what the simulator says of its answers."""
+"""Whether the machine is fast enough to fly in real time, judged by the simulator's count of late answers."""
 
 from __future__ import annotations
 
 from typing import Any
 
-MOST_MISSED = 0.01  # share of the commands of a second
+MOST_MISSED = 0.01  # share of the commands in one second
 
 
 class Punctuality:
-    """The share of the commands that came too late, second by second; in lockstep nothing is told of it."""
+    """The share of the commands that came too late, second by second; in lockstep it is not reported."""
 
     def __init__(self) -> None:
         self._last: tuple[int, int, int] | None = None  # time, tick, missed commands
 
     def hear(self, status: Any, tick: int) -> tuple[str, ...]:
-        """Why the vehicle is not to be armed by SIM_STATUS, heard at this tick of ours; empty: nothing."""
+        """Why the vehicle must not be armed, from SIM_STATUS received at this tick; empty: no reason."""
         last, self._last = self._last, (status.time_usec, tick, status.missed)
         if last is None or status.time_usec <= last[0]:
             return ()

@@ -1,8 +1,9 @@
-"""Ticks that machine code can fly by itself: what it needs for that, and what comes of it.
+"""Ticks that machine code can fly by itself: the data for them, and their results.
 
-Most ticks are alike: readings come, nothing is to be decided, an answer goes out, and perhaps streams that
-machine code can write. `Onboard` says until when that is all there is (`running`), a loop in machine code
-does it (`autopilot.shell.tick_loop`), `Onboard.ran` takes over what has come of it. All else is left to it.
+Most ticks are alike: readings arrive, no decision is needed, an answer is sent, and perhaps streams that
+machine code can write. `Onboard` determines until when nothing else is due (`running`), a loop in machine
+code flies these ticks (`autopilot.shell.tick_loop`), and `Onboard.ran` takes over the results. `Onboard` does
+everything else.
 """
 
 from __future__ import annotations
@@ -35,27 +36,27 @@ from autopilot.wire.ulog import UlogWriter
 
 Ints = NDArray[np.int64]
 
-# what `Running.numbers` are: of the clock
+# the contents of `Running.numbers`: of the clock
 NOW_US, TICK, PERIOD_US, UNTIL_US, RAN = range(5)
-# of the present tick's readings, if it was not flown to its end: `Tick`; and whether any tick had a HIL_GPS
+# of the present tick's readings, if it was not completed: `Tick`; and whether any tick had a HIL_GPS
 READINGS, FIELDS, FIXED, EVER_FIXED = range(5, 9)
-# of the answer: its writer, what it says, how many bytes it has, whether the inertial sample was sane
+# of the answer: its writer, its contents, its number of bytes, whether the inertial sample was sane
 SEQUENCE, SYSTEM, COMPONENT, ARMED, LOCKSTEP, RELEASED, LENGTH, SENSED = range(9, 17)
-# of the streams: their writers, and how many bytes were written
+# of the streams: their writers, and the number of bytes written
 OWN_SYSTEM, OWN_COMPONENT, OWN_SEQUENCE, DIALECT_COMPONENT, DIALECT_SEQUENCE, SAID = range(17, 23)
-# of what is flown, as `put_instant` is told
+# of what is flown, as arguments of `put_instant`
 TRACKS, FIRST_US, MODE, SINCE_US, PHASE, SEQ, CARRYING, CARRIES, ROTORS = range(23, 32)
-# of the questions: when the next is due, and how long a window is; `Questions`; how many windows wait to be
-# sent, and when the last question was; who asks
+# of the questions: when the next is due, and the length of a window; `Questions`; how many windows wait to be
+# sent, and the time of the last question; the component that asks
 QUESTION_US, WINDOW_US, ASKED_UNTIL_US, ALONE_US, MOST_ASKED = range(32, 37)
 ASKED, ASKED_US, ASIDE_COMPONENT, ASIDE_SEQUENCE = range(37, 41)
-# of the flight log: when it is due, how often, bytes that were written, which bytes are the inertial sample's
+# of the flight log: when it is due, its period, bytes that were written, range of the inertial sample's bytes
 LOG_US, LOG_PERIOD_US, LOGGED, SENSED_BEGIN, SENSED_END = range(41, 46)
 NUMBERS = 46
 _MOST_SAID = 8 * STREAMS_ROOM  # bytes of streams without Python
 _MOST_LOGGED = 65_536
 MOST_WINDOWS = 16  # that can wait to be sent
-# what `Running.limits` are
+# the contents of `Running.limits`
 DURATION_S, ROTOR_MIN, ROTOR_MAX = range(3)
 
 TIMESYNC = wire_record(mavlink.MAVLink_timesync_message, __name__)
@@ -77,19 +78,19 @@ class Code(NamedTuple):
 
 
 class Questions(NamedTuple):
-    """What the shell lets machine code ask the ground station."""
+    """The questions that the shell allows machine code to ask the ground station."""
 
-    until_us: int  # those before are not waited for
-    alone_us: int  # from then on what was said is sent with each
-    most: int  # before, so many windows are sent together
-    unsent: tuple[bytes, ...]  # windows that are over, and what belongs to the one that is open
+    until_us: int  # answers to questions before this time are not waited for
+    alone_us: int  # from this time on windows are sent one by one
+    most: int  # before it, so many windows are sent together
+    unsent: tuple[bytes, ...]  # the closed windows, and the messages of the open window
 
 
 NO_QUESTIONS = Questions(0, 0, 0, (b"",))
 
 
 class Log(NamedTuple):
-    """What the flight log's records are made from, as `put_sample` takes it, and where they go."""
+    """The data from which the flight log's records are made, for `put_sample`, and where they are put."""
 
     home: Row
     row: Row
@@ -100,7 +101,7 @@ class Log(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Where readings are put, as `SensorInbox` has it."""
+    """Where readings are put, as in `SensorInbox`."""
 
     home: Row
     imu: Row
@@ -110,7 +111,7 @@ class Readings(NamedTuple):
 
 
 class Streams(NamedTuple):
-    """What streams are written from, and where to."""
+    """The data from which streams are written, and where they are put."""
 
     due: Ints  # (n, 2): interval in us, set of streams
     instant: Row
@@ -120,7 +121,7 @@ class Streams(NamedTuple):
 
 
 class Running(NamedTuple):
-    """What the ticks to come work with, until `numbers[UNTIL_US]`: that one is not such a tick any more."""
+    """The data of the next ticks, before `numbers[UNTIL_US]`: the tick at that time is left to Python."""
 
     numbers: Ints
     limits: Row
@@ -136,13 +137,13 @@ class Running(NamedTuple):
     targets: Array
     asked: Array
     streams: Streams
-    windows: Ints  # how far what is said goes in each window that is over and not sent
+    windows: Ints  # where the messages of each closed window that is not sent end
     log: Log
     code: Code
 
 
 class Runner:
-    """Puts `Running` together, and takes apart what has become of it."""
+    """Assembles `Running`, and reads the results from it."""
 
     def __init__(self, moments: Moments, battery: Row, writer: FrameWriter, lockstep: bool) -> None:
         """`battery` is the row of the battery's constants, `writer` that of the answers."""
@@ -154,9 +155,9 @@ class Runner:
         self._windows = np.zeros(MOST_WINDOWS, np.int64)
         self._logged = np.zeros(_MOST_LOGGED, np.uint8)
         self._frame, self._payload = np.zeros(FRAME_ROOM, np.uint8), np.zeros(PAYLOAD_ROOM, np.uint8)
-        # of no log, as long as there is none
+        # records of no log, as long as there is none
         self._records = SampleRecords(UlogWriter(topic for topic, _ in FAST), moments.options.home)
-        self._code: Code | None = None  # once it was asked for
+        self._code: Code | None = None  # after the first call
         self._written: Written | None = None
 
     @property
@@ -167,7 +168,7 @@ class Runner:
 
     @property
     def said(self) -> list[bytes]:
-        """What is not sent yet: each window that is over, and what belongs to the one that is open."""
+        """The messages that are not sent yet: each closed window, and the open one."""
         said = self._said[: self._numbers[SAID]].tobytes()
         ends = self._windows[: self._numbers[ASKED]].tolist()
         return [said[begin:end] for begin, end in zip((0, *ends), (*ends, len(said)), strict=True)]
@@ -184,7 +185,7 @@ class Runner:
 
     @property
     def next_question_us(self) -> int:
-        """When the next question is."""
+        """When the next question is due."""
         return int(self._numbers[QUESTION_US])
 
     def running(
@@ -196,10 +197,10 @@ class Runner:
         log: LogRunning | None,
         asked: tuple[int, int, Questions],
     ) -> Running | None:
-        """What the next ticks work with; `times`: the time now (us), the number of this tick, how long one
-        lasts (us), when the first comes that is left to Python (us). `seq`: the mission item under way;
-        `asked`: when the next question is due, how long a window is (us), and what may be asked. None where
-        nothing is compiled, or too much waits to be sent."""
+        """The data of the next ticks; `times`: the time now (us), the number of this tick, its duration (us),
+        the time of the first tick that is left to Python (us). `seq`: the mission item under way; `asked`:
+        when the next question is due, the length of a window (us), and the allowed questions. None if nothing
+        is compiled, or too much waits to be sent."""
         moments = self._moments
         core, frames, writer = moments.core, written.frames, self._writer
         if log is not None:
@@ -237,7 +238,7 @@ class Runner:
         return self._together(core.law, known, written, code)
 
     def rehearsed(self) -> Running:
-        """What `running` gives, to compile for; it cannot be flown."""
+        """What `running` returns, only for compiling; it cannot be flown."""
         moments = self._moments
         frames = StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2), moments.options.home)
         written = Written("", 0, np.zeros((0, 2), np.int64), frames, frames.autopilot)
@@ -268,8 +269,8 @@ class Runner:
         )
 
     def ran(self) -> tuple[int, int, bool, bytes] | None:
-        """Of the last tick flown so: its time (us), its number, whether its inertial sample is sane, and the
-        answer to it; None: there was none. Writers and what is known of fixes are brought up to date."""
+        """The time (us) and number of the last tick flown by machine code, whether its inertial sample is
+        sane, and the answer to it; None: no tick was flown. Updates the writers and `Moments.fixed`."""
         numbers = self._numbers
         if numbers[RAN] == 0:
             return None

@@ -1,8 +1,9 @@
-"""The simulator's SIM_* parameters, shown to ground stations as if they were ours.
+"""The simulator's SIM_* parameters, shown to ground stations as if they belonged to the autopilot.
 
-They are learned over the simulator link, once it is up; a ground station's PARAM_SET is handed on, and what
-the simulator then says is what holds, and the answer. They describe a world, not the autopilot, and are
-stored only where PREFLIGHT_STORAGE asks for it; then they are set again in every simulator that is met.
+They are learned over the simulator link once it is up. A ground station's PARAM_SET is passed on to the
+simulator; the value that it then reports is in force, and is the answer. These parameters describe a world,
+not the autopilot, and are stored only if PREFLIGHT_STORAGE requests it; then they are set again in every
+simulator that connects.
 """
 
 from __future__ import annotations
@@ -15,21 +16,21 @@ from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_fr
 
 SIMULATOR_COMPONENT = 26
 RETRY_US = 500_000
-LIST_ASKS = 6  # a simulator that never answers has no parameters
+LIST_ASKS = 6  # requests, after which a silent simulator is assumed to have no parameters
 _ANYTHING = 1e9
 
 
 class WorldParameters:
-    """The mirror of the simulator's table in ours."""
+    """The copy of the simulator's parameters in our table."""
 
     def __init__(self, table: ParameterTable) -> None:
         self._table = table
         self._heard: set[str] = set()
-        self._complete = False  # the simulator has told all that it has
+        self._complete = False  # the simulator has reported all its parameters
         self._asks = 0
         self._ask_us = 0
         self._restored: Mapping[str, float] = {}
-        self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is sent (again)
+        self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is next sent
 
     def ask(self, name: str, value: float) -> None:
         """Set a parameter in the simulator."""
@@ -37,22 +38,22 @@ class WorldParameters:
 
     @property
     def asked(self) -> dict[str, float]:
-        """What is to be set in the simulator, which has not answered yet."""
+        """The values to be set in the simulator that it has not answered yet."""
         return {name: value for name, (value, _) in self._wanted.items()}
 
     def forget_asked(self) -> None:
-        """Set nothing of what was asked for and not answered: whoever asked will have given up. What is
-        restored is still wanted."""
+        """Drop requested values that are not answered, since the client will have given up. Values to be
+        restored are kept."""
         wanted = self._wanted.items()
         self._wanted = {name: due for name, due in wanted if self._restored.get(name) == due[0]}
 
     def restore(self, values: Mapping[str, float]) -> None:
-        """Set these in the simulator as soon as it has told that it has them."""
+        """Set these values in the simulator as soon as it has reported that it has these parameters."""
         self._restored = values
 
     def receive(self, message: Any) -> str | None:
-        """Take a message of the simulator in; the name of a value that is to be told: it is the answer to
-        what was asked for, or another one than we have told."""
+        """Handle a message of the simulator. Returns the name of a parameter whose value is to be sent to the
+        ground stations: it answers a request, or differs from the value sent before."""
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             return None
         name: str = message.param_id
@@ -76,15 +77,15 @@ class WorldParameters:
 
     @property
     def speaks(self) -> bool:
-        """Whether there is, or may soon be, anything to say to the simulator."""
+        """Whether there is, or may soon be, anything to send to the simulator."""
         return bool(self._wanted) or not (self._complete or self._asks >= LIST_ASKS)
 
     def settled(self, now_us: int) -> bool:
-        """Whether all are known, or the simulator has had time enough to tell them."""
+        """Whether all parameters are known, or the simulator has had enough time to report them."""
         return self._complete or (self._asks == LIST_ASKS and now_us >= self._ask_us)
 
     def messages(self, now_us: int) -> list[Any]:
-        """What goes to the simulator beside the answer to this tick."""
+        """Messages to the simulator besides the answer to this tick."""
         messages: list[Any] = []
         if not self._complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
             self._asks += 1

@@ -45,9 +45,9 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import HilGps
 from autopilot.wire.dialect import plumbline as mavlink
 
-FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
+FRESH_S = 0.5  # a tracker is healthy while its last reading is younger
 UNARMED = (Phase.DISARMED, Phase.FAILSAFE)  # the rotors stand
-_NO_COUNT = 255  # satellites of a fix that no receiver gave
+_NO_COUNT = 255  # number of satellites of a fix without a receiver: unknown
 
 _PHASE_MODES = {
     Phase.TAUTEN: identity.AUTO_TAKEOFF,
@@ -82,19 +82,19 @@ _WIDTH = width(Instant)
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line decides for the whole run."""
+    """Options of the command line for the whole run."""
 
     home: Home
     boot_unix_us: int
     lockstep: bool = True
-    clock_waits: bool = True  # for the autopilot, however long it works
-    log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
-    own: Own = NOTHING_OWN  # what somebody has brought, as it was named
-    setup_signing: bool = False  # a first signing key is taken from whoever sends one
+    clock_waits: bool = True  # the clock waits for the autopilot, however long it works
+    log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` returns
+    own: Own = NOTHING_OWN  # user code, by its names
+    setup_signing: bool = False  # a first signing key is accepted from any sender
 
 
 def sub_mode(flight: Flight) -> int:
-    """Sub-mode of AUTO: what was asked for, of which the phase is a part."""
+    """Sub-mode of AUTO: the request that is being executed, of which the phase is a part."""
     if flight.mission.active or flight.mission.waiting:
         return identity.AUTO_MISSION
     if flight.returning:
@@ -105,7 +105,7 @@ def sub_mode(flight: Flight) -> int:
 
 
 def mode_of(flight: Flight) -> tuple[int, int]:
-    """PX4's pair of what was asked for."""
+    """PX4's pair of the mode that was requested."""
     rising = flight.phase in ON_GROUND or flight.phase in (Phase.TAUTEN, Phase.LIFT)
     if flight.selected == Selected.OFFBOARD and rising:
         return identity.OFFBOARD, 0
@@ -137,7 +137,7 @@ def mission_state(flight: Flight, items: int) -> int:
 
 
 def tracked(estimator: EstimatorState) -> bool:
-    """Whether a tracker tells where the vehicle is, and of late."""
+    """Whether a tracker measures the vehicle, with recent readings of vehicle and load."""
     vehicle, load = estimator.vehicle, estimator.load
     return vehicle.source == TRACKER and vehicle.age_s < FRESH_S and load.age_s < FRESH_S
 
@@ -145,7 +145,8 @@ def tracked(estimator: EstimatorState) -> bool:
 def sensor_bits(
     condition: Condition, estimator: EstimatorState, ready: bool, fake_gps: bool, now_us: int
 ) -> tuple[int, int]:
-    """Sensors present and healthy, as bits of SYS_STATUS; a tracker stands in for what it makes needless."""
+    """Sensors present and healthy, as bits of SYS_STATUS; with `fake_gps`, a tracker counts as the sensors
+    that it replaces."""
     present, healthy = (bits | _ALWAYS for bits in sensors(condition, now_us))
     if estimator.vehicle.source == TRACKER:
         by_tracker = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
@@ -158,7 +159,7 @@ def sensor_bits(
 
 
 def wind(push: Vec3, drag: Drag) -> Vec3:
-    """The wind (m/s) whose drag on a resting vehicle is the push (N) that is felt; NaN if there is none."""
+    """The wind (m/s) whose drag on a resting vehicle equals the observed push (N); NaN without drag."""
     force = norm(push)
     if force == 0.0:
         return push
@@ -169,7 +170,7 @@ def wind(push: Vec3, drag: Drag) -> Vec3:
 
 
 class Told(NamedTuple):
-    """What a flight record says to telemetry, whatever the estimate: fields of `Snapshot`."""
+    """What telemetry takes from a flight record, independent of the estimate: fields of `Snapshot`."""
 
     launch: Vec3
     guarded: bool
@@ -189,7 +190,7 @@ class Told(NamedTuple):
 
 
 def told(flight: Flight, items: int) -> Told:
-    """What a flight record with a mission of so many items says."""
+    """What telemetry takes from a flight record with a mission of `items` items."""
     area, sequence = flight.area, flight.mission.plan.sequence
     seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     return Told(
@@ -211,7 +212,7 @@ def told(flight: Flight, items: int) -> Told:
 
 
 def sortie_after(before: Sortie, was: Flight, now: Flight) -> Sortie:
-    """The flight under way, or the last one, when a flight record is followed by another."""
+    """The present or the last flight, after the flight record `was` has been followed by `now`."""
     if was.phase in UNARMED and now.phase not in UNARMED:
         before = Sortie(armed_us=now.phase_start_us)
     if now.phase in IN_AIR and not before.takeoff_us:
@@ -222,18 +223,18 @@ def sortie_after(before: Sortie, was: Flight, now: Flight) -> Sortie:
 
 
 class MeasuredBattery(NamedTuple):
-    """What a power module said last, and when."""
+    """The last reading of a power module, and its time."""
 
     at_us: int
     reading: BatteryReading
 
 
 NOT_MEASURED = MeasuredBattery(-(2**62), BatteryReading())
-_FRESH_BATTERY_US = 2_000_000  # older words of the battery are those of nobody: its model is told
+_FRESH_BATTERY_US = 2_000_000  # after this time without a reading, the battery's model is reported
 
 
 class Moments:
-    """Makes the snapshots of one flight core; remembers what follows from a flight record while it lasts."""
+    """Makes the snapshots of one flight core; stores what follows from a flight record while it lasts."""
 
     def __init__(
         self,
@@ -257,27 +258,27 @@ class Moments:
         self._items = 0
         self._told = told(core.flight, 0)
         self._standing = _standing(core, core.flight, None)
-        self._put: Callable[..., None] | None = None  # machine code, once it was asked for
+        self._put: Callable[..., None] | None = None  # machine code, after the first call
 
     def told(self, flight: Flight, items: int) -> Told:
-        """What a flight record with a mission of so many items says."""
+        """What telemetry takes from a flight record with a mission of `items` items."""
         if flight is not self._flight or items != self._items:
             self.sortie = sortie_after(self.sortie, self._flight, flight)
             self._flight, self._items = flight, items
             says = told(flight, items)
-            if says != self._told:  # else it stays the same record, by which a change is noticed
+            if says != self._told:  # else it stays the same object: a change is noticed by its identity
                 self._told = says
         return self._told
 
     def standing(self, flight: Flight) -> Standing:
-        """What is the same in the instants to come, while this flight record is."""
+        """What stays the same in the next instants, as long as this flight record is in force."""
         core, known = self.core, self._standing
         if flight is not known.flight or core.laid is not known.laid or core.setup is not known.setup:
             known = self._standing = _standing(core, flight, known)
         return known
 
     def instant(self, flight: Flight, seq: int, now_us: int) -> Row:
-        """The packed `Instant` at which the core stands with this flight."""
+        """The packed `Instant` of the core's present state with this flight record."""
         core, known = self.core, self.standing(flight)
         elapsed_s = (now_us - known.since_us) * 1e-6
         targets, asked, at = known.targets, known.asked, 0
@@ -297,13 +298,13 @@ class Moments:
 
 
 def address_of_instant(known: Standing, instant: Row) -> int:
-    """The address of `put_instant`, compiled or loaded where need be."""
+    """The address of `put_instant`, compiled or loaded if necessary."""
     flown = (*known.rows, known.targets, known.asked, 0, known.control_mode, 0.0, known.duration_s, 0)
     return native_address_of(put_instant, *flown, known.phase, 0, *known.facts, instant)
 
 
 class Standing(NamedTuple):
-    """What is the same in each instant while flight record, setpoints and parameters are: arguments of
+    """What stays the same in each instant while flight record, setpoints and parameters do: arguments of
     `put_instant`."""
 
     flight: Flight
@@ -312,9 +313,9 @@ class Standing(NamedTuple):
     rows: tuple[Row, Row, Row, Row]  # `seen`, `estimator`, `pilot`, forces of the rotors
     tracks: bool  # the leg has setpoints:
     targets: Array
-    asked: Array  # what the mission asks for, row by row as `targets`
+    asked: Array  # the requested path, row by row as `targets`
     control_mode: int
-    since_us: int  # when the leg began, or without one the phase
+    since_us: int  # when the leg began, or the phase if there is no leg
     duration_s: float
     phase: int
     facts: tuple[bool, bool, float, float, int]  # `carrying`, `carries`, `rotor_min`, `rotor_max`, `rotors`
@@ -329,7 +330,7 @@ def _standing(core: FlightCore, flight: Flight, before: Standing | None) -> Stan
         mode, since_us = int(leg.control_mode), flight.leg_start_us
         duration_s = leg.duration_s if leg.duration_s < inf else nan
         if isinstance(leg, Run) and laid is not None and laid.legs is flight.legs:
-            # while a winch reels, the flight record is another one at each tick
+            # while a winch reels, the flight record is replaced at each tick
             same = before is not None and before.laid is laid and before.flight.legs is flight.legs
             asked = before.asked if before and same else jets(leg, laid.times_s, asked=True)
     limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
@@ -350,20 +351,20 @@ def _standing(core: FlightCore, flight: Flight, before: Standing | None) -> Stan
 
 
 def _setpoint(leg: Leg, elapsed_s: float) -> tuple[Array, Array]:
-    """What a leg has for this instant, and what the mission asks for, where neither is laid out."""
+    """The setpoint of a leg for this instant, and the requested path, if they are not laid out in tables."""
     times_s = np.array([elapsed_s])
     targets = jets(leg, times_s)
     return targets, jets(leg, times_s, asked=True) if isinstance(leg, Run) else targets
 
 
 class Moment(Snapshot):
-    """The instant at which the flight core stands; to be read before anything changes there.
+    """The present instant of the flight core; to be read before anything changes there.
 
-    Its fields are made when they are first read, each with those of its part below: at most instants few of
-    them are sent.
+    Its fields are computed when they are first read, each together with those of its part below, because few
+    of them are sent at most instants.
     """
 
-    instant: Row  # what is sent and logged most often
+    instant: Row  # the values that are sent and logged most often
 
     def __init__(self, moments: Moments, mission: StoredMission, now_us: int) -> None:
         self.now_us = now_us
@@ -373,7 +374,7 @@ class Moment(Snapshot):
         self.core = moments.core
         self.flight = moments.core.flight
         self.told = moments.told(self.flight, len(mission.items))
-        # a vehicle that is not armed says whether it may be
+        # a disarmed vehicle also reports whether it may be armed
         self.unchanged = None if self.flight.phase == Phase.DISARMED else self.told
         self.armed, self.phase = self.told.armed, self.told.phase
         self.instant = moments.instant(self.flight, self.told.seq, now_us)
@@ -385,7 +386,7 @@ class Moment(Snapshot):
 
     @cached_property
     def condition(self) -> Condition:
-        """Sensors heard, vibration, battery."""
+        """Times of the sensors' readings, vibration, battery."""
         return unpack(Condition, self.moments.health, 0)
 
     @cached_property
@@ -395,14 +396,14 @@ class Moment(Snapshot):
 
     @cached_property
     def ready(self) -> bool:
-        """Whether the vehicle may be armed, or is: in flight it does not count what keeps one from that."""
+        """Whether the vehicle may be armed or is armed: in flight, reasons against arming do not count."""
         if self.flight.phase not in UNARMED:
             return True
         return not arming_complaints(self.flight, self.view, self.core.settings)
 
     @property
     def fake_gps(self) -> bool:
-        """Whether the tracker is shown as a receiver where there is none."""
+        """Whether the tracker is reported as a GNSS receiver if there is none."""
         return self.moments.parameters["MAV_FAKE_GPS"] == 1.0
 
 
@@ -410,7 +411,7 @@ Part = Callable[[Moment], tuple[Any, ...]]
 
 
 class _Field:
-    """A field of a `Moment` that is not made yet: it is with those beside it in its part."""
+    """A field of a `Moment` that is not computed yet: reading it computes all fields of its part."""
 
     def __init__(self, part: Part, names: tuple[str, ...], name: str) -> None:
         self._part, self._names, self._name = part, names, name
@@ -422,7 +423,7 @@ class _Field:
 
 
 def _makes(*names: str) -> Callable[[Part], Part]:
-    """The part gives the values of these fields."""
+    """Decorator: the part returns the values of these fields."""
 
     def decorate(part: Part) -> Part:
         for name in names:

@@ -1,4 +1,4 @@
-"""What comes behind the flight software's tick, in machine code: the vehicle's condition, and the answer."""
+"""What follows the tick of the flight software, in machine code: the vehicle's condition, and the answer."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def answer_tick(
     released: bool,
     reel_rate: float,
 ) -> tuple[int, bool]:
-    """Bring the `Condition` to this tick (`follow`) and write HIL_ACTUATOR_CONTROLS at the begin of a buffer
-    (`put_answer`); how many bytes it has, and whether the inertial sample is sane."""
+    """Update the `Condition` to this tick (`follow`) and write HIL_ACTUATOR_CONTROLS to the beginning of a
+    buffer (`put_answer`). Returns its number of bytes, and whether the inertial sample is sane."""
     follow(condition, imu, forces, battery, fields, fixed, now_us, dt)
     end = put_answer(
         buffer,
@@ -54,7 +54,7 @@ def answer_tick(
 
 
 def address_of_answer() -> int:
-    """The address of `answer_tick`, compiled or loaded where need be."""
+    """The address of `answer_tick`, compiled or loaded if necessary."""
     row, scratch = np.zeros(1), np.zeros(1, np.uint8)
     rows, room, said = (row, row, row, row), (scratch, scratch), (False, False, False, 0.0)
     return native_address_of(answer_tick, *rows, 0, False, 0, 0.0, *room, 0, 0, 0, *said)

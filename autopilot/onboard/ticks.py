@@ -1,7 +1,7 @@
-"""A tick of the flight software in machine code. How its sensors come and its answer goes is up to others.
+"""A tick of the flight software in machine code; the caller receives the sensors and sends the answer.
 
-`fly_next` flies it and writes the streams that are due, as long as nothing is to be decided, or asked
-(`goes_on`): see `autopilot.onboard.running`.
+`fly_next` flies it and writes the streams that are due, as long as no decision is needed and no answer of the
+ground has to be waited for (`goes_on`): see `autopilot.onboard.running`.
 """
 
 from __future__ import annotations
@@ -68,14 +68,14 @@ from autopilot.services.stream_frames import STREAMS_ROOM
 from autopilot.wire.compiled import FRAME_ROOM, Origin, put_frame
 from autopilot.wire.periods import next_multiple
 
-# what becomes of a tick: it is FLOWN, and a window may have ENDED with it; or Python is to fly it: since what
-# was HEARD is not the plain next tick, or since its estimate is made and the supervisor is to DECIDE upon it
+# result of a tick: it was FLOWN, or flown and a window ENDED with it. Or Python must fly it: the datagram
+# that was HEARD is not the plain next tick, or the estimate is made and the supervisor must DECIDE
 FLOWN, ENDED, HEARD, DECIDE = range(4)
 
 
 @kernel
 def fly_next(run: Running, address: int, size: int) -> int:
-    """Fly the tick whose sensors are the `size` bytes at an address; the answer is in `run.frame`."""
+    """Fly the tick whose sensors are the `size` bytes at `address`; the answer is put into `run.frame`."""
     numbers, kept, code = run.numbers, run.readings, run.code
     before_us, period_us = numbers[NOW_US], numbers[PERIOD_US]
     dt, decided = period_us * 1e-6, False
@@ -130,7 +130,7 @@ def fly_next(run: Running, address: int, size: int) -> int:
 
 
 def begun(run: Running) -> Tick:
-    """The tick that is to be decided upon."""
+    """The tick for which the supervisor must decide."""
     numbers = run.numbers
     now_us, readings = int(numbers[NOW_US] + numbers[PERIOD_US]), int(numbers[READINGS])
     return Tick(now_us, readings, int(numbers[FIELDS]), bool(numbers[FIXED]), ())
@@ -138,7 +138,7 @@ def begun(run: Running) -> Tick:
 
 @kernel
 def goes_on(run: Running) -> bool:
-    """Whether there is nothing else to be done at the next tick, and room for what is."""
+    """Whether the next tick requires nothing else, and there is room for its output."""
     numbers = run.numbers
     next_us = numbers[NOW_US] + numbers[PERIOD_US]
     asks = next_us >= numbers[QUESTION_US]
@@ -150,9 +150,9 @@ def goes_on(run: Running) -> bool:
 
 @kernel
 def _tell(run: Running, now_us: int, sane: bool) -> bool:
-    """Write the streams and the records of the flight log that are due at this tick, behind those of the
-    ticks before; ask the ground station at the end of a window, and return whether it is one. `sane`: the
-    inertial sample is."""
+    """Write the streams and the records of the flight log that are due at this tick, after those of the
+    previous ticks; at the end of a window, write the question to the ground station. Returns whether a window
+    ends. `sane`: whether the inertial sample is sane."""
     numbers, streams = run.numbers, run.streams
     bits = 0
     for k in range(streams.due.shape[0]):
@@ -181,7 +181,7 @@ def _tell(run: Running, now_us: int, sane: bool) -> bool:
 
 @kernel
 def _put_records(run: Running, now_us: int, sane: bool) -> None:
-    """Write the records of an instant that has been put together."""
+    """Write the records of an instant that has been assembled."""
     numbers, log = run.numbers, run.log
     numbers[LOG_US] = next_multiple(now_us, numbers[LOG_PERIOD_US])
     rows = (run.streams.instant, run.readings.imu, log.home, now_us, log.row)
@@ -196,7 +196,7 @@ def _put_records(run: Running, now_us: int, sane: bool) -> None:
 
 @kernel
 def _put_instant(run: Running, now_us: int) -> None:
-    """Put the instant of this tick together."""
+    """Assemble the instant of this tick."""
     numbers, streams = run.numbers, run.streams
     at = 0
     if numbers[TRACKS]:
@@ -226,7 +226,7 @@ def _put_instant(run: Running, now_us: int) -> None:
 
 @kernel
 def _put_streams(run: Running, bits: int) -> None:
-    """Write a set of streams of an instant that has been put together."""
+    """Write a set of streams of an instant that has been assembled."""
     numbers, streams = run.numbers, run.streams
     begin = numbers[SAID]
     length, numbers[OWN_SEQUENCE], numbers[DIALECT_SEQUENCE] = ask_streams(

@@ -26,7 +26,7 @@ from autopilot.wire.ulog import UlogWriter
 
 
 def rehearse_telemetry(setup: Setup, parameters: AutopilotParameters) -> None:
-    """Put an instant together, send and log it."""
+    """Assemble an instant, write its streams, and log it."""
     core, options = FlightCore(setup), Options(Home(), 0)
     moments = Moments(
         core, options, parameters, packed(Condition()), SensorInbox(options.home, core.rows.inbox)

@@ -1,1 +1,1 @@
-"""What users bring to the autopilot: control laws of their own, in files of their own."""
+"""User code in the autopilot: custom control laws, estimators and path planners, each in its own file."""

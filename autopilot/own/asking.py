@@ -1,4 +1,4 @@
-"""What a law may ask for: how it is said in Python, and in compiled methods."""
+"""The commands that a law may give, for plain Python and for compiled methods."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def wrench(thrust: float, moment: Sequence[float]) -> Asked:
 
 
 def force(F: Sequence[float]) -> Asked:
-    """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, the nose as
-    the reference says."""
+    """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, and the nose
+    to the direction of the reference."""
     return Asked(FORCE, 0.0, three_numbers(F, "the force"), IDENTITY)
 
 

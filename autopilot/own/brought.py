@@ -1,4 +1,4 @@
-"""A class that somebody has brought, as the rest of the autopilot knows it, and the parameters it brings."""
+"""A custom class as the rest of the autopilot sees it, and the parameters that it defines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NAME = re.compile(r"[A-Za-z][\w-]{0,31}")
 
 
 class Parameter(NamedTuple):
-    """A parameter that a class brings along: a number in `low` ... `high`."""
+    """A parameter that a custom class defines: a number in `low` ... `high`."""
 
     default: float
     low: float
@@ -27,11 +27,11 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True)
 class Brought:
-    """A class, loaded."""
+    """A loaded custom class."""
 
-    what: ClassVar[str] = ""  # as messages name it, with a capital letter
+    what: ClassVar[str] = ""  # its kind in messages, with a capital letter
 
-    reference: str  # as it was named
+    reference: str  # as the user named it
     name: str
     kind: type
     parameters: tuple[table.Parameter, ...]
@@ -48,18 +48,18 @@ class Brought:
 
     @property
     def told(self) -> str:
-        """What it is called in messages."""
+        """Its kind and name, for messages."""
         return f"{self.what} {self.name}"
 
     def made(self, parameters: Mapping[str, float]) -> Any:
-        """One with these parameters."""
+        """An instance with these parameters."""
         build = getattr(self.kind, "build", None)
         if build is not None:
             return build(parameters)
         return self.kind(parameters) if signature(self.kind).parameters else self.kind()
 
     def line(self, method: str) -> str:
-        """File and line of a method; of the class, where that has the method from another file."""
+        """File and line of a method; of the class if the method is not in the file of the class."""
         found = getattr(self.kind, method, None)
         found = getattr(found, "py_func", getattr(found, "__func__", found))
         code = getattr(found, "__code__", None)
@@ -75,12 +75,12 @@ class Brought:
 
     @property
     def making(self) -> str:
-        """File and line of what makes one."""
+        """File and line of the method that makes an instance."""
         return self.line("build" if hasattr(self.kind, "build") else "__init__")
 
 
 class Named(NamedTuple):
-    """What each class must have that somebody brings: the arguments of `Brought`."""
+    """What every custom class must have: the arguments of `Brought`."""
 
     reference: str
     name: str
@@ -89,7 +89,8 @@ class Named(NamedTuple):
 
 
 def named(kind: type, reference: str, shipped: Sequence[str] = ()) -> Named:
-    """The class with name and parameters. OwnError if these cannot be; `shipped` are laws' names."""
+    """The class with its name and parameters. OwnError if these are invalid; `shipped` are the names of
+    shipped laws, which it must not have."""
     told = f"{reference}: {kind.__name__}"
     name = getattr(kind, "name", kind.__name__)
     if not isinstance(name, str) or not _NAME.fullmatch(name):

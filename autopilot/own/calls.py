@@ -1,7 +1,7 @@
-"""The call that goes on in what somebody has brought, for a shell that watches how long it takes.
+"""The present call of user code, for a shell that watches how long it takes.
 
-No clock is read here: a shell that has one gives it to `CALL`, in real time, where a law that is too slow is
-one that flies late; or looks at `CALL` from a thread of its own.
+No clock is read here: in real time, where a slow law flies late, the shell gives its clock to `CALL`; or it
+watches `CALL` from a separate thread.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 
 class TooSlow(Exception):
-    """A call took longer than it may."""
+    """A call took longer than allowed."""
 
     def __str__(self) -> str:
         return "no answer in time"
@@ -20,25 +20,25 @@ class TooSlow(Exception):
 
 @dataclass
 class Call:
-    """The present call, and how many there were."""
+    """The present call, and the number of calls so far."""
 
     count: int = 0
     going_on: bool = False
     clock: Callable[[], float] | None = None  # s
 
     def begin(self) -> float:
-        """A call begins; when that is, if there is a clock."""
+        """Note that a call begins; return the time in s, or 0 without a clock."""
         self.count += 1
         self.going_on = True
         return self.clock() if self.clock is not None else 0.0
 
     def end(self, began_s: float) -> float:
-        """It is over; how long it took, s."""
+        """Note that the call has ended; return how long it took in s, or 0 without a clock."""
         self.going_on = False
         return self.clock() - began_s if self.clock is not None else 0.0
 
     def break_off(self, thread: int) -> None:
-        """Raise TooSlow in the call that goes on in a thread (of Python code alone)."""
+        """Raise TooSlow in the present call, which runs in this thread (only Python code can be stopped)."""
         if self.going_on:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(TooSlow))
 

@@ -1,4 +1,4 @@
-"""What of a flight's software somebody has brought, by reference, and the parameters that come along."""
+"""The custom classes of a flight, by reference, and the parameters that they define."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from autopilot.wire import parameter_table as table
 
 @contextmanager
 def of_option(option: str) -> Iterator[None]:
-    """An OwnError meanwhile says by which option of the command line its cause was brought."""
+    """Make an OwnError in this context name the option of the command line that caused it."""
     try:
         yield
     except OwnError as error:
@@ -27,14 +27,14 @@ def of_option(option: str) -> Iterator[None]:
 
 
 class Own(NamedTuple):
-    """References, as `autopilot.own.source` reads them; empty where what is built in flies."""
+    """References as in `autopilot.own.source`; empty if the built-in code is used."""
 
     law: str = ""
     estimator: str = ""
     planner: str = ""
 
     def loaded(self) -> tuple[Brought, ...]:
-        """The classes. OwnError if one cannot be."""
+        """The loaded classes. OwnError if one cannot be loaded."""
         loaded: list[Brought] = []
         ways = zip(self._fields, self, (load_law, load_estimator, load_planner), strict=True)
         for option, reference, load in ways:
@@ -45,7 +45,7 @@ class Own(NamedTuple):
 
     @property
     def digests(self) -> tuple[str, ...]:
-        """Hashes of their sources."""
+        """Hashes of the sources of the classes."""
         return tuple(one.digest for one in self.loaded())
 
 
@@ -54,15 +54,15 @@ NOTHING_OWN = Own()
 
 @dataclass(frozen=True)
 class OwnSetup:
-    """What a class that somebody has brought is made from; plain data, for other processes."""
+    """What an instance of a custom class is made from; plain data, for other processes."""
 
     reference: str
     values: Mapping[str, float]  # of all parameters
 
 
 def parameters_for(belief: Vehicle, own: Own = NOTHING_OWN) -> AutopilotParameters:
-    """The autopilot's parameters for a vehicle, with those of what somebody has brought. OwnError if that, or
-    a parameter of it, cannot be."""
+    """The autopilot's parameters for a vehicle, with those of the custom classes. OwnError if a class cannot
+    be loaded, or a parameter of it is invalid."""
     brought: tuple[table.Parameter, ...] = ()
     found = autopilot_parameters(belief)
     for one in own.loaded():

@@ -1,7 +1,7 @@
-"""A class of compiled methods as C functions over its desk: Python is not asked while it flies.
+"""A class of compiled methods as C functions on its desk: no Python code runs while it flies.
 
-The class is a NamedTuple of numbers, and so is what its `start` returns. Behind the answer on the desk lie
-its own numbers and those of its memory, which the functions take from there and put back.
+The class is a NamedTuple of numbers, and so is what its `start` returns. On the desk, the answer is followed
+by the numbers of the class and those of its memory; the functions read them there and write the memory back.
 """
 
 from __future__ import annotations
@@ -25,52 +25,52 @@ T = TypeVar("T")
 
 
 class Nothing(NamedTuple):
-    """The memory of a law that has none."""
+    """The memory of a class that has none."""
 
 
 class Desk(NamedTuple):
-    """What lies where on a desk: from number 0 on what a method is given, a record of numbers."""
+    """Layout of a desk: what a method is given, a record of numbers, begins at number 0."""
 
-    given: Any  # its type
-    answer: int  # where the answer is put
-    own: int  # from where on the numbers of the class lie, and behind them those of its memory
+    given: Any  # the type of this record
+    answer: int  # where the answer begins
+    own: int  # where the numbers of the class begin, followed by those of its memory
 
     def room(self, kind: type, memory: type) -> int:
-        """How many numbers it has for a class and what that remembers."""
+        """Count of all numbers on the desk, for a class and its memory."""
         return self.own + width(kind) + width(memory)
 
 
 class CFunction(NamedTuple):
-    """Machine code that is called with an address; it lives as long as its kernel."""
+    """Machine code that is called with an address; it is valid as long as its kernel exists."""
 
     address: int
     kernel: Any
 
 
 def c_function(entry: Any) -> CFunction:
-    """A kernel of one whole number as a C function.
+    """A kernel of one integer as a C function.
 
-    Not by numba's `cfunc`: that leaves what it calls visible to the linker, which then finds in its place
-    functions of the same name that were fitted to one caller.
+    numba's `cfunc` is not used: it leaves the functions that it calls visible to the linker, which then takes
+    in their place functions of the same name that were specialised for one caller.
     """
     return CFunction(address_of(entry, 0), entry)
 
 
 def is_compiled(brought: Brought, methods: tuple[str, ...]) -> bool:
-    """Whether a class can be called as machine code: all of these methods are kernels over numbers."""
+    """Whether a class can be called as machine code: it is a NamedTuple, and its methods are kernels."""
     kind = brought.kind
     found = [getattr(kind, name) for name in (*methods, "start") if hasattr(kind, name)]
     return hasattr(kind, "_fields") and all(isinstance(method, Kernel) for method in found)
 
 
 def memory_of(made: Any, now: Any) -> Any:
-    """The type of what one remembers, given what it is given at its first tick."""
+    """The type of the memory of an instance, for its input `now` at the first tick."""
     return type(made.start(now)) if hasattr(made, "start") else Nothing
 
 
 @cache
 def compiled(kind: type, methods: tuple[str, ...], memory: type, desk: Desk) -> Mapping[str, CFunction]:
-    """The C function of each of these methods of a class, given the type of its memory."""
+    """The C function of each of these methods of a class, for the type of its memory."""
     start = getattr(kind, "start", None) or _without(memory)
     return {name: _function(kind, memory, desk, start, getattr(kind, name)) for name in methods}
 
@@ -84,9 +84,9 @@ def address_in(function: Any) -> int:
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a method, or a function that it calls, to machine code; strict IEEE arithmetic.
 
-    The methods are those of a law or an estimator. It is compiled where it is flown, in about a second. It
-    may make no arrays: vectors are tuples of three floats, and the functions of `autopilot.geometry.linear`
-    reckon with them.
+    The methods are those of a law or an estimator. Each program that flies one compiles it, in about a
+    second. It must not create arrays: vectors are tuples of three floats, for which
+    `autopilot.geometry.linear` has functions.
     """
     if numba.config.DISABLE_JIT:
         return function

@@ -1,4 +1,4 @@
-"""What of a class that somebody has brought may not be meant so: it can be flown, and is told."""
+"""What is probably a mistake in a custom class: the class can be flown nevertheless, with a warning."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _LIKENESS = 0.85
 
 
 def own_doubts(own: Own) -> list[str]:
-    """A line for each public method that is never called, and whose name is near to that of one that is and
-    is not there: as `quad_postion`, whose mode the built-in law would fly.
+    """A line for each public method that is never called and whose name is close to that of a missing method:
+    such as `quad_postion`, whose mode the built-in law would fly.
 
     OwnError if a class cannot be loaded.
     """

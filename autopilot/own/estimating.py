@@ -1,4 +1,4 @@
-"""What an estimator gives: how it is said in Python, and in compiled methods."""
+"""What an estimator returns, for plain Python and for compiled methods."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def estimated(
 ) -> Estimate:
     """An estimate: what laws are given as `now.state`, in its order, units and frames.
 
-    What may be left out: `a_quad` (m/s^2; then the built-in filter's is used), `tension` of the cable (N) and
-    the standard deviations of the vehicle's position (m, each axis), which are told to ground stations.
+    Optional are `a_quad` (m/s^2; without it the built-in filter's is used), `tension` of the cable (N) and
+    the standard deviations of the vehicle's position (m, each axis), which are reported to ground stations.
     """
     state = State(
         three_numbers(x_load, "x_load"),
@@ -52,8 +52,7 @@ def estimated(
 
 
 def no_estimate() -> Estimate:
-    """Nothing is known yet: until the first estimate the built-in filter's is used, and the vehicle is not
-    armed."""
+    """No estimate yet: until the first one, the built-in filter's is used, and arming is refused."""
     return NO_ESTIMATE
 
 

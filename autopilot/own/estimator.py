@@ -1,15 +1,15 @@
-"""An estimator that somebody has brought, as the rest of the autopilot knows it.
+"""A custom estimator as the rest of the autopilot sees it.
 
     class MyEstimator:
         parameters = {"MY_TAU": Parameter(0.1, 0.01, 1.0, "s", "Time constant")}
 
         def __init__(self, parameters): ...       # all parameters of the autopilot by name
         def start(self, now): ...                 # memory at the first tick; without it None
-        def estimate(self, memory, now): ...      # (memory, what is estimated)
+        def estimate(self, memory, now): ...      # (memory, estimate)
 
-`now` is `autopilot.estimation.desk.Sensed`; what is estimated is made by `estimated` or `no_estimate` of
-`autopilot.own.estimating`. One whose class is a NamedTuple of numbers, and whose methods are compiled by
-`kernel`, is called as machine code.
+`now` is `autopilot.estimation.desk.Sensed`; the estimate is made by `estimated` or `no_estimate` of
+`autopilot.own.estimating`. An estimator whose class is a NamedTuple of numbers, and whose methods are
+compiled by `kernel`, is called as machine code.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ METHOD = "estimate"
 
 @dataclass(frozen=True)
 class OwnEstimator(Brought):
-    """An estimator, loaded."""
+    """A loaded estimator."""
 
     what = "Estimator"
 
 
 def load_estimator(reference: str) -> OwnEstimator:
-    """The estimator that a reference names, as `autopilot.own.source` reads it. OwnError if it cannot be
-    one."""
+    """The estimator that a reference, as in `autopilot.own.source`, names. OwnError if it is none."""
     return estimator_of(found_class(reference, GROUP, _suits, "estimator", ()), reference)
 
 
 def estimator_of(kind: type, reference: str) -> OwnEstimator:
-    """The estimator of a class. OwnError if it is none."""
+    """The estimator of a class. OwnError if the class is none."""
     if not _suits(kind):
         raise OwnError(f"{reference}: {kind.__name__} has no method {METHOD}(self, memory, now)")
     return OwnEstimator(*named(kind, reference))

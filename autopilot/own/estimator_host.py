@@ -1,7 +1,7 @@
-"""Calls an estimator that somebody has brought: its place in the tick is `autopilot.core.estimator_seat`.
+"""Calls a custom estimator; its place in the tick is `autopilot.core.estimator_seat`.
 
-It is called by the address of its desk, a row of numbers: `Sensed`, behind it the `Estimate`, and behind that
-what is the estimator's own.
+It is called with the address of its desk, a row of numbers: `Sensed`, then the `Estimate`, then the
+estimator's own numbers.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ UNGIVEN = Estimate(True, REST._replace(x_quad=(nan, nan, nan)), nan, nan, nan)
 
 
 class EstimatorHost:
-    """One flight's estimator. `failed` is called, perhaps amid a tick, when it has failed."""
+    """The estimator of one flight. `failed` is called, perhaps amid a tick, when it has failed."""
 
     def __init__(self, estimator: OwnEstimator, failed: Callable[[], None] = lambda: None) -> None:
         self.estimator = estimator
@@ -55,16 +55,16 @@ class EstimatorHost:
 
     @property
     def address(self) -> int:
-        """The C function that is called with the address of the desk."""
+        """Address of the C function that is called with the address of the desk."""
         return address_in(self._function)
 
     def begin(self) -> None:
-        """The next tick is its first."""
+        """Clear the desk: the next tick is the estimator's first."""
         pack(NOTHING_SENSED, self.desk, 0)
         pack(NO_ESTIMATE, self.desk, GIVEN)
 
     def make(self, values: Mapping[str, float]) -> None:
-        """Make it with these parameters; what it remembers is kept. The desk may be another one then."""
+        """Make the estimator with these parameters; its memory is kept. The desk may be replaced."""
         if self.guard.fault:
             return
         kind: Any = self.estimator.kind
@@ -82,7 +82,7 @@ class EstimatorHost:
             self.guard.fail(blamed(error, self.estimator.path, self.estimator.making))
 
     def estimate_once(self, now: Sensed) -> None:
-        """Call it as the tick calls it, and find what is wrong."""
+        """Call it as the tick calls it, and raise the alarm if something is wrong."""
         was_known = self.known
         pack(now, self.desk, 0)
         pack(UNGIVEN, self.desk, GIVEN)
@@ -93,7 +93,7 @@ class EstimatorHost:
             self.raise_alarm()
 
     def raise_alarm(self) -> None:
-        """The estimate on the desk is of no use, or there is none."""
+        """Fail, because the estimate on the desk is unusable or missing."""
         estimate = unpack(Estimate, self.desk, GIVEN)
         found = flaw(estimate) if estimate.known else FORGOTTEN
         self.guard.fail(self.guard.why or f"{told_of(estimate, found)} ({self.estimator.line(METHOD)})")
@@ -107,7 +107,7 @@ class EstimatorHost:
 
 
 def _checked(answer: Any, method: str) -> tuple[Any, Estimate]:
-    """Memory and estimate, if an estimator has returned these."""
+    """Memory and estimate that an estimator has returned; raises Wrong if it returned anything else."""
     memory, estimate = pair_of(answer, method, "estimated(...)")
     if not isinstance(estimate, Estimate):
         raise Wrong(f"{method} gives {shown(estimate)}, which must be made by estimated or no_estimate")

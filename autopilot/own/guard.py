@@ -1,6 +1,6 @@
-"""Calls methods of what somebody has brought, and tells what is wrong with them.
+"""Calls methods of custom classes, and reports what is wrong with them.
 
-A class that raises, or returns what it must not, is not called again; `fault` says why, with file and line.
+A class that raises, or returns something invalid, is not called again; `fault` says why, with file and line.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from autopilot.own.source import blamed
 
 T = TypeVar("T")
 
-_WATCHED = 250  # calls over which none may take longer, on average, than there is time
+_WATCHED = 250  # number of calls over which the average duration must not exceed the available time
 _SHOWN = 60  # characters of what a method returned
 
 
 class Wrong(Exception):
-    """A method has returned what it must not."""
+    """A method has returned something invalid, or takes too long."""
 
 
 class Guard:
-    """Of one class in one flight. `failed` is called, perhaps amid a tick, when it has failed."""
+    """The guard of one class in one flight. `failed` is called, perhaps amid a tick, when it has failed."""
 
     def __init__(self, brought: Brought, failed: Callable[[], None]) -> None:
         self.brought = brought
         self.fault = ""
-        self.interrupted: BaseException | None = None  # is not the class's fault: whoever flies raises it
-        self.why = ""  # the last call had no answer
+        self.interrupted: BaseException | None = None  # not the class's fault: raised outside the tick
+        self.why = ""  # why the last call had no answer
         self._failed = failed
-        self._took: deque[float] = deque(maxlen=_WATCHED)  # s, of the last calls
+        self._took: deque[float] = deque(maxlen=_WATCHED)  # s, durations of the last calls
 
     def call(
         self, method: str, period_s: float, answer: Callable[[], Any], checked: Callable[[Any], T]
     ) -> T | None:
-        """The answer, checked, of something that calls this method; None where there is none, and `why` says
-        why. In real time it may take no longer than `period_s`."""
+        """The checked result of `answer`, which calls this method; None if there is none, and `why` says why.
+        In real time, calls must not take longer than `period_s` on average."""
         self.why = ""
         began_s = CALL.begin()
         try:
@@ -61,12 +61,12 @@ class Guard:
         return None
 
     def fail(self, why: str) -> None:
-        """It has failed."""
+        """Record that the class has failed."""
         self.fault = f"{self.brought.told} failed: {why}"
         self._failed()
 
     def raise_interruption(self) -> None:
-        """Raise what has interrupted it and is for others: it cannot pass through the compiled tick."""
+        """Raise the exception that interrupted the class: it cannot pass through the compiled tick itself."""
         if self.interrupted is not None:
             raise self.interrupted
 
@@ -82,16 +82,16 @@ class Guard:
 
 
 class Calling:
-    """Calls the methods of one in plain Python, with what it remembers."""
+    """Calls the methods of an instance in plain Python, and keeps its memory."""
 
     def __init__(self, guard: Guard, checked: Callable[[Any, str], tuple[Any, T]]) -> None:
-        self.made: Any = None  # it, with the present parameters
+        self.made: Any = None  # the instance, with the present parameters
         self._guard = guard
         self._checked = checked
         self._memory: Any = None
 
     def call(self, method: str, now: Any, period_s: float) -> Any:
-        """What a method answers; None where there is no answer, and the guard knows why."""
+        """The answer of a method; None if there is none, and the guard has the reason."""
 
         def answer() -> Any:
             if now.begins:
@@ -106,13 +106,14 @@ class Calling:
 
 
 def shown(value: Any) -> str:
-    """A value in a message."""
+    """A value as text for a message, cut if it is long."""
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
 def pair_of(answer: Any, method: str, made: str) -> tuple[Any, Any]:
-    """Memory and what goes with it, if a method has returned these; `made` tells how the latter is made."""
+    """The pair of memory and answer that a method has returned; raises Wrong if it returned anything else.
+    `made` says how the answer is made."""
     if not (isinstance(answer, tuple) and len(answer) == 2):
         raise Wrong(f"{method} returned {shown(answer)}, which must be (memory, {made}) or the like")
     return answer

@@ -1,7 +1,8 @@
-"""Flies a control law that somebody has brought: calls its methods, and finds what is wrong with them.
+"""Flies a custom control law: calls its methods, and finds what is wrong with them.
 
-A law that raises, or asks for what is no number, flies no more: its functions are unlinked, so that the
-built-in law flies from this very tick on, and `fault` says why. The supervisor sees that at the next tick.
+A law that raises, or commands something that is no number, is not called again: its functions are unlinked,
+so that the built-in law flies from the same tick on, and `fault` says why. The supervisor sees that at the
+next tick.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _DESK = Desk(Now, ASKED, OWN)
 
 
 class Host:
-    """One flight's law. `alarmed` is called, amid a tick, when it has failed."""
+    """The law of one flight. `alarmed` is called, perhaps amid a tick, when it has failed."""
 
     def __init__(self, law: OwnLaw, alarmed: Callable[[], None] = lambda: None) -> None:
         self.law = law
@@ -52,7 +53,7 @@ class Host:
 
     @property
     def fault(self) -> str:
-        """Why it flies no more; empty while it does."""
+        """Why the law is no longer called; empty while it flies."""
         return self.guard.fault
 
     def bind(self, rows: Any, values: Mapping[str, float]) -> None:
@@ -62,7 +63,7 @@ class Host:
         self._link()
 
     def make(self, values: Mapping[str, float]) -> None:
-        """Make the law with these parameters; what it remembers is kept."""
+        """Make the law with these parameters; its memory is kept."""
         if self.fault:
             return
         try:
@@ -79,12 +80,12 @@ class Host:
         return is_compiled(self.law, self.law.modes)
 
     def address(self, mode: str) -> int:
-        """The C function that flies a mode; 0: the law does not."""
+        """Address of the C function that flies a mode; 0 if the law does not fly it."""
         function = self._functions.get(mode)
         return 0 if function is None else address_in(function)
 
     def fly_once(self, mode: str, now: Now) -> Asked:
-        """What a mode asks for when it is called as the tick calls it."""
+        """The command of a mode, called as the tick calls it."""
         pack(now, self.desk, 0)
         pack(UNASKED, self.desk, ASKED)
         _FUNCTION(self.address(mode))(self.desk.ctypes.data)
@@ -98,7 +99,7 @@ class Host:
         return {mode: _FUNCTION(self._caller(mode)) for mode in self.law.modes}
 
     def _compiled(self) -> Mapping[str, Any]:
-        """Functions that are the methods' machine code; they find law and memory on the desk."""
+        """Functions that are the machine code of the methods; law and memory are on the desk."""
         memory = memory_of(self._calling.made, unpack(Now, self.desk, 0))
         self.desk = np.zeros(_DESK.room(self.law.kind, memory))
         return compiled(self.law.kind, self.law.modes, memory, _DESK)
@@ -112,7 +113,7 @@ class Host:
         return call
 
     def call(self, mode: str, now: Now) -> Asked | None:
-        """What the law asks for; None where there is no answer, whose reason the alarm then tells."""
+        """The command of the law; None if there is no answer; the alarm then reports the reason."""
         self._mode = mode
         asked: Asked | None = self._calling.call(mode, now, now.period_s)
         return asked
@@ -120,7 +121,7 @@ class Host:
     def _line(self) -> str:
         """File and line of the method that was called last."""
         path = self.law.path
-        if self._is_compiled and len(self.law.modes) > 1:  # which of them it was is not known
+        if self._is_compiled and len(self.law.modes) > 1:  # it is unknown which of them it was
             return path.name if path else self.law.reference
         return self.law.line(self._mode)
 
@@ -133,7 +134,7 @@ class Host:
         link_own(self._rows, Link(self.desk.ctypes.data, address_in(self._alarm), *map(self.address, MODES)))
 
     def _raise_alarm(self, _: int) -> None:
-        """The tick has found no numbers on the desk."""
+        """Fail, because the tick has found no valid command on the desk."""
         asked = unpack(Asked, self.desk, ASKED)
         self.guard.fail(self.guard.why or f"{_told(asked)} ({self._line()})")
 
@@ -143,7 +144,7 @@ class Host:
 
 
 def _checked(answer: Any, mode: str) -> tuple[Any, Asked]:
-    """Memory and what is asked for, if a law has returned these."""
+    """Memory and command that a law has returned; raises Wrong if it returned anything else."""
     memory, asked = pair_of(answer, mode, "force(...)")
     if not isinstance(asked, Asked):
         raise Wrong(f"{mode} asks for {shown(asked)}, which must be made by wrench, force, attitude or rates")
@@ -151,7 +152,7 @@ def _checked(answer: Any, mode: str) -> tuple[Any, Asked]:
 
 
 def _told(asked: Asked) -> str:
-    """What was asked for that cannot be done."""
+    """What is invalid in a command, in words."""
     if not WRENCH <= asked.kind <= RATES:
         return f"asks for a kind {asked.kind} that there is not"
     if not isfinite(asked.thrust):

@@ -1,4 +1,4 @@
-"""Tells an exception that comes from outside, as Ctrl-C, from one of the code that it interrupts."""
+"""Distinguishes an exception that comes from outside, such as Ctrl-C, from one of the interrupted code."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _RAISE = opmap["RAISE_VARARGS"]  # the statement `raise`
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Whether nobody in the traceback of an error is to blame for it.
+    """Whether none of the interrupted code in the traceback of an error caused it.
 
-    So it is with Python's own answer to Ctrl-C, which no statement raises, and with what a handler of signals
+    This holds for Python's own reaction to Ctrl-C, which no statement raises, and for what a signal handler
     raises. A `SystemExit`, or a `KeyboardInterrupt` that the interrupted code raises itself, is its fault.
     """
     if isinstance(error, Exception):
@@ -29,7 +29,7 @@ def is_interruption(error: BaseException) -> bool:
 
 
 def _handles_signals(inner: FrameType, outer: FrameType) -> bool:
-    """Whether the inner frame is that of a handler: it is given the frame that the signal interrupted."""
+    """Whether the inner frame is a signal handler: its variables include the frame that was interrupted."""
     given = list(inner.f_locals.values())
     for several in [one for one in given if isinstance(one, tuple)]:
         given += several

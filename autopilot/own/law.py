@@ -1,4 +1,4 @@
-"""A control law that somebody has brought, as the rest of the autopilot knows it.
+"""A custom control law as the rest of the autopilot sees it.
 
 It is a class with at least one of the four modes as a method:
 
@@ -7,11 +7,11 @@ It is a class with at least one of the four modes as a method:
 
         def __init__(self, parameters): ...          # all parameters of the autopilot by name
         def start(self, now): ...                    # memory of a mode that begins; without it None
-        def load_position(self, memory, now): ...    # (memory, what is asked for)
+        def load_position(self, memory, now): ...    # (memory, command)
 
-`now` is `autopilot.control.law_desk.Now`; what is asked for is made by `wrench`, `force`, `attitude` or
-`rates` of `autopilot.own.asking`. A law whose class is a NamedTuple of numbers, and whose methods are
-compiled by `kernel`, is called as machine code.
+`now` is `autopilot.control.law_desk.Now`; the command is made by `wrench`, `force`, `attitude` or `rates` of
+`autopilot.own.asking`. A law whose class is a NamedTuple of numbers, and whose methods are compiled by
+`kernel`, is called as machine code.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ MODES = ("load_position", "quad_position", "load_attitude", "quad_attitude")
 
 @dataclass(frozen=True)
 class OwnLaw(Brought):
-    """A law, loaded."""
+    """A loaded law."""
 
     what = "Law"
 
-    modes: tuple[str, ...]  # that it flies; the others are flown by `plumbline`
+    modes: tuple[str, ...]  # that it flies; the law `plumbline` flies the others
 
 
 def load_law(reference: str) -> OwnLaw:
-    """The law that a reference names, as `autopilot.own.source` reads it. OwnError if it cannot be one."""
+    """The law that a reference, as in `autopilot.own.source`, names. OwnError if it is none."""
     return law_of(found_class(reference, GROUP, _suits, "control law", LAWS), reference)
 
 
 def law_of(kind: type, reference: str) -> OwnLaw:
-    """The law of a class. OwnError if it is none."""
+    """The law of a class. OwnError if the class is none."""
     modes = tuple(mode for mode in MODES if callable(getattr(kind, mode, None)))
     if not modes:
         told = f"{reference}: {kind.__name__}"
@@ -53,12 +53,12 @@ def law_of(kind: type, reference: str) -> OwnLaw:
 
 
 def law_number(law: str) -> int:
-    """CTL_LAW of a law: of a shipped one by its name, else of the one that was brought."""
+    """CTL_LAW of a law: that of a shipped law by its name, otherwise that of the custom law."""
     return LAWS.index(law) if law in LAWS else OWN_LAW
 
 
 def own_law(law: str) -> str:
-    """The reference of a law that somebody has brought; empty for a shipped one."""
+    """The reference of a custom law; empty for a shipped law."""
     return "" if law in LAWS else law
 
 

@@ -1,4 +1,4 @@
-"""A path planner that somebody has brought, as the rest of the autopilot knows it.
+"""A custom path planner as the rest of the autopilot sees it.
 
     class MyPlanner:
         parameters = {"MY_SLOW": Parameter(1.0, 1.0, 10.0, "", "Times as long")}
@@ -23,18 +23,18 @@ METHOD = "plan"
 
 @dataclass(frozen=True)
 class OwnPlanner(Brought):
-    """A planner, loaded."""
+    """A loaded planner."""
 
     what = "Planner"
 
 
 def load_planner(reference: str) -> OwnPlanner:
-    """The planner that a reference names, as `autopilot.own.source` reads it. OwnError if it can be none."""
+    """The planner that a reference, as in `autopilot.own.source`, names. OwnError if it is none."""
     return planner_of(found_class(reference, GROUP, _suits, "planner", ()), reference)
 
 
 def planner_of(kind: type, reference: str) -> OwnPlanner:
-    """The planner of a class. OwnError if it is none."""
+    """The planner of a class. OwnError if the class is none."""
     if not _suits(kind):
         raise OwnError(f"{reference}: {kind.__name__} has no method {METHOD}(self, route)")
     return OwnPlanner(*named(kind, reference))

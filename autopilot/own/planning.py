@@ -1,4 +1,4 @@
-"""Calls a path planner that somebody has brought."""
+"""Calls a custom path planner."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from autopilot.trajectory.route import Path, PlanError, Planner, Route, check_pa
 
 
 def planner_for(setup: OwnSetup | None) -> Planner | None:
-    """The planner that this says, to be called; None where the built-in one plans."""
+    """The planner of this setup as a function; None if there is no setup: the built-in planner is used."""
     return None if setup is None else planner_of(load_planner(setup.reference), setup.values)
 
 
 def planner_of(planner: OwnPlanner, values: Mapping[str, float]) -> Planner:
-    """The planner with these parameters. What is called raises PlanError, with file and line, if it fails."""
+    """The planner with these parameters as a function, which raises PlanError, with file and line, if it
+    fails."""
 
     def plan(route: Route) -> Path:
         guard = Guard(planner, lambda: None)

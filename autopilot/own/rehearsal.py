@@ -1,4 +1,4 @@
-"""A law that is flown for nothing: by it the tick that calls laws of your own is compiled beforehand."""
+"""A law that serves only to compile, in advance, the tick that calls custom laws."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ REFERENCE = f"{__name__}:Rehearsal"
 
 
 class Rehearsal:
-    """Holds the weight."""
+    """A law that only carries the weight."""
 
     def load_position(self, memory: None, now: Now) -> tuple[None, Asked]:
         """A force that carries vehicle and load."""

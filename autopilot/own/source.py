@@ -1,6 +1,6 @@
-"""A class that somebody has brought: found by its file, by its module, or by an entry point.
+"""A custom class: found by its file, by its module, or by an entry point.
 
-my_law.py:MyLaw       the class of a file; `:MyLaw` may be left out where the file has one such class
+my_law.py:MyLaw       the class of a file; `:MyLaw` may be left out if the file has only one such class
 package.module:MyLaw  the class of a module
 my-law                an entry point, of the group that the caller names
 """
@@ -25,19 +25,19 @@ from missions.toml_files import of_another_kind
 _OURS = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_LONGEST = 120  # characters of an error that are told
-_LONGEST_COMPILER = 240  # and of one of the compiler, which names types before it says why
+_LONGEST = 120  # most characters of an error that are reported
+_LONGEST_COMPILER = 240  # the same for errors of the compiler, which name types before the reason
 
 
 class OwnError(ValueError):
-    """What was brought cannot be used; the text says where and why."""
+    """A custom class cannot be used; the text says where and why."""
 
 
 def found_class(
     reference: str, group: str, suits: Callable[[type], bool], what: str, shipped: Sequence[str]
 ) -> type:
-    """The class that a reference names. `suits` tells those that can be meant, `what` is their kind in words,
-    and `shipped` are the names of those that are there anyway.
+    """The class that a reference names. `suits` says whether a class can be meant, `what` is the kind in
+    words, and `shipped` are the names of the shipped ones.
 
     OwnError if there is no such file, module, class or entry point, or if its module cannot be loaded.
     """
@@ -51,7 +51,7 @@ def found_class(
     if not name:
         every = [one for one in vars(module).values() if isinstance(one, type)]
         there = [one for one in every if one.__module__ == module.__name__]
-        # of a single class that does not suit it is told what it lacks
+        # a single class that does not suit is returned too: the caller says what it lacks
         own = [one for one in there if suits(one)] or (there if len(there) == 1 else [])
         if len(own) == 1:
             return own[0]
@@ -73,8 +73,8 @@ def _of_file(place: str) -> ModuleType:
 
 
 def _loaded(path: Path, told: str) -> ModuleType:
-    # by its content: a file that was changed is another module. Records find what their annotations mean by
-    # the name
+    # named by its content, so that a changed file is another module. It must be in `sys.modules` under its
+    # name, by which records resolve their annotations
     name = f"{path.stem}_{hashlib.sha256(str(path).encode() + path.read_bytes()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
@@ -84,7 +84,7 @@ def _loaded(path: Path, told: str) -> ModuleType:
     module = module_from_spec(spec)
     sys.modules[name] = module
     folder = str(path.parent)
-    sys.path.insert(0, folder)  # what lies beside it can be imported
+    sys.path.insert(0, folder)  # files beside it can be imported
     try:
         spec.loader.exec_module(module)
     except BaseException as error:
@@ -101,7 +101,7 @@ def _of_name(place: str) -> ModuleType:
         raise OwnError(f"{place}: is no Python file (.py), and no name of a module")
     here = str(Path.cwd())
     if here not in sys.path:
-        sys.path.append(here)  # as a program that is run from here has it
+        sys.path.append(here)  # as for a program that is run from here
     try:
         return import_module(place)
     except BaseException as error:
@@ -127,15 +127,14 @@ def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) ->
 
 
 def file_of(kind: type) -> Path | None:
-    """The file in which a class is written, None where there is none."""
+    """The file in which a class is written; None if there is none."""
     module = sys.modules.get(kind.__module__)
     place = getattr(module, "__file__", None)
     return Path(place) if place else None
 
 
 def digest_of(kind: type) -> str:
-    """A hash of the file in which a class is written, and of all modules beside and below that it has
-    loaded."""
+    """A hash of the file in which a class is written, and of all loaded modules in its folder and below."""
     path = file_of(kind)
     digest = hashlib.sha256()
     for file in sorted(_beside(path)) if path is not None else ():
@@ -150,11 +149,11 @@ def _beside(path: Path) -> set[Path]:
 
 
 def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
-    """What is told of an error of what somebody has brought, written in the file `path`: one line, with file
-    and line, the last place in the folder of that file, else the one that was to be `entered`, else the last
-    at all.
+    """One line about an error of user code written in the file `path`. It ends with file and line: the last
+    place in the folder of that file, or else `entered`, the place that was to be entered, or else the last
+    place of all.
 
-    What has only interrupted it, as Ctrl-C, is raised again.
+    An exception that only interrupted the code, such as Ctrl-C, is raised again.
     """
     if is_interruption(error):
         raise error
@@ -166,14 +165,14 @@ def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}:{error.lineno})"
     frames = traceback.extract_tb(error.__traceback__)
     near = [one for one in frames if path is not None and _is_beside(path, one.filename)]
-    if entered and not near:  # as with an argument too few
+    if entered and not near:  # for example if an argument is missing
         return f"{text} ({entered})"
     last = near or [one for one in frames if not _of_importing(one.filename)]
     return f"{text} ({Path(last[-1].filename).name}:{last[-1].lineno})" if last else text
 
 
 def _is_beside(path: Path, filename: str) -> bool:
-    """Whether a file lies beside or below another, and is neither ours nor of a library."""
+    """Whether a file lies beside or below another, and belongs neither to Plumbline nor to a library."""
     file = Path(filename)
     theirs = not file.is_relative_to(_OURS) and "site-packages" not in file.parts
     return file == path or (theirs and file.is_relative_to(path.parent))
@@ -184,8 +183,8 @@ def _of_importing(filename: str) -> bool:
 
 
 def _told_of_compiler(said: str, path: Path | None) -> str:
-    """What the compiler cannot do and why, and the place in the file of `path`."""
-    said = _COLOURS.sub("", said)  # numba's errors have them where colorama is installed
+    """What the compiler cannot compile and why, and the place in the file `path`."""
+    said = _COLOURS.sub("", said)  # numba's errors have colours if colorama is installed
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     why = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
     call = next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "")
@@ -198,7 +197,7 @@ def _told_of_compiler(said: str, path: Path | None) -> str:
 
 
 def _place_in(said: str, path: Path | None) -> str:
-    """Where in the file of `path` the compiler was, else the method that it compiled."""
+    """The line in the file `path` where the compiler was, or else that of the method that it compiled."""
     if path is None:
         return ""
     found = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', said)

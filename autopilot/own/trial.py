@@ -1,4 +1,4 @@
-"""What somebody has brought, tried before it flies: its methods are called a few times, as if near hover."""
+"""Custom classes are tried before they fly: their methods are called a few times, as if near hover."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def try_out(
     ticks: int = TICKS,
     told: Callable[[Asked], None] = lambda _: None,
 ) -> None:
-    """Call each mode for a few ticks; `told` gets what is asked for.
+    """Call each mode for a few ticks; `told` is called with each command.
 
-    OwnError, with file and line, if the law cannot be made with these parameters, or asks for what cannot be
-    done.
+    OwnError, with file and line, if the law cannot be made with these parameters, or commands something
+    invalid.
     """
     host = Host(law)
     host.make(parameters)
@@ -61,9 +61,9 @@ def try_out(
 
 
 def try_estimator(estimator: OwnEstimator, parameters: Mapping[str, float], ticks: int = TICKS) -> None:
-    """Call it for a few ticks, at each of which every sensor is heard.
+    """Call an estimator for a few ticks, with a new reading of every sensor at each.
 
-    OwnError, with file and line, if it cannot be made with these parameters, or gives what is no estimate.
+    OwnError, with file and line, if it cannot be made with these parameters, or returns an invalid estimate.
     """
     host = EstimatorHost(estimator)
     host.make(parameters)
@@ -76,8 +76,8 @@ def try_estimator(estimator: OwnEstimator, parameters: Mapping[str, float], tick
 
 
 def try_planner(planner: OwnPlanner, parameters: Mapping[str, float]) -> None:
-    """Have it plan a transfer, and a way through three points. OwnError, with file and line, if that is no
-    path."""
+    """Let a planner plan a transfer, and a path through three points. OwnError, with file and line, if it
+    fails or its path is invalid."""
     plan = planner_of(planner, parameters)
     vehicle = load_vehicle("bebop")
     limits = VehicleLimits(vehicle).shaping
@@ -90,7 +90,7 @@ def try_planner(planner: OwnPlanner, parameters: Mapping[str, float]) -> None:
 
 
 def try_all(own: Own, parameters: Mapping[str, float]) -> None:
-    """Try what somebody has brought. OwnError, with file and line, if something of it cannot fly."""
+    """Try all custom classes. OwnError, with file and line, if one of them cannot fly."""
     if own.law:
         with of_option("law"):
             try_out(load_law(own.law), parameters)

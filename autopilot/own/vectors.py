@@ -1,4 +1,4 @@
-"""Three numbers, as the methods that somebody has brought give them."""
+"""Vectors of three numbers as returned by the methods of custom classes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from autopilot.own.guard import shown
 
 
 def three_numbers(numbers: Any, what: str) -> Vec3:
-    """Three numbers of a tuple, a list or an array. ValueError, which names `what` they are, if it has not
-    these."""
+    """The three numbers of a tuple, a list or an array. ValueError, which names `what` they are, if it does
+    not contain three."""
     try:
         shape = np.shape(numbers)
         if shape == (3,):

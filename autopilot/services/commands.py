@@ -1,8 +1,8 @@
-"""COMMAND_LONG, COMMAND_INT and the mode and item messages that are commands in all but name.
+"""COMMAND_LONG, COMMAND_INT and the messages SET_MODE and MISSION_SET_CURRENT, which act as commands.
 
-`PARSERS` says for each command how its parameters become a request, or why they are refused. Who decides
-about a request is an argument. Every command addressed to the vehicle gets one COMMAND_ACK, sent to the asker
-alone; a command for somebody else gets nothing.
+`PARSERS` states for each command how its parameters become a request, or why they are refused. The function
+that decides on a request is an argument. Every command addressed to the vehicle gets one COMMAND_ACK, sent to
+the requesting client only; a command for another system is not answered.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGround
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
-GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all of them
+GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -73,7 +73,7 @@ _ABOVE_HOME_FRAMES = (
 
 
 class Call(NamedTuple):
-    """A command as it came: `frame` None for COMMAND_LONG, whose coordinates are degrees."""
+    """A command as it arrived: `frame` None for COMMAND_LONG, whose coordinates are degrees."""
 
     command: int
     p: tuple[float, float, float, float]
@@ -84,7 +84,7 @@ class Call(NamedTuple):
 
 
 class Context(NamedTuple):
-    """What a parser needs to know of the vehicle."""
+    """What a parser needs to know about the vehicle."""
 
     home: Home
     flavour: Flavour
@@ -99,7 +99,7 @@ def _refused(text: str) -> Verdict:
 
 
 def _whole(value: float) -> int | None:
-    """The integer that `value` is, or None."""
+    """`value` as an integer, or None if it is not a whole number."""
     return int(value) if math.isfinite(value) and value.is_integer() else None
 
 
@@ -112,7 +112,7 @@ def _altitude_above_home(call: Call, context: Context) -> float | None:
 
 
 def _place(call: Call, context: Context) -> Vec3 | None:
-    """param5 ... param7 as ENU from home [m]; NaN stays NaN, None for coordinates that are none."""
+    """param5 ... param7 as ENU from home [m]; NaN stays NaN, None for invalid coordinates or frame."""
     if call.frame is None:
         latitude, longitude = call.x * 1e7, call.y * 1e7
     elif call.frame in _AMSL_FRAMES or call.frame in _ABOVE_HOME_FRAMES:
@@ -213,7 +213,7 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
     east, north, up = (None if math.isnan(value) else value for value in place)
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
-        return Pause()  # what ground stations send for "hold here"
+        return Pause()  # ground stations send this for "hold here"
     flags = _whole(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     speed_m_s = call.p[0] if call.p[0] > 0.0 else None
@@ -221,7 +221,7 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
 
 
 def _yaw(call: Call, context: Context) -> float | None:
-    """param4 as a heading from east to north [rad]; None for none. ArduPilot heeds none: clients say 0."""
+    """param4 as a heading from east to north [rad], or None. ArduPilot ignores it, and its clients send 0."""
     if not context.flavour.heeds_yaw or not math.isfinite(call.p[3]):
         return None
     return 0.5 * math.pi - call.p[3]
@@ -248,7 +248,7 @@ def _change_altitude(call: Call, context: Context) -> Request | Verdict:
 
 
 def _loiter(call: Call, context: Context) -> Request | Verdict:
-    """Go there (0, 0 and NaN: here) and stay."""
+    """Fly to the position (0, 0 and NaN: here) and stay there."""
     if call.x == 0.0 and call.y == 0.0:
         call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
     place = _place(call, context)
@@ -270,7 +270,7 @@ def _loiter_turns(call: Call, context: Context) -> Request | Verdict:
 def _calibrate(call: Call, context: Context) -> Request | Verdict:
     asked = (*call.p, call.x, call.y, call.z)
     if not any(value for value in asked):
-        return Verdict(ACCEPTED)  # stop a calibration: none is under way
+        return Verdict(ACCEPTED)  # all 0: stop a calibration, of which none is under way
     return Verdict(UNSUPPORTED, "Calibration: sensors are simulated, their errors are what SIM_ says")
 
 
@@ -336,7 +336,7 @@ def _gripper(call: Call, context: Context) -> Request | Verdict:
     choice: dict[float, Request | Verdict] = {
         mavlink.GRIPPER_ACTION_RELEASE: Release(),
         mavlink.GRIPPER_ACTION_GRAB: Grab(),
-        mavlink.GRIPPER_ACTION_HOLD: Verdict(ACCEPTED),  # it stays as it is
+        mavlink.GRIPPER_ACTION_HOLD: Verdict(ACCEPTED),  # the gripper stays as it is
     }
     return choice.get(call.p[1]) or _refused(f"Gripper: param2 = {call.p[1]:g}; must be 0, 1 or 2")
 
@@ -377,7 +377,7 @@ def _roi_location(call: Call, context: Context) -> Request | Verdict:
 
 
 def _roi(call: Call, context: Context) -> Request | Verdict:
-    """The command in which param1 says what is meant; ArduPilot and MAVProxy leave it 0 and give a place."""
+    """The command whose param1 selects the kind; ArduPilot and MAVProxy leave it 0 and give a position."""
     named = not (math.isnan(call.x) or math.isnan(call.y)) and (call.x, call.y) != (0.0, 0.0)
     if call.p[0] in (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION) and named:
         return _roi_location(call, context)
@@ -392,7 +392,7 @@ def _enable_fence(call: Call, context: Context) -> Request | Verdict:
     return EnableFence(call.p[0] == 1.0)
 
 
-# bits of SIM_SENS_FAIL; gyroscope and accelerometer are one unit, motion capture comes as visual odometry
+# bits of SIM_SENS_FAIL; gyroscope and accelerometer are one unit, motion capture is sent as visual odometry
 _SENSORS: dict[int | None, int] = {
     mavlink.FAILURE_UNIT_SENSOR_GYRO: 1,
     mavlink.FAILURE_UNIT_SENSOR_ACCEL: 1,
@@ -451,7 +451,7 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
-    mavlink.MAV_CMD_NAV_LOITER_TIME: _loiter,  # behind it comes nothing: the load stays
+    mavlink.MAV_CMD_NAV_LOITER_TIME: _loiter,  # nothing follows after the time: the load stays
     mavlink.MAV_CMD_NAV_LOITER_TO_ALT: _loiter,
     mavlink.MAV_CMD_NAV_LOITER_TURNS: _loiter_turns,
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
@@ -493,7 +493,7 @@ def _call_of_int(m: Any) -> Call:
 
 
 class _Done(NamedTuple):
-    """An accepted command and when: a repetition is answered, not executed."""
+    """An accepted command and its time: a repetition is answered, not executed."""
 
     call: str
     verdict: Verdict
@@ -501,7 +501,7 @@ class _Done(NamedTuple):
 
 
 class CommandService:
-    """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
+    """Commands in, COMMAND_ACK out; the `decide` given with each message decides on the request."""
 
     def __init__(self, home: Home, identity: Identity) -> None:
         self.context = Context(home, identity.flavour, identity.rotors)
@@ -511,7 +511,7 @@ class CommandService:
     def _conclude(
         self, call: str, command: int, request: Request, peer: Peer, now_us: int, decide: Decide
     ) -> list[Output]:
-        """Have a request decided; its answer."""
+        """Have a request decided; return the answer."""
         verdict = decide(request)
         if verdict.result in _REFUSED and self._is_repeated(call, command, peer, now_us):
             return [_ack(command, ACCEPTED, peer)]
@@ -538,7 +538,7 @@ class CommandService:
         return self._execute(_call_of_int(message), peer, now_us, decide)
 
     def receive_set_mode(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Execute SET_MODE, the message older than the command; acknowledged as the command."""
+        """Execute SET_MODE, which is older than the command and is acknowledged like it."""
         request: Request | Verdict = Verdict(UNSUPPORTED, "Set mode: only custom modes are known")
         if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             request = _mode_of_number(message.custom_mode, self.context)
@@ -566,8 +566,8 @@ class CommandService:
         return outputs
 
     def _is_repeated(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
-        """The command that was accepted last, again: its ACK was lost, and some clients never say that they
-        repeat it. What it asked for may be so far under way that it cannot be asked for any more."""
+        """Whether the command that was accepted last has arrived again: its ACK was lost, and some clients do
+        not mark a repetition. The supervisor may refuse it by now because its execution has begun."""
         done = self._done.get((peer, command))
         if self._last != (peer, command) or done is None:
             return False
@@ -595,5 +595,5 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
 
 
 def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
-    """The reason first, so that it is there when the ACK is shown."""
+    """The reason first, so that it has arrived when the ACK is shown."""
     return [*_said(command, verdict), _ack(command, verdict.result, peer)]

@@ -1,7 +1,7 @@
-"""The components of the vehicle beside the autopilot: each answers what it is asked, under its own id.
+"""The components of the vehicle other than the autopilot: each answers requests under its own id.
 
-The winch does DO_WINCH. Each tells, when it is asked, what it sends anyway; it has no parameters, files and
-missions, and says so.
+The winch executes DO_WINCH. Each component serves requests for the messages that it sends; it refuses
+requests for parameters, files and missions, since it has none.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ _OF: dict[int | None, frozenset[int]] = {WINCH_COMPONENT: _OF_ALL | {mavlink.MAV
 
 
 class ComponentService:
-    """Messages to a component that is not the autopilot."""
+    """Handles messages to a component other than the autopilot."""
 
     def __init__(self, commands: CommandService) -> None:
         self._commands = commands
 
     def receive(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Do what the component does, refuse what it does not."""
+        """Execute what the component offers, and refuse everything else."""
         kind = message.get_msgId()
         component = None if peer.addressed is None else peer.addressed[1]
         if kind in (_LONG, _INT) and message.command in _OF.get(component, _OF_ALL):

@@ -5,7 +5,7 @@ The shell owns sockets, clock and files. It calls `receive` for each datagram, t
     for event in endpoint.receive(datagram, link, now_us, decide): ...
     for link, datagram in endpoint.poll(make_snapshot, now_us): ...
 
-`decide` is the supervisor's word on a request; `make_snapshot` is called only where something is due.
+`decide` returns the supervisor's decision on a request; `make_snapshot` is called only if something is due.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
-LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
-REACHED_AGAIN = 10  # times that the end of a mission is said again, as PX4 does
-REACHED_US = 1_000_000  # between two of them
-PATIENCE = 64  # bytes of a datagram that may be part of no message, before the rest of it is passed over
-MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
-MAKING_ROOM_US = 20_000  # for another not more often: a new link costs as much as ten messages
+LINK_SILENCE_US = 30_000_000  # after this silence a link that was not configured is forgotten
+REACHED_AGAIN = 10  # repetitions of the end of a mission, as in PX4
+REACHED_US = 1_000_000  # between two repetitions
+PATIENCE = 64  # bytes of a datagram that may belong to no message before the rest of it is skipped
+MAX_LINKS = 16  # links that were not configured; a new one replaces the one silent longest
+MAKING_ROOM_US = 20_000  # least time between two replacements: a new link costs as much as ten messages
 _SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
 _UINT16 = 2**16 - 1
@@ -123,17 +123,17 @@ class Written(NamedTuple):
 
     link: Link
     until_us: int  # when something else is due
-    due: NDArray[np.int64]  # as of `Streams.written_by`
+    due: NDArray[np.int64]  # from `Streams.written_by`
     frames: StreamFrames
-    aside: FrameWriter  # of a component that asks
+    aside: FrameWriter  # of a component that sends questions besides
 
 
-# streams that machine code writes, or that say nothing: FILTER_STATE speaks of estimators that are not ours
+# streams that machine code writes, or that are empty: FILTER_STATE is sent only with a custom estimator
 _WRITTEN = BITS | {mavlink.MAVLINK_MSG_ID_FILTER_STATE: 0}
 
 
 class VehicleEndpoint:
-    """All services of one vehicle joined over all its links."""
+    """All services of one vehicle, on all its links."""
 
     def __init__(
         self,
@@ -146,12 +146,12 @@ class VehicleEndpoint:
         boot_unix_us: int = 0,
         setup_signing: bool = False,
     ) -> None:
-        """`setup_signing`: a first signing key is taken from whoever sends one."""
+        """`setup_signing`: a first signing key is accepted from any sender."""
         self.identity = identity
         self._home = home
         self._signing = SigningService(signing, boot_unix_us, setup_signing)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
-        self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
+        self._reached, self._reached_left = 0, 0  # last item of a completed mission, to be reported again
         self._reached_us: int | None = None
         self._parameters = ParameterService(parameters, identity.parameter_encoding)
         self._commands = CommandService(home, identity)
@@ -163,8 +163,8 @@ class VehicleEndpoint:
         self._logs = LogService(self.files)
         self._texts = TextWriter()
         self.kept_texts = KeptTexts(self._texts)
-        self._now_us = 0  # of what was called last, by which texts are dated
-        self._stood_us = 0  # for which the vehicle's clock stood, by that of the services
+        self._now_us = 0  # of the last call; texts are dated by it
+        self._stood_us = 0  # time for which the vehicle's clock stood while that of the services ran
         self._timed = (
             self._signing,
             self._missions,
@@ -175,8 +175,8 @@ class VehicleEndpoint:
         )
         self._faults = Faults()
         self._links: dict[Link, LinkState] = {}
-        self._room_us = 0  # when the next link may take the place of another
-        self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
+        self._room_us = 0  # when the next link may replace another
+        self._learned: dict[Link, LinkState] = {}  # of `_links`, those that were not configured
         load: dict[int, Stream] = LOAD_STREAMS if identity.load_system else {}
         table = STREAMS | COMPONENT_STREAMS | load
         intervals_us = {key: stream.interval_us for key, stream in table.items()}
@@ -189,22 +189,22 @@ class VehicleEndpoint:
             for key, row in table.items()
         }
         self._own: Source = (identity.system, AUTOPILOT_COMPONENT)
-        # streams by message id, as each part of the vehicle is asked for them; the autopilot knows nearly all
+        # streams by message id that each part of the vehicle serves on request; the autopilot nearly all
         self._streams_of: dict[Source, dict[int, int]] = {}
         for key, (source, _) in self._built_by.items():
             self._streams_of.setdefault(source, {})[key & MESSAGE_ID] = key
         self._streams_of[self._own] = {key: key for key in STREAMS}
         self._watched: dict[int, Any] = {}
-        self._seen: tuple[object, Any] = (None, ())  # of the snapshot that was watched last
+        self._seen: tuple[object, Any] = (None, ())  # `unchanged` and `plan_ids` of the last snapshot
         self._asked_mode: int | None = None
         self._consequences: list[Output] = []  # of a decision
         self._work = False  # something waits in a queue
-        self._stirred = False  # timers may have been set since it was noted:
+        self._stirred = False  # timers may have changed since these times were noted:
         self._timer_us = self._next_us = 0  # when a service has something to do, and when anything is due
         self._events: list[Event] = []  # of `poll`, until they are taken
-        self.ground_us = NEVER_US  # when a ground station's HEARTBEAT came last
-        self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
-        self.simulator_run: Any = None  # SIM_BOOT of the simulator that is flown in, once it has told
+        self.ground_us = NEVER_US  # when the last HEARTBEAT of a ground station arrived
+        self.on_text: Callable[[int, str], None] | None = None  # called with each text for the operators
+        self.simulator_run: Any = None  # SIM_BOOT of the present simulator, once received
         self.handlers = self._handler_table()  # by message id
 
     @property
@@ -218,34 +218,34 @@ class VehicleEndpoint:
         return dict(self._missions.areas)
 
     def set_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
-        """Fence or rally points as they were stored."""
+        """Set fence or rally points as they were stored."""
         self._missions.areas[kind] = items
 
     @property
     def links(self) -> tuple[Link, ...]:
-        """The links that get telemetry now."""
+        """The links that receive telemetry now."""
         return tuple(self._links)
 
     # ---- what the shell calls
 
     def add_link(self, link: Link, now_us: int = 0, program: bool = False) -> None:
-        """A link that always gets telemetry, whether or not somebody is heard on it; `program`: as one that
-        flies the vehicle by a program, not as a ground station."""
+        """Add a link that always receives telemetry, even if no message arrives on it; `program`: with the
+        streams for programs instead of those for ground stations."""
         self._links[link] = self._new_link(now_us, program)
         self._learned.pop(link, None)
         self._work = True
 
     def remove_link(self, link: Link) -> None:
-        """The link is no more."""
+        """Forget a link that no longer exists."""
         if link in self._links:
             self._forget(link)
 
     def receive(
         self, datagram: bytes, link: Link, now_us: int, decide: Decide, program: bool = False
     ) -> list[Event]:
-        """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises.
+        """Handle a datagram of `link`; answers are sent with the next `poll`. Malformed input never raises.
 
-        `program`: what the link is, if it is new (see `add_link`).
+        `program`: the kind of the link if it is new (see `add_link`).
         """
         events: list[Event] = []
         self._stirred, self._now_us = True, now_us
@@ -271,62 +271,62 @@ class VehicleEndpoint:
                 service_us = now_us + self._stood_us
                 try:
                     outputs = handler(received.message, peer, service_us, wrapped)
-                except Exception:  # a fault of ours must not bring the vehicle down
+                except Exception:  # an error in a service must not crash the vehicle
                     outputs = self._faults.answered(received.message, peer, service_us)
                 self._do(outputs, events)
                 self._follow_up(events)
         return events
 
     def _follow_up(self, events: list[Event]) -> None:
-        """What came of a decision besides its answer."""
+        """Carry out the consequences of a decision besides its answer."""
         consequences, self._consequences = self._consequences, []
         self._do(consequences, events)
 
     def tell_time(self, unix_us: int) -> None:
-        """The wall clock, by which messages are signed where the vehicle's clock is not in step with it."""
+        """Set the time of the wall clock, with which messages are signed if the vehicle's clock differs."""
         self._signing.tell_time(unix_us)
 
     def take_events(self) -> list[Event]:
-        """What came up without a message: to be handled as the events of `receive`."""
+        """Events that arose without a message, to be handled like those of `receive`."""
         events, self._events = self._events, []
         return events
 
     def stand(self, passed_us: int) -> None:
-        """So much time has passed by which the vehicle's clock did not go on.
+        """Note time that has passed while the vehicle's clock stood.
 
-        Answers that go out at a pace of their own do so all the same; streams wait for the vehicle.
+        Answers that are sent at their own pace continue meanwhile; streams wait for the vehicle.
         """
         self._stood_us += passed_us
         self._stirred = True
 
     def say(self, severity: int, text: str, about: Hashable = None) -> None:
-        """A text for the operators of all links; of a refusal, what it is `about`."""
+        """Send a text to the operators of all links; for a refusal, `about` states what was refused."""
         self._do([Say(severity, text, about)], [])
 
     def inherit_texts(self, before: VehicleEndpoint) -> None:
-        """What the vehicle said in the run that ended as this one begins."""
+        """Take over the kept texts of the previous run."""
         self.kept_texts.inherit(before.kept_texts.texts, before._now_us + before._stood_us)
 
     def item_reached(self, seq: int, last: bool = False) -> None:
-        """The mission came to the end of an item.
+        """Report that the mission has completed an item.
 
-        Of the last one this is said for ten seconds: MAVSDK learns by nothing else that a mission is over,
-        and forgets it where it hears no heartbeat for three.
+        For the last item this is repeated for ten seconds: MAVSDK learns only from this message that a
+        mission has ended, and forgets it if it receives no heartbeat for three seconds.
         """
         self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
         self._reached, self._reached_us = seq, None
         self._reached_left = REACHED_AGAIN if last else 0
 
     def state_changed(self) -> None:
-        """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
+        """Mode or arming changed: send a HEARTBEAT to all links with the next `poll`."""
         self._do([Announce(None, (_HEARTBEAT,))], [])
 
     def expect_parameters(self) -> None:
-        """More parameters will be learned soon: lists of them wait until `parameters_complete`."""
+        """More parameters will be learned soon: parameter lists wait until `parameters_complete`."""
         self._parameters.expect_more()
 
     def world_silent(self, silent: bool) -> None:
-        """Whether the simulator has fallen silent: none of its parameters can be set then."""
+        """State whether the simulator is silent: then none of its parameters can be set."""
         self._parameters.world_silent = silent
 
     def parameters_complete(self, now_us: int) -> None:
@@ -335,11 +335,11 @@ class VehicleEndpoint:
         self._stirred = True
 
     def parameter_changed(self, name: str) -> None:
-        """The vehicle itself changed a parameter: show it to all links."""
+        """The vehicle itself changed a parameter: send it to all links."""
         self._do([Send(None, self._parameters.value_message(name))], [])
 
     def datagram(self, link: Link, message: Any, component: int = AUTOPILOT_COMPONENT) -> bytes:
-        """One message of a component for a link, now, in the link's sequence."""
+        """One message of a component for a link as a datagram, with the link's next sequence number."""
         return self._links[link].frame((self.identity.system, component), message)
 
     def due(self, now_us: int) -> bool:
@@ -347,7 +347,7 @@ class VehicleEndpoint:
         return self._work or now_us >= min(self._next_timer(), self._next_stream())
 
     def _next_timer(self) -> int:
-        """When a service, or the end of a mission, has something to do, by the vehicle's clock."""
+        """When a service, or the end of a mission, next has something to do, by the vehicle's clock."""
         timers = [service.next_timer() - self._stood_us for service in self._timed]
         if self._reached_left:
             timers.append(self._reached_us or 0)
@@ -388,15 +388,15 @@ class VehicleEndpoint:
         return self._datagrams(due, snapshot)
 
     def written(self, told: object, now_us: int, aside: int) -> Written | None:
-        """What machine code can say at the ticks to come in place of `poll`, on the only link there is, while
-        what the flight record says is `told` and our own estimator flies; None: there may be more to say.
-        A component (`aside`) asks beside that."""
+        """The streams that machine code can write at the next ticks in place of `poll`, on the only link,
+        while the flight record reports `told` and the built-in estimator flies; None: there may be more to
+        send. The component `aside` sends its questions besides."""
         if self._work or self._learned or self._signing.signing is not None or len(self._links) != 1:
             return None
         if self._stirred:
             self._look_ahead()
         (link, state), seen = next(iter(self._links.items())), self._seen
-        # what has changed is announced, which is for `poll`
+        # changes are announced, which only `poll` does
         changed = told is not seen[0] or seen[1] != self._missions.plan_ids
         if changed or state.queue or state.announced or self._next_us <= now_us:
             return None
@@ -405,13 +405,13 @@ class VehicleEndpoint:
         return Written(link, min(self._timer_us, others_us), due, state.frames, writer)
 
     def wrote(self, written: Written, now_us: int) -> None:
-        """All that was due until now has been said."""
+        """Note that machine code has written all streams that were due until now."""
         streams = self._links[written.link].streams
         streams.take_due(now_us)
         self._now_us, self._next_us = now_us, min(self._timer_us, streams.next_us)
 
     def _look(self, make_snapshot: SnapshotFactory) -> Snapshot:
-        """The instant at which streams are due; what has changed is announced."""
+        """The snapshot for the streams that are due; announces what has changed."""
         snapshot = make_snapshot()
         snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
         self._watch(snapshot)
@@ -420,7 +420,7 @@ class VehicleEndpoint:
     def _datagrams(
         self, due: list[tuple[Link, LinkState, tuple[int, ...]]], snapshot: Snapshot | None
     ) -> list[tuple[Link, bytes]]:
-        """What waits on each link, and of an instant the streams that are due there."""
+        """Datagrams of the messages that wait on each link, and of the streams that are due there."""
         built: dict[int, list[Outgoing]] = {}
         instant = _NO_INSTANT if snapshot is None or snapshot.instant is None else snapshot.instant
         datagrams: list[tuple[Link, bytes]] = []
@@ -436,12 +436,12 @@ class VehicleEndpoint:
     def _streams(
         self, state: LinkState, keys: tuple[int, ...], snapshot: Snapshot, built: dict[int, list[Outgoing]]
     ) -> list[Outgoing | int]:
-        """The streams that are due on a link; `built` has those that were built for others."""
+        """The streams that are due on a link; `built` holds the messages built for other links."""
         if state.announced:
-            # what was announced, just now as well, comes before the streams
+            # announced messages, including those of this poll, precede the streams
             keys = tuple(dict.fromkeys((*state.announced, *keys)))
             state.announced.clear()
-        # what is signed is written frame by frame
+        # signed messages are written frame by frame
         written = snapshot.instant is not None and self._signing.signing is None
         outgoing: list[Outgoing | int] = []
         for part in parts_of(keys) if written else (keys,):
@@ -458,7 +458,7 @@ class VehicleEndpoint:
         return outgoing
 
     def _look_ahead(self) -> None:
-        """Note when there is something to do next, if nothing comes in before."""
+        """Note when there is something to do next if nothing arrives before."""
         self._stirred = False
         self._timer_us = self._next_timer()
         self._next_us = min(self._timer_us, self._next_stream())
@@ -470,7 +470,7 @@ class VehicleEndpoint:
             self._reached_us = now_us + REACHED_US
         elif now_us >= self._reached_us:
             if self._look(make_snapshot).mission_state != mavlink.MISSION_STATE_COMPLETE:
-                self._reached_left = 0  # begun again, or another one
+                self._reached_left = 0  # the mission was begun again or replaced
                 return
             self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(self._reached))], [])
             self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_US
@@ -478,7 +478,7 @@ class VehicleEndpoint:
     # ---- sending
 
     def _watch(self, snapshot: Snapshot) -> None:
-        """Announce what changed since it was last looked at."""
+        """Announce what has changed since the last snapshot."""
         seen = (snapshot.unchanged, snapshot.plan_ids)
         if seen[0] is not None and seen[0] is self._seen[0] and seen[1] == self._seen[1]:
             return
@@ -535,7 +535,7 @@ class VehicleEndpoint:
         return state
 
     def _heard(self, link: Link, now_us: int, program: bool) -> LinkState | None:
-        """The link on which somebody is heard; None: a new one for which there is no room now."""
+        """The link on which a message arrived; None: a new link for which there is no room now."""
         state = self._links.get(link)
         if state is None:
             if len(self._learned) >= MAX_LINKS:
@@ -562,15 +562,15 @@ class VehicleEndpoint:
     # ---- receiving
 
     def _is_own(self, received: Received) -> bool:
-        """Our own words come back where a link is looped."""
+        """Whether the vehicle itself sent the message, which returns on a looped link."""
         own = (received.system, received.component) in self._streams_of
         return own or received.system == self.identity.load_system != 0
 
     def _addressed(self, message_id: int, message: Any) -> Source | None:
-        """The part of the vehicle to which a message is addressed: the autopilot where it is to all (0) or
-        has no address; None: somebody else."""
+        """The part of the vehicle to which a message is addressed: the autopilot if the address is 0 (all) or
+        missing; None: another system or component."""
         if message_id == mavlink.MAVLINK_MSG_ID_PING:
-            return self._own  # its target says whether it is a question
+            return self._own  # its target states whether it is a request
         system = getattr(message, "target_system", 0) or self.identity.system
         component = getattr(message, "target_component", 0)
         if component == 0:
@@ -578,7 +578,7 @@ class VehicleEndpoint:
         return (system, component) if (system, component) in self._streams_of else None
 
     def _decider(self, state: LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
-        """`decide` for the supervisor's requests, joined with what is answered here."""
+        """`decide` for the supervisor's requests, combined with the requests that are answered here."""
 
         def decided(request: Any) -> Verdict:
             match request:
@@ -672,7 +672,7 @@ class VehicleEndpoint:
         return _ACCEPTED
 
     def _set_origin(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """SET_GPS_GLOBAL_ORIGIN: the world stays where it is, and says where that is."""
+        """SET_GPS_GLOBAL_ORIGIN: the origin is not moved; a text and GPS_GLOBAL_ORIGIN report it."""
         if message.target_system not in (0, self.identity.system):
             return []
         text = "Origin not moved: sitl --home and autopilot --home say where the world is"
@@ -680,7 +680,7 @@ class VehicleEndpoint:
         return [Say(mavlink.MAV_SEVERITY_WARNING, text), where]
 
     def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """REQUEST_DATA_STREAM: the rate of a group on the link of the asker; stop: the default rates."""
+        """REQUEST_DATA_STREAM: set the rate of a group on the requesting link; stop: the default rates."""
         state = self._links[peer.link]
         rate_hz = message.req_message_rate if message.start_stop else 0
         interval_us = _SECOND_US // rate_hz if rate_hz else DEFAULT
@@ -689,7 +689,7 @@ class VehicleEndpoint:
         return []
 
     def _handler_table(self) -> dict[int, Handler]:
-        """What is done about each message; all others are for somebody else."""
+        """The handler of each message; messages that are not listed are ignored."""
         commands, missions, parameters = self._commands, self._missions, self._parameters
         guided = self._guided
         m = mavlink

@@ -1,7 +1,7 @@
-"""ESC_STATUS and ESC_INFO: what the speed controllers tell, four of them a message, as PX4 sends them.
+"""ESC_STATUS and ESC_INFO: what the speed controllers report, four of them in a message, as PX4 sends them.
 
-Builders of `telemetry`. The speeds are those that the controllers measure; voltage and current are the
-battery's, the current shared out by the power that each rotor takes, the cube of its speed.
+Builders of `telemetry`. The speeds are those that the controllers measure. Voltage and current are the
+battery's; the current is divided in proportion to the power of each rotor, the cube of its speed.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.dialect import plumbline as mavlink
 
-_GROUP = 4  # of a message
-_TOLD_US = 20_000  # the controllers tell their speeds so often
+_GROUP = 4  # rotors in a message
+_TOLD_US = 20_000  # interval at which the controllers report their speeds
 _DSHOT = 5  # ESC_CONNECTION_TYPE
-_STUCK = 32  # ESC_FAILURE_FLAGS: the motor stands though it is asked to turn
+_STUCK = 32  # ESC_FAILURE_FLAGS: the motor is commanded to turn but stands
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _INT32 = 2**31 - 1
 
 
 def _four(values: list[Any], first: int, missing: Any) -> list[Any]:
-    """The values of a group, filled up."""
+    """The values of a group, filled up with `missing`."""
     found = values[first : first + _GROUP]
     return found + [missing] * (_GROUP - len(found))
 
@@ -50,7 +50,7 @@ def esc_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def esc_info(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """ESC_INFO of every group of rotors; all controllers answer, also that of a rotor that is lost."""
+    """ESC_INFO of every group of rotors; all controllers answer, including that of a lost rotor."""
     flags = [_STUCK if s.rotors_lost >> i & 1 else 0 for i in range(s.rotors)]
     return tuple(
         mavlink.MAVLink_esc_info_message(

@@ -1,4 +1,4 @@
-"""What is said where a service of ours fails: the vehicle flies on, and who asked is answered."""
+"""Reports of a service that fails: the vehicle continues to fly, and the client that asked gets an answer."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from autopilot.services.records import Output, Peer, Say, ServiceFailed
 from autopilot.services.refusals import refusals
 from autopilot.wire.dialect import plumbline as mavlink
 
-AGAIN_US = 10_000_000  # between two words about one service
+AGAIN_US = 10_000_000  # between two reports on one service
 
 
 class Faults:
-    """Tells of each service that fails, but not again and again."""
+    """Reports each service that fails, but at most once in `AGAIN_US`."""
 
     def __init__(self) -> None:
         self._told_us: dict[str, int] = {}
 
     def told(self, what: str, now_us: int) -> list[Output]:
-        """The words about the exception that is being handled; none where they were said just now."""
+        """The report on the exception that is being handled; empty if it was reported recently."""
         last = self._told_us.get(what)
         if last is not None and now_us - last < AGAIN_US:
             return []
@@ -31,6 +31,6 @@ class Faults:
         return [Say(mavlink.MAV_SEVERITY_ERROR, text), ServiceFailed(what, traceback.format_exc())]
 
     def answered(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
-        """The words, and what the asker waits for: that nothing was done."""
+        """The report, and the refusal for which the client waits: nothing was done."""
         refused = refusals(message, peer, mavlink.MAV_RESULT_FAILED, mavlink.MAV_MISSION_ERROR)
         return [*self.told(message.get_type(), now_us), *refused]

@@ -1,7 +1,7 @@
 """Files as the services see them: paths that cannot leave their root, and a card that holds bytes.
 
-The card itself belongs to the shell (`autopilot.shell.sd_card` keeps one in a directory); `MemoryCard` is
-one without a disk, for tests and for flights inside one process.
+The card itself belongs to the shell (`autopilot.shell.sd_card` keeps one in a directory); `MemoryCard` is a
+card without a disk, for tests and for flights inside one process.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Trouble(IntEnum):
 
 
 class FileError(Exception):
-    """An operation that was not done; `errno` (POSIX) goes with FAIL_ERRNO."""
+    """A failed operation; `errno` (POSIX) accompanies FAIL_ERRNO."""
 
     def __init__(self, trouble: Trouble, errno: int = 0) -> None:
         super().__init__(f"{trouble.name} {errno}" if errno else trouble.name)
@@ -52,43 +52,44 @@ class Entry(NamedTuple):
 
 
 class Card(Protocol):
-    """A tree of files. Every method raises FileError where it cannot do what it says."""
+    """A tree of files. Every method raises FileError if it cannot do what its docstring says."""
 
     def entries(self, path: Path, first: int = 0, most: int | None = None) -> list[Entry]:
-        """What is in a folder, by name: at most so many entries from the first one on."""
+        """The contents of a folder, sorted by name: at most `most` entries from number `first` on."""
 
     def size(self, path: Path) -> int:
         """Bytes in a file."""
 
     def read(self, path: Path, offset: int, size: int) -> bytes:
-        """At most `size` bytes; fewer at the end, none behind it."""
+        """At most `size` bytes; fewer at the end of the file, none after it."""
 
     def create(self, path: Path) -> None:
-        """An empty file, in place of one that is there."""
+        """Create an empty file, in place of an existing one."""
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
-        """Put `data` into a file that exists; a hole before it reads as zeros."""
+        """Write `data` into an existing file; a hole before it reads as zeros."""
 
     def truncate(self, path: Path, size: int) -> None:
-        """Cut a file, or fill it up with zeros."""
+        """Cut a file, or extend it with zeros."""
 
     def remove(self, path: Path) -> None:
-        """Take a file away."""
+        """Remove a file."""
 
     def rename(self, old: Path, new: Path) -> None:
-        """Move a file or folder to a name that is free."""
+        """Move a file or folder to an unused name."""
 
     def make_folder(self, path: Path) -> None:
-        """An empty folder in a folder that exists."""
+        """Create an empty folder in an existing folder."""
 
     def remove_folder(self, path: Path) -> None:
-        """Take an empty folder away."""
+        """Remove an empty folder."""
 
 
 def path_of(text: bytes) -> Path:
-    """The path that a client wrote, '/' between its names; FileError if it is none.
+    """The path that a client wrote, with '/' between its names; FileError if it is invalid.
 
-    `.` and empty names say nothing; `..` is refused, as are control characters and what is not UTF-8.
+    `.` and empty names are ignored; `..` is refused, as are backslashes, control characters, names that are
+    too long and text that is not UTF-8.
     """
     try:
         decoded = text.split(b"\0", 1)[0].decode("utf-8")
@@ -103,22 +104,22 @@ def path_of(text: bytes) -> Path:
 
 @dataclass(slots=True)
 class Limits:
-    """What a card takes from outside: bytes in one file, bytes in all, files and folders, and how many names
-    a path may have."""
+    """What clients may store on a card: bytes in one file, bytes in all, number of files and folders, and
+    number of names in a path."""
 
     file_bytes: int = 64 * 2**20
     total_bytes: int = 1024 * 2**20
-    files: int = 1024  # to list them all takes a millisecond
+    files: int = 1024  # listing them all takes a millisecond
     depth: int = 32
 
     def check_depth(self, names: int) -> None:
-        """Raise FileError for a path of more names."""
+        """Raise FileError for a path with too many names."""
         if names > self.depth:
             raise FileError(Trouble.FAIL_ERRNO, ENAMETOOLONG)
 
 
 class MemoryCard:
-    """A card in memory. Folders are names of their own, so that an empty one exists."""
+    """A card in memory. Folders are stored separately, so that an empty folder can exist."""
 
     def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits or Limits()

@@ -1,12 +1,13 @@
-"""FILE_TRANSFER_PROTOCOL: a file server for any number of clients, each with sessions of its own.
+"""FILE_TRANSFER_PROTOCOL: a file server for any number of clients, each with its own sessions.
 
-A session bears the number that its client proposes in the request that opens it (MAVProxy counts them up,
-MAVSDK and QGroundControl say 0); opening with a number that is open puts the new file in the old one's place.
-Sessions that are not used for `IDLE_US` are closed.
+A session has the number that its client proposes in the request that opens it (MAVProxy counts up, MAVSDK and
+QGroundControl send 0); if a session with this number is open, the new file replaces the old one. Sessions
+that are not used for `IDLE_US` are closed.
 
-A request that comes twice (same client, same sequence number, same bytes) is not done twice: its reply is
-sent again. Bursts go out at a steady pace, `BURST_PACKETS` at a time, the last of them marked. The checksum
-of a file is counted a part at each tick, of one client after the other; a client has one under way at most.
+A request that arrives twice (same client, same sequence number, same bytes) is not executed twice: its reply
+is sent again. Bursts are sent at a steady pace, `BURST_PACKETS` at a time, with the last packet marked. The
+checksum of a file is computed in parts, one part per tick, for the clients in turn; a client has at most one
+under way.
 """
 
 from __future__ import annotations
@@ -24,19 +25,19 @@ from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
 
 IDLE_US = 60_000_000
-REPEAT_US = 10_000_000  # so long a reply is kept for a request that comes again
-MOST_SESSIONS = 64  # of all clients together
+REPEAT_US = 10_000_000  # for this time a reply is kept for a repeated request
+MOST_SESSIONS = 64  # for all clients together
 MOST_REPLIES = 32  # kept for each client
 MOST_CLIENTS = 32  # whose replies are kept
 BURST_PACKETS = 128
 BURST_PACE_US = 500  # between two packets of a burst: 478 kB/s
-BURST_AT_ONCE = 16  # of them in one tick
-SUMMED_AT_ONCE = 2**17  # bytes of a file whose checksum is asked for, in one tick
+BURST_AT_ONCE = 16  # packets of a burst in one tick
+SUMMED_AT_ONCE = 2**17  # bytes of a file that are added to its checksum in one tick
 
 LENGTH = 251  # FILE_TRANSFER_PROTOCOL.payload
 _HEADER = struct.Struct("<HBBBBBxI")  # seq, session, opcode, size, asked, burst complete, offset
 DATA_BYTES = LENGTH - _HEADER.size  # 239
-_MOST_LISTED = DATA_BYTES // 3  # entries that go into one reply: a letter, a name, and its end
+_MOST_LISTED = DATA_BYTES // 3  # entries that fit into one reply: a letter, a name, and its end
 _UINT32 = struct.Struct("<I")
 
 
@@ -77,7 +78,7 @@ class Packet(NamedTuple):
 
 
 def packet_of(payload: bytes) -> Packet:
-    """Read a payload; `data` is what `size` covers of it."""
+    """Read a payload; `data` has the `size` bytes after the header."""
     seq, session, opcode, size, asked, last, offset = _HEADER.unpack_from(payload)
     return Packet(
         seq, session, opcode, size, asked, last, offset, payload[_HEADER.size : _HEADER.size + size]
@@ -117,7 +118,7 @@ class _Burst:
 
 @dataclass(slots=True)
 class _Sum:
-    """A checksum that is being counted."""
+    """A checksum that is being computed."""
 
     asked: Packet
     file: OpenFile
@@ -126,7 +127,7 @@ class _Sum:
 
 
 _Key = tuple[Peer, int]  # a client and one of its sessions
-# what is done afresh whenever it is asked: nothing changes by it
+# executed again when repeated, since these requests change nothing
 _REPEATABLE = frozenset((Op.NONE, Op.LIST, Op.READ, Op.BURST, Op.CHECKSUM))
 
 
@@ -142,7 +143,7 @@ class FtpService:
         self._replies: OrderedDict[Peer, OrderedDict[bytes, tuple[Packet, int]]] = OrderedDict()
 
     def receive(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Do what a client asks, and answer it."""
+        """Execute a client's request, and answer it."""
         payload = bytes(message.payload)
         asked = packet_of(payload)
         if asked.opcode in (Op.ACK, Op.NAK):
@@ -163,7 +164,7 @@ class FtpService:
         return [_message(reply, peer)]
 
     def next_timer(self) -> int:
-        """When `poll` has something to do, in us."""
+        """Time at which `poll` has something to do, in us."""
         if self._sums:
             return 0
         if not self._sessions:
@@ -173,9 +174,9 @@ class FtpService:
         return min(bursts, idle + IDLE_US)
 
     def poll(self, now_us: int) -> list[Output]:
-        """The packets of bursts whose time has come, and checksums; forgets idle sessions."""
+        """The packets of bursts that are due, and checksums; closes idle sessions."""
         outputs: list[Output] = []
-        if self._sums:  # one client's a tick, in turn: however many ask, a tick takes no longer
+        if self._sums:  # one client's per tick, in turn, so that many clients make no tick longer
             peer = next(iter(self._sums))
             self._sums[peer] = one = self._sums.pop(peer)
             outputs += self._count(peer, one)
@@ -187,7 +188,7 @@ class FtpService:
         return outputs
 
     def forget(self, link: Link) -> None:
-        """The link is gone, and all clients on it."""
+        """Forget all clients on a link that no longer exists."""
         for key in [key for key in self._sessions if key[0].link == link]:
             self._close(key)
         for peer in [peer for peer in self._replies if peer.link == link]:
@@ -198,8 +199,8 @@ class FtpService:
     # ---- requests
 
     def _do(self, asked: Packet, peer: Peer, now_us: int) -> Packet | None:
-        """The reply; None for a burst, whose packets are replies of their own, and a checksum, whose reply
-        comes when it is counted."""
+        """The reply; None for a burst, whose packets are the replies, and for a checksum, whose reply follows
+        when it is computed."""
         tree, data = self._tree, asked.data
         if asked.size > DATA_BYTES:
             raise FileError(Trouble.INVALID_DATA_SIZE)
@@ -296,7 +297,7 @@ class FtpService:
     # ---- checksums and bursts
 
     def _count(self, peer: Peer, one: _Sum) -> list[Output]:
-        """The next part of a checksum; its reply where it was the last."""
+        """Add the next part to a checksum; the reply after the last part."""
         try:
             data = self._tree.read(one.file, one.offset, SUMMED_AT_ONCE)
         except FileError as error:
@@ -339,13 +340,13 @@ class FtpService:
 
 
 def _listing(entries: list[Entry]) -> bytes:
-    """As many entries as go in, each ended by NUL; FileError END_OF_FILE behind the last."""
+    """As many entries as fit, each ended by NUL; FileError END_OF_FILE after the last entry."""
     listing = b""
     for entry in entries:
         text = f"D{entry.name}" if entry.is_folder else f"F{entry.name}\t{entry.size}"
         one = text.encode() + b"\0"
         if len(one) > DATA_BYTES:
-            one = b"S\0"  # a name too long to be told: skipped, but counted
+            one = b"S\0"  # a name too long for a reply is skipped, but counted
         if len(listing) + len(one) > DATA_BYTES:
             break
         listing += one
@@ -355,7 +356,7 @@ def _listing(entries: list[Entry]) -> bytes:
 
 
 def refusal_of(message: Any, peer: Peer) -> Any:
-    """The reply to a request that could not be done, for no fault of its own."""
+    """The reply to a request that could not be executed, through no fault of the client."""
     return _message(_refusal(packet_of(bytes(message.payload)), FileError(Trouble.FAIL)), peer).message
 
 

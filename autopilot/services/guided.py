@@ -1,8 +1,8 @@
 """Setpoints and sticks: messages that are repeated many times a second and are never acknowledged.
 
-What they ask becomes a request in ENU. A message that asks for nothing that can be flown is refused by a
-STATUSTEXT, once in COMPLAIN_US for each reason. Body axes are level, and those of the heading; a yaw that is
-no number is not asked for.
+Each message becomes a request in ENU. A message that requests nothing that can be flown is refused by a
+STATUSTEXT, once in COMPLAIN_US for each reason. Body axes are level and follow the heading; a yaw of NaN is
+ignored.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NO_YAW, _NO_YAW_RATE = 0x400, 0x800
 _RATE_BITS = 0x7  # of an attitude setpoint: about forward, right, down
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
-_NO_STICK = 32767  # INT16_MAX: the axis is not there
+_NO_STICK = 32767  # INT16_MAX: the axis does not exist
 
 _BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
 _LOCAL_FRAMES = (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_OFFSET_NED, *_BODY_FRAMES)
@@ -38,18 +38,18 @@ Asking = FollowSetpoint | FollowAttitude | FollowRates | FollowStick
 
 
 def _masked(values: tuple[float, float, float], mask: int, shift: int) -> Vec3:
-    """The values, NaN where the mask says to ignore them."""
+    """The values, NaN where a mask bit is set, which means to ignore the value."""
     n, e, d = (math.nan if mask >> (shift + i) & 1 else v for i, v in enumerate(values))
     return (n, e, d)
 
 
 def _asks_badly(values: tuple[float, float, float], mask: int, shift: int) -> bool:
-    """A number that is to be used and is none."""
+    """Whether a value that is to be used is not a finite number."""
     return any(not mask >> (shift + i) & 1 and not math.isfinite(v) for i, v in enumerate(values))
 
 
 def _heading(m: Any) -> float:
-    """Heading that a position setpoint asks for, from east to north; NaN: none."""
+    """Heading that a position setpoint requests, from east to north; NaN: none."""
     return math.nan if m.type_mask & _NO_YAW else 0.5 * math.pi - m.yaw
 
 
@@ -61,7 +61,7 @@ def _turning(m: Any) -> float:
 def _problem(m: Any, place: tuple[float, float, float]) -> str:
     """Why a position setpoint cannot be used, or an empty string."""
     mask = m.type_mask
-    # the bit says what an acceleration that is used means; MAVProxy sets it and uses none
+    # the bit makes the accelerations forces, if any is used; MAVProxy sets it and uses none
     if mask & _FORCE and mask & _ACCELERATION_BITS != _ACCELERATION_BITS:
         return "Setpoint refused: forces are not followed"
     if all(mask & bits == bits for bits in (_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS)):
@@ -122,8 +122,8 @@ def read_global(m: Any, home: Home) -> FollowSetpoint | Verdict:
 
 
 def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
-    """SET_ATTITUDE_TARGET: thrust axis and heading of the quaternion, or body rates without one; thrust as a
-    share."""
+    """SET_ATTITUDE_TARGET: thrust axis and heading of the quaternion, or body rates if there is no
+    quaternion; thrust as a share."""
     mask = m.type_mask
     if not mask & _NO_THRUST and not 0.0 <= m.thrust <= 1.0:
         return _refused("Attitude setpoint refused: thrust must be 0 ... 1")
@@ -145,7 +145,7 @@ def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
     # minus the third column of the rotation: NED
     up_ned = (-2.0 * (x * z + w * y), -2.0 * (y * z - w * x), -(w * w - x * x - y * y + z * z))
     upward = enu_from_ned(up_ned)
-    # the first column: forward, of which the level part
+    # heading of the level part of the first column, forward
     yaw = math.atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
     turning = math.nan if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE else -m.body_yaw_rate
     return FollowAttitude(upward, thrust, 0.5 * math.pi - yaw, turning)
@@ -165,7 +165,7 @@ def _refused(text: str) -> Verdict:
 
 
 class GuidedService:
-    """Turns setpoints and sticks into requests; says why where it cannot."""
+    """Turns setpoints and sticks into requests, or reports why it cannot."""
 
     def __init__(self, home: Home, system: int) -> None:
         self._home = home
@@ -185,7 +185,7 @@ class GuidedService:
         return self._ask(read_attitude(message), now_us, decide)
 
     def receive_stick(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """MANUAL_CONTROL, whose target is a system and has no component."""
+        """MANUAL_CONTROL, which addresses a system and has no target component."""
         if message.target not in (0, self._system):
             return []
         return self._ask(read_stick(message), now_us, decide)

@@ -1,4 +1,4 @@
-"""HEARTBEAT: that the vehicle is there, its mode, and whether its rotors may turn."""
+"""HEARTBEAT: the presence of the vehicle, its mode, and whether its rotors may turn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PROTOCOL_VERSION = 3  # HEARTBEAT.mavlink_version, the same since MAVLink 1
 
 
 def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink_heartbeat_message:
-    """The vehicle's HEARTBEAT; a mode that is not in the flavour's table is said as custom mode 0."""
+    """The vehicle's HEARTBEAT; a mode that is not in the flavour's table is reported as custom mode 0."""
     flavour = identity.flavour
     mode = flavour.mode(snapshot.main_mode, snapshot.sub_mode, snapshot.asked_mode)
     base_mode = mode.base_mode if mode else mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -35,7 +35,7 @@ def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink
 
 
 def load_heartbeat_message(snapshot: Snapshot) -> mavlink.MAVLink_heartbeat_message:
-    """HEARTBEAT of the load as a system of its own: no autopilot, nothing to command."""
+    """HEARTBEAT of the load as a separate system: no autopilot, nothing to command."""
     return _heartbeat_of(mavlink.MAV_TYPE_AIRSHIP, snapshot)
 
 

@@ -1,8 +1,8 @@
-"""Who the vehicle says it is: one table per flavour, so that the tools in the field know its modes.
+"""The identity that the vehicle reports: one table per flavour, so that common tools know its modes.
 
-Inside, a mode is PX4's pair (main, sub); a flavour says under which number it travels. Where several numbers
-of a flavour mean one pair, the one that was asked for is reported, else the first. A flavour is a promise
-about protocol habits (how modes are packed, what a take-off height means), not about whose code flies.
+Internally a mode is PX4's pair (main, sub); a flavour defines its number on the wire. If several numbers of a
+flavour mean one pair, the requested number is reported, else the first. A flavour determines protocol
+conventions (how modes are packed, what a take-off height means), not whose code flies.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = 2, 3, 4, 5, 6
 
 _AUTOMATIC = 4  # MAV_MODE_PROPERTY_AUTO_MODE
 
-# What the supervisor flies; the other names are known and refused
+# Modes that the supervisor flies; the other named modes are refused
 FLOWN = (
     (AUTO, AUTO_TAKEOFF),
     (AUTO, AUTO_LOITER),
@@ -46,7 +46,7 @@ FLOWN = (
     (OFFBOARD, 0),
     (POSCTL, 0),
 )
-# the modes that are named to whoever asks for another, the most useful first
+# modes that are suggested when a mode is refused, the most useful first
 _NAMED = (
     (AUTO, AUTO_LOITER),
     (AUTO, AUTO_MISSION),
@@ -55,7 +55,7 @@ _NAMED = (
     (POSCTL, 0),
     (OFFBOARD, 0),
 )
-# MAV_STANDARD_MODE of a pair, and its name for people
+# MAV_STANDARD_MODE of a pair
 _STANDARD = {
     (AUTO, AUTO_TAKEOFF): mavlink.MAV_STANDARD_MODE_TAKEOFF,
     (AUTO, AUTO_MISSION): mavlink.MAV_STANDARD_MODE_MISSION,
@@ -98,14 +98,14 @@ def _ardupilot(custom_mode: int, name: str, main: int, sub: int = 0) -> Mode:
 
 @dataclass(frozen=True)
 class Flavour:
-    """How one family of autopilots presents itself."""
+    """How one family of autopilots presents itself on the wire."""
 
     name: str
     autopilot: int  # MAV_AUTOPILOT
     modes: tuple[Mode, ...]
-    takeoff_above_home: bool  # NAV_TAKEOFF in COMMAND_LONG: height above home, else above sea level
+    takeoff_above_home: bool  # height of NAV_TAKEOFF in COMMAND_LONG: above home, else above sea level
     capabilities: int
-    release: tuple[int, int, int]  # whose protocol habits are claimed; clients refuse to work with old ones
+    release: tuple[int, int, int]  # whose protocol is followed; clients refuse to work with old releases
 
     @cached_property
     def _by_pair(self) -> dict[tuple[int, int], Mode]:
@@ -117,17 +117,17 @@ class Flavour:
 
     @property
     def home_is_item(self) -> bool:
-        """Item 0 of every mission is home, so that there always is one: ArduPilot's habit."""
+        """Whether item 0 of every mission is home, so that a mission always has an item, as in ArduPilot."""
         return self.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
     @property
     def heeds_yaw(self) -> bool:
-        """The yaw of a place to go to is flown: PX4's habit."""
+        """Whether the yaw of DO_REPOSITION is flown, as in PX4."""
         return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
     @property
     def modes_are_packed(self) -> bool:
-        """A mode's number is PX4's pair."""
+        """Whether the numbers of the modes are PX4's packed pairs."""
         return all(mode.custom_mode == mode.sub << 24 | mode.main << 16 for mode in self.modes)
 
     @cached_property
@@ -138,8 +138,7 @@ class Flavour:
         )
 
     def not_flown(self, what: str) -> str:
-        """What is wrong with a mode that was asked for, and names of others, as many as one STATUSTEXT has
-        room for."""
+        """Why a mode is refused (`what`), and as many names of other modes as fit into one STATUSTEXT."""
         text = f"{what}; use"
         for pair in _NAMED:
             longer = f"{text} {self._by_pair[pair].name}" if pair in self._by_pair else text
@@ -147,9 +146,9 @@ class Flavour:
         return text
 
     def mode(self, main: int, sub: int, asked: int | None = None) -> Mode | None:
-        """The mode of PX4's pair, under the number `asked` where that means the pair.
+        """The mode of PX4's pair, with the number `asked` if that means the pair.
 
-        AUTO without a sub-mode is AUTO.MISSION, as PX4 has it.
+        AUTO without a sub-mode is AUTO.MISSION, as in PX4.
         """
         if (main, sub) == (AUTO, 0):
             sub = AUTO_MISSION
@@ -163,7 +162,7 @@ class Flavour:
         return self._by_number.get(custom_mode)
 
     def mode_of_standard(self, standard: int) -> Mode | None:
-        """The mode that can be flown of this MAV_STANDARD_MODE."""
+        """The mode with this MAV_STANDARD_MODE that can be flown."""
         return next((mode for mode in self.flown if mode.standard == standard != 0), None)
 
 
@@ -209,7 +208,7 @@ ARDUPILOT = Flavour(
     name="ardupilot",
     autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
     modes=(
-        # GUIDED is where take-off, "go there" and holding happen; in a request it means holding
+        # GUIDED comprises take-off, "go there" and holding; in a request it means holding
         _ardupilot(ARDUPILOT_GUIDED, "GUIDED", AUTO, AUTO_LOITER),
         _ardupilot(5, "LOITER", AUTO, AUTO_LOITER),
         _ardupilot(17, "BRAKE", AUTO, AUTO_LOITER),
@@ -242,7 +241,7 @@ FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, GENERIC)}
 
 @dataclass(frozen=True, slots=True)
 class ParameterEncoding:
-    """How parameters travel: all as REAL32, or whole-numbered ones as INT32, by their bits or their value."""
+    """How parameters are transferred: all as REAL32, or whole numbers as INT32, by bits or by value."""
 
     integers: bool
     bytewise: bool
@@ -253,23 +252,23 @@ ALL_REAL = ParameterEncoding(False, False)
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Ids on the wire and the flavour. `load_system` 0: the load is no MAVLink system of its own."""
+    """Ids on the wire and the flavour. `load_system` 0: the load is not a separate MAVLink system."""
 
     system: int = 1
     flavour: Flavour = PX4
     version: tuple[int, int, int] = (0, 1, 0)  # of this program
     load_system: int = 0
-    integers: bool = False  # whole-numbered parameters travel as INT32
-    rotors: int = 4  # how many the vehicle has
+    integers: bool = False  # whole-numbered parameters are transferred as INT32
+    rotors: int = 4  # number of rotors
 
     @property
     def parameter_encoding(self) -> ParameterEncoding:
-        """Bit by bit or by value, as the capabilities say."""
+        """By bits or by value, as the capabilities state."""
         return ParameterEncoding(self.integers, bool(self.flavour.capabilities & _BYTEWISE))
 
 
 def identity_of(table: AutopilotParameters) -> Identity:
-    """The identity that the parameters ask for; a load under the vehicle's own id is no system of its own."""
+    """The identity that the parameters request; a load with the vehicle's own id is not a separate system."""
     system, load = int(table["MAV_SYS_ID"]), int(table["MAV_LOAD_SYS_ID"])
     flavour = tuple(FLAVOURS.values())[int(table["MAV_IDENTITY"])]
     integers = table["MAV_PARAM_INT"] > 0.0
@@ -294,7 +293,7 @@ def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_availa
 
 
 def protocol_version_message() -> mavlink.MAVLink_protocol_version_message:
-    """PROTOCOL_VERSION: MAVLink 2 is spoken, MAVLink 1 understood."""
+    """PROTOCOL_VERSION: MAVLink 2 is sent, MAVLink 1 is understood."""
     nothing = (0,) * 8
     return mavlink.MAVLink_protocol_version_message(200, 100, 200, nothing, nothing)
 
@@ -306,7 +305,7 @@ def _version_word(version: tuple[int, int, int]) -> int:
 
 
 def autopilot_version_message(identity: Identity) -> mavlink.MAVLink_autopilot_version_message:
-    """AUTOPILOT_VERSION: what the vehicle can do, and which releases speak."""
+    """AUTOPILOT_VERSION: the capabilities of the vehicle, and the versions."""
     nothing = (0,) * 8
     return mavlink.MAVLink_autopilot_version_message(
         capabilities=identity.flavour.capabilities,

@@ -1,7 +1,7 @@
-"""What telemetry and the flight log say many times a second of one instant, as a record that kernels read.
+"""The values of one instant that telemetry and flight log report many times a second, as a record.
 
-Its fields are those of `Snapshot` with the same names. The functions below take either: which numbers of the
-flight a message has stands once, for the streams that are written in machine code and for all else.
+Its fields are those of `Snapshot` with the same names. The functions below take either record: the numbers
+that a message contains are defined once, for the streams that are written in machine code and for all others.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Instant(NamedTuple):
 
 @register_jitable
 def attitude_of(s: Any) -> tuple[float, ...]:
-    """ATTITUDE of an instant, its numbers in the order of the wire; so are all of these."""
+    """ATTITUDE of an instant: its numbers in the order of the wire, as in all functions below."""
     return attitude_values(s.now_us, s.quat_wxyz, s.omega_body)
 
 
@@ -131,7 +131,7 @@ def altitude_of(s: Any, home: Home) -> tuple[float, ...]:
 
 @register_jitable
 def force_share(force: float, s: Any) -> float:
-    """Share of what one rotor can give; a rotor without limit counts as the nominal one."""
+    """A force as a share of a rotor's maximum; for a rotor without limit, of the nominal maximum."""
     return force / (s.rotor_max if 0.0 < s.rotor_max < math.inf else ROTOR_FMAX)
 
 
@@ -147,7 +147,7 @@ def vfr_hud_of(s: Any, home: Home) -> tuple[float, ...]:
 
 @register_jitable
 def position_target_local_ned_of(s: Any) -> tuple[float, ...]:
-    """POSITION_TARGET_LOCAL_NED; there is none where the vehicle is wanted nowhere, and `x_quad_d` is NaN."""
+    """POSITION_TARGET_LOCAL_NED; not sent while there is no position setpoint of the vehicle (NaN)."""
     return position_target_local_ned_values(s.now_us, s.x_quad_d, ZERO, ZERO)
 
 
@@ -174,7 +174,7 @@ def servo_output_raw_of(s: Any) -> tuple[float, ...]:
 
 @register_jitable
 def pulses_of(s: Any) -> tuple[int, ...]:
-    """The pulse of each of the most rotors, us; 0 for those that there are not."""
+    """The pulse of each of the 14 possible rotors, us; 0 for a rotor that the vehicle does not have."""
     return (
         _pulse_us(0, s),
         _pulse_us(1, s),
@@ -195,7 +195,7 @@ def pulses_of(s: Any) -> tuple[int, ...]:
 
 @register_jitable
 def debug_vectors_of(s: Any) -> tuple[Vec3, Vec3, Vec3, Vec3]:
-    """NED, what the DEBUG_VECT of `DEBUG_VECTORS` say."""
+    """The vectors of the DEBUG_VECT messages named in `DEBUG_VECTORS`, NED."""
     return (
         ned_from_enu(s.x_load),
         ned_from_enu(s.v_load),
@@ -206,7 +206,7 @@ def debug_vectors_of(s: Any) -> tuple[Vec3, Vec3, Vec3, Vec3]:
 
 @register_jitable
 def named_values_of(s: Any) -> tuple[float, float, float, float, float]:
-    """What the NAMED_VALUE_FLOAT of `NAMED_VALUES` say."""
+    """The values of the NAMED_VALUE_FLOAT messages named in `NAMED_VALUES`."""
     down = -s.q_cable[2]
     if not down < 1.0:
         down = 1.0

@@ -1,4 +1,4 @@
-"""One way to clients: its streams, its sequence counters, and what waits to be sent."""
+"""One link to clients: its streams, its sequence counters, and the messages that wait to be sent."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from autopilot.wire.signing import Sign
 
 DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
 
-SignerOf = Callable[[int], Sign | None]  # what signs the frames of a link, by its number
+SignerOf = Callable[[int], Sign | None]  # the signer of the frames of a link, by its number
 
-Outgoing = tuple[Source, Any]  # who speaks, and what
+Outgoing = tuple[Source, Any]  # sender and message
 
 
 class LinkState:
-    """What the endpoint keeps for a link; a new one begins with a HEARTBEAT."""
+    """The endpoint's data of a link; a new link begins with a HEARTBEAT."""
 
     __slots__ = (
         "announced",
@@ -45,7 +45,7 @@ class LinkState:
         system: int,
         home: Home,
     ) -> None:
-        self.number = number  # that signatures bear
+        self.number = number  # in the signatures
         self.signer = signer
         self.heard_us = now_us
         self.streams = Streams(defaults, now_us)
@@ -53,7 +53,7 @@ class LinkState:
         own, dialect = self.writer((system, AUTOPILOT_COMPONENT)), self.writer((system, DIALECT_COMPONENT))
         self.frames = StreamFrames(own, dialect, home)
         self.queue: list[Outgoing] = []  # answers
-        # streamed messages out of turn, in their order
+        # streamed messages to be sent out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
 
     def frame(self, source: Source, message: Any) -> bytes:
@@ -61,15 +61,15 @@ class LinkState:
         return self.writer(source).frame(message, self.signer(self.number))
 
     def writer(self, source: Source) -> FrameWriter:
-        """What writes the frames of a source on this link."""
+        """The writer of the frames of a source on this link."""
         writer = self.writers.get(source)
         if writer is None:
             writer = self.writers[source] = FrameWriter(*source)
         return writer
 
     def datagrams(self, outgoing: Iterable[Outgoing | int], instant: Row) -> list[bytes]:
-        """Frames in their order, as many in a datagram as go in. A number is a set of streams of `instant`,
-        as `StreamFrames` has them; of a link that signs there must be none."""
+        """Frames in their order, as many in a datagram as fit. A number is a set of streams of `instant` as
+        in `StreamFrames`; a link that signs must not have any."""
         sign, writers = self.signer(self.number), self.writers
         pieces: list[bytes] = []
         for one in outgoing:
@@ -83,7 +83,7 @@ class LinkState:
 
 
 def _packed(frames: Iterable[bytes]) -> list[bytes]:
-    """Datagrams of these frames in their order, as many in each as go in."""
+    """Datagrams of these frames in their order, as many in each as fit."""
     datagrams: list[bytes] = []
     together: list[bytes] = []
     size = 0

@@ -1,14 +1,15 @@
-"""The flight logs on the card, by the LOG_ messages: list, download, erase.
+"""The flight logs on the card, served by the LOG_ messages: list, download, erase.
 
-Logs are numbered from 0 in the order of their names. A client may have several ranges of one log on order,
-as MAVProxy does for what it missed; one that lies within another is not sent twice (MAVSDK orders the rest of
-a range anew with every block of it). Blocks go out at a steady pace. A range that reaches beyond the end of
-the log ends with a block of fewer than 90 bytes, an empty one where the log is a multiple of that.
+Logs are numbered from 0 in the order of their names. A client may request several ranges of one log, as
+MAVProxy does for missed blocks; a range within another requested range is not sent twice (MAVSDK requests the
+rest of a range again with every block of it). Blocks are sent at a steady pace. A range that extends beyond
+the end of the log ends with a block of fewer than 90 bytes, which is empty if the log is a multiple of that.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +21,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 BLOCK = 90  # LOG_DATA.data
 PACE_US = 250  # between two blocks: 360 kB/s
-AT_ONCE = 32  # of them in one tick
+AT_ONCE = 32  # blocks in one tick
 MOST_RANGES = 32
 MOST_CLIENTS = 16
 _UINT32 = 2**32 - 1
@@ -28,7 +29,7 @@ _UINT32 = 2**32 - 1
 
 @dataclass(slots=True)
 class _Client:
-    """What one client still waits for."""
+    """Entries and ranges for which a client still waits."""
 
     entries: deque[Any] = field(default_factory=deque)
     log: int = -1
@@ -48,7 +49,7 @@ class LogService:
         self._clients: dict[Peer, _Client] = {}
 
     def receive_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """LOG_REQUEST_LIST: an entry for each log of the range, or one that says that there are none."""
+        """LOG_REQUEST_LIST: an entry for each log of the range, or one that states that there are no logs."""
         logs = self._logs()
         if not logs:
             return [Send(peer.link, mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))]
@@ -64,14 +65,14 @@ class LogService:
         return []
 
     def receive_data(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """LOG_REQUEST_DATA: order a range."""
+        """LOG_REQUEST_DATA: add a range to those to be sent."""
         logs = self._logs()
         if message.id >= len(logs):
             return [Send(peer.link, _block(message.id, message.ofs, b""))]
         client = self._client(peer, now_us)
         wanted = (message.ofs, message.ofs + message.count)
         if client.log != message.id or wanted[1] >= logs[message.id].size:
-            client.ranges.clear()  # another log, or all that is left of this one
+            client.ranges.clear()  # another log, or the whole rest of this one
         client.log = message.id
         on_order = any(start <= wanted[0] and wanted[1] <= end for start, end in client.ranges)
         if not on_order and len(client.ranges) < MOST_RANGES:
@@ -79,33 +80,28 @@ class LogService:
         return []
 
     def receive_end(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """LOG_REQUEST_END: the client wants no more."""
+        """LOG_REQUEST_END: stop sending to the client."""
         self._clients.pop(peer, None)
         return []
 
     def receive_erase(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """LOG_ERASE: all logs but the one that is being written."""
-        kept = 0
+        """LOG_ERASE: remove all logs except the one that is being written."""
         for log in self._logs():
             path = (*LOG_FOLDER, log.name)
-            try:
-                if path == self._tree.protected:
-                    kept += 1
-                else:
+            if path != self._tree.protected:
+                with suppress(FileError):  # its entry in the next list tells that it is still there
                     self._tree.card.remove(path)
-            except FileError:
-                kept += 1
         self._clients.clear()
         return []
 
     def next_timer(self) -> int:
-        """When `poll` has something to send, in us."""
+        """Time at which `poll` has something to send, in us."""
         if not self._clients:
             return NEVER_US
         return min((client.due_us for client in self._clients.values() if client.waiting), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
-        """Entries and blocks whose time has come."""
+        """Entries and blocks that are due."""
         outputs: list[Output] = []
         for peer, client in list(self._clients.items()):
             if not client.waiting or client.due_us > now_us:
@@ -120,7 +116,7 @@ class LogService:
         return outputs
 
     def forget(self, link: Link) -> None:
-        """The link is gone, and all clients on it."""
+        """Forget all clients on a link that no longer exists."""
         for peer in [peer for peer in self._clients if peer.link == link]:
             del self._clients[peer]
 
@@ -129,12 +125,12 @@ class LogService:
         if not client.waiting:
             client.due_us = now_us
         if len(self._clients) >= MOST_CLIENTS:
-            del self._clients[next(iter(self._clients))]  # the one that asked longest ago
+            del self._clients[next(iter(self._clients))]  # the client whose last request is oldest
         self._clients[peer] = client
         return client
 
     def _blocks(self, client: _Client, budget: int) -> list[Any]:
-        """At most `budget` blocks of what is on order."""
+        """At most `budget` blocks of the requested ranges."""
         logs = self._logs()
         if client.log >= len(logs):
             client.ranges.clear()

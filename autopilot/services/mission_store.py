@@ -2,8 +2,8 @@
 
     magic "PLMI" | uint16 version | uint16 count | count records | uint32 CRC-32 of all before
 
-little-endian; a record is MISSION_ITEM_INT without its addresses, so what is read back is bit for bit what a
-ground station uploaded, NaN included.
+little-endian. A record is MISSION_ITEM_INT without its addresses, so the items that are read back equal the
+uploaded ones bit for bit, NaN included.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class StoredMission:
 
 @dataclass(frozen=True, slots=True)
 class CorruptMission:
-    """Stored bytes that are no mission, and why."""
+    """Stored bytes that are not a mission, and the reason."""
 
     reason: str
 
@@ -61,7 +61,7 @@ def serialise(items: tuple[WireItem, ...]) -> bytes:
 
 
 def plan_id(items: tuple[WireItem, ...]) -> int:
-    """Number of this version of a plan, the same after a restart; 0: there is none."""
+    """Number of this version of a plan, the same after a restart; 0: there is no plan."""
     if not items:
         return 0
     check: int = _CHECK.unpack(serialise(items)[-_CHECK.size :])[0]
@@ -69,7 +69,7 @@ def plan_id(items: tuple[WireItem, ...]) -> int:
 
 
 def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
-    """The mission in `data`; anything but what `serialise` wrote is `CorruptMission`."""
+    """The mission in `data`; `CorruptMission` if `serialise` did not write it."""
     items = deserialise_items(data)
     if isinstance(items, CorruptMission):
         return items

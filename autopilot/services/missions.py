@@ -1,19 +1,20 @@
-"""The mission protocol: upload as a state machine, download without any state, clear, and what is refused.
+"""The mission protocol: upload as a state machine, download without any state, clear, and refusals.
 
-Upload, seen from here (one at a time; the old mission stays in force until the last item is in and checked):
+Upload, seen from the vehicle (one at a time; the old mission stays in force until all items have arrived and
+are checked):
 
     idle       COUNT n > 0          ask for item 0                        -> receiving
-    receiving  item asked for       ask for the next one                  -> receiving
+    receiving  requested item       ask for the next one                  -> receiving
                the last item        check all; ACK; mission replaced      -> idle
                an item before it    nothing (a duplicate)                 -> receiving
-               an item behind it    ask again for the one that is missing -> receiving
+               an item after it     ask again for the missing one         -> receiving
                COUNT, same peer     begin again                           -> receiving
                anything, other peer DENIED for its COUNT, else nothing    -> receiving
-               ACK from the peer    it has given up                       -> idle
+               ACK from the peer    the peer has given up                 -> idle
                silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
 
-The ACK that ends an upload is sent once where no message was lost. Where an item had to be asked for again
-it is repeated, until the peer says anything more about missions: some clients never ask for it.
+The ACK that ends an upload is sent once if no message was lost. If an item had to be requested again, the ACK
+is repeated until the peer sends another mission message: some clients never ask for a lost ACK.
 
 Fence and rally points are transferred in the same way, one transfer at a time of any kind.
 """
@@ -44,13 +45,13 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
-ASK_US = 250_000  # an item that was asked for is asked for again after this silence, as by PX4
-MAX_ASKS = 20  # times that one item is asked for: a link that loses a third each way fails 1 in 10^6 items
-# Times that the first item is asked for as MISSION_ITEM_INT, before a client that knows only MISSION_ITEM
-# (DroneKit) is taken to be there. Never asked the other way round: MAVSDK cancels on a MISSION_REQUEST.
+ASK_US = 250_000  # after this silence a requested item is requested again, as PX4 does
+MAX_ASKS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
+# Requests for the first item as MISSION_ITEM_INT, after which the client is assumed to know only MISSION_ITEM
+# (DroneKit). Never in the other order: MAVSDK cancels on a MISSION_REQUEST.
 INT_ASKS = 6
 ECHOES = 3  # repetitions of the last ACK on a link that loses messages
-ECHO_US = 600_000  # between two of them
+ECHO_US = 600_000  # between two repetitions
 LATE_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
@@ -63,7 +64,7 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
 }
 
 _NO_INT = 2**31 - 1
-_GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to go to at once
+_GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to fly to immediately
 _ABOVE_HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _GLOBAL_FRAMES = (*_ABOVE_HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _LOCAL_FRAMES = (
@@ -82,31 +83,31 @@ class _Upload:
     count: int
     ask_again_us: int
     kind: int = _MISSION
-    asks: int = 1  # times that the next item was asked for
-    lossy: bool = False  # an item had to be asked for again
-    as_float: bool = False  # the client speaks MISSION_ITEM
+    asks: int = 1  # how often the next item was requested
+    lossy: bool = False  # an item had to be requested again
+    as_float: bool = False  # the client uses MISSION_ITEM
     items: list[WireItem] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
 class _Ended:
-    """The transfer that ended last, to answer its last item again."""
+    """The transfer that ended last, kept to answer its last item again."""
 
     peer: Peer
     count: int
     result: int
     at_us: int
     kind: int
-    echoes: int = 0  # times that its ACK is still to be sent
+    echoes: int = 0  # how often its ACK is still to be sent
     echo_us: int = NEVER_US
 
 
 class MissionService:
     """Holds the mission and serves it to any number of links.
 
-    `home_is_item`: where there is no mission, home is served as its only item. Clients of ArduPilot wait for
-    ever for a mission without items, and begin what they upload with the item 0 that they were served, or
-    with the home of the file that they read, which may be another: a waypoint as item 0 is taken for home.
+    `home_is_item`: if there is no mission, home is served as its only item, and a waypoint uploaded as item 0
+    is replaced by home. Clients of ArduPilot wait for ever for a mission without items. They begin an upload
+    with the item 0 that was served to them, or with the home in the file that they read, which may differ.
     """
 
     def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
@@ -116,7 +117,7 @@ class MissionService:
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
         self._ended: _Ended | None = None
-        self._numbered: tuple[tuple[WireItem, ...], ...] = ((), (), ())  # that `_plan_ids` were made of
+        self._numbered: tuple[tuple[WireItem, ...], ...] = ((), (), ())  # items that `_plan_ids` identify
         self._plan_ids = (0, 0, 0)
 
     @property
@@ -171,13 +172,13 @@ class MissionService:
         return []
 
     def next_timer(self) -> int:
-        """When `poll` has something to do, in us."""
+        """Time at which `poll` has something to do, in us."""
         if self._upload:
             return self._upload.ask_again_us
         return self._ended.echo_us if self._ended else NEVER_US
 
     def poll(self, now_us: int) -> list[Output]:
-        """Ask again for an item that has not come, or give the upload up; say again that it has ended."""
+        """Request a missing item again, or give up the upload; repeat the ACK of an ended upload."""
         upload, ended = self._upload, self._ended
         if upload is None and ended and now_us >= ended.echo_us:
             left = ended.echoes - 1
@@ -233,7 +234,7 @@ class MissionService:
         return self._complete(upload, now_us, decide)
 
     def _go_there(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
-        """A single waypoint outside any upload: ArduPilot's way to say "go there"."""
+        """A single waypoint outside any upload, which is ArduPilot's "go there"."""
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
         east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)
@@ -245,7 +246,7 @@ class MissionService:
         return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED)]
 
     def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
-        """All items are here: check them as a whole, and only then replace the mission."""
+        """All items have arrived: check them as a whole, and only then replace the mission."""
         items, kind = tuple(upload.items), upload.kind
         if self._item_of_home and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
             items = (*self._item_of_home, *items[1:])
@@ -269,7 +270,7 @@ class MissionService:
         return [Settled(_upload_of(kind)), *replaced, self._accepted(upload.peer, kind)]
 
     def _accepted(self, peer: Peer, kind: int) -> Output:
-        """The acknowledgement of a plan that is in force by now."""
+        """The acknowledgement of a plan that is now in force."""
         return _ack(peer, _ACCEPTED, kind, self._plan_id(kind))
 
     def _late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
@@ -298,7 +299,7 @@ class MissionService:
             self._ended = replace(self._ended, echoes=ECHOES, echo_us=now_us + ECHO_US)
 
     def _hush(self, peer: Peer) -> None:
-        """The peer goes on: it need not be told again how its upload ended."""
+        """The peer has sent another mission message: stop repeating the ACK of its upload."""
         if self._ended and self._ended.peer == peer:
             self._ended = replace(self._ended, echoes=0, echo_us=NEVER_US)
 
@@ -365,7 +366,7 @@ class MissionService:
     # ---- download
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """MISSION_REQUEST_LIST: how many items there are, told to the asker alone."""
+        """MISSION_REQUEST_LIST: send the number of items to the requesting client only."""
         self._hush(peer)
         kind = message.mission_type
         if kind != _MISSION and kind not in _AREAS:
@@ -377,17 +378,17 @@ class MissionService:
         return [Send(peer.link, answer)]
 
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
-        """All items of a kind; none of a kind that does not exist."""
+        """All items of a kind; empty for an unknown kind."""
         if kind == _MISSION:
             return self.mission.items or self._item_of_home
         return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """MISSION_REQUEST_INT: any item in any order, as often as asked."""
+        """MISSION_REQUEST_INT: any item in any order, as often as requested."""
         return self._download(message, peer, mavlink.MAVLink_mission_item_int_message, _coordinates_as_int)
 
     def receive_request(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """MISSION_REQUEST, answered in the older form."""
+        """MISSION_REQUEST, answered by MISSION_ITEM, the older form."""
         return self._download(message, peer, mavlink.MAVLink_mission_item_message, _coordinates_as_float)
 
     def _download(self, message: Any, peer: Peer, answer: Any, coordinates: Any) -> list[Output]:
@@ -433,7 +434,7 @@ def _home_item(home: Home) -> WireItem:
 
 
 def _upload_of(kind: int) -> tuple[str, int]:
-    """What a refusal of items of this kind is about."""
+    """The `about` of a refusal of items of this kind."""
     return "upload", kind
 
 
@@ -459,7 +460,7 @@ def _item_of_int(m: Any) -> WireItem:
 
 
 def _scale(frame: int) -> float:
-    """What a float coordinate is multiplied with to become the integer of MISSION_ITEM_INT."""
+    """Factor by which a float coordinate becomes the integer of MISSION_ITEM_INT."""
     if frame == mavlink.MAV_FRAME_MISSION:
         return 1.0
     return _METRE_SCALE if frame in _LOCAL_FRAMES else _DEGREE_SCALE
@@ -473,7 +474,7 @@ def _int_coordinate(value: float, scale: float) -> int | None:
 
 
 def _item_of_float(m: Any) -> WireItem | None:
-    """The item with integer coordinates; None where they are beyond the range."""
+    """The item with integer coordinates; None if they are out of range."""
     scale = _scale(m.frame)
     x, y = _int_coordinate(m.x, scale), _int_coordinate(m.y, scale)
     if x is None or y is None:

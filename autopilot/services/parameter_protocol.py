@@ -1,12 +1,13 @@
-"""The parameter protocol: list, read and set of a `ParameterTable`, every value a float32, or whole numbers
-an INT32 where the identity says so.
+"""The parameter protocol: list, read and set of a `ParameterTable`. Every value is a float32; with the
+corresponding identity, whole numbers are an INT32.
 
-Lists go out at a steady pace for each link; whoever misses an index asks for it again. A set is answered with
-the value that is really stored, to every link if it is a new one, so that no ground station shows an old one.
-One of the simulator's is answered when that has said what holds: it alone knows the range.
+Lists are sent at a steady pace on each link; a client that misses an index requests it again. A set is
+answered with the value that is actually stored, to every link if the value has changed, so that no ground
+station shows an old value. The set of a simulator's parameter is answered when the simulator has reported the
+value in force, since only the simulator knows the range.
 
-Where values travel by their bits, as from PX4, a list begins with PX4's `_HASH_CHECK`: a ground station that
-has kept parameters of this hash sends it back, and the list ends there.
+If values are transferred by their bits, as by PX4, a list begins with PX4's `_HASH_CHECK`: a ground station
+that has stored parameters with this hash sends it back, and the list ends there.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from autopilot.wire.parameter_table import ParameterError, ParameterTable, float
 
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
 LIST_PACE_US = 2000  # between two values of a list: 500 a second
-LIST_BURST = 8  # of them at once, where ticks are longer than that
+LIST_BURST = 8  # values at once, if ticks are longer than that
 
 # MAV_PARAM_ERROR; the last is newer than the dialect's copy of the enum
 DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
@@ -51,7 +52,7 @@ _TYPE_NAMES = {mavlink.MAV_PARAM_TYPE_REAL32: "REAL32", mavlink.MAV_PARAM_TYPE_I
 
 
 class _HashValue(mavlink.MAVLink_param_value_message):
-    """PARAM_VALUE with a UINT32 in the field of the float; as a float, some would not keep their bits."""
+    """PARAM_VALUE with a UINT32 in the field of the float; as a float, some values would lose their bits."""
 
     unpacker = struct.Struct("<IHH16sB")
 
@@ -64,14 +65,14 @@ class ParameterService:
 
     def __init__(self, table: ParameterTable, encoding: ParameterEncoding = ALL_REAL) -> None:
         self.table = table
-        self.world_silent = False  # the simulator, so that nothing can be set in it
+        self.world_silent = False  # the simulator is silent, so that its parameters cannot be set
         self._encoding = encoding
-        self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
-        self._complete = True  # the table: no more parameters will be learned
+        self._lists: dict[Link, tuple[int, int]] = {}  # next index, and its time
+        self._complete = True  # no more parameters will be learned
         self._hash: tuple[int, int] = (-1, 0)  # version of the table, and its hash
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Begin the list for this link, from the start if one is under way; then without the hash."""
+        """Begin the list for this link; if one is under way, begin it again without the hash."""
         self._lists[peer.link] = (0 if peer.link in self._lists else self._begin, now_us)
         return []
 
@@ -88,9 +89,9 @@ class ParameterService:
         return [no_such_parameter(message.param_id, index, peer)]
 
     def receive_set(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Store a value, or say why not; either way the answer is the value in force."""
+        """Store a value, or report why not; in both cases the answer is the value in force."""
         name = message.param_id
-        if name == HASH_NAME and self._encoding.bytewise:  # it has our parameters already
+        if name == HASH_NAME and self._encoding.bytewise:  # the ground station already has our parameters
             self._lists.pop(peer.link, None)
             return []
         if name not in self.table:
@@ -118,7 +119,7 @@ class ParameterService:
         return [Send(None, self.value_message(name)), ParameterChanged(name, after)]
 
     def reset(self) -> list[Output]:
-        """Every parameter back to its default, but for those that are fixed while running."""
+        """Reset every parameter to its default, except those that are fixed while running."""
         outputs: list[Output] = []
         count = kept = 0
         for name, value in self.table.changed().items():
@@ -141,9 +142,9 @@ class ParameterService:
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
 
     def fail_parts(self, name: str, bits: int, fail: bool) -> WorldAsked | str:
-        """Let fail or work what these bits of a simulator's parameter stand for; a text says why it cannot.
+        """Make the parts behind these bits of a simulator's parameter fail or work; a text if it cannot.
 
-        The value is in our table at once, so that commands which follow each other at once add up.
+        The value is in our table immediately, so that commands in quick succession add up.
         """
         if name not in self.table.learned:
             return f"the simulator has told of no {name}"
@@ -153,7 +154,7 @@ class ParameterService:
         return WorldAsked(name, self.table.set(name, before | bits if fail else before & ~bits))
 
     def world(self) -> WorldSaved:
-        """What the simulator's parameters are now."""
+        """The present values of the simulator's parameters."""
         return WorldSaved({name: self.table[name] for name in sorted(self.table.learned)})
 
     def value_message(self, name: str) -> Any:
@@ -165,11 +166,11 @@ class ParameterService:
 
     @property
     def _begin(self) -> int:
-        """With what a list begins."""
+        """The index with which a list begins."""
         return _HASH_INDEX if self._encoding.bytewise else 0
 
     def _hash_message(self) -> Any:
-        """PARAM_VALUE of the hash: PX4's, over names and values in the order of the names."""
+        """PARAM_VALUE of PX4's hash over names and values in the order of the names."""
         table = self.table
         if self._hash[0] != table.version:
             parts = []
@@ -190,18 +191,18 @@ class ParameterService:
         self._complete = False
 
     def complete(self, now_us: int) -> None:
-        """The table is complete: lists that were asked for begin."""
+        """The table is complete: requested lists begin."""
         self._complete = True
         self._lists = dict.fromkeys(self._lists, (self._begin, now_us))
 
     def next_timer(self) -> int:
-        """When `poll` has something to send, in us."""
+        """Time at which `poll` has something to send, in us."""
         if not self._complete:
             return NEVER_US
         return min((at_us for _, at_us in self._lists.values()), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
-        """The values of the lists under way whose time has come."""
+        """The values that are due of the lists under way."""
         outputs: list[Output] = []
         if not self._complete:
             return outputs
@@ -220,7 +221,7 @@ class ParameterService:
         return outputs
 
     def forget(self, link: Link) -> None:
-        """The link is gone: no list for it."""
+        """Stop the list for a link that no longer exists."""
         self._lists.pop(link, None)
 
     def _refused(self, name: str, error: int, why: str, peer: Peer) -> list[Output]:
@@ -232,7 +233,7 @@ class ParameterService:
 
 
 def no_such_parameter(name: str, index: int, peer: Peer) -> Output:
-    """PARAM_ERROR for a parameter that whoever was addressed does not have."""
+    """PARAM_ERROR for a parameter that the addressed component does not have."""
     return _error(name, index, DOES_NOT_EXIST, peer)
 
 

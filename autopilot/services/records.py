@@ -1,8 +1,8 @@
-"""What the services say to each other and to the shell: plain records, no behaviour.
+"""Records that the services exchange with each other and with the shell; they have no behaviour.
 
-A service takes a message, the peer it came from and `now_us`; it returns outputs. `Send` and `Say` go out on
-the wire, `Announce` asks for messages that are made from the next snapshot, and the rest are events for the
-shell, named as facts.
+A service takes a message, the peer that sent it and `now_us`; it returns outputs. `Send` and `Say` are sent
+on the wire, `Announce` requests messages that are built from the next snapshot, `Settled` is for the kept
+texts, and the rest are events for the shell, named as facts.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 from autopilot.services.mission_store import StoredMission
 from autopilot.wire.items import WireItem
 
-Link = Hashable  # opaque name of a way to a client, chosen by the shell
+Link = Hashable  # opaque name of a connection to a client, chosen by the shell
 
 
-Source = tuple[int, int]  # system and component that speak
+Source = tuple[int, int]  # system and component that send
 
 
 class Peer(NamedTuple):
-    """Who sent a message, over which link, and to which part of the vehicle (None: the autopilot), which is
-    the one to answer."""
+    """The sender of a message, its link, and the part of the vehicle to which it was addressed (None: the
+    autopilot), which answers it."""
 
     link: Link
     system: int
@@ -32,7 +32,7 @@ class Peer(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """A message for one link, or for all of them (None), by a part of the vehicle (None: the autopilot)."""
+    """A message for one link, or for all links (None), from a part of the vehicle (None: the autopilot)."""
 
     link: Link | None
     message: Any
@@ -43,7 +43,8 @@ class Send:
 class Say:
     """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug).
 
-    A refusal says what it is `about`, a command or an upload: it counts until that is accepted (`Settled`).
+    A refusal states what it is `about`, a command or an upload: it is a warning until that is accepted
+    (`Settled`).
     """
 
     severity: int
@@ -53,14 +54,14 @@ class Say:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """What was refused before is accepted now: the refusals `about` it are no warnings any more."""
+    """A command or upload that was refused before is now accepted: its refusals are no longer warnings."""
 
     about: Hashable
 
 
 @dataclass(frozen=True, slots=True)
 class Announce:
-    """Send these streamed messages once, out of turn, to one link or to all of them (None)."""
+    """Send these streamed messages once, out of turn, to one link or to all links (None)."""
 
     link: Link | None
     message_ids: tuple[int, ...]
@@ -76,7 +77,8 @@ class ParameterChanged:
 
 @dataclass(frozen=True, slots=True)
 class WorldAsked:
-    """A parameter of the simulator is to be `value`; what it then says is what holds, and is told."""
+    """A parameter of the simulator is to be set to `value`; the value that the simulator then reports is in
+    force and is sent to the ground stations."""
 
     name: str
     value: float
@@ -84,7 +86,7 @@ class WorldAsked:
 
 @dataclass(frozen=True, slots=True)
 class MissionChanged:
-    """A whole mission was accepted in place of the last one, or the mission was cleared (no items)."""
+    """A whole mission was accepted in place of the previous one, or the mission was cleared (no items)."""
 
     mission: StoredMission
 
@@ -99,7 +101,7 @@ class AreasChanged:
 
 @dataclass(frozen=True, slots=True)
 class TimesyncAnswered:
-    """A peer answered our TIMESYNC: both stamps as they stand in its message, ns."""
+    """A peer answered our TIMESYNC: both time stamps of its message, ns."""
 
     link: Link
     tc1: int
@@ -108,7 +110,8 @@ class TimesyncAnswered:
 
 @dataclass(frozen=True, slots=True)
 class SigningChanged:
-    """To be stored before more is sent: the key (None: no more), and a time later than any in use."""
+    """The signing key (None: signing is off) and a time stamp later than any in use, to be stored before more
+    is sent."""
 
     key: bytes | None = field(repr=False)
     timestamp: int
@@ -116,19 +119,19 @@ class SigningChanged:
 
 @dataclass(frozen=True, slots=True)
 class ParametersSaved:
-    """The parameters are meant to be as they are now, whatever was stored before."""
+    """The parameters are to be stored as they are now, whatever was stored before."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorldSaved:
-    """The simulator's parameters are to be as they are now after a restart as well (none: as it likes)."""
+    """Values of the simulator's parameters that are to be restored after a restart (empty: none are)."""
 
     values: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceFailed:
-    """A fault of ours in the service of a message: where, and the trace of it for a developer."""
+    """An error of the autopilot itself while it served a message: where, and the trace for a developer."""
 
     what: str
     trace: str
@@ -149,14 +152,14 @@ Output = Send | Say | Settled | Announce | Event
 
 
 class Verdict(NamedTuple):
-    """What becomes of a request: a MAV_RESULT, and why in one line where there is something to say."""
+    """The decision on a request: a MAV_RESULT, and the reason in one line if there is something to say."""
 
     result: int
     text: str | None = None
-    warns: bool = False  # of what was accepted: the text is a warning all the same
+    warns: bool = False  # the text is a warning although the request is accepted
 
 
 # A request is one of the dataclasses of `requests`; the supervisor decides.
 Decide = Callable[[Any], Verdict]
-# What a service does about a message: (message, peer, now_us, decide) -> outputs
+# How a service handles a message: (message, peer, now_us, decide) -> outputs
 Handler = Callable[[Any, Peer, int, Decide], list[Output]]

@@ -1,4 +1,4 @@
-"""That nothing was done about a message, in the words of its protocol, so that nobody waits for an answer."""
+"""Refusals of messages, each in the form of its protocol, so that no client waits for an answer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 
 def refusals(message: Any, peer: Peer, result: int, mission_result: int) -> list[Output]:
-    """The answer with a MAV_RESULT or a MAV_MISSION_RESULT; none where the protocol has no such answer."""
+    """The answer with a MAV_RESULT or a MAV_MISSION_RESULT; empty if the protocol has no such answer."""
     system, component = peer.system, peer.component
     match message.get_msgId():
         case mavlink.MAVLINK_MSG_ID_COMMAND_LONG | mavlink.MAVLINK_MSG_ID_COMMAND_INT:

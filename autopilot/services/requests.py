@@ -1,6 +1,6 @@
-"""What a ground station can ask for, as facts in SI units and ENU from home, apart from how it was said.
+"""The requests of ground stations, in SI units and ENU from home, whatever message carried them.
 
-The first group is decided by the supervisor, the second is answered by the endpoint itself.
+The supervisor decides on those in `Decided`; the endpoint itself answers those in `Answered`.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ class Land:
 
 @dataclass(frozen=True, slots=True)
 class EnableFence:
-    """Heed the fence, or do not, until it is said otherwise or the vehicle starts anew."""
+    """Switch the fence on or off, until the next such request or a restart of the vehicle."""
 
     on: bool
 
 
 @dataclass(frozen=True, slots=True)
 class FailParts:
-    """Let parts of the simulated vehicle fail, or work again: `bits` of the simulator's parameter."""
+    """Make parts of the simulated vehicle fail or work again: `bits` of the simulator's parameter."""
 
     parameter: str
     bits: int
@@ -60,7 +60,7 @@ class SetMode:
 
     main: int
     sub: int
-    number: int | None = field(default=None, compare=False)  # under which it was asked for
+    number: int | None = field(default=None, compare=False)  # by which it was requested
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +72,12 @@ class StartMission:
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Hold where the load is now, keep the mission."""
+    """Hold the load where it is now, and keep the mission."""
 
 
 @dataclass(frozen=True, slots=True)
 class Continue:
-    """Go on with the paused mission."""
+    """Continue the paused mission."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +89,8 @@ class SetCurrent:
 
 @dataclass(frozen=True, slots=True)
 class ReplaceMission:
-    """May the mission be replaced now (`count` items), or cleared (0)? Asked at the begin and the end; at the
-    end with the steps that would be flown."""
+    """May the mission be replaced now (`count` items), or cleared (0)? Asked at the beginning and the end
+    of an upload; at the end with the steps that would be flown."""
 
     count: int
     steps: tuple[LocatedStep, ...] = ()
@@ -98,8 +98,8 @@ class ReplaceMission:
 
 @dataclass(frozen=True, slots=True)
 class Reposition:
-    """Bring the load to a place and hold it there; a component that is None is kept. `speed_m_s` None: the
-    speed of transfers."""
+    """Move the load to a position and hold it there; a component that is None is unchanged. `speed_m_s` None:
+    the speed of transfers."""
 
     east_m: float | None
     north_m: float | None
@@ -111,21 +111,21 @@ class Reposition:
 
 @dataclass(frozen=True, slots=True)
 class FollowSetpoint:
-    """One setpoint of a stream, ENU from home; NaN: not asked for. `relative`: the position is one from
-    where the load is asked to be now. `body`: the axes are those of the nose, forward, left and up."""
+    """One setpoint of a stream, ENU from home; NaN: not requested. `relative`: the position counts from the
+    present commanded position of the load. `body`: axes along the heading: forward, left and up."""
 
     position: Vec3
     velocity: Vec3
     accel: Vec3
     relative: bool
     body: bool = False
-    heading_rad: float = nan  # from east to north; of a `body` setpoint from the present heading on
+    heading_rad: float = nan  # from east to north; in a `body` setpoint relative to the present heading
     turning_rad_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)
 class FollowAttitude:
-    """One attitude of a stream: thrust axis, unit vector, ENU; thrust 0 ... 1, None: keep the height."""
+    """One attitude of a stream: thrust axis as a unit vector, ENU; thrust 0 ... 1, None: keep the height."""
 
     upward: Vec3
     thrust: float | None
@@ -135,7 +135,8 @@ class FollowAttitude:
 
 @dataclass(frozen=True, slots=True)
 class FollowRates:
-    """One set of body rates of a stream, rad/s about the axes forward, left and up; thrust as above."""
+    """One set of body rates of a stream, rad/s about the axes forward, left and up; thrust as in
+    `FollowAttitude`."""
 
     rates: Vec3
     thrust: float | None
@@ -143,8 +144,8 @@ class FollowRates:
 
 @dataclass(frozen=True, slots=True)
 class FollowStick:
-    """One position of the stick: each component of the velocity, forward, left and up, and the yaw rate,
-    counter-clockwise, as a share of its greatest."""
+    """One position of the stick: the components of the velocity, forward, left and up, and the yaw rate,
+    counter-clockwise, each as a share of its maximum."""
 
     share: Vec3
     turning: float = 0.0
@@ -152,8 +153,8 @@ class FollowStick:
 
 @dataclass(frozen=True, slots=True)
 class Orbit:
-    """Fly the load round a circle; None: here, at this height, at the speed of transfers. Clockwise seen from
-    above; a negative radius is counter-clockwise, and so is a negative speed."""
+    """Fly the load round a circle; None: here, at this height, at the speed of transfers. The direction is
+    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise."""
 
     radius_m: float
     speed_m_s: float | None
@@ -165,34 +166,34 @@ class Orbit:
 
 @dataclass(frozen=True, slots=True)
 class ChangeAltitude:
-    """Bring the load to a height above home, where it is."""
+    """Move the load vertically to a height above home."""
 
     altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)
 class ChangeSpeed:
-    """Peak speed of the load on transfers."""
+    """Set the peak speed of the load on transfers."""
 
     speed_m_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class SetHome:
-    """Move home to a place in the present coordinates; None: to where the vehicle is."""
+    """Move home to a position in the present coordinates; None: to the position of the vehicle."""
 
     position: Vec3 | None
 
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Let the load go, wherever it is."""
+    """Release the load, wherever it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Winch:
-    """Make the cable longer by `length_m` (negative: shorter; infinite: as far as it goes; 0: stop).
-    `speed_m_s` None: as fast as the winch may."""
+    """Make the cable longer by `length_m` (negative: shorter; infinite: to the end; 0: stop). `speed_m_s`
+    None: at the winch's maximum speed."""
 
     length_m: float
     speed_m_s: float | None = None
@@ -200,10 +201,10 @@ class Winch:
 
 @dataclass(frozen=True, slots=True)
 class Grab:
-    """Take hold of the cable of a load that lies within reach; nothing where it was never let go."""
+    """Grip the cable of a load that lies within reach; no effect if the load was never released."""
 
 
-# what moves the vehicle or its load, as soon as time goes on
+# requests that move the vehicle or its load as soon as time continues
 FLOWN = (
     Takeoff
     | Land
@@ -225,32 +226,32 @@ FLOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Terminate:
-    """Stop the rotors at once, wherever the vehicle is."""
+    """Stop the rotors immediately, wherever the vehicle is."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunPrearmChecks:
-    """Say what would keep the vehicle from arming."""
+    """Report what would prevent arming."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reboot:
-    """Start the autopilot anew (`shutdown`: stop it)."""
+    """Restart the autopilot (`shutdown`: stop it)."""
 
     shutdown: bool
 
 
 @dataclass(frozen=True, slots=True)
 class StoreParameters:
-    """Save the parameters (`save`) or load them. Our own are stored when they change; those of the simulator
-    are saved by this alone."""
+    """Save the parameters (`save`) or load them. The autopilot's own are stored with each change; those of
+    the simulator are saved by this request only."""
 
     save: bool
 
 
 @dataclass(frozen=True, slots=True)
 class ResetParameters:
-    """Bring every parameter back to its default."""
+    """Reset every parameter to its default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +264,7 @@ class RequestMessage:
 
 @dataclass(frozen=True, slots=True)
 class SetMessageInterval:
-    """Send a message every `interval_us` on the asker's link; 0: the default rate, -1: never."""
+    """Send a message every `interval_us` on the requesting link; 0: the default rate, -1: never."""
 
     message_id: int
     interval_us: int
@@ -271,7 +272,7 @@ class SetMessageInterval:
 
 @dataclass(frozen=True, slots=True)
 class GetMessageInterval:
-    """Tell the interval of a message on the asker's link."""
+    """Report the interval of a message on the requesting link."""
 
     message_id: int
 
@@ -283,7 +284,7 @@ class RequestCapabilities:
 
 @dataclass(frozen=True, slots=True)
 class ChangeSigningKey:
-    """Another key for signed messages, or none; which, only the service knows."""
+    """Change or remove the key for signed messages; only the signing service knows the new key."""
 
 
 Decided = (

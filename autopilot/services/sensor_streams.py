@@ -1,7 +1,7 @@
-"""What the vehicle's own sensors read, its estimate as odometry, and what else an autopilot can be asked for.
+"""The readings of the vehicle's sensors, its estimate as odometry, and other messages sent on request.
 
-Builders of `telemetry`; NED and FRD on the wire, scaled integers saturate. Nothing is said of a sensor that
-the vehicle does not carry.
+Builders of `telemetry`; NED and FRD on the wire, scaled integers saturate. Nothing is reported for a sensor
+that the vehicle does not carry.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _ACTUATOR_OUTPUT_STATUS = layout_of(mavlink.MAVLink_actuator_output_status_messa
 _UINT16, _INT16 = 0xFFFF, 0x7FFF
 _CHANNELS = 18  # of RC_CHANNELS
 _OUTPUTS = 32  # of ACTUATOR_OUTPUT_STATUS
-_STANDARD_GRAVITY = 9.80665  # m/s^2, of a milli-g
+_STANDARD_GRAVITY = 9.80665  # m/s^2, for milli-g
 # HIGHRES_IMU.fields_updated
 _INERTIAL, _FIELD, _PRESSURE = 0x003F, 0x01C0, 0x1A00
-_UPDATED_US = 20_000  # a slower sensor is "updated" where it read within the default interval of HIGHRES_IMU
+_UPDATED_US = 20_000  # a slower sensor is "updated" if it read within the default interval of HIGHRES_IMU
 _LOST = -1  # ODOMETRY.quality; 0 is "not stated"
 
 
@@ -39,7 +39,7 @@ def _within(value: float, factor: float) -> int:
 
 
 def _updated(s: Snapshot, sensed: Sensed) -> int:
-    """The fields of HIGHRES_IMU that are news."""
+    """Bits of the fields of HIGHRES_IMU that are new."""
     fields = _INERTIAL
     for bits, read_us in ((_FIELD, sensed.field_us), (_PRESSURE, sensed.pressure_us)):
         if read_us >= 0 and s.now_us - read_us < _UPDATED_US:
@@ -48,7 +48,7 @@ def _updated(s: Snapshot, sensed: Sensed) -> int:
 
 
 def highres_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """HIGHRES_IMU; 0 in the fields of a sensor that never read anything, whose bits are never set."""
+    """HIGHRES_IMU; fields of a sensor that has never read anything are 0, and their bits are not set."""
     sensed = s.sensed
     if sensed is None:
         return ()
@@ -85,7 +85,7 @@ def scaled_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def scaled_pressure(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """SCALED_PRESSURE of the barometer, where one is carried."""
+    """SCALED_PRESSURE of the barometer, if one is carried."""
     sensed = s.sensed
     if sensed is None or sensed.pressure_us < 0:
         return ()
@@ -138,9 +138,9 @@ def rc_channels(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def flight_information(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """FLIGHT_INFORMATION of the flight under way, or of the last one: us since boot, whatever the names say.
+    """FLIGHT_INFORMATION of the present or the last flight: us since boot, although the field names say UTC.
 
-    The number of a flight is when it was armed, us since 1970.
+    The number of a flight is the time of its arming, us since 1970.
     """
     armed_us, takeoff_us, landed_us = s.sortie
     number = s.boot_unix_us + armed_us if armed_us else 0

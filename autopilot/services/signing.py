@@ -1,4 +1,4 @@
-"""SETUP_SIGNING, and which frames are heard and how ours leave, over all links of the vehicle."""
+"""SETUP_SIGNING, which received frames are accepted, and how sent frames are signed, on all links."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from autopilot.wire.codec import Received
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import NEWEST, UNITS_PER_S, Sign, Signing, timestamp_of
 
-AHEAD = 10 * UNITS_PER_S  # by so much the stored time is ahead of the one in use
+AHEAD = 10 * UNITS_PER_S  # by which the stored time is ahead of the time in use
 _COMPLAIN_US = 10_000_000
 _NO_KEY = bytes(32)
 _NOT_TAKEN = "Signing key not changed: start the autopilot with --signing-key or --allow-setup-signing"
@@ -21,7 +21,7 @@ class SigningService:
     """The key in force, if there is one."""
 
     def __init__(self, signing: Signing | None, boot_unix_us: int, setup: bool = False) -> None:
-        """`setup`: whoever is heard may set the first key."""
+        """`setup`: any sender may set the first key."""
         self.signing = signing
         self._setup = setup
         self._boot_unix_us = boot_unix_us
@@ -31,22 +31,22 @@ class SigningService:
         self._told: int | None = None
 
     def tell_time(self, unix_us: int) -> None:
-        """The time of the wall clock; without it, that of the vehicle's clock since its boot."""
+        """Sign with this time of the wall clock; without it, the vehicle's clock since its boot is used."""
         self._told = unix_us
 
     def _clock(self, now_us: int) -> int:
         return timestamp_of(self._boot_unix_us + now_us if self._told is None else self._told)
 
     def next_timer(self) -> int:
-        """When `poll` has something to do, in us."""
+        """Time at which `poll` has something to do, in us."""
         return self._complain_us if self._refused else NEVER_US
 
     def signer(self, link_id: int) -> Sign | None:
-        """What signs the frames of a link; None without a key."""
+        """The signer of the frames of a link; None without a key."""
         return None if self.signing is None else self.signing.signer(link_id)
 
     def hears(self, received: Received, message_id: int) -> bool:
-        """Whether a frame is to be heard."""
+        """Whether a received frame is accepted."""
         if self.signing is None:
             return True
         heard = self.signing.accepts(received.frame, message_id, received.system, received.component)
@@ -54,8 +54,9 @@ class SigningService:
         return heard
 
     def receive_setup(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """SETUP_SIGNING: a new key, or none (all zeros). Once there is a key, only by who knows it; before,
-        by nobody, for it would lock out all others, unless the vehicle was started to take one."""
+        """SETUP_SIGNING: a new key, or none (all zeros). Once there is a key, only a sender that knows it can
+        change it. A first key, which would lock out all others, is accepted only if the vehicle was started
+        with `setup`."""
         if self.signing is None and not self._setup:
             return [Say(mavlink.MAV_SEVERITY_WARNING, _NOT_TAKEN)]
         verdict = decide(ChangeSigningKey())
@@ -79,7 +80,7 @@ class SigningService:
         ]
 
     def poll(self, now_us: int) -> list[Output]:
-        """The time to be stored before it is reached; a word to those who are not heard."""
+        """The time stamp to be stored before it is reached; a text if messages were refused."""
         signing = self.signing
         if signing is None:
             return []

@@ -1,6 +1,6 @@
-"""The flight at one instant, as telemetry needs it: SI, world ENU from home, body FLU.
+"""The flight at one instant, as telemetry requires it: SI, world ENU from home, body FLU.
 
-The onboard software gives one where `VehicleEndpoint.poll` asks for it; no service reaches into the core.
+The onboard software provides one when `VehicleEndpoint.poll` requests it; no service accesses the core.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ TRACKER = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
 MOTORS = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 AHRS = mavlink.MAV_SYS_STATUS_AHRS
 BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
-GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is something to keep within
+GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is a fence
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
 
 
 class GpsFix(NamedTuple):
-    """The last fix of the receiver, as the receiver gave it (not the estimate)."""
+    """The last fix as the receiver reported it (not the estimate)."""
 
     time_us: int
     fix_type: int  # GPS_FIX_TYPE
@@ -47,7 +47,7 @@ class GpsFix(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """What the vehicle's own sensors read last, body FLU; zeros of one that never read anything."""
+    """The last readings of the vehicle's own sensors, body FLU; zeros for a sensor that has read nothing."""
 
     gyro: Vec3  # rad/s
     accel: Vec3  # specific force, m/s^2
@@ -55,12 +55,12 @@ class Sensed(NamedTuple):
     pressure_pa: float
     pressure_altitude_m: float
     temperature_degC: float
-    field_us: int  # when the magnetometer read, and the barometer; -1: never
+    field_us: int  # time of the last reading of the magnetometer, and of the barometer; -1: never
     pressure_us: int
 
 
 class Sortie(NamedTuple):
-    """The flight under way, or the last one, by the vehicle's clock in us; 0: not yet."""
+    """The present or the last flight, by the vehicle's clock in us; 0: not yet."""
 
     armed_us: int = 0
     takeoff_us: int = 0
@@ -74,21 +74,22 @@ _NO_SORTIE = Sortie()
 class Snapshot:
     """One instant of the flight. The defaults are a vehicle that stands at home and has measured nothing.
 
-    A snapshot belongs to its reader, who may set fields. An heir may make fields when they are first read.
+    A snapshot belongs to its reader, who may set fields. A subclass may compute fields when they are first
+    read.
     """
 
     now_us: int
     boot_unix_us: int
     home: Home
 
-    # what it is doing
+    # state of the flight
     armed: bool
     phase: int  # PLUMBLINE_PHASE
     main_mode: int  # PX4's pair, see identity
     sub_mode: int
     landed_state: int  # MAV_LANDED_STATE
     system_status: int  # MAV_STATE
-    asked_mode: int | None = None  # custom mode that was asked for by its number
+    asked_mode: int | None = None  # custom mode that was requested by its number
 
     launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
 
@@ -116,7 +117,7 @@ class Snapshot:
     taut: bool = False
     slack_events: int = 0
 
-    # load (position, velocity) and vehicle as the built-in filter has them, where somebody's own flies
+    # load (position, velocity) and vehicle in the built-in filter's estimate, while a custom estimator flies
     built_in: tuple[Vec3, Vec3, Vec3] | None = None
 
     # what the cascade tracks
@@ -127,13 +128,13 @@ class Snapshot:
     x_load_d: Vec3 = ZERO
     v_load_d: Vec3 = ZERO
     a_load_d: Vec3 = ZERO
-    x_load_asked: Vec3 = ZERO  # what the mission asks for; the above is as near to it as can be flown
+    x_load_asked: Vec3 = ZERO  # the requested path; the above is as close to it as the vehicle can fly
     v_load_asked: Vec3 = ZERO
     q_cable_c: Vec3 = _DOWN
-    x_quad_d: Vec3 = _UNKNOWN  # where that wants the vehicle; NaN while it is not wanted anywhere
+    x_quad_d: Vec3 = _UNKNOWN  # position setpoint of the vehicle; NaN while there is none
     quat_c_wxyz: Quat = _LEVEL
 
-    # its errors and what it asks of the mixer
+    # errors of the cascade, and its commands to the mixer
     e_x: Vec3 = ZERO
     e_v: Vec3 = ZERO
     e_q: Vec3 = ZERO
@@ -150,9 +151,9 @@ class Snapshot:
     rotor_min: float = 0.0
     rotor_max: float = math.inf
     saturated: int = 0  # bit i: rotor i+1 was cut
-    rotors: int = 4  # how many there are
-    rotor_rpm: tuple[float, ...] = (0.0,) * 4  # as the speed controllers told last, one of each
-    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
+    rotors: int = 4  # number of rotors
+    rotor_rpm: tuple[float, ...] = (0.0,) * 4  # last reported by the speed controllers, one per rotor
+    rotors_lost: int = 0  # bit i: rotor i+1 does not follow its commands
 
     # the rest of the vehicle
     sensors_present: int = 0  # the bits above
@@ -161,7 +162,7 @@ class Snapshot:
     sensed: Sensed | None = None  # None: no inertial sample yet
     sortie: Sortie = _NO_SORTIE
     vibration: Vec3 = ZERO  # m/s^2, body
-    wind: Vec3 = _UNKNOWN  # m/s, where to
+    wind: Vec3 = _UNKNOWN  # m/s, the direction towards which it blows
     battery_voltage: float = math.nan  # V
     battery_current: float = math.nan  # A
     battery_used_mah: float = math.nan
@@ -171,8 +172,8 @@ class Snapshot:
     mission_current: int = 0
     mission_total: int = 0
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
-    reel_rate: float = 0.0  # m/s, at which the winch lets the cable out
+    reel_rate: float = 0.0  # m/s at which the winch lets out the cable
     plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none
 
-    instant: Row | None = None  # the packed `Instant`, if it is there: frames are made of it in machine code
-    unchanged: object = None  # while it is the same object, nothing of `telemetry.WATCHED` changes but plans
+    instant: Row | None = None  # the packed `Instant`, if available: machine code makes frames of it
+    unchanged: object = None  # while it is the same object, only the plans of `telemetry.WATCHED` can change

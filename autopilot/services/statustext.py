@@ -1,4 +1,4 @@
-"""STATUSTEXT: one line for the operator, cut into chunks of 50 bytes where it is longer."""
+"""STATUSTEXT: one line for the operator, cut into chunks of 50 bytes if it is longer."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ _MOST_CHUNKS = 256  # STATUSTEXT.chunk_seq is a byte
 
 
 class TextWriter:
-    """Makes the messages of a text; chunks of one text bear its number."""
+    """Makes the messages of a text; the chunks of one text have the same number."""
 
     def __init__(self) -> None:
         self._id = 0
 
     def messages(self, severity: int, text: str) -> list[mavlink.MAVLink_statustext_message]:
-        """The messages that carry `text`; what is not ASCII becomes a question mark."""
+        """The messages that carry `text`; characters that are not ASCII become question marks."""
         line = " ".join(text.split()).encode("ascii", errors="replace")[: CHUNK * _MOST_CHUNKS]
         if len(line) <= CHUNK:
             return [mavlink.MAVLink_statustext_message(severity, line)]
         self._id = self._id % _LAST_ID + 1
-        # a last chunk that is full needs an empty one behind it: a NUL is what ends the text
+        # a full last chunk needs an empty one after it, since a NUL ends the text
         starts = range(0, min(len(line) + 1, CHUNK * _MOST_CHUNKS), CHUNK)
         return [
             mavlink.MAVLink_statustext_message(severity, line[start : start + CHUNK], self._id, number)

@@ -1,6 +1,6 @@
-"""The frames of the streams that are sent most often, in machine code, from an instant's row of numbers.
+"""The frames of the streams that are sent most often, in machine code, from the row of an instant.
 
-The bytes are those that `FrameWriter` makes of the same streams of `telemetry`.
+The bytes are those that `FrameWriter` writes for the same streams of `telemetry`.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ LOAD_SETPOINT = wire_record(mavlink.MAVLink_load_setpoint_message, __name__)
 CASCADE_ERRORS = wire_record(mavlink.MAVLink_cascade_errors_message, __name__)
 ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 
-# a set of these streams is the sum of their bits, which rise in the order in which they are sent
+# a set of these streams is the sum of their bits, which increase in the order of sending
 _WRITTEN = (
     mavlink.MAVLINK_MSG_ID_ATTITUDE,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -71,14 +71,14 @@ _WRITTEN = (
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     mavlink.MAVLINK_MSG_ID_DEBUG_VECT,
     mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE,  # from here on they leave from the component of the dialect
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,  # from here on they are sent from the component of the dialect
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
 )
 BITS = {key: 1 << i for i, key in enumerate(_WRITTEN)}
 _MOST_FRAMES = len(BITS) + len(DEBUG_VECTORS) + len(NAMED_VALUES)
-STREAMS_ROOM = _MOST_FRAMES * FRAME_ROOM  # bytes in which all of them go
+STREAMS_ROOM = _MOST_FRAMES * FRAME_ROOM  # bytes that hold all of them
 
 
 def _name(name: bytes) -> tuple[int, ...]:
@@ -88,13 +88,13 @@ def _name(name: bytes) -> tuple[int, ...]:
 _POSITION, _VELOCITY, _CABLE, _ERROR = (_name(name) for name in DEBUG_VECTORS)
 _TENSION, _SWING, _DISTANCE, _PSI_R, _PSI_Q = (_name(name) for name in NAMED_VALUES)
 
-# a set of streams that are written together, or the keys of streams that are not written here
+# a set of streams that are written together, or the keys of streams that are not written by this module
 Part = int | tuple[int, ...]
 
 
 @lru_cache(maxsize=256)
 def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
-    """Streams in the order in which they are sent, those together that are written together."""
+    """Streams in the order of sending, grouped into those that are written together."""
     parts: list[Part] = []
     last: Part = 0
     for key in keys:
@@ -116,7 +116,7 @@ def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
 def _put(
     kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
 ) -> tuple[int, Origin]:
-    """Write a frame; where the next one begins, and its origin."""
+    """Write a frame; return where the next one begins, and its origin."""
     end = put_frame(kind, values, payload, buffer, at, origin)
     return end, Origin(origin.sequence + 1, origin.system, origin.component)
 
@@ -148,10 +148,10 @@ def put_streams(
     payload: Bytes,
     buffer: Bytes,
 ) -> tuple[int, int, int]:
-    """Write the frames of a set of streams (`BITS`) at the begin of a buffer.
+    """Write the frames of a set of streams (`BITS`) to the beginning of a buffer.
 
     `instant` is a packed `Instant`, `home` a packed `Home`; sequence numbers are those of the first frame of
-    each component. Returns how many bytes there are, and the sequence numbers of the next frames.
+    each component. Returns the number of bytes, and the sequence numbers of the next frames.
     """
     s, place = unpack(Instant, instant, 0), unpack(Home, home, 0)
     at = 0
@@ -203,13 +203,13 @@ def put_streams(
 
 
 def address_of_streams(instant: Row) -> int:
-    """The address of `put_streams` for such an instant, compiled or loaded where need be."""
+    """The address of `put_streams` for such an instant, compiled or loaded if necessary."""
     scratch = np.zeros(1, np.uint8)
     return native_address_of(put_streams, 0, instant, instant, 0, 0, 0, 0, 0, scratch, scratch)
 
 
 class StreamFrames:
-    """Makes the frames of these streams on one link, in the sequences of its two components."""
+    """Writes the frames of these streams on one link, with the sequence numbers of its two components."""
 
     def __init__(self, autopilot: FrameWriter, dialect: FrameWriter, home: Home) -> None:
         self.autopilot = autopilot
@@ -218,10 +218,10 @@ class StreamFrames:
         self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._buffer = np.zeros(STREAMS_ROOM, np.uint8)
         self._written = self._buffer.data
-        self._put: Callable[..., tuple[int, int, int]] | None = None  # machine code, once it was asked for
+        self._put: Callable[..., tuple[int, int, int]] | None = None  # machine code, after the first call
 
     def frames(self, streams: int, instant: Row) -> bytes:
-        """The frames of a set of streams (`BITS`), one behind the other."""
+        """The frames of a set of streams (`BITS`), one after the other."""
         autopilot, dialect = self.autopilot, self.dialect
         arguments = (
             *(streams, instant, self.home, autopilot.system, autopilot.component, autopilot.sequence),

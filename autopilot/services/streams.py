@@ -1,7 +1,7 @@
 """When each message is due on one link: intervals locked to the simulated clock.
 
-A stream of interval I is due at the first tick at or after every multiple of I. Nothing is added up, so
-nothing drifts: at a tick of 4 ms, 8 ms is every second tick for ever, 50 ms alternates between 12 and 13.
+A stream of interval I is due at the first tick at or after every multiple of I. Intervals are not added up,
+so nothing drifts: at a tick of 4 ms, 8 ms is always every second tick, 50 ms every 12 or 13 ticks in turn.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 OFF = -1  # MAV_CMD_SET_MESSAGE_INTERVAL: never
 DEFAULT = 0  # and: the default interval
 NEVER_US = 2**63 - 1
-_MOST_MET = 64  # sets of groups that are remembered; a client may choose intervals that seldom meet again
+_MOST_MET = 64  # remembered sets of groups; a client may choose intervals that seldom coincide again
 
 
 class Streams:
@@ -27,12 +27,12 @@ class Streams:
         self._defaults = defaults
         self._interval = dict(defaults)
         self._order = {key: number for number, key in enumerate(defaults)}
-        # streams of one interval are due together: a heap of (when due next, interval, their keys in order)
+        # streams of one interval are due together: a heap of (next due time, interval, their keys in order)
         self._groups: list[tuple[int, int, tuple[int, ...]]] = []
         self._regroup({key: _at_or_after(interval, now_us) for key, interval in defaults.items()})
 
     def _regroup(self, due_us: Mapping[int, int]) -> None:
-        """Group all streams anew by interval and when each is due."""
+        """Group all streams again by their interval and the time at which each is due."""
         groups: dict[tuple[int, int], list[int]] = {}
         for key in self._order:
             groups.setdefault((due_us[key], self._interval[key]), []).append(key)
@@ -55,9 +55,9 @@ class Streams:
         self._regroup(due_us)
 
     def written_by(self, bits: Mapping[int, int]) -> tuple[NDArray[np.int64], int]:
-        """The groups all of whose streams have a bit, (n, 2): interval in us, and the sum of their bits; and
-        when the first of the other streams is due. None of the former may be due now: from then on such a
-        group is due at each tick to or over which a multiple of its interval is passed."""
+        """The groups all of whose streams have a bit, (n, 2): interval in us and the sum of their bits; and
+        the time at which the first of the other streams is due. No group of the table may be due now: from
+        then on, it is due at each tick that reaches or passes a multiple of its interval."""
         if self._written is None:
             rows = [(each, sum(map(bits.__getitem__, keys))) for each, keys in self._by(bits, True)]
             others = {key for _, keys in self._by(bits, False) for key in keys}
@@ -66,18 +66,19 @@ class Streams:
         return table, min((due for due, _, keys in self._groups if keys[0] in others), default=NEVER_US)
 
     def _by(self, bits: Mapping[int, int], written: bool) -> list[tuple[int, tuple[int, ...]]]:
-        """Intervals and streams of the groups that are sent, and are written by bits all together or not."""
+        """Intervals and streams of the groups that are sent; `written`: of those all of whose streams have a
+        bit, else of the others."""
         sent = [(interval, keys) for _, interval, keys in self._groups if interval > 0]
         return [(interval, keys) for interval, keys in sent if all(key in bits for key in keys) is written]
 
     def take_due(self, now_us: int) -> tuple[int, ...]:
-        """What is due at this tick; each of them is due again at its next multiple."""
+        """The streams due at this tick; each of them is due again at the next multiple of its interval."""
         groups = self._groups
         taken: tuple[tuple[int, ...], ...] = ()
         last, twice = 0, False
         while self.next_us <= now_us:
             _, interval, keys = groups[0]
-            # a stream was set to this interval between two instants at which the others were due
+            # a stream was set to this interval between two times at which the others with it were due
             twice, last = twice or interval == last, interval
             taken += (keys,)
             heapreplace(groups, (_at_or_after(interval, now_us + 1), interval, keys))
@@ -87,7 +88,7 @@ class Streams:
         return self._together(taken)
 
     def _together(self, groups: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
-        """The keys of these groups in their order. The same groups meet again and again."""
+        """The keys of these groups in their order. The same groups coincide again and again."""
         if len(groups) <= 1:
             return groups[0] if groups else ()
         keys = self._met.get(groups)

@@ -1,8 +1,8 @@
-"""What is streamed: one table from message id to sender, default interval and builder.
+"""The streamed messages: one table from message id to sender, default interval and builder.
 
 A builder makes its messages from one `Snapshot`, as fields if they are sent often; numbers too large for a
-scaled field saturate. Messages of the private dialect leave from their own component, so that ground stations
-that do not know them do not count them as losses of the autopilot.
+scaled field saturate. Messages of the private dialect are sent from a separate component, so that ground
+stations that do not know them do not count them as losses of the autopilot.
 """
 
 from __future__ import annotations
@@ -329,7 +329,7 @@ def _load_global_position_int(s: Snapshot, identity: Identity) -> tuple[Any, ...
 
 
 def _load_attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """The cable as an attitude without yaw whose z axis points from vehicle to load."""
+    """The cable as an attitude without yaw; its z axis points from vehicle to load."""
     d, d_dot = ned_from_enu(s.q_cable), ned_from_enu(s.q_cable_dot)
     roll = math.asin(max(-1.0, min(1.0, -d[1])))
     pitch = math.atan2(d[0], d[2])
@@ -343,7 +343,7 @@ class Stream(NamedTuple):
     """One row of the table."""
 
     component: int
-    interval_us: int  # by default; OFF: sent on request only
+    interval_us: int  # default; OFF: sent on request only
     build: Builder
 
 
@@ -393,7 +393,7 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
     mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: Stream(_AUTOPILOT, OFF, _protocol_version),
-    # not streamed: tools that do not know them would count them as lost
+    # not streamed: tools that do not know these messages would count them as lost
     mavlink.MAVLINK_MSG_ID_CURRENT_MODE: Stream(_AUTOPILOT, OFF, _current_mode),
     mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(_AUTOPILOT, OFF, _available_modes_monitor),
     mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _rate(20), _load_state),
@@ -403,7 +403,7 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_FILTER_STATE: Stream(_DIALECT, _rate(50), _filter_state),
 }
 
-# What a link to a program has besides, as PX4's profile `onboard`
+# Intervals on a link to a program that differ from the defaults, as in PX4's profile `onboard`
 PROGRAM_INTERVALS_US: dict[int, int] = {
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _rate(50),
     mavlink.MAVLINK_MSG_ID_ODOMETRY: _rate(30),
@@ -444,19 +444,19 @@ _GROUPED: dict[int, tuple[int, ...]] = {
         mavlink.MAVLINK_MSG_ID_VIBRATION,
     ),
 }
-# What REQUEST_DATA_STREAM means by its groups
+# The messages of each group of REQUEST_DATA_STREAM
 GROUPS = _GROUPED | {mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_GROUPED.values(), ()))}
 
-# What other parts of the vehicle send under an id that the autopilot uses as well: the keys stand
-# beside those above, since a message id has 24 bits
+# Other parts of the vehicle send messages with ids that the autopilot uses as well: their keys have a bit
+# above the 24 bits of a message id, so that they differ from the keys above
 MESSAGE_ID = (1 << 24) - 1
-# The winch's HEARTBEAT is sent on a link from the first message on that is addressed to it there: DroneKit
-# and `set_mode` of pymavlink take the last HEARTBEAT for that of the vehicle
+# The winch's HEARTBEAT is sent on a link only after a message on this link was addressed to the winch:
+# DroneKit and `set_mode` of pymavlink take the last HEARTBEAT for that of the vehicle
 WINCH_HEARTBEAT = 1 << 25 | mavlink.MAVLINK_MSG_ID_HEARTBEAT
 COMPONENT_STREAMS: dict[int, Stream] = {
     WINCH_HEARTBEAT: Stream(WINCH_COMPONENT, HEARTBEAT_US, _winch_heartbeat)
 }
-# The load as a MAVLink system of its own
+# The load as a separate MAVLink system
 LOAD_SYSTEM = 1 << 24
 LOAD_STREAMS: dict[int, Stream] = {
     LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(LOAD_COMPONENT, HEARTBEAT_US, _load_heartbeat),
@@ -466,7 +466,7 @@ LOAD_STREAMS: dict[int, Stream] = {
     LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(LOAD_COMPONENT, _rate(5), _load_attitude),
 }
 
-# Sent at once to every link when what is picked here has changed, besides their rate
+# Sent immediately to every link, in addition to their rate, when the values picked here have changed
 WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda s: (s.armed, s.main_mode, s.sub_mode, s.system_status),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda s: (s.landed_state,),

@@ -1,4 +1,4 @@
-"""The contents of the files that are made when they are read: packed parameters, the mission, metadata.
+"""The contents of the files that are generated when they are read: packed parameters, the mission, metadata.
 
 `param.pck` and `mission.dat` are ArduPilot's formats, which MAVProxy and pymavlink read; the metadata are
 the JSON files of MAVLink's component information protocol, from which QGroundControl takes texts, units and
@@ -28,20 +28,20 @@ PARAMETER_TEXTS: Path = ("etc", "extras", "parameters.json")
 
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _INT32_TYPE, _FLOAT_TYPE, _HAS_DEFAULT = 3, 4, 0x10
-_LONGEST_COMMON = 15  # letters of a name that the one before it may lend, a field of four bits
+_LONGEST_COMMON = 15  # letters that a name may share with the one before it, a field of four bits
 _HEAD = struct.Struct("<HHH")
 _MISSION_MAGIC = 0x763D
 _MISSION_HEAD = struct.Struct("<5H")
-_ITEM = struct.Struct("<ffffiifHHBBBBBB")  # MISSION_ITEM_INT as it travels
+_ITEM = struct.Struct("<ffffiifHHBBBBBB")  # MISSION_ITEM_INT as it is transferred
 _FLOAT32_MAX = 3.4028234663852886e38
 _PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
 
 
 def parameter_pack(table: ParameterTable, query: Mapping[str, str], integers: bool = False) -> bytes:
-    """All parameters; `withdefaults=1` adds the defaults, `start` and `count` choose a part.
+    """All parameters; `withdefaults=1` adds the defaults, `start` and `count` select a part.
 
-    A record is type and flags, length of the name and how much of it is that of the name before, the rest of
-    the name, the value, and its default where that differs.
+    A record consists of the type and flags, the length of the name and of the part that it shares with the
+    name before, the rest of the name, the value, and the default if it differs.
     """
     defaults = query.get("withdefaults") == "1"
     start, count = _whole(query.get("start"), 0), _whole(query.get("count"), len(table))
@@ -69,7 +69,7 @@ def _packed(table: ParameterTable, defaults: bool, start: int, count: int, integ
 
 
 def mission_pack(items: tuple[WireItem, ...]) -> bytes:
-    """The items as MISSION_ITEM_INT, one behind the other."""
+    """The items as MISSION_ITEM_INT, one after the other."""
     head = _MISSION_HEAD.pack(_MISSION_MAGIC, mavlink.MAV_MISSION_TYPE_MISSION, 0, 0, len(items))
     return head + b"".join(
         _ITEM.pack(
@@ -94,7 +94,7 @@ def mission_pack(items: tuple[WireItem, ...]) -> bytes:
 
 
 def parameter_texts(table: ParameterTable, integers: bool = False) -> bytes:
-    """Metadata of the parameters; those of another process without a range, which only it knows."""
+    """Metadata of the parameters; those of the simulator without a range, which only the simulator knows."""
     return table.remembered((PARAMETER_TEXTS, integers), lambda: _texts(table, integers))
 
 
@@ -118,7 +118,7 @@ def _texts(table: ParameterTable, integers: bool) -> bytes:
 
 
 def general(identity: Identity, table: ParameterTable) -> bytes:
-    """Which metadata there are, and where."""
+    """The general file: which metadata exist, and where."""
     texts = parameter_texts(table, identity.integers)
     return _json(
         {
@@ -136,7 +136,7 @@ def general(identity: Identity, table: ParameterTable) -> bytes:
 def made_files(
     identity: Identity, table: ParameterTable, mission: Callable[[], StoredMission]
 ) -> dict[Path, Maker]:
-    """All of them by path; `mission` tells the mission in force."""
+    """All generated files by path; `mission` returns the mission in force."""
     return {
         PARAMETERS: lambda query: parameter_pack(table, query, identity.integers),
         MISSION: lambda query: mission_pack(mission().items),
@@ -176,7 +176,7 @@ def _tellable(value: Any) -> bool:
 
 
 def _shared(a: bytes, b: bytes) -> int:
-    """How many bytes at their beginnings are equal."""
+    """Number of equal bytes at the beginning of both."""
     count = 0
     for x, y in zip(a, b, strict=False):
         if x != y:

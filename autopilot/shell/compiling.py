@@ -1,7 +1,7 @@
-"""The parts in which the flight software is compiled before the first flight, and what is said meanwhile.
+"""The parts in which the flight software is compiled before the first flight, and the text meanwhile.
 
-Each part is a program of its own, so that several compile at the same time; what they have in common is
-compiled by the one that comes first (`autopilot.geometry.kernel`).
+Each part is a separate program, so that several compile at the same time; kernels that they share are
+compiled by the first program that needs them (`autopilot.geometry.kernel`).
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Part:
 
     @property
     def ready(self) -> bool:
-        """Nothing is left to be compiled."""
+        """Whether nothing is left to be compiled."""
         return is_ready(self.source, (self.mark,))
 
     def done(self) -> None:
-        """Nothing is left to be compiled from now on."""
+        """Mark the part: nothing is left to be compiled from now on."""
         mark_ready(self.source, (self.mark,))
 
 
@@ -42,16 +42,16 @@ _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
 
 
-OWN = "own"  # stands for any law that somebody has brought: they are compiled for once
+OWN = "own"  # stands for any custom law: the autopilot is compiled once for all of them
 
 
 def compiled_for(laws: Iterable[str]) -> tuple[str, ...]:
-    """What is compiled to fly with these laws, each once."""
+    """The names for which code is compiled to fly with these laws, each once."""
     return tuple(dict.fromkeys(law if law in LAWS else OWN for law in laws))
 
 
 def autopilot_parts(*laws: str) -> tuple[Part, ...]:
-    """What the autopilot needs to fly with these laws, the longest first; what they share is there once."""
+    """The parts that the autopilot needs to fly with these laws, the longest one first; shared parts once."""
     module, any_law = "autopilot.shell.warmup", compiled_for(laws)[0]
     return (
         Part("the autopilot", module, ("tick", any_law), _AUTOPILOT, "tick", 25.0),
@@ -65,7 +65,7 @@ def autopilot_parts(*laws: str) -> tuple[Part, ...]:
 
 
 def ready(parts: Iterable[Part]) -> bool:
-    """Nothing is left to be compiled in any of these parts."""
+    """Whether nothing is left to be compiled in any of these parts."""
     return all(part.ready for part in parts)
 
 
@@ -76,7 +76,7 @@ def name_what_is_compiled() -> None:
     class Names(event.Listener):
         def on_start(self, event: object) -> None:
             function = event.data["dispatcher"].py_func  # type: ignore[attr-defined]
-            module = function.__module__  # of what numba makes up there is none
+            module = function.__module__  # functions that numba generates have none
             if module and module.partition(".")[0] != "numba":
                 print(f"{module}.{function.__name__}", flush=True)
 

@@ -22,27 +22,27 @@ from autopilot.wire.dialect import plumbline as mavlink
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 0.5
 _TS1 = Field(mavlink.MAVLink_timesync_message, "ts1")
-_LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock can promise
+_LONGEST_SILENCE_US = 1_000_000  # longest silence that a ground station which shares our clock can promise
 _MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
-_TOGETHER = 4  # windows that are sent at once to a ground station that says nothing meanwhile
-_LARGEST_HEARD = 2048  # bytes of a datagram from the ground; what is behind them is not heard
-_LARGEST_AT_ONCE = 280  # bytes of one that are handed over together, as large as a frame may be
-_BUDGET_S = 0.5e-3  # for all that the ground says between two ticks; a flood must not stop the clock
-_SENDING_S = 1e-3  # for all that is sent between two ticks, where much has waited for the disk
+_TOGETHER = 4  # windows that are sent together to a ground station that sends nothing meanwhile
+_LARGEST_HEARD = 2048  # bytes of a datagram from the ground; the rest is dropped
+_LARGEST_AT_ONCE = 280  # bytes of a datagram that are handed over together: the largest frame
+_BUDGET_S = 0.5e-3  # for all messages from the ground between two ticks; a flood must not stop the clock
+_SENDING_S = 1e-3  # for all that is sent between two ticks, if much has waited for the disk
 _MOST_WAITING = 16_384  # datagrams
-_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
+_GONE_S = 30.0  # silence after which a ground station in lockstep is assumed to be gone
 _LINK: Link = "ground"
 
 
 class AutopilotError(Exception):
-    """What ends the program with one line."""
+    """An error that ends the program with one line of text."""
 
 
 def open_socket(address: Address, what: str) -> socket.socket:
-    """A socket that speaks to one address; AutopilotError names `what` is there if it cannot be had."""
+    """A socket for one address; AutopilotError, which names the address as `what`, if it cannot be opened."""
     try:
         sock = datagram_socket(address)
-        # no traffic but to where we are pointed, and answers to it
+        # no traffic except to the given address and answers from there
         sock.bind(("127.0.0.1" if _is_loopback(address[0]) else "", 0))
     except OSError as error:
         raise AutopilotError(f"{what} {shown(address)}: {reason(error)}") from None
@@ -50,7 +50,7 @@ def open_socket(address: Address, what: str) -> socket.socket:
 
 
 def listen(address: Address) -> TcpServer:
-    """Ground stations that connect by TCP; AutopilotError if the port cannot be had."""
+    """Listen for ground stations that connect by TCP; AutopilotError if the port cannot be used."""
     try:
         return TcpServer(address)
     except OSError as error:
@@ -65,7 +65,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def _pieces(datagram: bytes, link: Link) -> list[tuple[bytes, Link]]:
-    """A datagram of many messages in pieces: a hundred at once cost more time than there is between ticks."""
+    """A datagram of many messages in pieces: a hundred together take longer than the time between ticks."""
     if len(datagram) <= _LARGEST_AT_ONCE:
         return [(datagram, link)]
     frames = [received.frame for received in decode(datagram, PATIENCE)[0]] or [b""]
@@ -73,9 +73,9 @@ def _pieces(datagram: bytes, link: Link) -> list[tuple[bytes, Link]]:
 
 
 class GroundStations:
-    """Sockets towards ground stations and programs, one for each address that we were pointed at.
+    """Sockets towards ground stations and programs, one for each configured address.
 
-    Whoever else speaks to such a socket is a link of its own and is answered where it is.
+    Any other sender to such a socket is a separate link and is answered at its own address.
     """
 
     def __init__(
@@ -85,16 +85,16 @@ class GroundStations:
         tcp: TcpServer | None,
         storing: Storing,
     ) -> None:
-        """What is said waits for what is to be stored."""
+        """Datagrams wait until `storing` has stored what was to be stored before them."""
         self._tcp = tcp
         self._storing = storing
-        # until so much is stored; the oldest are lost where nobody could take as many
+        # number of jobs to be stored before, link, datagram; if there are too many, the oldest are lost
         self._waiting: deque[tuple[int, Link, bytes]] = deque(maxlen=_MOST_WAITING)
         addresses = (*stations, *programs)
         self._sockets = [open_socket(address, "ground station") for address in addresses]
         self._is_program = [i >= len(stations) for i in range(len(addresses))]
         self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
-        # what came by each of the sockets, and by TCP, and is not handed over yet
+        # messages that arrived at each of the sockets, and by TCP, and are not handed over yet
         self._heard: list[deque[tuple[bytes, Link]]] = [deque() for _ in range(len(addresses) + 1)]
 
     def join(self, onboard: Onboard) -> None:
@@ -105,18 +105,18 @@ class GroundStations:
             self._tcp.join(onboard)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
-        """Hand over what came, as far as there is time for it, and send what is due."""
+        """Hand over the messages that arrived, as far as time allows, and send what is due."""
         until = time.perf_counter() + _BUDGET_S
         for i in range(len(self._heard)):
             program = i < len(self._is_program) and self._is_program[i]
             while (heard := self._next(i, onboard)) is not None:
                 handle(onboard.receive_ground(*heard, program))
-                if time.perf_counter() > until:  # the others have their turn, and the rest waits
+                if time.perf_counter() > until:  # the next sockets get one message each, and the rest waits
                     break
         self.send(onboard)
 
     def _next(self, i: int, onboard: Onboard) -> tuple[bytes, Link] | None:
-        """What is to be handed over next of what came by a socket, or behind the last of them by TCP."""
+        """The next message that arrived at socket `i`, or by TCP if `i` is beyond the last socket."""
         waiting = self._heard[i]
         if not waiting:
             arrived = self._arrived(i, onboard)
@@ -160,7 +160,7 @@ class GroundStations:
 
 
 def _answers_before(datagram: bytes, stamp: int) -> bool:
-    """Whether this is but the answer to a question before that of `stamp`, for which nobody waited."""
+    """Whether this is only the answer to a question before that of `stamp`, which was not waited for."""
     received, _ = decode(datagram)
     timesync = mavlink.MAVLINK_MSG_ID_TIMESYNC
     return len(received) == 1 and received[0].id == timesync and _TS1.of(received[0].frame) < stamp
@@ -169,19 +169,19 @@ def _answers_before(datagram: bytes, stamp: int) -> bool:
 class GroundInStep:
     """One ground station that shares our clock: every 20 ms we wait until it has caught up.
 
-    It does nothing with what it hears until it is asked: what is said in a window goes with the question.
-    Where it has promised to say nothing for a while, we ask and go on; and as to wake it takes as long as all
-    else that is done for it, it then hears of several windows at once.
+    It processes messages only when asked, so the messages of a window are sent with the question. If it has
+    promised to send nothing for a while, we ask and continue without waiting. Several windows are then sent
+    together, because waking the ground station takes as long as everything else that is done for it.
     """
 
     def __init__(self, address: Address) -> None:
         self._socket = open_socket(address, "ground station")
         self._address = address
-        self._silent_until_us = 0  # it says nothing before
-        self._waits_s = 0.0  # a receive that waits
-        self._said: list[bytes] = []  # in this window
+        self._silent_until_us = 0  # it sends nothing before
+        self._waits_s = 0.0  # timeout of a receive
+        self._said: list[bytes] = []  # messages of this window
         self._size = 0
-        self._windows: list[bytes] = []  # datagrams that are to be sent
+        self._windows: list[bytes] = []  # datagrams to be sent
 
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
@@ -190,7 +190,7 @@ class GroundInStep:
         self._wait(_RESEND_FIRST_S)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
-        """Say what is due; at the end of a window wait for the ground station's word on it."""
+        """Send what is due; at the end of a window wait for the ground station's answer."""
         for _, datagram in onboard.ground_datagrams():
             self._say(datagram)
         ask = onboard.question(_LINK)
@@ -221,33 +221,33 @@ class GroundInStep:
             for event in events:
                 if isinstance(event, TimesyncAnswered) and event.ts1 == stamp:
                     promised_us = (event.tc1 - stamp) // 1000
-                    if promised_us <= _LONGEST_SILENCE_US:  # else it is a clock of its own
+                    if promised_us <= _LONGEST_SILENCE_US:  # else the ground station uses another clock
                         self._silent_until_us = onboard.now_us + promised_us
                     return
 
     @property
     def way(self) -> tuple[socket.socket, Address]:
-        """By which machine code sends."""
+        """The socket and the address with which machine code sends."""
         return self._socket, self._address
 
     @property
     def questions(self) -> Questions:
-        """What may be asked without `exchange`, as nobody waits for an answer."""
+        """The questions that may be asked without `exchange`, since their answers are not waited for."""
         unsent = (*self._windows, b"".join(self._said))
         return Questions(self._silent_until_us, self._alone_us, _TOGETHER, unsent)
 
     def take_back(self, unsent: list[bytes]) -> None:
-        """What of `questions.unsent`, and of what was said without `exchange`, is not sent."""
+        """Take back what is not sent of `questions.unsent` and of the messages written without `exchange`."""
         *self._windows, last = unsent
         self._said, self._size = [last], len(last)
 
     @property
     def _alone_us(self) -> int:
-        """When windows are sent one by one, as the ground station will soon be waited for."""
+        """Time from which windows are sent one by one, since the ground station will soon be waited for."""
         return self._silent_until_us - _TOGETHER * GROUND_WINDOW_US
 
     def _wait(self, seconds: float) -> None:
-        """How long a receive waits."""
+        """Set how long a receive waits."""
         if seconds != self._waits_s:
             self._waits_s = seconds
             set_timeout(self._socket, seconds)
@@ -264,8 +264,7 @@ class GroundInStep:
         self._size = 0
 
     def _send_together(self, now_us: int) -> None:
-        """Send the windows that are over, once there are enough of them, or the ground will soon be waited
-        for."""
+        """Send the closed windows if there are enough of them or the ground will soon be waited for."""
         if len(self._windows) >= _TOGETHER or now_us >= self._alone_us:
             for datagram in self._windows:
                 self._send(datagram)

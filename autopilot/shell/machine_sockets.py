@@ -1,8 +1,8 @@
-"""Datagrams received and sent by machine code: for loops that exchange several without Python between them.
+"""Datagrams received and sent by machine code, for loops that exchange many of them without Python.
 
-A socket is given by its file descriptor, bytes by their address, an address of the network as the system
-has it (`system_address`). A receive waits as long as the socket's SO_RCVTIMEO says; a signal ends it, for
-Python to look after. All of it works in kernels alone, and where `usable` says so.
+A socket is given by its file descriptor, bytes by their address, a network address in the form of the system
+(`system_address`). A receive waits as long as the socket's SO_RCVTIMEO; a signal ends it, so that Python can
+handle the signal. The functions `..._at` work in kernels only, and only with sockets that are `usable`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-SUPPORTED = sys.platform == "linux"  # as far as it is tried
-SYSTEM_ADDRESS_BYTES = 16  # of an IPv4 address with its port
+SUPPORTED = sys.platform == "linux"  # as far as tested
+SYSTEM_ADDRESS_BYTES = 16  # bytes of an IPv4 address with its port
 NOWHERE = bytes(SYSTEM_ADDRESS_BYTES)
 
 _INT, _WIDE = ir.IntType(32), ir.IntType(64)
@@ -31,7 +31,7 @@ def usable(sock: socket.socket) -> bool:
 
 
 def system_address(address: tuple[str, int]) -> bytes | None:
-    """`struct sockaddr_in` of an address that is given by numbers; None of any other."""
+    """`struct sockaddr_in` of a numeric address; None for any other."""
     try:
         host = socket.inet_pton(socket.AF_INET, address[0])
     except OSError:
@@ -40,12 +40,13 @@ def system_address(address: tuple[str, int]) -> bytes | None:
 
 
 def address_of_system(address: bytes) -> tuple[str, int]:
-    """The address that `system_address` gives so."""
+    """The address of a `struct sockaddr_in`, the inverse of `system_address`."""
     return socket.inet_ntop(socket.AF_INET, address[4:8]), struct.unpack("!H", address[2:4])[0]
 
 
 def _called(name: str, kinds: list[Any]) -> Any:
-    """A function of the system's library: of a file descriptor, an address, a size, no flags, and more."""
+    """A function of the system's library; its arguments are a file descriptor, an address, a size, the flags
+    0, and those of `kinds`."""
 
     def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         kind = ir.FunctionType(_WIDE, [_INT, _POINTER, _WIDE, _INT, *kinds])
@@ -76,8 +77,8 @@ def _send_to(_: Any, fd: Any, address: Any, size: Any, receiver: Any, receiver_s
     return types.int64(*[types.int64] * 5), _called("sendto", [_POINTER, _INT])
 
 
-# how many bytes came or went; less than 0: none
+# number of bytes received or sent; less than 0: none
 receive_at: Any = intrinsic(_receive)  # fd, address, size
 send_at: Any = intrinsic(_send)  # fd, address, size
-receive_from_at: Any = intrinsic(_receive_from)  # ..., where the sender is put, where its size stands
+receive_from_at: Any = intrinsic(_receive_from)  # ..., address for the sender, address of its size
 send_to_at: Any = intrinsic(_send_to)  # ..., the receiver, its size

@@ -1,4 +1,4 @@
-"""What the shells of `sitl` and `autopilot` have in common: how they stop, wait, and read their options."""
+"""Functions that the shells of `sitl` and `autopilot` share: stopping, waiting, and reading options."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Address = tuple[str, int]
 
 LARGEST_DATAGRAM = 65535
 MOST_SEED = 2**63 - 1
-EXIT_ERROR, EXIT_USAGE = 1, 2  # of the latter the fault is the command line's, or a file's that it names
+EXIT_ERROR, EXIT_USAGE = 1, 2  # usage: an error of the command line, or of a file that it names
 MOST_SPEED = 1000.0  # times the wall clock
 ARGUMENTS_FOLLOW = "--arguments-follow"  # on stdin
 _THIS_MACHINE = "127.0.0.1"
@@ -33,10 +33,10 @@ _PR_SET_TIMERSLACK = 29
 
 
 class ProgramCommand(click.Command):
-    """A program that tells wrong usage in one line, and ends with 2.
+    """A program that reports wrong usage in one line and exits with 2.
 
-    It can be loaded before it is known with what it is to start: with `ARGUMENTS_FOLLOW` alone it waits for
-    its arguments on stdin.
+    It can be loaded before its arguments are known: with `ARGUMENTS_FOLLOW` as the only argument it waits for
+    them on stdin.
     """
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
@@ -54,7 +54,8 @@ class ProgramCommand(click.Command):
 
 
 def _following_arguments() -> list[str]:
-    """The arguments in a line of JSON on stdin, behind the file to which to write; ends where none comes."""
+    """The arguments in a line of JSON on stdin, whose first entry is the file for stdout and stderr; exits if
+    no line arrives."""
     line = sys.stdin.buffer.readline()
     if not line:
         sys.exit(0)
@@ -65,7 +66,7 @@ def _following_arguments() -> list[str]:
 
 
 def _lead(path: str, flags: int, *numbers: int) -> None:
-    """Let these descriptors lead to a file."""
+    """Redirect these file descriptors to a file."""
     opened = os.open(path, flags)
     for number in numbers:
         os.dup2(opened, number)
@@ -74,14 +75,14 @@ def _lead(path: str, flags: int, *numbers: int) -> None:
 
 
 def complain(program: str, exit_code: int, *lines: str) -> int:
-    """Tell why a program ends, a line for each thing that is wrong; the exit code."""
+    """Print why a program ends, a line for each problem; return the exit code."""
     for line in lines:
         print(f"{program}: {line}", file=sys.stderr)
     return exit_code
 
 
 def usage_text(error: click.UsageError) -> str:
-    """What is wrong with the words of a command, in one line, and who tells how they are meant."""
+    """What is wrong with the arguments of a command, in one line, with a reference to its --help."""
     text = " ".join(error.format_message().split()).rstrip(".")
     link = " " if text.endswith("?") else "; "
     return f"{text}{link}see {error.ctx.command_path} --help" if error.ctx else text
@@ -94,7 +95,7 @@ class WholeNumber(click.IntRange):
 
 
 class NamedPath(click.Path):
-    """A path that says where: not an empty one, which would be the folder that somebody happens to be in."""
+    """A path that is not empty: an empty one would mean whatever folder is the current one."""
 
     def convert(
         self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
@@ -105,13 +106,13 @@ class NamedPath(click.Path):
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
-    """What asks a program to end: also that its terminal is closed, unless it is to outlive that (nohup)."""
+    """The signals that end a program; a closed terminal too, unless the program is to outlive it (nohup)."""
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     return (signal.SIGINT, signal.SIGTERM) if outlives else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class LastingStream:
-    """A terminal to which may be written even when it is closed: from then on nobody reads it."""
+    """A terminal that accepts text even after it is closed; from then on the text is lost."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -132,7 +133,7 @@ class LastingStream:
         except OSError as error:
             if error.errno != errno.EIO:
                 raise
-            # what is left in its buffer goes there, too
+            # the rest of its buffer is written there, too
             _lead(os.devnull, os.O_WRONLY, self._stream.fileno())
 
     def __getattr__(self, name: str) -> Any:
@@ -140,8 +141,8 @@ class LastingStream:
 
 
 def open_closed_streams() -> None:
-    """Let stdin, stdout and stderr lead nowhere if we were started without (`>&-`): the next files that are
-    opened would take their places."""
+    """Redirect stdin, stdout and stderr to the null device if the program was started without them (`>&-`):
+    else the next files that are opened would take their places."""
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:
             os.fstat(number)
@@ -152,7 +153,7 @@ def open_closed_streams() -> None:
 
 
 def outlive_terminal() -> None:
-    """What is said to a terminal that was closed is lost, and no error."""
+    """Make text to a closed terminal be lost without an error."""
     if sys.stdout.isatty():
         sys.stdout = cast(TextIO, LastingStream(sys.stdout))
     if sys.stderr.isatty():
@@ -164,10 +165,10 @@ class Stop(BaseException):
 
 
 class StopRequest:
-    """Notes a signal; the loops look at it where nothing is half done.
+    """Notes a signal; the loops check it at points where nothing is half done.
 
-    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
-    made for it.
+    An exception raised by the handler itself could occur within a kernel's call, whose machine code cannot
+    handle it.
     """
 
     asked = False
@@ -193,7 +194,7 @@ class StopRequest:
 
 
 def set_timeout(sock: socket.socket, seconds: float) -> None:
-    """How long a receive waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
+    """Set how long a receive waits; 0: for ever. Uses SO_RCVTIMEO, which costs nothing per datagram."""
     whole = int(seconds)
     value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
@@ -202,8 +203,8 @@ def set_timeout(sock: socket.socket, seconds: float) -> None:
 def receive(
     sock: socket.socket, flags: int = 0, most_bytes: int = LARGEST_DATAGRAM
 ) -> tuple[bytes, Address] | None:
-    """The next datagram, or so much of it, and its sender; None after the timeout, or if one of ours found no
-    listener."""
+    """The next datagram, at most `most_bytes` of it, and its sender; None after the timeout, or if one of
+    ours found no listener."""
     try:
         return sock.recvfrom(most_bytes, flags)
     except OSError:
@@ -211,8 +212,8 @@ def receive(
 
 
 def send(sock: socket.socket, datagram: bytes, address: Address | None = None) -> bool:
-    """Send a datagram, of a connected socket without an address; False if it is lost: nobody listens there
-    yet, or the network is full."""
+    """Send a datagram, by a connected socket if there is no address; False if it is lost: nobody listens
+    there yet, or the network is full."""
     try:
         if address is None:
             sock.send(datagram)
@@ -230,7 +231,7 @@ def datagram_socket(address: Address) -> socket.socket:
 
 
 def reason(error: OSError) -> str:
-    """What the system says of an error, in words, without what Python adds of the call (its `strerror`)."""
+    """The system's text of an error, without what Python adds about the call (its `strerror`)."""
     is_of_system = not isinstance(error, socket.gaierror)
     if error.errno is not None and error.errno in errno.errorcode and is_of_system:
         return os.strerror(error.errno).lower()
@@ -238,21 +239,20 @@ def reason(error: OSError) -> str:
 
 
 def shown(address: Address | None) -> str:
-    """An address for a person."""
+    """An address as readable text."""
     return f"{address[0]}:{address[1]}" if address else "nowhere"
 
 
 def can_branch_off() -> bool:
-    """Whether another process can begin with what is loaded here: no thread holds a lock that it would take
-    along."""
+    """Whether a forked process can use what is loaded here: no other thread holds a lock to inherit."""
     return sys.platform.startswith("linux") and threading.active_count() == 1
 
 
 def be_punctual(real_time: bool) -> None:
-    """Ask the system and the interpreter for short delays; none of it is needed.
+    """Request short delays from the system and the interpreter; the program also works without them.
 
-    A program that keeps to the wall clock also asks to go before all others, but not for the processes that
-    it starts.
+    A program that keeps to the wall clock also requests priority over all others, but not for the processes
+    that it starts.
     """
     if real_time:
         with suppress(OSError, AttributeError):
@@ -261,7 +261,7 @@ def be_punctual(real_time: bool) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
     if real_time:
         gc.collect()
-    gc.freeze()  # what is there is there to stay, and is not looked through again
+    gc.freeze()  # the present objects stay, and are not scanned again
     gc.enable()
 
 
@@ -282,8 +282,8 @@ def home_option(text: str) -> Home:
 
 
 def signing_key_option(text: str) -> bytes:
-    """FILE with a signing key that nobody else may read."""
-    from autopilot.wire.signing import NoKeyError, key_of_text  # in case of need alone
+    """FILE with a signing key that no other user may read."""
+    from autopilot.wire.signing import NoKeyError, key_of_text  # only if needed
 
     path = Path(text)
     try:
@@ -307,9 +307,9 @@ def setting_option(text: str) -> tuple[str, float]:
 
 
 def unknown_setting(name: str, names: Iterable[str]) -> str:
-    """That it is none of these names, and what is meant: where several go on where it ends (SIM_WIND), all of
+    """A text for a name that is unknown, with suggestions: if several names continue it (SIM_WIND), all of
     them, as none is nearer than the others; else as `unknown_parameter`."""
-    from autopilot.wire.parameter_names import unknown_parameter  # in case of need alone
+    from autopilot.wire.parameter_names import unknown_parameter  # only if needed
 
     known = sorted(names)
     longer = [one for one in known if "_" in name and one.startswith(f"{name}_")]

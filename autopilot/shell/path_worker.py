@@ -1,4 +1,4 @@
-"""Work for another process. A module of its own, because a spawned process cannot import `__main__`."""
+"""Work for another process. It is a separate module because a spawned process cannot import `__main__`."""
 
 from __future__ import annotations
 
@@ -16,35 +16,36 @@ from autopilot.shell.options import can_branch_off
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.supervisor.state import ON_GROUND
 
-_LONGEST_IN_VAIN_S = 1.0  # about what another process takes to load
+_LONGEST_IN_VAIN_S = 1.0  # longest wait for obsolete work; about the time in which a new process loads
 
 
 class Aside:
-    """Work for which the control loop must not wait, done by a process of its own that is kept ready.
+    """Work for which the control loop must not wait, done by a separate process that is kept ready.
 
-    Where it was not started, because the clock waits, a vehicle on the ground does its work itself.
+    If it was not started because the clock waits, a vehicle on the ground does its work itself.
     """
 
     def __init__(self) -> None:
-        self._work: Work | Gains | None = None  # what it is at
-        self._since = 0.0  # when that began
+        self._work: Work | Gains | None = None  # present work of the process
+        self._since = 0.0  # when it began
         self._loaded = False
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
 
     def branch_off(self) -> None:
-        """Begin the process with what is loaded here, while there is no thread, lock or socket to take along.
+        """Fork the process with what is loaded here, while there is no thread, lock or socket to inherit.
 
-        Where that cannot be, `start` begins one that loads all of it itself: a second of processor time.
+        If that is impossible, `start` begins a process that loads everything itself: a second of processor
+        time.
         """
         if can_branch_off():
             self._begin(get_context("fork"))
 
     def start(self, rehearsal: Rehearsal) -> None:
-        """Have the process load what it needs, which it does by `rehearsal`."""
+        """Have the process load what it needs by doing `rehearsal`."""
         if self._process is None:
             self._begin(get_context("spawn"))
-        with suppress(OSError):  # it has died: the next look finds that out
+        with suppress(OSError):  # it has died: the next check notices that
             self._pipe.send(rehearsal)  # type: ignore[union-attr]
 
     def _begin(self, context: ForkContext | SpawnContext) -> None:
@@ -55,12 +56,12 @@ class Aside:
         theirs.close()
 
     def attend(self, onboard: Onboard) -> None:
-        """Begin what waits; hand over what is done."""
+        """Begin waiting work; hand over finished work."""
         if (self._work is not None or not self._loaded) and self._pipe is not None and self._pipe.poll():
             self._hear(self._pipe, onboard)
         if onboard.work is None or self._work is onboard.work:
             return
-        if self._work is not None:  # of no use any more, which most often does not take long
+        if self._work is not None:  # obsolete work, which usually does not take long
             if not self._loaded or time.monotonic() - self._since < _LONGEST_IN_VAIN_S:
                 return
             self.close()
@@ -71,7 +72,7 @@ class Aside:
         if self._pipe is None:
             self.start(onboard.rehearsal)
         self._work, self._since = onboard.work, time.monotonic()
-        with suppress(OSError):  # it has died idle: the next look finds that out
+        with suppress(OSError):  # it has died idle: the next check notices that
             self._pipe.send(self._work)  # type: ignore[union-attr]
 
     def _hear(self, pipe: Connection, onboard: Onboard) -> None:
@@ -84,13 +85,13 @@ class Aside:
                 onboard.finish(work, work.failed("the process that prepares paths has died"))
             return
         if not self._loaded:
-            self._loaded, self._since = True, time.monotonic()  # its first word
+            self._loaded, self._since = True, time.monotonic()  # its first message
         elif self._work is not None:
             work, self._work = self._work, None
             onboard.finish(work, done)
 
     def close(self) -> None:
-        """End what goes on."""
+        """End the process."""
         if self._process is not None:
             self._process.kill()
             self._process.join()
@@ -101,9 +102,10 @@ class Aside:
 
 
 def _serve(pipe: Connection, of_parent: Connection | None) -> None:
-    """Work for whom `pipe` leads to; a fork has the other end too, and would not see it closed."""
+    """Do the work that arrives by `pipe`. A fork inherits the parent's end too, and closes it, since it would
+    not notice otherwise that the parent has closed it."""
     for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)  # whoever began it ends it
+        signal.signal(number, signal.SIG_IGN)  # the parent ends this process
     if of_parent is not None:
         of_parent.close()
         gc.enable()

@@ -72,12 +72,12 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterError
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
-_GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
+_GREETING_S = 0.2  # between heartbeats to a simulator that does not answer yet
 _BEAT_S = 1.0  # between two heartbeats while the clock stands
-_SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
-_STANDING_STEP_US = 4000  # by which answers go on meanwhile, so often between two greetings:
+_SLOW_SHARE = 0.8  # share of the wall clock's rate below which the vehicle's clock is slow
+_STANDING_STEP_US = 4000  # steps in which answers continue meanwhile; so many between two greetings:
 _STANDING_STEPS = round(1e6 * _GREETING_S / _STANDING_STEP_US)
-_SILENCE_S = 3.0  # of the simulator, until it is said
+_SILENCE_S = 3.0  # silence of the simulator after which it is reported
 _LOG_BYTES = 32_768  # of the flight log that are stored at once
 
 
@@ -85,13 +85,13 @@ SIMULATOR_RESTARTED = "Simulator restarted, vehicle on the ground: disarmed"
 
 
 def turned_away(datagram: bytes) -> str:
-    """What a simulator says to an autopilot that it does not serve, and what to do; else empty."""
+    """The text of a simulator to an autopilot that it does not serve, and what to do; else empty."""
     said = [one.message.text for one in decode(datagram)[0] if one.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT]
     return f"{said[-1]}; end that one, or start another sitl (--listen, --sim)" if said else ""
 
 
 class Program:
-    """The running autopilot: an `Onboard`, and anew whenever the simulator starts again."""
+    """The running autopilot: an `Onboard`, which is built anew whenever the simulator restarts."""
 
     def __init__(
         self,
@@ -113,11 +113,11 @@ class Program:
         self._say = say
         self._socket = open_socket(simulator, "simulator")
         self._connect()
-        self._greeted = 0.0  # when, monotonic clock
+        self._greeted = 0.0  # time of the last greeting, monotonic clock
         self._beaten, self._beaten_us = (
             0.0,
             0,
-        )  # the wall's and the vehicle's clock when it was last looked at
+        )  # the wall clock and the vehicle's clock at the last check
         greeting = mavlink.MAVLink_heartbeat_message(
             type=mavlink.MAV_TYPE_QUADROTOR,
             autopilot=mavlink.MAV_AUTOPILOT_PX4,
@@ -135,19 +135,19 @@ class Program:
         self._ground.join(self.onboard)
 
     def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
-        """Fence and rally points that are already there."""
+        """Take over stored fence and rally points, and report what of the storage is lost."""
         for kind, items in areas.items():
             self.onboard.take_areas(kind, items)
         self.onboard.take_losses(self._storage.lost)
 
     def tell(self, troubles: list[str]) -> None:
-        """What is wrong with the storage: on the terminal, and to the operators."""
+        """Report problems of the storage on the terminal and to the operators."""
         for trouble in troubles:
             print(f"autopilot: {trouble}", file=sys.stderr)
             self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, f"Storage: {trouble}")
 
     def run(self, stop: StopRequest) -> None:
-        """Tick for ever."""
+        """Fly ticks until a signal stops the program."""
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
         silent, lost, beaten, refused = True, False, 0.0, ""
@@ -171,7 +171,7 @@ class Program:
             stop.check()
             try:
                 datagram = met.datagram or receive_from_simulator(LARGEST_DATAGRAM)
-            except OSError:  # nothing within the timeout, or nobody listens where we sent to
+            except OSError:  # nothing arrived within the timeout, or nobody listens at the address
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
                     silent = True
@@ -183,7 +183,7 @@ class Program:
                     lost = True
                 if silent or now - heard > 1.0:
                     self._greet()
-                # the clock stands, but questions are answered
+                # the clock stands, but requests are answered
                 self.cost.pause()
                 if isinstance(self._ground, GroundStations):
                     self._ground.exchange(self.onboard, self._keep, stop)
@@ -223,7 +223,7 @@ class Program:
                 self._say(f"the simulator at {shown(self._simulator)} does not serve this one: {why}")
 
     def _run_on(self, ticks: TickLoop, ground: GroundInStep) -> Met:
-        """Fly ticks without Python, if the next are such."""
+        """Fly ticks without Python, if the next ones allow it."""
         met = ticks.run(self.onboard, ground.questions)
         if met.ran:
             self.cost.pause()
@@ -233,7 +233,7 @@ class Program:
         return met
 
     def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
-        """Exchange with the ground before the answer where the ground shares our clock, else after it."""
+        """Exchange with the ground before the answer if the ground shares our clock, else after it."""
         if isinstance(self._ground, GroundInStep):
             if new:
                 self._ground.exchange(self.onboard, self._keep, stop)
@@ -253,7 +253,7 @@ class Program:
             raise AutopilotError(onboard.fault)
 
     def _keep_beating(self) -> None:
-        """A heartbeat each second of the wall clock where the vehicle's is slower: clients wait by theirs."""
+        """A heartbeat each second of the wall clock, by which clients wait, if the vehicle's is slower."""
         now, now_us = time.monotonic(), self.onboard.now_us
         if now - self._beaten >= _BEAT_S:
             if now_us - self._beaten_us < _SLOW_SHARE * _BEAT_S * 1e6:
@@ -261,14 +261,15 @@ class Program:
             self._beaten, self._beaten_us = now, now_us
 
     def _connect(self) -> None:
-        """Hear nobody but the simulator; what is sent goes there."""
+        """Connect the socket: receive only from the simulator, and send to it."""
         try:
             self._socket.connect(self._simulator)
         except OSError as error:
             raise AutopilotError(f"simulator {shown(self._simulator)}: {reason(error)}") from None
 
     def _greet(self) -> None:
-        """A heartbeat to the simulator, now and then: where nobody listens, no receiving waits for it."""
+        """Send a heartbeat to the simulator, at most one per `_GREETING_S`: if nobody listens there, a
+        receive fails without waiting."""
         now = time.monotonic()
         if now - self._greeted >= _GREETING_S:
             self._greeted = now
@@ -283,7 +284,7 @@ class Program:
                 self._storing.ask(store, self._not_stored, self._stored)
 
     def _stored(self) -> None:
-        """Something lies on the disk, which may make good what was lost."""
+        """Something was stored, which may replace what was lost."""
         self.onboard.take_losses(self._storage.lost)
 
     def _not_stored(self, error: OSError) -> None:
@@ -313,7 +314,7 @@ class Program:
 
 
 def _stored_by(storage: Storage, event: Event) -> Callable[[], None] | None:
-    """What stores an event; None where nothing is to be stored."""
+    """The function that stores an event; None if nothing is to be stored."""
     match event:
         case MissionChanged(mission):
             return partial(storage.keep_mission, mission)
@@ -458,7 +459,7 @@ def main(
         if not quiet:
             print(f"autopilot: {text}", flush=True)
 
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to bring to an end
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to finish
     program: Program | None = None
     place = home or Home()
     in_step = ground_lockstep is not None
@@ -482,7 +483,7 @@ def main(
         parts = autopilot_parts((*LAWS, OWN)[int(table["CTL_LAW"])])
         compiled = ready(parts)
         if not compiled:
-            gc.enable()  # the compiler leaves much behind
+            gc.enable()  # the compiler leaves much garbage
             say(ONCE)
         mission, trouble = kept.load_mission(place)
         troubles += [trouble] if trouble else []

@@ -32,7 +32,7 @@ def _as_file_errors() -> Iterator[None]:
 
 
 class DirectoryCard:
-    """A card kept in a directory, which it makes. Nothing outside it can be reached, not by links either."""
+    """A card kept in a directory, which it creates. Nothing outside can be reached, not even by links."""
 
     def __init__(self, root: Path, limits: Limits | None = None) -> None:
         root.mkdir(parents=True, exist_ok=True)
@@ -113,19 +113,21 @@ class DirectoryCard:
             self._gone(0)
 
     def append(self, path: files.Path, data: bytes) -> None:
-        """Write behind the end of a file, which is made if there is none; OSError as the system says."""
+        """Append to a file, which is created if it does not exist; raises the system's OSError."""
         try:
             place = self._at(path)
         except FileError:
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
+        steps = (self._root.joinpath(*path[:depth]) for depth in range(1, len(path) + 1))
+        new = sum(not step.exists() for step in steps)
         place.parent.mkdir(parents=True, exist_ok=True)
         with place.open("ab") as file:
-            self._held += file.tell() == 0
+            self._held += new
             file.write(data)
             self._used += len(data)
 
     def make_room(self, folder: files.Path, ending: str, most_bytes: int) -> None:
-        """Take away the first files of a folder, by name, until the rest is no more than that."""
+        """Remove the first files of a folder, by name, until the rest has at most `most_bytes`."""
         try:
             place = self._at(folder)
         except FileError:
@@ -156,7 +158,7 @@ class DirectoryCard:
         return place
 
     def _room(self, path: files.Path, size: int) -> int:
-        """By how many bytes a file of this size is larger than the present one, if there is room for them."""
+        """Bytes by which a file of this size exceeds the present one; FileError if they do not fit."""
         grown = size - self._file(path).stat().st_size
         too_large = size > self._limits.file_bytes or self._used + grown > self._limits.total_bytes
         if grown > 0 and too_large:
@@ -181,14 +183,14 @@ class DirectoryCard:
         return count, size
 
     def _height(self, folder: Path) -> int:
-        """How many levels lie in a folder."""
+        """Number of levels inside a folder."""
         return max((depth for depth, _ in _below(folder)), default=0)
 
 
 def _below(folder: Path) -> Iterator[tuple[int, os.DirEntry[str]]]:
-    """Everything in a folder with its depth, 1 for what lies in it directly, however deep that goes.
+    """Everything in a folder and its subfolders with its depth, 1 for what lies directly in the folder.
 
-    What vanishes meanwhile, or can no longer be named, is passed over.
+    Entries that vanish meanwhile, or whose paths are too long for the system, are skipped.
     """
     ahead = [(1, str(folder))]
     while ahead:

@@ -1,5 +1,5 @@
-"""Names of parameters that `--set` of `sitl` and of `autopilot` take: those of either program, as one list of
-settings may be given to both."""
+"""Names of parameters that `--set` of `sitl` and of `autopilot` accept: those of either program, since one
+list of settings may be given to both."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from autopilot.vehicle.parameters import definitions
 
 
 def check_names(settings: Iterable[tuple[str, float]], brought: Iterable[str] = ()) -> None:
-    """click.UsageError with the nearest name where neither program has such a parameter, nor is it one of
-    those that somebody has `brought`."""
+    """click.UsageError with the nearest name if neither program has such a parameter and it does not belong
+    to user code (`brought`)."""
     known = {*brought, *definitions().parameters, *_world()}
     for name, _ in settings:
         if name not in known:
@@ -23,7 +23,7 @@ def check_names(settings: Iterable[tuple[str, float]], brought: Iterable[str] = 
 
 
 def _world() -> set[str]:
-    """The simulator's names, from its file: the autopilot is installed with it and imports nothing of it."""
+    """The simulator's names, from its file: the autopilot is installed with it, but imports nothing of it."""
     return set(tomllib.loads((files("sitl") / "sim_parameters.toml").read_text(encoding="utf-8"))) - {
         "groups"
     }

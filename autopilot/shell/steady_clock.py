@@ -1,6 +1,6 @@
-"""The time of day that goes on evenly: as it was at the start, and what has passed since.
+"""A steady time of day: the time at the start plus the time that has passed since.
 
-A wall clock that is set forward or back changes nothing.
+Setting the wall clock forward or back has no effect on it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What must outlive the process: the mission and the parameters that a ground station set, as files."""
+"""Data that must outlive the process, as files: mission, fence, parameters, signing key, logs and more."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
 PARAMETER_FILE = "parameters.txt"
 WORLD_FILE = "world.txt"  # parameters of the simulator
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
-CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
+CARD_DIRECTORY = "card"  # files that clients access by FILE_TRANSFER_PROTOCOL
 LOCK_FILE = "lock"
-# what a vehicle is not armed without, if it was stored: a fence, and parameters as they were set
+# stored data without which a vehicle is not armed: the fence and the parameters
 _MISSED: dict[int | str, str] = {
     mavlink.MAV_MISSION_TYPE_FENCE: "the stored fence is damaged; upload it again, or clear it",
     PARAMETER_FILE: "the stored parameters are damaged; set and save them again",
@@ -49,16 +49,16 @@ class StorageError(OSError):
 
 
 class Storage:
-    """A directory; every write is a whole new file put in place at once.
+    """A directory; every write is a whole new file that replaces the old one atomically.
 
-    A file that is not what was written is never lost: a copy of it is made before another takes its place.
+    A damaged file is never lost: it is copied before another file takes its place.
     """
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._parameters: dict[str, float] = {}
-        self._logs: set[files.Path] = set()  # begun by this process
-        self._lost: set[int | str] = set()  # whose files cannot be read: they stay until others come
+        self._logs: set[files.Path] = set()  # logs begun by this process
+        self._lost: set[int | str] = set()  # whose files cannot be read: they stay until replaced
         self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,7 @@ class Storage:
             ) from None
 
     def lock(self) -> None:
-        """Keep other autopilots out until this object or the process is gone."""
+        """Keep other autopilots out as long as this object and the process exist."""
         try:
             self._lock.acquire(blocking=False)
         except Timeout:
@@ -81,7 +81,7 @@ class Storage:
             raise StorageError(f"--storage {self._directory}: {error.strerror}") from None
 
     def load_mission(self, home: Home) -> tuple[StoredMission | None, str]:
-        """The stored mission, and what is wrong with the file if it is none (empty: nothing)."""
+        """The stored mission, and what is wrong with the file if it cannot be used (empty: nothing)."""
         path = self._directory / MISSION_FILE
         try:
             mission = deserialise(path.read_bytes(), home)
@@ -94,7 +94,7 @@ class Storage:
         return mission, ""
 
     def _moved(self, path: Path) -> str:
-        """Move a damaged file out of the way, and say so."""
+        """Move a damaged file to another name, and return a text about it."""
         try:
             aside = keep_copy(path)
             remove(path)
@@ -103,7 +103,7 @@ class Storage:
         return f"moved to {aside.name}"
 
     def _replace(self, what: int | str, name: str, data: bytes | None) -> None:
-        """Put other data into a file, or take it away, after a copy of what cannot be read of it."""
+        """Replace a file's contents, or remove it (None), after a copy of a file that cannot be read."""
         path = self._directory / name
         if what in self._lost:
             keep_copy(path)
@@ -114,7 +114,7 @@ class Storage:
         self._lost.discard(what)
 
     def load_areas(self, home: Home) -> tuple[dict[int, tuple[WireItem, ...]], list[str]]:
-        """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each that is none."""
+        """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each unusable file."""
         found: dict[int, tuple[WireItem, ...]] = {}
         troubles = []
         for kind, name in AREA_FILES.items():
@@ -134,15 +134,15 @@ class Storage:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """What was stored, cannot be read, and is not a thing to fly without: the reasons not to arm."""
+        """The reasons not to arm: stored data that cannot be read, without which the vehicle must not fly."""
         return tuple(text for what, text in _MISSED.items() if what in self._lost)
 
     def keep_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
-        """Store fence or rally points; none are stored as none."""
+        """Store fence or rally points; without items the file is removed."""
         self._replace(kind, AREA_FILES[kind], serialise(items) if items else None)
 
     def load_parameters(self, table: ParameterTable) -> list[str]:
-        """Set what is stored; returns a line for each stored value that no longer fits."""
+        """Set the stored parameters; returns a line for each stored value that is no longer valid."""
         stored, troubles = self._load_text(PARAMETER_FILE, "starting with the defaults")
         for name, value in stored.items():
             try:
@@ -152,7 +152,7 @@ class Storage:
         return troubles
 
     def _load_text(self, name: str, then: str) -> tuple[dict[str, float], list[str]]:
-        """Names and numbers in a file, and what is wrong with it and what comes of that, if it is none."""
+        """Names and numbers in a file; if it is unusable, a line with the error and its consequence."""
         path = self._directory / name
         try:
             return parse_text(unseal(path.read_bytes())), []
@@ -163,7 +163,7 @@ class Storage:
             return {}, [f"{path}: {_why(error)}; {then}"]
 
     def keep_mission(self, mission: StoredMission) -> None:
-        """Store the mission; an empty one is stored as none."""
+        """Store the mission; for an empty mission the file is removed."""
         self._replace(MISSION_FILE, MISSION_FILE, serialise(mission.items) if mission.items else None)
 
     def keep_parameter(self, name: str, value: float) -> None:
@@ -172,19 +172,19 @@ class Storage:
         self.keep_parameters()
 
     def keep_parameters(self) -> None:
-        """Store all that were set; so what could not be read is given up."""
+        """Store all parameters that were set; values of a file that could not be read are given up."""
         self._replace(PARAMETER_FILE, PARAMETER_FILE, seal(_lines(sorted(self._parameters.items()))))
 
     def load_world(self) -> tuple[dict[str, float], list[str]]:
-        """The simulator's parameters as they were saved, and a line if the file is none."""
+        """The saved parameters of the simulator, and a line if the file is unusable."""
         return self._load_text(WORLD_FILE, "left out")
 
     def keep_world(self, values: Mapping[str, float]) -> None:
-        """Store the simulator's parameters; none are stored as none."""
+        """Store the simulator's parameters; without values the file is removed."""
         self._replace(WORLD_FILE, WORLD_FILE, seal(_lines(values.items())) if values else None)
 
     def load_signing(self) -> Signing | None:
-        """The stored key with a time later than any that was used; StorageError if it is none."""
+        """The stored key with a time later than any that was used; StorageError if the file is unusable."""
         path = self._directory / SIGNING_FILE
         try:
             key, timestamp = unseal(path.read_bytes()).split()
@@ -197,7 +197,7 @@ class Storage:
             ) from None
 
     def keep_signing(self, key: bytes | None, timestamp: int) -> None:
-        """Store the key, for nobody else to read, or take it away."""
+        """Store the key, readable by this user only, or remove it (None)."""
         path = self._directory / SIGNING_FILE
         if key is None:
             remove(path)
@@ -205,7 +205,7 @@ class Storage:
             write_whole(path, seal(f"{key.hex()} {timestamp}\n"), private=True)
 
     def keep_log(self, chunk: LogChunk, most_mb: float) -> None:
-        """Store a part of a flight log; a new log takes the place of the oldest where they are too many."""
+        """Store a part of a flight log; for a new log the oldest ones beyond `most_mb` are removed."""
         if chunk.path not in self._logs:
             self._logs.add(chunk.path)
             self.card.make_room(LOG_FOLDER, LOG_ENDING, round(most_mb * 1e6))

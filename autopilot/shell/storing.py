@@ -1,7 +1,7 @@
-"""Storing aside: what a disk takes long to do is done by a thread, and the ground hears of it afterwards.
+"""Storing in a thread: slow disk work is done beside the control loop, and reported to the ground afterwards.
 
-What is said to the ground stations waits, in its order, until all that was to be stored before it lies on the
-disk: so an answer that says that something is stored is true, and the control loop waits for no disk.
+Messages to the ground stations wait, in their order, until everything that was to be stored before them is on
+the disk. An answer that reports something as stored is thus true, and the control loop waits for no disk.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Failed = Callable[[OSError], None]
 
 
 class Storing:
-    """Stores in the order in which it is asked to; `aside`: by a thread, else at once."""
+    """Stores in the order of the requests; `aside`: in a thread, else immediately."""
 
     def __init__(self, aside: bool) -> None:
         self._asked = 0
@@ -29,7 +29,7 @@ class Storing:
             self._thread.start()
 
     def ask(self, store: Callable[[], None], failed: Failed, stored: Callable[[], None]) -> None:
-        """Have something stored; `failed` or `stored` is called by `attend`."""
+        """Request that something is stored; `attend` then calls `failed` or `stored`."""
 
         def job() -> None:
             try:
@@ -48,18 +48,18 @@ class Storing:
             self._jobs.put(job)
 
     def attend(self) -> None:
-        """Tell what has come of it."""
+        """Report the results of finished requests."""
         while self._outcomes:
             self._outcomes.popleft()()
 
     @property
     def asked(self) -> int:
-        """How often something was asked for."""
+        """Number of requests so far."""
         return self._asked
 
     @property
     def done(self) -> int:
-        """How much of that is done, the first first."""
+        """Number of finished requests, which are executed in their order."""
         return self._done
 
     def close(self) -> None:

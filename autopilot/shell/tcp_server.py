@@ -1,4 +1,4 @@
-"""Ground stations that connect by TCP: each connection is a link of its own, which ends with it."""
+"""Ground stations that connect by TCP: each connection is a separate link, which ends with it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from autopilot.services.records import Link
 from autopilot.shell.options import Address
 from autopilot.wire.codec import whole_frames
 
-_LARGEST_READ = 2048  # of a client, until it is the turn of another
-_LARGEST_BACKLOG = 262_144  # bytes that a client has not taken: it is stuck, and is let go
-MAX_CLIENTS = 16  # the one silent longest makes room, once it is silent for so long:
-SILENCE_US = 5_000_000  # a ground station says its heartbeat every second
+_LARGEST_READ = 2048  # bytes from a client, before it is another's turn
+_LARGEST_BACKLOG = 262_144  # bytes that a client has not taken; beyond that it is stuck and is disconnected
+MAX_CLIENTS = 16  # a new client replaces the one silent longest, if its silence has lasted this long:
+SILENCE_US = 5_000_000  # a ground station sends a heartbeat every second
 
 
 class _Client:
-    """One connection: what came of a frame, and what could not be sent yet."""
+    """One connection: the received part of a frame, and the bytes that could not be sent yet."""
 
     def __init__(self, sock: socket.socket, now_us: int) -> None:
         self.socket = sock
@@ -26,7 +26,7 @@ class _Client:
         self.waiting = b""
 
     def take(self) -> bytes | None:
-        """Whole frames that came; None at the end of the connection."""
+        """Whole frames that arrived; None at the end of the connection."""
         try:
             read = self.socket.recv(_LARGEST_READ)
         except BlockingIOError:
@@ -41,7 +41,7 @@ class _Client:
         return whole
 
     def give(self, frames: bytes) -> bool:
-        """Send, or keep what the client does not take yet; False where it is stuck or gone."""
+        """Send, or keep what the client does not take yet; False if it is stuck or gone."""
         self.waiting += frames
         try:
             self.waiting = self.waiting[self.socket.send(self.waiting) :]
@@ -56,7 +56,7 @@ class TcpServer:
     """Listens, serves any number of clients, and never waits for one."""
 
     def __init__(self, address: Address) -> None:
-        """Raises OSError where the address cannot be had."""
+        """Raises OSError if the address cannot be used."""
         family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM)[0][0]
         self._listener = socket.create_server(address, family=family)
         self._listener.setblocking(False)
@@ -64,7 +64,7 @@ class TcpServer:
         self._number = 0
 
     def take(self, onboard: Onboard) -> tuple[bytes, Link] | None:
-        """Let in who knocks; the frames that came from one client, from another the next time."""
+        """Accept a new connection; return the frames of one client, and of another at the next call."""
         self._accept(onboard)
         for link, client in list(self._clients.items()):
             frames = client.take()
@@ -72,12 +72,12 @@ class TcpServer:
                 self._let_go(link, onboard)
             elif frames:
                 client.heard_us = onboard.now_us
-                self._clients[link] = self._clients.pop(link)  # behind the others
+                self._clients[link] = self._clients.pop(link)  # after the others
                 return frames, link
         return None
 
     def send(self, link: Link, frames: bytes, onboard: Onboard) -> None:
-        """Frames for one client; nothing happens where it is gone."""
+        """Send frames to one client; no effect if it is gone."""
         client = self._clients.get(link)
         if client is not None and not client.give(frames):
             self._let_go(link, onboard)
@@ -87,7 +87,7 @@ class TcpServer:
         return tuple(self._clients)
 
     def join(self, onboard: Onboard) -> None:
-        """Serve the connections that there are from now on."""
+        """Serve the existing connections from now on."""
         for link in self._clients:
             onboard.add_link(link)
 
@@ -98,7 +98,7 @@ class TcpServer:
             client.socket.close()
 
     def _accept(self, onboard: Onboard) -> None:
-        with suppress(OSError):  # nobody knocks
+        with suppress(OSError):  # no new connection
             sock, _ = self._listener.accept()
             if len(self._clients) >= MAX_CLIENTS:
                 longest = min(self._clients, key=lambda link: self._clients[link].heard_us)

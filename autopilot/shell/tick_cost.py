@@ -1,4 +1,4 @@
-"""How much processor time of this thread each tick took: what is late beyond that is the machine's doing."""
+"""Processor time of this thread for each tick; any further delay is caused by the machine."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ class TickCost:
         self._last_ns = -1
 
     def tick(self, period_us: int) -> None:
-        """A tick begins; what ran since the last one began was that one's. Ticks last so many microseconds, 0
-        while that is not known, and then nothing counts."""
+        """A tick begins; the time since the previous call belongs to the previous tick. Ticks last
+        `period_us`; 0: not known yet, and nothing is counted."""
         now_ns = time.thread_time_ns()
         if self._last_ns >= 0 and period_us > 0:
             self.count((now_ns - self._last_ns) // 1000, period_us)
         self._last_ns = now_ns
 
     def count(self, cost_us: int, period_us: int) -> None:
-        """One tick more that took so long."""
+        """Count a tick that took `cost_us`."""
         self._bins[min(cost_us // _BIN_US, _BINS)] += 1
         self._longest_us = max(self._longest_us, cost_us)
         self._ticks += 1
         self._too_long += cost_us > period_us
 
     def pause(self) -> None:
-        """What runs until the next tick is no tick's work."""
+        """The time until the next tick belongs to no tick."""
         self._last_ns = -1
 
     def _percentile_us(self, share: float) -> int:
-        """The upper edge of the bin that so many ticks do not exceed."""
+        """The upper edge of the bin that this share of the ticks does not exceed."""
         left = share * self._ticks
         for k, count in enumerate(self._bins):
             left -= count
@@ -45,7 +45,7 @@ class TickCost:
         return self._longest_us
 
     def summary(self) -> str:
-        """One line on the whole run; empty before the first tick has ended."""
+        """One line about the whole run; empty before the first tick has ended."""
         if not self._ticks:
             return ""
         return (

@@ -1,8 +1,8 @@
-"""Lockstep in machine code: tick after tick without Python, as long as nothing is to be decided, or asked.
+"""Lockstep in machine code: ticks without Python, as long as no decision or answer has to be waited for.
 
 `fly_on` waits for the sensors of the next tick, flies it, writes the streams that are due, and answers, until
-something else is to be done: a datagram comes that is not the plain next tick, none comes in time, the
-supervisor is to decide, or a tick is near at which more is to be said.
+something else is to be done: a datagram arrives that is not the plain next tick, none arrives in time, the
+supervisor must decide, or the next tick requires more.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ UNTIL, SILENCE = 4, 5
 
 
 class Wire(NamedTuple):
-    """The socket towards the simulator, what came by it, and the way to the ground station."""
+    """The socket towards the simulator, the datagram received by it, and socket and address of the ground."""
 
     fd: int
     heard: Bytes
     size: Ints  # (1,) of `heard`
     ground_fd: int
-    ground: Bytes  # its address, as the system has it
+    ground: Bytes  # its address in the form of the system
 
 
 class Met(NamedTuple):
     """What ended the ticks without Python."""
 
-    ran: bool  # there were any
-    more: bool = False  # and there may be more
-    datagram: bytes | None = None  # that is to be handled
-    decide: Tick | None = None  # a tick that is to be decided upon
+    ran: bool  # whether there were any
+    more: bool = False  # and whether there may be more
+    datagram: bytes | None = None  # a datagram to be handled
+    decide: Tick | None = None  # a tick that needs a decision
 
 
 NOTHING = Met(False)
@@ -68,7 +68,7 @@ NOTHING = Met(False)
 
 @kernel
 def _send_windows(wire: Wire, run: Running) -> None:
-    """Send the windows that are over, once they are enough or the ground will soon be waited for."""
+    """Send the closed windows if there are enough of them or the ground will soon be waited for."""
     numbers, said = run.numbers, run.streams.said.ctypes.data
     if numbers[ASKED] < numbers[MOST_ASKED] and numbers[ASKED_US] < numbers[ALONE_US]:
         return
@@ -77,14 +77,14 @@ def _send_windows(wire: Wire, run: Running) -> None:
         end = run.windows[i]
         send_to_at(wire.ground_fd, said + begin, end - begin, wire.ground.ctypes.data, len(wire.ground))
         begin = end
-    if begin > 0:  # what was said last was a question: nothing is left
+    if begin > 0:  # the last message was a question: nothing is left
         numbers[ASKED] = numbers[SAID] = 0
 
 
 @threaded
 def fly_on(wire: Wire, run: Running) -> int:
-    """Fly ticks until one is near that is none of these (UNTIL), until another datagram is HEARD, or none
-    (SILENCE), or until there is one to DECIDE upon."""
+    """Fly ticks until the next one must be left to Python (UNTIL), another datagram is HEARD, none arrives
+    (SILENCE), or the supervisor must DECIDE."""
     while goes_on(run):
         size = receive_at(wire.fd, wire.heard.ctypes.data, len(wire.heard))
         wire.size[0] = size
@@ -100,7 +100,7 @@ def fly_on(wire: Wire, run: Running) -> int:
 
 
 class TickLoop:
-    """Runs `fly_on` where it can be run."""
+    """Runs `fly_on` if the system and the sockets allow it."""
 
     def __init__(self, sock: socket.socket, ground: socket.socket, address: Address) -> None:
         """`sock` is connected to the simulator; `ground` sends to the ground station at `address`."""
@@ -108,10 +108,10 @@ class TickLoop:
         self._usable = usable(sock) and usable(ground) and at is not None
         heard, to = np.zeros(LARGEST_DATAGRAM, np.uint8), np.frombuffer(at or NOWHERE, np.uint8).copy()
         self._wire = Wire(sock.fileno(), heard, np.zeros(1, np.int64), ground.fileno(), to)
-        self._fly_on: Any = None  # machine code, once it was asked for
+        self._fly_on: Any = None  # machine code, after the first call
 
     def run(self, onboard: Onboard, questions: Questions) -> Met:
-        """Fly the ticks that can be flown so; what ended them."""
+        """Fly the ticks that can be flown in this way; returns what ended them."""
         run = onboard.running(questions) if self._usable else None
         if run is None:
             return NOTHING
@@ -128,7 +128,7 @@ class TickLoop:
 
 
 def rehearse(onboard: Onboard) -> None:
-    """Have the machine code of `fly_on` ready, where it is used."""
+    """Compile or load the machine code of `fly_on` if it can be used on this system."""
     if SUPPORTED:
         none = np.zeros(1, np.uint8)
         wire = Wire(-1, none, np.zeros(1, np.int64), -1, none)

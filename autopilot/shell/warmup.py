@@ -8,9 +8,9 @@ from autopilot.shell.compiling import OWN, name_what_is_compiled
 
 
 def main(part: str, law: str) -> None:
-    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    """Compile a part, unless it is compiled already; prints the names of the kernels that it compiles."""
     name_what_is_compiled()
-    # only now: the import itself compiles the first ones
+    # only now, since the import itself compiles the first kernels
     from autopilot.core.warmup import PARTS
     from autopilot.onboard.onboard import Onboard, build_setup
     from autopilot.onboard.snapshot import Options

@@ -1,7 +1,7 @@
-"""A watch over the calls of what users bring: one that does not come back is broken off.
+"""A watch over the calls of user code: a call that does not return is broken off.
 
-Of Python code alone: machine code cannot be interrupted. In the main thread a signal also wakes a call that
-sleeps or waits; SIGURG, because the system passes over it where nobody asks for it.
+This works only for Python code: machine code cannot be interrupted. In the main thread a signal also wakes a
+call that sleeps or waits. The signal is SIGURG, which the system ignores where a program does not handle it.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from functools import partial
 
 from autopilot.own.calls import CALL, TooSlow
 
-LONGEST_S = 5.0  # of one call, on the wall clock
-_LOOKS = 10  # in that time: a call that begins after one of them lasts so much longer
+LONGEST_S = 5.0  # longest call, on the wall clock
+_LOOKS = 10  # checks in that time: a call that begins after a check may last longer by up to one interval
 
 _WAKING = signal.SIGURG
 
 
 @contextmanager
 def watched_calls(real_time: bool = False, longest_s: float = LONGEST_S) -> Iterator[None]:
-    """Watch the calls in this thread, each of which is broken off after `longest_s`, or a little later.
+    """Watch the calls in this thread; each is broken off after `longest_s`, or a little later.
 
-    In real time they are also held to the time that there is for them.
+    In real time their duration is also measured against the time available to them.
     """
     ended, thread = threading.Event(), threading.get_ident()
     wakes = threading.current_thread() is threading.main_thread()
@@ -60,6 +60,6 @@ def _wake(thread: int) -> None:
 
 
 def _woken(_signal: int, _frame: object) -> None:
-    """In the main thread, amid the call, or just after it."""
+    """Signal handler; runs in the main thread, during the call or just after it."""
     if CALL.going_on:
         raise TooSlow

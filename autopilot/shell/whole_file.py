@@ -1,8 +1,8 @@
-"""Files that are there whole or not at all, whenever the process or the machine dies.
+"""Files that exist whole or not at all, whenever the process or the machine dies.
 
-A file is written beside the old one, brought to the disk, and put in its place at once; then the directory is
-brought to the disk, so that the new name outlives a power failure. Texts end with the checksum of what stands
-before: a bit that a disk has lost makes another number, or another key, of a text.
+A file is written beside the old one, brought to the disk, and replaces it atomically; then the directory is
+brought to the disk, so that the new name outlives a power failure. Texts end with the checksum of what
+precedes: a lost bit on a disk could otherwise turn a number or a key into another.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class DamagedError(ValueError):
 
 
 def seal(text: str) -> bytes:
-    """The bytes of a text with its checksum as a last line, a comment in files of parameters."""
+    """The bytes of a text with its checksum as the last line, a comment in parameter files."""
     body = text.encode()
     return body + _MARK + _digits(body)
 
@@ -39,7 +39,7 @@ def _digits(body: bytes) -> bytes:
 
 
 def write_whole(path: Path, data: bytes, private: bool = False) -> None:
-    """Put a file with this content in place; OSError leaves the old one. `private`: nobody else reads it."""
+    """Replace a file by this content; OSError leaves the old one. `private`: readable by this user only."""
     new = path.with_suffix(".new")
     new.unlink(missing_ok=True)  # it may be readable by others
     handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
@@ -55,13 +55,13 @@ def write_whole(path: Path, data: bytes, private: bool = False) -> None:
 
 
 def remove(path: Path) -> None:
-    """Take a file away for good, if it is there."""
+    """Remove a file permanently if it exists."""
     path.unlink(missing_ok=True)
     _bring_to_disk(path.parent)
 
 
 def keep_copy(path: Path) -> Path:
-    """Copy a damaged file to a name that is free, as long as it may be mended: the new name."""
+    """Copy a damaged file, which may be repairable, to an unused name; return the new name."""
     aside = path.with_suffix(".corrupt")
     number = 1
     while aside.exists():

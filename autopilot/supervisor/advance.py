@@ -1,4 +1,4 @@
-"""The supervisor from tick to tick: what is watched, in order, and legs that are over.
+"""The supervisor from tick to tick: the watches in their order, and what follows when a leg ends.
 
 Everything is a function of the flight, the view and the settings.
 """
@@ -43,7 +43,7 @@ WATCHES: tuple[Watch, ...] = (
 
 
 def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
-    """The flight at `view.now_us`: the first watch that finds something decides, else the legs go on."""
+    """The flight at `view.now_us`: the first watch that finds something decides, else the legs continue."""
     flight = heading_onward(flight, view, settings)
     for watch in WATCHES:
         watched = watch(flight, view, settings)
@@ -56,11 +56,11 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 
 
 def _legs_over(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
-    """The flight in the leg that is to be flown now, after all that are over."""
+    """The flight in the leg that is to be flown now, after all legs that have ended."""
     had_load = not flight.cable.released
     reached: tuple[int, ...] = ()
     texts: tuple[Text, ...] = ()
-    # a step may take no time at all: go on until one does
+    # a step may take no time at all: continue until one does
     while flight.phase in IN_AIR and (
         not flight.legs or leg_time_s(flight, view.now_us) >= flight.legs[0].duration_s
     ):
@@ -78,7 +78,7 @@ def _legs_over(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
 
 
 def _reeled(flight: Flight) -> Flight:
-    """The flight at the end of its present leg, with the cable that this leg leaves."""
+    """The flight at the end of its present leg, with the cable length at which this leg ends."""
     leg = flight.legs[0] if flight.legs else None
     top = None if leg is None else top_of(leg)
     if leg is None or top is None:

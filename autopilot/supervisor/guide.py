@@ -1,4 +1,4 @@
-"""The source of setpoints while GUIDED: what it asks for, and whether it is still heard."""
+"""The source of setpoints while GUIDED: its present setpoint, and whether it has fallen silent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the nose is to point: what is asked of it, and its way there from tick to tick."""
+"""Where the nose is to point: its aim, and the heading on the way there from tick to tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import IN_AIR, Flight, Guide, Phase, View
 from missions.model import LookAt, TurnNose
 
-ASKEW = radians(30.0)  # between heading and nose of a vehicle that stands, beyond which the nose is believed
+ASKEW = radians(30.0)  # between stored heading and estimated nose on the ground; beyond it the latter is used
 
 
 def pointed(flight: Flight, aim: Aim, view: View) -> Flight:
@@ -22,7 +22,7 @@ def pointed(flight: Flight, aim: Aim, view: View) -> Flight:
 
 
 def heading_kept(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight whose nose stays where it points, as soon as it can."""
+    """The flight whose nose stops turning, as soon as it can, and then keeps its heading."""
     return replace(flight, heading=flight.heading.stopped(view.now_us, settings.heading))
 
 
@@ -38,7 +38,7 @@ def turned(flight: Flight, asked: TurnNose, view: View) -> Flight:
 
 
 def looking(flight: Flight, asked: LookAt, view: View, settings: Settings) -> Flight:
-    """The flight whose nose stays turned to a place, or as it points now."""
+    """The flight whose nose stays turned to a place; without a place, it stops where it points now."""
     if asked.east_m is None or asked.north_m is None:
         gazes = isinstance(flight.heading.aim, Gaze)
         return heading_kept(flight, view, settings) if gazes else flight
@@ -46,7 +46,7 @@ def looking(flight: Flight, asked: LookAt, view: View, settings: Settings) -> Fl
 
 
 def heading_of_step(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight with what its present mission step asks of the nose as it begins."""
+    """The flight with the aims of the nose that its present mission step sets as it begins."""
     plan, step = flight.mission.plan, flight.mission.step
     for aim in plan.aims[step] if step < len(plan.aims) else ():
         if isinstance(aim, TurnNose):
@@ -57,7 +57,7 @@ def heading_of_step(flight: Flight, view: View, settings: Settings) -> Flight:
 
 
 def heading_before_flight(flight: Flight, view: View) -> Flight:
-    """The flight of a vehicle that is armed: its heading is the one it was left with, unless it was moved."""
+    """The flight of a vehicle that is being armed: its heading stays as it was left, unless it was turned."""
     nose, heading = heading_of(view.attitude), flight.heading.at_rest()
     if not abs(turn(nose - heading.angle)) <= ASKEW and not isnan(nose):
         heading = Heading(nose, aim=Towards(nose))
@@ -65,7 +65,7 @@ def heading_before_flight(flight: Flight, view: View) -> Flight:
 
 
 def heading_onward(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight with its heading as it is to be at this tick."""
+    """The flight with the heading of this tick."""
     if flight.phase not in IN_AIR:
         return flight
     flight = _heeded(flight, view, settings)
@@ -85,8 +85,8 @@ def heading_onward(flight: Flight, view: View, settings: Settings) -> Flight:
 
 
 def _heeded(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight with the aim of the setpoint that it follows, which is taken once; turning on and on lasts
-    as long as it is asked for."""
+    """The flight with the aim of the setpoint that it follows. Each setpoint is taken once; a spin lasts as
+    long as setpoints request it."""
     stream = _followed(flight)
     spins = isinstance(flight.heading.aim, Spin)
     if stream is None:

@@ -1,4 +1,4 @@
-"""The machine: the only code that enters a phase, and it does so by an event of the transition table.
+"""The machine: the only code that enters a phase, upon an event of the transition table.
 
 Everything is a function of the flight, the view and the settings.
 """
@@ -30,7 +30,7 @@ def must_happen(flight: Flight, event: Event, view: View, settings: Settings) ->
 
 
 def begin_legs(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight with the legs of its present phase, which had to wait until a swing was calmed."""
+    """The flight with the legs of its present phase, which had to wait until a swing was damped."""
     legs = as_flown(flight, ENTRY[flight.phase](flight, view, settings))
     return replace(flight, legs=legs, leg_start_us=view.now_us)
 
@@ -63,7 +63,7 @@ def _rewound(flight: Flight) -> Flight:
         flight,
         selected=Selected.NOTHING,
         heading=flight.heading.at_rest(),
-        rotors_lost=0,  # whether they turn is seen when they turn again
+        rotors_lost=0,  # whether they turn is detected after the next start
         mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
         cable=replace(flight.cable, reel_to_m=None),
     )

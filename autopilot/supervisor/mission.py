@@ -1,4 +1,4 @@
-"""The course of a mission: what begins with a step, and what comes when the last leg of a phase is over."""
+"""The course of a mission: what begins with a step, and what follows the last leg of a phase."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def with_plan(flight: Flight, plan: MissionPlan) -> Flight:
 
 
 def at_step(flight: Flight, step: int, done: bool) -> Flight:
-    """The flight with another step of the mission as the present one, of which nothing is flown yet."""
+    """The flight with another step of the mission as the present one, not begun yet."""
     return replace(
         flight,
         mission=replace(flight.mission, step=step, step_anchor=None, done=done),
@@ -56,7 +56,7 @@ def step_event(flight: Flight) -> Event:
 
 
 def begin_step(flight: Flight, event: Event, view: View, settings: Settings) -> Flight:
-    """The flight on its present mission step, which the event begins anew or takes up again."""
+    """The flight on its present mission step, which the event begins or resumes."""
     step = flight.mission.plan.steps[flight.mission.step]
     if isinstance(step, Speed):
         flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
@@ -76,7 +76,7 @@ def begin_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
 
 
 def legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
-    """The flight when the last leg of its phase is over."""
+    """The flight after the last leg of its phase has ended."""
     leg = flight.legs[0] if flight.legs else None
     if isinstance(leg, Calm) and not leg.ends_step:  # now the phase can begin
         return begin_legs(flight, view, settings), Report()
@@ -97,16 +97,16 @@ def legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, R
 
 
 def _stays_below(flight: Flight, leg: Leg, view: View) -> bool:
-    """Whether a lift that is over has brought the load less than `LIFTED` of its way up."""
+    """Whether a lift that has ended brought the load less than the share `LIFTED` of its way up."""
     begun, asked = leg.jet(0.0)[0][2], leg.jet(leg.duration_s)[0][2]
     return not flight.cable.released and view.x_load[2] - begun < LIFTED * (asked - begun)
 
 
 def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
-    """The present mission step is over: the next one, or the end of the mission."""
+    """The flight after its present mission step: on the next step, or at the end of the mission."""
     plan, number = flight.mission.plan, flight.mission.step
     step = plan.steps[number]
-    if flight.phase == Phase.LIFT and not isinstance(step, Takeoff):  # lifted unasked
+    if flight.phase == Phase.LIFT and not isinstance(step, Takeoff):  # lifted although no step requested it
         flight = heading_of_step(flight, view, settings)
         return begin_step(flight, step_event(flight), view, settings), Report()
     after = plan.after(number)
@@ -121,7 +121,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     flight = at_step(flight, number + 1 if after is None else after, done=flight.mission.done)
     if following is None:
         event, text = Event.DONE, "Mission complete, holding"
-        if isinstance(step, ReturnHome):  # nothing follows it: it ends on the ground, as ordered by mode
+        if isinstance(step, ReturnHome):  # as the last step it ends on the ground, like a return by mode
             event, text = Event.LAND, "Mission complete, landing"
         rewound = replace(flight, mission=replace(flight.mission, active=False, done=True, step=0))
         return must_happen(rewound, event, view, settings), Report(((INFO, text),), reached)
@@ -130,10 +130,10 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
 
 
 def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings: Settings) -> Flight:
-    """The flight on the step that follows the one that ended with `leg`, without a stop where that can be."""
+    """The flight on the step after the one that ended with `leg`, without a stop where possible."""
     ahead = made(flight, flight.mission.step)
     if isinstance(leg, Pass) and isinstance(ahead, Passage) and ahead.table is leg.path.table:
-        # past the waypoint without a stop; the clock goes on from where the stretch ended
+        # past the waypoint without a stop; the clock continues from the end of the stretch
         assert isinstance(step, Waypoint)
         legs: tuple[Leg, ...] = (replace(leg, path=ahead),)
         if step.hold_s > 0.0:
@@ -143,7 +143,7 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
         gone = replace(flight, legs=as_flown(flight, legs), leg_start_us=passed)
         return replace(gone, following=following_legs(gone, settings))
     if isinstance(leg, Swing):
-        # the next run takes the motion over as it is; only the height is still that of the first
+        # the next run begins with the present motion; only the height remains that of the first run
         here = (view.x_load[0], view.x_load[1], leg.anchor[2])
         legs = step_legs(step, here, flight, settings)
         flight = replace(flight, mission=replace(flight.mission, step_anchor=here))
@@ -152,11 +152,11 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
 
 
 def _on_time(begun: Flight, before: Flight, leg: Leg | None) -> Flight:
-    """The flight on a step that began when the one before it was over, which may have been between two ticks:
-    the clock of the mission loses nothing from step to step."""
+    """The flight on a step that began when the previous step ended, possibly between two ticks, so that the
+    clock of the mission loses no time between steps."""
     if leg is None or not begun.legs or isinstance(begun.legs[0], Calm):
         return begun
-    if norm(leg.jet(leg.duration_s)[1]) > AT_REST:  # what is left of its motion is stopped from now on
+    if norm(leg.jet(leg.duration_s)[1]) > AT_REST:  # its remaining motion is stopped from now on
         return begun
     return replace(begun, leg_start_us=before.leg_start_us + round(leg.duration_s * 1e6))
 

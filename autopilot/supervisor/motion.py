@@ -1,4 +1,4 @@
-"""Motion that is asked of the load, or of the vehicle that has released it, and how it is brought to rest."""
+"""The commanded motion of the load, or of a vehicle that has released it, and how it is brought to rest."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
 
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
-FALLING = 1.0  # m/s, of a load that was caught and nobody lowers
+FALLING = 1.0  # m/s: a load that sinks faster has fallen and was caught; it is not being lowered
 RESCUE_SHARE = 0.5  # of gravity: deceleration of a load that was caught
-STOPPING_S = 0.3  # of climbing or sinking: so far ahead is a height that stops it with no more than 2/s of it
-DESCENT_SHARE = 0.5  # of its height, which a sinking load is left at least
-STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
+STOPPING_S = 0.3  # a climb or descent is stopped at the height it reaches in this time, by at most 2/s of it
+DESCENT_SHARE = 0.5  # of its height: a sinking load is stopped no lower
+STEEPEST = 0.5  # cosine of the cable's greatest lean from which the acceleration of the load is computed
 
 
 def position_mode(flight: Flight) -> int:
@@ -37,7 +37,7 @@ def position_mode(flight: Flight) -> int:
 
 
 def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
-    """The legs as the vehicle flies them: by itself where the load is released."""
+    """The legs in the control modes in which they are flown: of the vehicle if the load is released."""
     if not flight.cable.released:
         return legs
     return tuple(
@@ -46,8 +46,8 @@ def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
 
 
 def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
-    """Position, velocity and acceleration asked of the load; those it has if nothing is asked of it. Of the
-    vehicle where the load is released."""
+    """Commanded position, velocity and acceleration of the load, or its present ones if none are commanded;
+    those of the vehicle if the load is released."""
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = flight.legs[0].jet(leg_time_s(flight, view.now_us))
         return jet[0], jet[1], jet[2]
@@ -55,7 +55,7 @@ def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, 
         return view.x_quad, view.v_quad if flight.phase in CARRYING else ZERO, ZERO
     if flight.phase not in CARRYING:
         return view.x_load, ZERO, ZERO
-    # a load that neither rises nor falls is accelerated by as much of its weight as the cable leans
+    # a load that neither rises nor falls is accelerated by gravity times the tangent of the cable's lean
     cable = sub(view.x_quad, view.x_load)
     if not cable[2] > STEEPEST * norm(cable):
         return view.x_load, view.v_load, ZERO
@@ -64,12 +64,12 @@ def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, 
 
 
 def swings(leg: Leg) -> bool:
-    """Whether the leg controls an attitude: position is uncontrolled."""
+    """Whether the leg controls an attitude, which leaves the position uncontrolled."""
     return isinstance(leg, Swing | Calm | Posture)
 
 
 def calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
-    """What must come between a leg that left the position alone and one that asks for it."""
+    """The leg that must come between a leg that does not control the position and one that does."""
     cable = sub(view.x_quad, view.x_load)
     length = norm(cable)
     lean = scale(1.0 / length, cable)
@@ -83,13 +83,13 @@ def calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
 
 
 def _stopping_place(view: View) -> Vec3:
-    """Where a load that climbs or sinks is held so that it comes to rest without a jerk."""
+    """The position at which a climbing or sinking load is held, so that it comes to rest without a jerk."""
     x, climb = view.x_load, view.v_load[2]
     return (x[0], x[1], max(x[2] + STOPPING_S * climb, min(x[2], DESCENT_SHARE * x[2])))
 
 
 def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
-    """Legs that bring the load to rest out of its present motion (none if it rests), and where that is."""
+    """Legs that bring the load from its present motion to rest (none if it rests), and where it will rest."""
     x, v, a = asked_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
@@ -101,18 +101,19 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
         return (slow,), slow.end
     accel, least_s = settings.motion.accel_m_s2, settings.least_move_s
     brake = brake_leg(x, v, a, accel, least_s)
-    if v[2] < -FALLING or brake.end[2] < min(x[2], 0.0):  # out of a fall: there is no time to lose
+    if v[2] < -FALLING or brake.end[2] < min(x[2], 0.0):  # out of a fall: brake as fast as possible
         accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
         brake = brake_leg(x, v, a, accel, least_s)
     return (brake,), brake.end
 
 
 def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
-    """A transfer of the load to another place, at rest at both ends, that takes at least so long."""
+    """A transfer of the load to another place, at rest at both ends, that takes at least `least_s`."""
     return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(least_s, settings.least_move_s))
 
 
 def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
-    """Length of the cable when the load has come to rest at `here`, whose height a winch at work decides."""
+    """Length of the cable (m) when the load has come to rest at `here`; it follows from its height while the
+    winch works."""
     top = top_of(flight.legs[0]) if flight.legs else None
     return settings.cable_length_m if top is None else top - here[2]

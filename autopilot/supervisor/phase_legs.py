@@ -1,4 +1,4 @@
-"""What each phase sets out to fly: the legs with which it begins.
+"""What each phase is to fly: the legs with which it begins.
 
 Everything is a function of the flight, the view and the settings.
 """
@@ -28,11 +28,11 @@ TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 BLIND_HEIGHT, BLIND_HASTE = (
     0.5,
     2.0,
-)  # readings are missing: m, added to it; times speed and acceleration
-HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
+)  # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
+HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
-HOME_RADIUS = 1.0  # m about home, within which a return does not climb
-LEAST_HEIGHT = 0.3  # m over home, at which a load that was being lifted or lowered is held or carried
+HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
+LEAST_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
 
 
 def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -56,7 +56,7 @@ def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 
 def _raised(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
-    """As `stop`, but clear of the ground."""
+    """Like `stop`, but the load comes to rest clear of the ground."""
     legs, here = stop(flight, view, settings)
     if here[2] >= LEAST_HEIGHT:
         return legs, here
@@ -118,7 +118,7 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 
 def _clear_of_load(here: Vec3, view: View, settings: Settings) -> Vec3:
-    """The place at which the vehicle comes down without landing on the load that it has released."""
+    """The place at which the vehicle descends so that it does not land on the load that it has released."""
     reach = ASIDE * settings.cable_length_m
     beside = (here[0] - view.x_load[0], here[1] - view.x_load[1], 0.0)
     distance = norm(beside)
@@ -144,7 +144,7 @@ def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = stop(flight, view, settings)
     anchor = flight.mission.step_anchor
     if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
-        # a step that is taken up again after a pause begins anew, from where it began
+        # a step that is resumed after a pause is flown again from where it began
         back = carry(here, anchor, flight.mission.speed_m_s, settings)
         return (*legs, back, *step_legs(step, anchor, flight, settings))
     return (*legs, *step_legs(step, here, flight, settings))

@@ -1,10 +1,10 @@
 """When the supervisor has nothing to decide: the ticks that pass without it.
 
-After each decision `next_stretch` lays down what is flown from here, until when no time runs out, and what
-must stay true meanwhile. `may_decide` looks at each tick whether it still is, in machine code. Where it is,
-`advance` would let the time go by and no more; it may ask once too often, never once too little. What a
-stretch cannot judge (setpoints that come at any time, fences, winches, cables that are caught) is decided at
-every tick.
+After each decision `next_stretch` determines what is flown from here, until when no time limit expires, and
+what must stay true meanwhile. `may_decide` checks at each tick, in machine code, whether it still is. If so,
+`advance` would change nothing. `may_decide` may call for a decision needlessly, but never misses one. What a
+stretch cannot judge (setpoints, which come at any time, fences, winches, loads that are being caught) is
+decided at every tick.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from autopilot.supervisor.watches.touchdown import (
     VEHICLE_SUNK,
 )
 
-RESTING = 0  # no rotor is controlled, beside the control modes of the legs
+RESTING = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
 # what else ends a stretch
 NOTHING, TAUT, LOAD_DOWN, VEHICLE_DOWN = 0, 1, 2, 3
@@ -58,21 +58,21 @@ class Stretch(NamedTuple):
     mode: int  # RESTING or a control mode
     idle: bool  # the rotors idle, while none is controlled
     first_us: Each
-    stop_us: Each  # at the latest
-    period_us: int  # of the ticks for which the setpoints are laid out
+    stop_us: Each  # when it ends at the latest
+    period_us: int  # between the ticks for which the setpoints are computed
     watch: int
     level: float  # m: of the watch
-    still: bool  # the supervisor has noted already that the thing is down, or that the cable pulls
-    error_limit: float  # m: of the place that is tracked; infinite where none is
+    still: bool  # the supervisor has already noted that load or vehicle is down, or that the cable pulls
+    error_limit: float  # m: of the tracked position; infinite where none is tracked
     hangs: bool  # the load should hang on the cable
     taut_length: float  # m, from load to vehicle
     load_weight: float  # N
-    carried: bool  # the load must be known to go on
+    carried: bool  # the load must be known for the flight to continue
     released: bool
     tilt_limit: float  # rad; infinite on the ground
-    anchor_height: float  # m, that is held while an attitude is tracked
+    anchor_height: float  # m, held while an attitude is tracked
     upward: Vec3  # attitude modes: where the thrust, or the cable seen from the load, is to point
-    thrust: float  # N, asked for with an attitude; NaN: what holds the height
+    thrust: float  # N, commanded with an attitude; NaN: the thrust that holds the height
     nose: Nose  # where the nose is to point
     rotors_lost: int = 0  # bit i: rotor i+1 is known to be lost
 
@@ -149,11 +149,11 @@ def next_stretch(
 
 
 def _rest_ends_us(flight: Flight, now_us: int) -> int:
-    """When something happens by itself while no rotor is controlled."""
+    """When the next decision is due without a request while no rotor is controlled."""
     if flight.phase == Phase.FAILSAFE:
         return flight.phase_start_us + FAILSAFE_DISARM_US + 1
     if flight.phase == Phase.ARMED:
-        rises = flight.selected == Selected.OFFBOARD  # a setpoint may take the load up at any tick
+        rises = flight.selected == Selected.OFFBOARD  # a setpoint may begin the take-off at any tick
         return now_us if rises else flight.phase_start_us + IDLE_DISARM_US + 1
     return FOREVER_US
 
@@ -172,7 +172,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
 
 
 def _watched(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, float, int]:
-    """What is watched for, its level in m, and when it has been true for long enough."""
+    """What is watched for, its level in m, and when it will have been true for long enough."""
     noted = flight.still_since_us >= 0
     if flight.phase == Phase.TAUTEN and len(flight.legs) == 1 and isinstance(leg, Creep):
         level = leg.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
@@ -186,7 +186,7 @@ def _watched(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, float, 
 
 
 def _leg_ends_us(flight: Flight, leg: Leg) -> int:
-    """The first microsecond at which the present leg is over, as `advance` sees it."""
+    """The first microsecond at which the present leg has ended by the comparison that `advance` makes."""
     if leg.duration_s == inf:
         return FOREVER_US
     end_us = flight.leg_start_us + round(leg.duration_s * 1e6) - 2
@@ -196,7 +196,7 @@ def _leg_ends_us(flight: Flight, leg: Leg) -> int:
 
 
 def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
-    """Height held, direction and thrust (N; NaN: what holds the height) that an attitude leg asks for."""
+    """Height to hold, direction and thrust (N; NaN: the one that holds the height) of an attitude leg."""
     if isinstance(leg, Steady):
         return 0.0, leg.upward(t), leg.thrust_n
     if not isinstance(leg, Swing | Calm | Posture):
@@ -206,7 +206,7 @@ def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
 
 
 def _nose(flight: Flight, leg: Leg, ahead_s: float) -> Nose:
-    """Where the nose is to point `ahead_s` seconds from now; of an attitude that is led by body rates, b1."""
+    """Where the nose is to point `ahead_s` seconds from now; b1 of an attitude that body rates lead."""
     if isinstance(leg, Posture) and leg.attitude is not None:
         return Nose(column(leg.attitude, 0), ZERO, ZERO)
     return flight.heading.nose(ahead_s)
@@ -216,10 +216,10 @@ def _nose(flight: Flight, leg: Leg, ahead_s: float) -> Nose:
 def may_decide(
     at: Stretch, now_us: int, state: State, known: bool, taut: bool, tilt: float, pull: float, target: Vec3
 ) -> bool:
-    """Whether the supervisor could do anything at this tick but let the time go by.
+    """Whether the supervisor might have something to decide at this tick.
 
-    `known`: the estimate is good enough to be flown on; `tilt` in rad; `pull` of the cable in N; `target` is
-    where load or vehicle are to be now.
+    `known`: the estimate is good enough to fly on; `tilt` in rad; `pull` of the cable in N; `target`: the
+    position that load or vehicle should have now.
     """
     elapsed = now_us - at.first_us
     if now_us >= at.stop_us or elapsed % at.period_us != 0:

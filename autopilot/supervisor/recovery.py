@@ -1,8 +1,8 @@
-"""A flight that is found under way: the autopilot has started anew while the rotors obey what it asked for.
+"""A flight that is found in progress: the autopilot was restarted while the rotors obey its last commands.
 
-The rotors keep the thrust that was asked for last while the gyroscope keeps the vehicle level, until
-`watches.recovery` finds that the sensors have told where vehicle and load are. Then the swing that the load
-has taken up beneath the level vehicle is calmed, and the load held.
+The rotors keep the last commanded thrust, and the gyroscope keeps the vehicle level, until `watches.recovery`
+finds that the sensors determine the positions of vehicle and load. Then the swing that the load has acquired
+beneath the level vehicle is damped, and the load is held.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from autopilot.supervisor.watches.failsafe import given_up
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What rotors, winch and gripper do when the autopilot starts."""
+    """The state of rotors, winch and gripper when the autopilot starts."""
 
-    thrust_n: float  # that was asked for last
-    reeled_m: float  # by which the winch has lengthened the cable
+    thrust_n: float  # the last one commanded
+    reeled_m: float  # length by which the winch has lengthened the cable
     released: bool
 
 
 def take_up(flight: Flight, found: Found, view: View, settings: Settings) -> Flight:
-    """The flight as it is found."""
+    """The flight that begins with the state found."""
     motion, cable = settings.motion, replace(flight.cable, released=found.released)
     if found.reeled_m != 0.0:
         cable = replace(cable, length_m=settings.cable_length_m + found.reeled_m)
@@ -39,7 +39,7 @@ def take_up(flight: Flight, found: Found, view: View, settings: Settings) -> Fli
 
 
 def broken_off(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, tuple[Text, ...]]:
-    """The flight that nobody has controlled for a while, its rotors stopped, and the texts about it."""
+    """The flight, given up because it was not controlled for a while, and the texts about it."""
     if (flight.phase, Event.FAIL) not in TRANSITIONS:
         return flight, ()
     ended = given_up(flight, why)

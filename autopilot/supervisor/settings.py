@@ -15,12 +15,12 @@ from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, Aut
 from autopilot.vehicle.rotors import authority, columns
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
-LEAST_AUTHORITY = 0.1  # over moments, of that of all rotors, with which a vehicle is flown
+LEAST_AUTHORITY = 0.1  # least authority over moments to fly with, as a share of that of all rotors
 
 
 @dataclass(frozen=True, slots=True)
 class MotionSettings:
-    """Height and speeds of the load, where no request and no mission says otherwise."""
+    """Height and speeds of the load, unless a request or a mission sets others."""
 
     takeoff_altitude_m: float
     speed_m_s: float
@@ -28,7 +28,7 @@ class MotionSettings:
     lift_speed_m_s: float
     taut_speed_m_s: float
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
-    return_altitude_m: float  # of the load on the way home, at least
+    return_altitude_m: float  # least height of the load on the way home
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,21 +42,21 @@ class FailsafeSettings:
 
 @dataclass(frozen=True, slots=True)
 class SetpointSettings:
-    """How setpoints are understood, and for how long."""
+    """How setpoints are interpreted, and how long they are valid."""
 
     offboard_loss_us: int  # silence after which setpoints count as lost
     manual_loss_us: int
-    guided_loss_us: int  # the same in ArduPilot's GUIDED, of setpoints that are not a place
+    guided_loss_us: int  # the same in ArduPilot's GUIDED, for setpoints that are not a place
     stick_speed_m_s: float  # of the load, for a stick at its end stop
     fastest_m_s: float  # velocity setpoint
-    hover_share: float  # thrust of an attitude setpoint that hovers
-    guided_mode: bool  # as in ArduPilot's GUIDED: heeded while holding, and a place stays asked for
-    guides_vehicle: bool  # positions are of the vehicle, which is kept a cable length over the load
+    hover_share: float  # thrust share of an attitude setpoint with which the vehicle hovers
+    guided_mode: bool  # as in ArduPilot's GUIDED: obeyed while holding, and a place remains the setpoint
+    guides_vehicle: bool  # positions are those of the vehicle, which is kept a cable length over the load
 
 
 @dataclass(frozen=True, slots=True)
 class FenceSettings:
-    """The circular fence around home, and what a breach of any fence leads to."""
+    """The circular fence around home, and the reaction to a breach of any fence."""
 
     action: int  # GF_ACTION
     radius_m: float  # 0: none
@@ -65,30 +65,30 @@ class FenceSettings:
 
 @dataclass(frozen=True, slots=True)
 class WinchSettings:
-    """What the winch can do."""
+    """Limits of the winch."""
 
-    shortest_m: float  # cable
+    shortest_m: float  # length of the cable
     longest_m: float
     speed_m_s: float
     accel_m_s2: float
-    usable: bool  # the law can fly another length than it was designed for
+    usable: bool  # the law can fly a cable length other than the one it was designed for
 
 
 @dataclass(frozen=True, slots=True)
 class RotorSettings:
-    """The rotors, and what they carry."""
+    """The rotors, and the weight that they carry."""
 
     layout: Layout
-    low_n: float  # least effort
-    high_n: float  # greatest
-    thrust_n: float  # that carries vehicle and load
+    low_n: float  # least effort of a rotor
+    high_n: float  # greatest effort of a rotor
+    thrust_n: float  # carries vehicle and load
 
     def can_fly_without(self, lost: int) -> bool:
-        """Whether the rotors that are left keep vehicle and load in the air and level."""
+        """Whether the remaining rotors can keep vehicle and load in the air and level."""
         return self._left(lost, yaw=False)
 
     def can_hold_heading_without(self, lost: int) -> bool:
-        """Whether they can turn it to where its nose is to point as well."""
+        """Whether the remaining rotors can control the heading as well."""
         return self._left(lost, yaw=True)
 
     def _left(self, lost: int, yaw: bool) -> bool:
@@ -100,14 +100,14 @@ class RotorSettings:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The supervisor's parameters: of the believed vehicle, and by subject."""
+    """The supervisor's parameters: those of the assumed vehicle, and the others by subject."""
 
     cable_length_m: float
     least_move_s: float
     gravity_m_s2: float
     load_weight_n: float
     weight_n: float  # of vehicle and load
-    ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
+    ramp_lag_s: float  # time by which a sinking load lags behind its setpoint with this law
     limits: Limits  # of the paths of missions
     motion: MotionSettings
     heading: HeadingLimits
@@ -121,10 +121,10 @@ class Settings:
 def settings_from(
     table: AutopilotParameters, ramp_lag_s: float, reels: bool, follows_shaped: bool
 ) -> Settings:
-    """The supervisor's settings from the parameter table, and what the law says of itself.
+    """The supervisor's settings from the parameter table and the properties of the law.
 
-    `ramp_lag_s`: by how much time the load keeps behind on a ramp. `reels`: it flies other lengths of the
-    cable. `follows_shaped`: shaping its paths beforehand pays.
+    `ramp_lag_s`: the time by which the load lags on a ramp. `reels`: the law can fly other lengths of the
+    cable. `follows_shaped`: shaping paths beforehand is worthwhile with this law.
     """
     length, gravity, load_mass = table["VEH_CABLE_LEN"], table["VEH_GRAVITY"], table["VEH_LOAD_MASS"]
     return Settings(
@@ -188,7 +188,7 @@ def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
 
 
 def limits_from(table: AutopilotParameters, follows_shaped: bool) -> Limits:
-    """What paths are shaped to: the believed vehicle, and the MIS_ parameters."""
+    """The limits within which paths are shaped: the assumed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
     limited = table["VEH_ROTOR_LIM"] != 0.0

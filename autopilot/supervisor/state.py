@@ -1,4 +1,4 @@
-"""The supervisor's state: the record of a flight, what it is decided from, and what follows from both."""
+"""The supervisor's state: the record of a flight, the view on which it decides, and functions of both."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class MissionPlan:
     sequence: tuple[int, ...] = ()
     items: int = 0
     prepared: Prepared = UNPREPARED
-    aims: tuple[tuple[NoseAim, ...], ...] = ()  # of each step: what the nose is asked as it begins
+    aims: tuple[tuple[NoseAim, ...], ...] = ()  # of each step: the aims of the nose as it begins
     again_from: int | None = None  # the step that follows the last one, if the mission has no end
 
     def after(self, step: int) -> int | None:
@@ -108,7 +108,7 @@ class MissionPlan:
 
 @dataclass(frozen=True, slots=True)
 class MissionProgress:
-    """How far the mission is flown, and with what."""
+    """The mission, how far it is flown, and its height and speed."""
 
     plan: MissionPlan = MissionPlan()
     step: int = 0  # of the plan: the present one, or the one to begin with
@@ -124,12 +124,12 @@ class MissionProgress:
 class CableState:
     """What is known of cable, winch and gripper."""
 
-    released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
-    length_m: float | None = None  # as the winch has it; None: VEH_CABLE_LEN
+    released: bool = False  # the load: positions and setpoints are then those of the vehicle
+    length_m: float | None = None  # as set by the winch; None: VEH_CABLE_LEN
     reel_rate: float = 0.0  # m/s, at which the length grows now
     reel_accel: float = 0.0  # m/s^2
-    reel_to_m: float | None = None  # length that the present mission step asks for
-    taut_length_m: float = 0.0  # from load to vehicle when lifting began: of the cable as it is
+    reel_to_m: float | None = None  # length that the present mission step requires
+    taut_length_m: float = 0.0  # from load to vehicle when lifting began: the true length of the cable
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack
 
@@ -142,7 +142,7 @@ class Setpoints:
     offboard: Stream = SILENT
     manual: Stream = SILENT
     circle: Circle | None = None
-    heeded_us: int = -1  # when the setpoint was heard whose heading is flown to
+    heeded_us: int = -1  # when the setpoint was received whose heading is the present aim
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +150,10 @@ class Area:
     """Places that matter to the flight, and whether the fence is breached."""
 
     home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
-    rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
+    rally: tuple[Vec3, ...] = ()  # where a return leads instead if that is nearer
     fence: Fence = NO_FENCE
-    guarded: bool = True  # nobody has switched the fence off
-    breach: str = ""  # why load or vehicle may not be where it is, or is about to be
+    guarded: bool = True  # the fence is not switched off
+    breach: str = ""  # why load or vehicle may not be where it is, or where it is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
 
@@ -169,15 +169,15 @@ class Flight:
     following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
     still_since_us: int = -1  # since when the condition that ends the phase holds, -1: it does not
     selected: Selected = Selected.NOTHING
-    heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
+    heeds: bool = True  # while holding, it follows any setpoint: ArduPilot's GUIDED, not its LOITER
     mission: MissionProgress = MissionProgress()
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
-    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
+    rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     heading: Heading = EASTWARD
     returning: bool = False  # home, or landing there
-    # reasons not to arm that lie beside the flight, by their source: the storage, the clock
+    # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
     hindrances: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
@@ -192,35 +192,35 @@ class View(NamedTuple):
     taut: bool
     tilt_rad: float
     complaints: tuple[str, ...]
-    pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
-    height_std: float = 0.0  # m, of heights over home, where a receiver tells them
+    pull_n: float = nan  # of the cable on the vehicle, by the accelerometer; NaN: not known
+    height_std: float = 0.0  # m, of heights over home, if they come from a receiver
     attitude: Mat3 = IDENTITY
     lost: str = ""  # why not even a landing is possible by these estimates
-    law_fault: str = ""  # why the law that somebody has brought does not fly any more
-    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
-    estimator_fault: str = ""  # why the estimator that somebody has brought does not fly any more
+    law_fault: str = ""  # why the custom law does not fly any more
+    rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
+    estimator_fault: str = ""  # why the custom estimator does not fly any more
     unseen: bool = False  # no sensor has ever seen the load
 
 
 class Report(NamedTuple):
-    """What came of an advance: texts for the operator, mission items reached."""
+    """The results of an advance: texts for the operator, mission items reached."""
 
     texts: tuple[Text, ...] = ()
     reached: tuple[int, ...] = ()
 
 
 def off_mission(flight: Flight) -> Flight:
-    """The flight with its mission interrupted, or not begun after all; the step is kept."""
+    """The flight with its mission interrupted, or no longer waiting to begin; the step is kept."""
     return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
 
 
 def takeoff_event(flight: Flight) -> Event:
-    """The event that takes off: with a load, its cable is pulled taut first."""
+    """The event that begins a take-off: with a load, the cable is pulled taut first."""
     return Event.TAKEOFF_ALONE if flight.cable.released else Event.TAKEOFF
 
 
 def pace_of(flight: Flight, settings: Settings) -> FollowLimits:
-    """How setpoints are followed."""
+    """Limits for following setpoints."""
     rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
     return FollowLimits(
         flight.mission.speed_m_s, settings.setpoints.fastest_m_s, settings.motion.accel_m_s2, rate
@@ -239,13 +239,13 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
 
 
 def fenced(flight: Flight, settings: Settings) -> bool:
-    """Whether the fence is heeded: GF_ACTION names what a breach leads to, and it is not switched off."""
+    """Whether the fence is in force: GF_ACTION names a reaction to a breach, and it is not switched off."""
     return settings.fence.action != 0 and flight.area.guarded
 
 
 def carries(flight: Flight) -> bool:
-    """Whether the load must be known to go on: not one that is released or lies, the vehicle landing
-    beside it."""
+    """Whether the load must be known for the flight to continue: not if it is released, or lies on the ground
+    while the vehicle lands beside it."""
     return not flight.cable.released and flight.phase != Phase.SET_DOWN
 
 
@@ -260,14 +260,14 @@ def leg_time_s(flight: Flight, now_us: int) -> float:
 
 
 def setpoint(flight: Flight, now_us: int) -> Jet | None:
-    """Position and derivatives to be flown now, of load or vehicle as the leg says; None without a leg."""
+    """Position and derivatives to fly now, of load or vehicle depending on the leg; None without a leg."""
     return jet_ahead(flight, leg_time_s(flight, now_us)) if flight.legs else None
 
 
 def jet_ahead(flight: Flight, t: float) -> Jet:
-    """Position and derivatives `t` seconds into the present leg, or into what follows where that is known.
+    """Position and derivatives `t` seconds into the present leg, or into following legs if these are known.
 
-    Only legs that control the same as the present one follow it for this.
+    A following leg counts only if its control mode is that of the leg before it.
     """
     leg = flight.legs[0]
     for after in (*flight.legs[1:], *flight.following):

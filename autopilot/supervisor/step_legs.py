@@ -1,4 +1,4 @@
-"""What each step of a mission sets out to fly."""
+"""What each step of a mission is to fly."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from missions.model import (
     Winch,
 )
 
-NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
+NEAR_START = 0.3  # m from the beginning of a path through waypoints, within which the path is still flown
 
 
 def destination(step: Step, here: Vec3, flight: Flight) -> Vec3:
-    """Where a step leads that begins with load or vehicle at rest at `here`."""
+    """Where a step ends that begins with load or vehicle at rest at `here`."""
     there = state_after(step, MissionState(here), flight.area.home).expected
     assert there is not None, "from a known place"
     return there
@@ -112,25 +112,25 @@ def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
 
 
 def made(flight: Flight, step: int) -> Shaped | Passage | None:
-    """What was made ready for a step of the plan, if anything was."""
+    """The path that was prepared for a step of the plan; None if there is none."""
     made = flight.mission.plan.prepared.made
     return made[step] if 0 <= step < len(made) else None
 
 
 def _signals_of(flight: Flight, step: int) -> Shaped | None:
-    """The signals that were made ready for a step of the plan, if it is one of these."""
+    """The shaped signals that were prepared for a step of the plan; None for any other step."""
     found = made(flight, step)
     return found if isinstance(found, Shaped) else None
 
 
 def borrowed(flight: Flight) -> float:
-    """Time (s) that the paths before and after the present step take from its hold: to come to rest, and to
-    get ready."""
+    """Time (s) that the signals before and after the present step take from its hold: to come to rest, and to
+    lead in."""
     before, after = _signals_of(flight, flight.mission.step - 1), _signals_of(flight, flight.mission.step + 1)
     return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
 
 
 def _least_s(flight: Flight) -> float:
-    """What the transfer of the present step takes at least, for rotors, cable and tilt."""
+    """Least duration (s) of the transfer of the present step within the limits of rotors, cable and tilt."""
     least = flight.mission.plan.prepared.least_s
     return least[flight.mission.step] if flight.mission.step < len(least) else 0.0

@@ -1,7 +1,7 @@
 """The transition table: the phase to which each event leads.
 
 An event that has no entry for a phase cannot happen in it, and a request for it is refused. Entering a phase,
-also the present one again, lays out its legs anew (`machine`).
+even the present one again, creates its legs anew (`machine`).
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
 
 
 def markdown() -> str:
-    """The table as Markdown: an event a row, a phase a column; empty where the event cannot happen."""
+    """The table as Markdown: one row per event, one column per phase; empty where the event cannot happen."""
     phases, events = sorted(Phase), list(Event)
     names = [phase.name.lower().replace("_", " ") for phase in phases]
     rows = [["event", *names], ["---"] * (len(phases) + 1)]

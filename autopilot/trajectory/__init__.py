@@ -1,1 +1,1 @@
-"""Paths of the load: signals, splines, shaping, feasibility, and what a mission becomes."""
+"""Paths of the load: signals, splines, shaping, feasibility, and the preparation of missions."""

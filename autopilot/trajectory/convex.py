@@ -1,14 +1,15 @@
 """Sequential convex programming over a spline: the nearest path, or the smoothest, that the vehicle can fly.
 
-The coefficients c of a spline (`autopilot.trajectory.splines`) are linear in the path and all its
-derivatives; what the path asks for (`autopilot.trajectory.rotor_demand`) is smooth in these and nearly
-linear. Each round linearises the demand along the present path, solves the quadratic programme
+The path and all its derivatives are linear in the coefficients c of a spline
+(`autopilot.trajectory.splines`); the demand of the path (`autopilot.trajectory.rotor_demand`) is a smooth and
+nearly linear function of them. Each round linearises the demand along the present path, solves the quadratic
+programme
 
     minimise    sum of |x - x_asked|^2 / d^2 + |x^(6)|^2 / p^2  +  rho * excess
     subject to  bounds on F + tau F', tension and tilt, each at each sample, softened by an excess >= 0
 
-for the change of the coefficients, and goes as far along it as the true cost falls. The samples are four to
-an interval. Solver: Clarabel, an interior point method, single-threaded and thus repeatable.
+for the change of the coefficients, and shortens this step until the true cost falls. There are four samples
+to an interval. Solver: Clarabel, an interior point method, single-threaded and thus reproducible.
 """
 
 from __future__ import annotations
@@ -36,19 +37,20 @@ from autopilot.trajectory.splines import DEGREE, Array, Basis
 SAMPLES = 4  # to an interval
 _BAND = DEGREE + 1
 _ROUNDS = 12
-_EXCESS_PRICE = 2e4  # of one newton for one second, where a distance of d costs 1 for each second
+_EXCESS_PRICE = 2e4  # of one newton for one second; a distance of d costs 1 per second
 _ROW_PRICE = 1e5  # of one metre
 _HALVINGS = 7
-_SETTLED = 1e-3  # relative fall of the cost that ends the rounds
-_COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # excess of cosine and tension, as newtons of a rotor
-_NEAR_ENOUGH_N = 0.05  # excess at which the rounds may begin
+_SETTLED = 1e-3  # relative decrease of the cost below which the rounds end
+_COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # convert an excess of cosine and tension to newtons of a rotor
+_NEAR_ENOUGH_N = 0.05  # largest excess with which the rounds may begin
 _SMOOTHER, _SMOOTHER_TRIES = 30.0, 8
-_AWAY_N = 0.6  # a bound from which the demand is so far away is left out of a round
+_AWAY_N = 0.6  # a round leaves out bounds that are at least this far from the demand
 _ACCURACY = 1e-7  # of the solver; the cost is of order one
 
 
 class Rows(NamedTuple):
-    """Linear constraints on the path itself, low <= direction . x^(order) (time) <= high, and equalities."""
+    """Linear constraints on the path itself: low <= direction . x^(order) (time) <= high; equalities if low =
+    high."""
 
     time: Array  # (m,)
     order: NDArray[np.int64]  # (m,)
@@ -61,7 +63,7 @@ NO_ROWS = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)
 
 
 class Goal(NamedTuple):
-    """Weights for one second: `near` of |x - target|^2 at the samples, `smooth` (order, weight) of
+    """Weights per second: `near` of |x - target|^2 at the samples, `smooth` (order, weight) of
     |x^(order)|^2."""
 
     target: Array  # (n, 3)
@@ -70,7 +72,7 @@ class Goal(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Coefficients (count, 3); the greatest excess over a bound in N; whether the solver gave an answer."""
+    """Coefficients (count, 3); the greatest excess over a bound in N; whether the solver succeeded."""
 
     coefficients: Array
     excess_n: float
@@ -97,7 +99,7 @@ class Problem:
         self._extra, self._extra_fixed = self._row_matrix()
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
-        """(n, size) from one order of the band, for one axis."""
+        """(n, size) matrix of one derivative by the free coefficients of one axis."""
         rows = np.repeat(np.arange(len(values)), _BAND).reshape(self._columns.shape)
         keep = self._inside
         entries = (values[keep], (rows[keep], self._columns[keep]))
@@ -112,7 +114,7 @@ class Problem:
         return sparse.csc_matrix(found)
 
     def _row_matrix(self) -> tuple[sparse.csr_matrix, Array]:
-        """Of the linear constraints: (m, 3 size), and what the fixed coefficients contribute."""
+        """The linear constraints: matrix (m, 3 size), and the contribution (m,) of the fixed coefficients."""
         rows = self.rows
         if not len(rows.time):
             return sparse.csr_matrix((0, 3 * self.size)), np.zeros(0)
@@ -133,7 +135,7 @@ class Problem:
                 at += list(columns[i][inside] - self.lo + axis * self.size)
         return sparse.csr_matrix((data, (where, at)), shape=(len(rows.time), 3 * self.size)), constant
 
-    # ---- the path of some coefficients
+    # ---- the path of given coefficients
 
     def jets(self, coefficients: Array) -> Array:
         """(8, n, 3) at the samples: the path and seven derivatives."""
@@ -151,7 +153,7 @@ class Problem:
         return excess(demand(jets, self.body), self.spacing, self.bounds)
 
     def _merit(self, free: Array, jets: Array, bounded: bool) -> float:
-        """Cost, with what the bounds and the linear constraints are broken by at its price."""
+        """The cost plus the price of all excess over the bounds and the linear constraints."""
         total = self._cost(jets)
         if bounded:
             total += _EXCESS_PRICE * self.spacing * float(np.sum(self._over(jets)))
@@ -164,7 +166,7 @@ class Problem:
     # ---- one round
 
     def solve(self, bounded: bool = True) -> Solution:
-        """The coefficients of the least cost."""
+        """The coefficients with the least cost; without `bounded` the bounds are ignored."""
         free = self._beginning() if bounded else self._unbounded(1.0)
         jets = self.jets(self._all(free))
         merit = self._merit(free, jets, bounded)
@@ -191,14 +193,14 @@ class Problem:
         return Solution(self._all(free), worst, True)
 
     def _gradient(self, jets: Array) -> Array:
-        """(size, 3) of the cost by the free coefficients."""
+        """(size, 3) gradient of the cost by the free coefficients."""
         found = self.goal.near * (self._linear[0].T @ (jets[0] - self.goal.target))
         for order, weight in self.goal.smooth:
             found = found + weight * (self._linear[order].T @ jets[order])
         return np.asarray(self.spacing * found)
 
     def _unbounded(self, smoother: float) -> Array:
-        """(size, 3) of the least cost with `smoother` times the weight on smoothness, whatever the bounds."""
+        """(size, 3) free coefficients of least cost without bounds; smoothness counts `smoother` times."""
         near, rest = self._near, self.jets(self.fixed)
         smooth = self._hessian - near
         gradient = self._gradient(rest)
@@ -207,9 +209,9 @@ class Problem:
         return np.asarray(-factor.solve(pull + smoother * (gradient - pull)))
 
     def _beginning(self) -> Array:
-        """Where to begin: the smoothest of the paths that are least smoothed and still within the bounds.
+        """The free coefficients to begin with: of the least smoothed path that is about within the bounds.
 
-        Far outside of them the demand is anything but linear: the thrust may turn over.
+        Far outside the bounds the demand is far from linear: the thrust may turn over.
         """
         smoother = 1.0
         free = self._unbounded(smoother)
@@ -226,9 +228,9 @@ class Problem:
         return found
 
     def _quadratic(self, free: Array, jets: Array | None) -> Array | None:
-        """The free coefficients that solve the programme linearised along `jets`; None if it has no answer.
+        """The free coefficients that solve the programme linearised along `jets`; None if the solver fails.
 
-        The unknowns are changes from `free`: of the path itself the solver would see the last digits only.
+        The unknowns are changes from `free`: in the path itself they would affect only the last digits.
         """
         n, size = len(self.times), self.size
         gradient = self._gradient(self.jets(self._all(free)))
@@ -265,7 +267,7 @@ class Problem:
         settings.verbose = False
         settings.max_threads = 1
         settings.tol_gap_abs = settings.tol_gap_rel = _ACCURACY
-        # in units in which the cost curves by about one
+        # scaled to units in which the curvature of the cost is about one
         unit = np.concatenate(
             [np.full(3 * size, 1.0 / np.sqrt(np.median(self._hessian.diagonal()))), np.ones(excesses)]
         )
@@ -288,7 +290,7 @@ class Problem:
         """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""
         n, size, bounds = len(self.times), self.size, self.bounds
         found, slope = demand(jets, self.body), slopes(jets, self.body)
-        # (n, outputs, 3, 10): by the coefficients of the band
+        # (n, outputs, 3, 10): derivatives by the coefficients of the band
         by_band = np.einsum("irod,oik->irdk", slope, self.values[:7])
 
         def matrix(output: int) -> sparse.csr_matrix:
@@ -335,7 +337,7 @@ def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> A
 
 
 def excess(found: Array, spacing: float, bounds: Bounds) -> Array:
-    """(n,) by how much the demand (n, outputs) of equally spaced samples exceeds the bounds, N of a rotor;
+    """(n,) excess of the demand (n, outputs) of equally spaced samples over the bounds, in N of a rotor;
     >= 0."""
     asked = commanded(found, spacing, bounds.rotor_tau)
     over = np.maximum(asked.max(axis=1) - bounds.rotor_high, bounds.rotor_low - asked.min(axis=1))
@@ -345,10 +347,7 @@ def excess(found: Array, spacing: float, bounds: Bounds) -> Array:
 
 
 def _lag_matrix(n: int, spacing: float, tau: float) -> sparse.csr_matrix:
-    """(n, n): v + tau v', differences as `numpy.gradient` takes them."""
-    slope = np.gradient(np.eye(n), spacing, axis=0) if n < 2 else None
-    if slope is not None:
-        return sparse.csr_matrix(np.eye(n))
+    """(n, n) matrix of v + tau v', with the differences of `numpy.gradient`."""
     half = 0.5 / spacing
     upper, lower, middle = np.full(n - 1, half), np.full(n - 1, -half), np.zeros(n)
     upper[0], middle[0] = 2.0 * half, -2.0 * half

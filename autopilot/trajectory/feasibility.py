@@ -1,12 +1,12 @@
 """Can the vehicle fly it? Answered before take-off, for every step of a mission.
 
-What is checked: the cable stays taut, total thrust (with a reserve) and each single rotor stay within their
-limits, so does the tilt of the vehicle, the load is carried at a height and stays above the ground, and a
-path has no jump in position or velocity. Drag of the vehicle is part of it. What is not checked: at the
-joints of half-sine envelopes the acceleration jumps, and to follow a jump exactly would take an unbounded
-moment for an instant; both sides of a joint are checked, the jump itself is not. An autopilot that shapes its
-paths flies near the jump (`autopilot.trajectory.shaping`), others err there and are none the worse. Nor
-does the check know of wind, delay or noise: what passes can be flown in principle.
+What is checked: the cable stays taut; the total thrust (with a reserve), each single rotor and the tilt of
+the vehicle stay within their limits; the load is carried high enough and stays above the ground; a path has
+no jump in position or velocity. The drag of the vehicle is included. What is not checked: at the joints of
+half-sine envelopes the acceleration jumps, and following a jump exactly would require an unbounded moment for
+an instant; both sides of a joint are checked, the jump itself is not. An autopilot that shapes its paths
+smooths the jump (`autopilot.trajectory.shaping`), others have an error there that does no harm. Wind, delays
+and noise are not part of the check either: a mission that passes can be flown in principle.
 """
 
 from __future__ import annotations
@@ -40,28 +40,28 @@ from missions.model import KINDS, AttitudeRun, Land, Mission, Signals, Takeoff, 
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
-LEAST_TENSION = 0.3  # MIS_TENSION and MIS_SHAPE_ERR as delivered
+LEAST_TENSION = 0.3  # this and the next: the defaults of MIS_TENSION and MIS_SHAPE_ERR
 SHAPING_M = 0.05
-LEAST_HEIGHT_M = 0.3  # above home, at which a load is carried
+LEAST_HEIGHT_M = 0.3  # above home, at which a load must be carried
 _REPORT_SAMPLES = 4001
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
-_MANIFOLD = 3.0  # from here on an excess is told as a multiple
+_MANIFOLD = 3.0  # from here on an excess is reported as a multiple
 _NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleLimits:
-    """The vehicle that is to fly, and what is asked of it at most.
+    """The vehicle that is to fly, and the limits within which it flies.
 
-    `thrust_reserve` is the share of the total thrust kept free for control, `rotor_margin` that of each
-    rotor's range beside either limit along shaped paths, `least_tension` the share of the load's weight that
-    the cable bears there, `shaping_m` how far they may be from what is asked. `speed_m_s` (until the mission
-    sets its own) and `accel_m_s2` are the peaks of transfers; `when_infeasible` is what becomes of a path
-    that cannot be had.
+    `thrust_reserve` is the share of the total thrust kept free for control. For shaped paths, `rotor_margin`
+    is the share of each rotor's range kept free at either limit, `least_tension` the least cable tension as
+    a share of the load's weight, `shaping_m` the greatest distance from the requested path. `speed_m_s`
+    (until the mission sets its own) and `accel_m_s2` are the peaks of transfers; `when_infeasible` says what
+    happens to a path that is impossible.
     """
 
     vehicle: Vehicle
@@ -76,7 +76,7 @@ class VehicleLimits:
 
     @property
     def body(self) -> Body:
-        """The part of it that the survey needs."""
+        """The properties of the vehicle that the survey needs."""
         vehicle = self.vehicle
         return Body(
             vehicle.quad_mass_kg,
@@ -93,12 +93,12 @@ class VehicleLimits:
 
     @property
     def usable_n(self) -> float:
-        """The thrust (N) of which the reserve is left."""
+        """The total thrust (N) without the reserve."""
         return self.vehicle.greatest_thrust_n * (1.0 - self.thrust_reserve)
 
     @property
     def says_thrust(self) -> str:
-        """What the rotors give, in words."""
+        """The thrust that the rotors give, in words."""
         rotors, full, usable = len(self.vehicle.layout), self.vehicle.greatest_thrust_n, self.usable_n
         reserve = f", {usable:.2f} N with the reserve of {100.0 * self.thrust_reserve:.0f} %"
         return (
@@ -107,7 +107,7 @@ class VehicleLimits:
 
     @property
     def shaping(self) -> Limits:
-        """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
+        """The limits to which the autopilot shapes paths: its MIS_ parameters, by default as delivered."""
         vehicle = self.vehicle
         margin = self.rotor_margin * (vehicle.rotor_max_n - vehicle.rotor_min_n)
         bounds = Bounds(
@@ -131,10 +131,12 @@ class VehicleLimits:
 
 @dataclass(frozen=True, slots=True)
 class PathReport:
-    """How a step is flown: signals as shaped, waypoints as passed, a way from rest to rest, an attitude run.
+    """How a step is flown: shaped signals, a passage through waypoints, a transfer from rest to rest, an
+    attitude run.
 
-    `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle;
-    `speed_m_s` of the load, at most (0 in an attitude run, which gives none).
+    `distance_m` is the greatest distance between the flown and the requested path; forces are in N;
+    `tilt_deg` is that of the vehicle; `speed_m_s` is the greatest speed of the load (0 in an attitude run,
+    which gives none).
     """
 
     item: int
@@ -145,7 +147,7 @@ class PathReport:
     rotor_high_n: float
     tension_low_n: float
     tilt_deg: float
-    slowed: float = 1.0  # times as long as asked
+    slowed: float = 1.0  # times as long as requested
     speed_m_s: float = 0.0
 
     def __str__(self) -> str:
@@ -166,7 +168,7 @@ class PathReport:
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """A limit that a step breaks, at its worst: `value` where `limit` is allowed, `time_s` into the step."""
+    """A limit that a step breaks, at the worst place: `value` instead of `limit`, `time_s` into the step."""
 
     item: int
     quantity: str
@@ -180,9 +182,9 @@ class Violation:
 
 
 def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list[Violation]:
-    """All that the mission asks and the vehicle cannot do, step by step; empty if it can be flown.
+    """All limits of the vehicle that the mission breaks, step by step; empty if it can be flown.
 
-    `shaped`: signals are flown by an autopilot that shapes them; what it can fly near the asked path passes.
+    `shaped`: an autopilot that shapes its paths flies the signals; they pass if a path near them is possible.
     """
     found: list[Violation] = _too_heavy(limits)
     if found:
@@ -219,7 +221,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
 
 
 def _within(limits: VehicleLimits) -> str:
-    """What a path must keep to, and what mends one that cannot."""
+    """The bounds of a shaped path in words, and what to change if it cannot keep them."""
     reserve = f"{100.0 * limits.rotor_margin:.0f} % of the rotors' range free at either limit"
     return (
         f"a path must leave {reserve} (MIS_ROTOR_MARG), the cable taut and the tilt below "
@@ -229,7 +231,7 @@ def _within(limits: VehicleLimits) -> str:
 
 
 def _too_heavy(limits: VehicleLimits) -> list[Violation]:
-    """What there is to say of a vehicle that cannot even hover with its load, however slowly it flies."""
+    """The violation of a vehicle that cannot even hover with its load; empty if it can."""
     vehicle = limits.vehicle
     weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
     if weight <= limits.usable_n:
@@ -245,10 +247,10 @@ def _too_heavy(limits: VehicleLimits) -> list[Violation]:
 def paths(
     mission: Mission, limits: VehicleLimits, planner: Planner | None = None, shaped: bool = True
 ) -> list[PathReport]:
-    """How each step is flown that carries the load along a path, or tracks an attitude.
+    """How each step that carries the load along a path, or tracks an attitude, is flown.
 
-    What the vehicle flies after it has released the load is left out. `planner` is somebody's own, of paths
-    through waypoints; PlanError, if what it gives is refused. Without `shaped` signals are as asked.
+    Steps after the release of the load are left out. `planner` is a custom planner of paths through
+    waypoints; PlanError if its path is refused. Without `shaped`, signals are flown as requested.
     """
     shaping = limits.shaping._replace(shaped=shaped)
     prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
@@ -324,14 +326,14 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
     vehicle = limits.vehicle
     gravity, usable = vehicle.gravity_m_s2, limits.usable_n
-    # a step that begins under the ground has been told of at the one that led there
+    # a step that begins under the ground was already reported with the step that led there
     if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
         says = f"the load would be {-along.height_low.value:.2f} m under the ground"
         lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
         advice = f"begin higher (altitude_m) or lower {lower}"
         yield violation("height", along.height_low, 0.0, says, advice)
     if fall.value >= gravity:
-        # beyond this the cable would have to push: thrust and tilt mean nothing any more
+        # beyond this the cable would have to push: thrust and tilt then have no meaning
         says = (
             f"the load would have to fall at {fall.value:.1f} m/s^2 with the cable taut; gravity gives "
             f"{gravity:.2f} m/s^2 ({_excess(fall.value, gravity)})"
@@ -393,7 +395,7 @@ def _jumps(item: int, step: Signals) -> Iterator[Violation]:
 
 
 def _end(term: Term) -> float:
-    """When a term has come to rest (s); inf for one that swings for ever."""
+    """Time (s) at which a term has come to rest; inf for one that swings for ever."""
     if term.hold_s is None:
         return inf if term.factors else term.start_s + term.rise_s
     return term.start_s + term.rise_s + term.hold_s + term.fall_s

@@ -1,6 +1,6 @@
 """Differential flatness: from the load's path to the whole state and the inputs that fly it.
 
-Symbols (world ENU unless said; primes are time derivatives)
+Symbols (world ENU unless stated otherwise; primes are time derivatives)
 
 =========  ==================  ======================================================================
 symbol     code                meaning
@@ -16,10 +16,10 @@ M          moment              moment (N m), body frame, (2-35)
 D          air                 drag of the vehicle (N), -(c_1 + c_2 |x_Q'|) x_Q'
 =========  ==================  ======================================================================
 
-Newton for the load gives T q = -m_L (x_L'' + g e3), hence q and T. Newton for both together (the sum of the
-two, equivalent to (2-31) and (2-33)) gives F = (m_Q + m_L)(x_L'' + g e3) - m_Q L q''. The moment needs F'',
-thus q'''' and the sixth derivative of x_L. In air the rotors give F - D in place of F. Model: the cable is
-massless, inextensible, taut and attached at the centre of mass; the air does not hold the load. The map is
+Newton's law for the load gives T q = -m_L (x_L'' + g e3), hence q and T. Newton's law for both bodies (the
+sum of the two, equivalent to (2-31) and (2-33)) gives F = (m_Q + m_L)(x_L'' + g e3) - m_Q L q''. The moment
+needs F'', thus q'''' and the sixth derivative of x_L. In air the rotors give F - D instead of F. Model: the
+cable is massless, inextensible, taut and attached at the centre of mass; the load has no drag. The map is
 singular where the load falls freely and where F is parallel to the heading.
 """
 
@@ -69,7 +69,7 @@ def unit_derivatives_4(
 ) -> tuple[Vec3, Vec3, Vec3, Vec3, Vec3]:
     """u = v/|v| and its first four derivatives from those of v.
 
-    Leibniz on v = n u solved for u^(k), and n' = u . v' (for u . u' = 0) differentiated k - 1 times.
+    Leibniz' rule for v = n u solved for u^(k), and n' = u . v' (as u . u' = 0) differentiated k - 1 times.
     """
     n = norm(v)
     r = 1.0 / n
@@ -87,9 +87,9 @@ def unit_derivatives_4(
 
 @kernel
 def _against_air(v: Vec3, a: Vec3, j: Vec3, linear: float, quadratic: float) -> tuple[Vec3, Vec3, Vec3]:
-    """-D, -D', -D'' for a vehicle with velocity v, acceleration a and jerk j in air at rest."""
+    """-D, -D' and -D'' for a vehicle with velocity v, acceleration a and jerk j in air at rest."""
     s = norm(v)
-    # s' and s'' have no limit at rest, but only products with v and s enter, which vanish there
+    # s' and s'' have no limit at rest, but enter only in products with v and s, which vanish there
     r = 1.0 / s if s > 1e-9 else 0.0
     s1 = r * dot(v, a)
     s2 = r * (dot(a, a) + dot(v, j) - s1 * s1)
@@ -103,10 +103,10 @@ def _against_air(v: Vec3, a: Vec3, j: Vec3, linear: float, quadratic: float) -> 
 
 @kernel
 def _attitude(F: Vec3, F1: Vec3, F2: Vec3, heading: float) -> tuple[Mat3, Vec3, Vec3]:
-    """R with b3 along F and b1 as near as can be to the heading, Omega and Omega' (body frame).
+    """R with b3 along F and b1 as near as possible to the heading, Omega and Omega' (body frame).
 
-    b2 is the normalised b3 x b1d, b1 = b2 x b3. Omega = (b3 . b2', b1 . b3', b2 . b1') from
-    R' = R hat(Omega), (2-34), and that differentiated once more.
+    b2 is the normalised b3 x b1d, b1 = b2 x b3. Omega = (b3 . b2', b1 . b3', b2 . b1') follows from
+    R' = R hat(Omega), (2-34); Omega' is its derivative.
     """
     b1_d = (cos(heading), sin(heading), 0.0)
     b3, b3_1, b3_2 = unit_derivatives(F, F1, F2)
@@ -137,7 +137,7 @@ def flat_outputs(
 ) -> FlatState:
     """State and inputs that fly the load's path `jet` exactly, with a constant heading (rad).
 
-    The heading is counted from east to north. Masses in kg, `cable_length` in m, `inertia` the principal
+    The heading is measured from east to north. Masses in kg, `cable_length` in m, `inertia` the principal
     moments (kg m^2), `gravity` in m/s^2; drag of the vehicle in N s/m and N s^2/m^2.
     """
     pull = axpy(gravity, E3, jet[2])

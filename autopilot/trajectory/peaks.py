@@ -1,4 +1,4 @@
-"""What a trajectory asks of vehicle and cable, sampled finely along it through the flat map."""
+"""The demand of a trajectory on vehicle and cable, sampled finely along it through the flat map."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ SPEED, ACCEL, FALL, TENSION, THRUST, ROTOR_LOW, ROTOR_HIGH, TILT, HEIGHT = range
 _COLUMNS = 9
 
 
-# By how much each rotor's force grows with thrust, with roll and pitch moment by the arm, and with yaw moment
-# by the torque ratio; of a rotor that differs from others its effort, the force by its strength
+# How much each rotor's force grows with thrust, with roll and pitch moment divided by the arm, and with yaw
+# moment divided by the torque ratio; for a rotor that differs from the others: its effort, which is the force
+# divided by its strength
 Efforts = tuple[tuple[float, float, float, float], ...]
 PLUS_EFFORTS: Efforts = (
     (0.25, 0.0, 0.5, -0.25),
@@ -39,7 +40,7 @@ PLUS_EFFORTS: Efforts = (
 
 
 class Body(NamedTuple):
-    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13).
+    """The properties of the vehicle that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, (2-13).
 
     Drag of the vehicle in N s/m and N s^2/m^2.
     """
@@ -57,7 +58,7 @@ class Body(NamedTuple):
 
 
 class Solid(NamedTuple):
-    """A `Body` without its rotors, as kernels take it: their machine code is the same for any number."""
+    """A `Body` without its rotors, for kernels: their machine code is the same for any number of rotors."""
 
     quad_mass: float
     load_mass: float
@@ -71,7 +72,7 @@ class Solid(NamedTuple):
 
 
 def for_kernels(body: Body) -> tuple[Solid, Samples]:
-    """The body as kernels take it, and the efforts of its rotors (rotors, 4)."""
+    """The body in the form for kernels, and the efforts of its rotors (rotors, 4)."""
     return Solid(*body[:-1]), np.array(body.efforts)
 
 
@@ -99,7 +100,7 @@ class Peaks:
 
 @kernel
 def effort(efforts: Samples, i: int, thrust: float, moment: Vec3, body: Solid) -> float:
-    """What is asked of rotor i: (2-13) solved for it."""
+    """The demand on rotor i: (2-13) solved for it."""
     roll, pitch, yaw = moment[0] / body.arm, moment[1] / body.arm, moment[2] / body.torque_ratio
     asked: float = thrust * efforts[i, 0] + roll * efforts[i, 1] + pitch * efforts[i, 2] + yaw * efforts[i, 3]
     return asked
@@ -107,7 +108,7 @@ def effort(efforts: Samples, i: int, thrust: float, moment: Vec3, body: Solid) -
 
 @kernel
 def _rotor_range(thrust: float, moment: Vec3, efforts: Samples, body: Solid) -> tuple[float, float]:
-    """The least and the greatest that is asked of a rotor."""
+    """The least and the greatest demand on a rotor."""
     least = greatest = effort(efforts, 0, thrust, moment, body)
     for i in range(1, efforts.shape[0]):
         asked = effort(efforts, i, thrust, moment, body)
@@ -195,7 +196,7 @@ def _peaks(times: Samples, rows: Samples) -> Peaks:
 
 
 def signal_times(step: Signals) -> Samples:
-    """Sample times: 200 to the shortest period or edge, at least each 10 ms, and both sides of each joint."""
+    """Sample times: 200 to the shortest period or edge, at most 10 ms apart, and both sides of each joint."""
     quickest = [sine.period_s for term in step.terms for sine in term.factors]
     quickest += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
     spacing = min([_COARSEST_S, *(period / _SAMPLES_PER_PERIOD for period in quickest)])
@@ -206,7 +207,7 @@ def signal_times(step: Signals) -> Samples:
 
 
 def survey_signals(step: Signals, anchor: Vec3, body: Body) -> Peaks:
-    """Extremes along load signals that begin at `anchor`; the jumps at joints are not part of it."""
+    """Extremes along load signals that begin at `anchor`; the jumps at joints are not included."""
     times = signal_times(step)
     rows = np.empty((times.size, _COLUMNS))
     _fill_signals(signal_table(step.terms), times, *for_kernels(body), rows)
@@ -223,7 +224,7 @@ def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
 
 
 def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
-    """Extremes along a path given by samples (7, n, 3), `height` m above home."""
+    """Extremes along a path given by samples (7, n, 3), raised by `height` m."""
     rows = np.empty((times.size, _COLUMNS))
     _fill_jets(jets, *for_kernels(body), rows)
     rows[:, HEIGHT] += height
@@ -231,14 +232,14 @@ def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Pea
 
 
 def survey_attitude(run: AttitudeRun, height: float, body: Body) -> Peaks:
-    """Extremes of an attitude run at constant height, on the safe side.
+    """Extremes of an attitude run at constant height, estimated on the safe side.
 
     A run of the vehicle: thrust along u carries the whole weight. A run of the load: the cable along -u
     carries the load and the vehicle moves with its upper end, F = (m_Q + m_L) g u / u_z + m_Q L u''. In both
-    the vehicle turns with F, and all of its angular acceleration is charged to the rotor that does most for
-    it.
+    cases the vehicle turns with F, and the rotor with the greatest effort for its angular acceleration is
+    assumed to take part in all of it.
     """
-    # the ends are left out: there u'' jumps, as it does at the joints of signals
+    # the ends are left out: u'' jumps there, as at the joints of signals
     times = np.linspace(0.0, run.duration_s, _STILL_SAMPLES)[1:-1]
     lean = [swing(run.tilt_north_rad, run.tilt_east_rad, run.duration_s, float(t)) for t in times]
     u = np.array([direction for direction, _, _ in lean])

@@ -1,8 +1,8 @@
-"""A mission made ready for its vehicle before it is flown: paths shaped, and what cannot be flown dealt with.
+"""Preparation of a mission for its vehicle before the flight: paths are shaped, impossible ones are handled.
 
-Signals become `Shaped` paths; waypoints without a hold are flown through, along one `Passage`. What cannot be
-flown even so, or only too far from where it was asked, is flown as asked, slowed down or refused, as the user
-chose.
+Signals become `Shaped` paths; waypoints without a hold are flown through, along one `Passage`. A path that is
+impossible nevertheless, or possible only too far from the requested path, is flown as requested, slowed down
+or refused, depending on the user's setting.
 """
 
 from __future__ import annotations
@@ -25,34 +25,35 @@ from autopilot.trajectory.waypoint_path import MOST_POINTS, NEAREST_M, Passage, 
 from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
 
 AS_ASKED, SLOW_DOWN, REFUSE = 0, 1, 2
-SLOWEST = 4.0  # times as long as asked
+SLOWEST = 4.0  # times as long as requested
 _SLOWER = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, SLOWEST)
 _HALVINGS = 3
-_LONGER, _LONGER_TRIES = 1.05, 60  # of a transfer
+_LONGER, _LONGER_TRIES = 1.05, 60  # for lengthening a transfer
 
 
 class Limits(NamedTuple):
-    """The vehicle, what is allowed along a path, and what to do where a path cannot be had within that."""
+    """The vehicle, what is allowed along a path, and what to do with a path that is impossible within it."""
 
     body: Body
     bounds: Bounds
-    shaped: bool  # False: signals are flown exactly as asked, whatever they ask for
-    distance_m: float  # a shaped path is no further from the asked one
+    shaped: bool  # False: signals are flown exactly as requested, even beyond the bounds
+    distance_m: float  # greatest distance of a shaped path from the requested one
     when_infeasible: int  # AS_ASKED, SLOW_DOWN or REFUSE
     speed_m_s: float  # peaks along paths through waypoints, until the mission sets its own speed
     accel_m_s2: float
-    time_optimal: bool  # paths through waypoints are as quick as the bounds allow, whatever the peaks
+    time_optimal: bool  # paths through waypoints are as quick as the bounds allow, without the peaks
 
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """`made` has a path for each step that needs one; `notes` say what was changed; `refusal` why not."""
+    """`made` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
+    refused."""
 
     made: tuple[Shaped | Passage | None, ...] = ()
     notes: tuple[str, ...] = ()
     refusal: str = ""
-    pending: bool = False  # the paths are not there yet
-    least_s: tuple[float, ...] = ()  # for each step: what its transfer takes at least, 0 where nothing binds
+    pending: bool = False  # the paths are not ready yet
+    least_s: tuple[float, ...] = ()  # for each step: least duration of its transfer, 0 if no bound applies
 
 
 UNPREPARED = Prepared()
@@ -66,9 +67,9 @@ def prepare(
     home: Vec3 = ZERO,
     planner: Planner | None = None,
 ) -> Prepared:
-    """The steps made ready; `sequence` has the mission item of each, by which the notes name it, and `home`
-    is where a return leads. `planner` is somebody's own, of paths through waypoints: what it gives is a
-    path along the route, or it raises PlanError."""
+    """Prepare the steps; `sequence` has the mission item of each, by which the notes name it, and `home` is
+    where a return leads. `planner` is a custom planner of paths through waypoints: it returns a path along
+    the route, or raises PlanError."""
     made: list[Shaped | Passage | None] = []
     notes: list[str] = []
     refusal = ""
@@ -99,7 +100,7 @@ def prepare(
 
 
 def _transfer_times(entries: Sequence[TimelineEntry], limits: Limits) -> Iterator[float]:
-    """For each step the least time (s) of its transfer within the bounds; 0 where these do not bind."""
+    """For each step the least time (s) of its transfer within the bounds; 0 if they need no longer one."""
     for entry in entries:
         duration = entry.transfer_s
         if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
@@ -122,7 +123,8 @@ def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
 
 
 def _passages(entries: Sequence[TimelineEntry], limits: Limits) -> dict[int, Passage]:
-    """The stretch of a passage for each step that is a waypoint of one, by its index."""
+    """For each step that is a waypoint of a passage, by its index, its stretch of the passage. Passages that
+    would touch the ground are left out."""
     found: dict[int, Passage] = {}
     for first, points, speed in _chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
@@ -140,7 +142,7 @@ def _passages(entries: Sequence[TimelineEntry], limits: Limits) -> dict[int, Pas
 def _planned(
     entries: Sequence[TimelineEntry], sequence: Sequence[int], limits: Limits, planner: Planner
 ) -> tuple[dict[int, Passage], list[str], str]:
-    """The same by somebody's own planner, with what is to be noted, and why it is refused."""
+    """The same by a custom planner, with notes, and the reason if its path is refused."""
     found: dict[int, Passage] = {}
     notes: list[str] = []
     for first, points, speed in _chains(entries, limits.speed_m_s):
@@ -169,8 +171,8 @@ def _planned(
 
 
 def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[int, list[Vec3], float]]:
-    """Stretches of waypoints in a row, all but the last without a hold: the index of the first, the points
-    from where the setpoint is known to be at rest, and the speed."""
+    """Stretches of consecutive waypoints, all but the last without a hold: the index of the first, the points
+    (the first is where the setpoint rests, which must be known), and the speed."""
     points: list[Vec3] = []
     first = 0
     for index, entry in enumerate(entries):
@@ -196,7 +198,7 @@ def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[in
 
 
 def trouble_of(found: Shaped, limits: Limits) -> str:
-    """Why the shaped path will not do, or an empty text."""
+    """Why the shaped path is not acceptable; empty if it is."""
     if found.reason:
         return found.reason
     if found.distance_m > limits.distance_m:
@@ -208,7 +210,7 @@ def trouble_of(found: Shaped, limits: Limits) -> str:
 
 
 class ShapedPath(NamedTuple):
-    """The path that is flown of signals; what forbids it as asked (`slowed_for`) or at all (`trouble`)."""
+    """The path flown for signals; why not at the requested speed (`slowed_for`) or not at all (`trouble`)."""
 
     path: Shaped
     trouble: str = ""
@@ -217,9 +219,9 @@ class ShapedPath(NamedTuple):
 
 @lru_cache(maxsize=16)
 def shaped_path(step: Signals, limits: Limits) -> ShapedPath:
-    """Signals shaped to the vehicle, slowed down where that is wanted and needed.
+    """Signals shaped to the vehicle, slowed down if that is allowed and necessary.
 
-    Hard ones take seconds, and whoever flies a mission in this process has checked it before.
+    Cached: hard signals take seconds, and a mission is checked in the same process before it is flown.
     """
     found = shape(step, limits.body, limits.bounds)
     trouble = trouble_of(found, limits)
@@ -231,13 +233,13 @@ def shaped_path(step: Signals, limits: Limits) -> ShapedPath:
 
 
 def slow_down(step: Signals, limits: Limits) -> Shaped | None:
-    """The signals no slower than they must be, to a few percent; None if no slower ones will do either."""
+    """The signals slowed down no more than necessary, to a few percent; None if that does not help either."""
 
     def tried(factor: float) -> Shaped | None:
         found = shape(slower(step, factor), limits.body, limits.bounds)
         return None if trouble_of(found, limits) else replace(found, slowed=factor)
 
-    # a path that cannot be flown takes the longest to be found so: few are tried
+    # shaping takes longest for an impossible path, so the search tries few of them
     low, best = 1.0, None
     factors = list(_SLOWER)
     while factors:

@@ -1,7 +1,7 @@
-"""What a path asks of rotors, cable and attitude, with its derivatives: the constraints of an optimisation.
+"""Demand of a path on rotors, cable and attitude, with its derivatives: the constraints of an optimisation.
 
-For each sample of a path two numbers and one more a rotor: the tension (N), the cosine of the vehicle's tilt,
-and what is asked of each rotor (N), with a heading of 0.
+For each sample of a path two numbers and one more per rotor: the tension (N), the cosine of the vehicle's
+tilt, and the demand on each rotor (N), with a heading of 0.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from autopilot.trajectory.signals import Jet
 Array = NDArray[np.float64]
 
 TENSION, COS_TILT, FIRST_ROTOR = 0, 1, 2  # outputs
-# of the central differences: m/s ... m/s^6, each about as much of a rotor force
+# steps of the central differences, m/s ... m/s^6: each changes a rotor force by about as much
 _NUDGE = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
 
 
 class Bounds(NamedTuple):
     """What is allowed along a path; infinite where there is no limit.
 
-    `rotor_low`, `rotor_high` (N) bound what is asked of a rotor that follows with the lag `rotor_tau` (s):
-    F + tau F'.
+    `rotor_low` and `rotor_high` (N) bound the command F + tau F' to a rotor that follows with the lag
+    `rotor_tau` (s).
     """
 
     rotor_low: float
@@ -71,15 +71,15 @@ def _jet_of(jets: Array, i: int) -> Jet:
 
 @kernel
 def fill_demand(jets: Array, body: Solid, efforts: Array, out: Array) -> None:
-    """`out` (n, 2 + rotors) from `jets` (7 or more, n, 3)."""
+    """Fill `out` (n, 2 + rotors) with the demand of `jets` (7 or more, n, 3)."""
     for i in range(jets.shape[1]):
         _asked(_jet_of(jets, i), body, efforts, out[i])
 
 
 @kernel
 def fill_slopes(jets: Array, body: Solid, efforts: Array, nudge: Array, scratch: Array, out: Array) -> None:
-    """`out` (n, 2 + rotors, 7, 3): the derivative of each output by each entry of the jet; `jets` stays as it
-    was. `scratch` is (2, 2 + rotors)."""
+    """Fill `out` (n, 2 + rotors, 7, 3) with the derivative of each output by each entry of the jet except the
+    position; `jets` is unchanged at the end. `scratch` is (2, 2 + rotors)."""
     high, low = scratch[0], scratch[1]
     for i in range(jets.shape[1]):
         for order in range(1, 7):
@@ -96,7 +96,7 @@ def fill_slopes(jets: Array, body: Solid, efforts: Array, nudge: Array, scratch:
 
 
 def demand(jets: Array, body: Body) -> Array:
-    """(n, 2 + rotors) what the path with `jets` (7, n, 3) asks for."""
+    """(n, 2 + rotors) demand of the path with `jets` (7, n, 3)."""
     solid, efforts = for_kernels(body)
     out = np.empty((jets.shape[1], FIRST_ROTOR + len(efforts)))
     fill_demand(jets, solid, efforts, out)
@@ -104,7 +104,7 @@ def demand(jets: Array, body: Body) -> Array:
 
 
 def slopes(jets: Array, body: Body) -> Array:
-    """(n, 2 + rotors, 7, 3) by how much the demand changes with the jets (7, n, 3)."""
+    """(n, 2 + rotors, 7, 3) derivatives of the demand by the jets (7, n, 3)."""
     solid, efforts = for_kernels(body)
     outputs = FIRST_ROTOR + len(efforts)
     out = np.zeros((jets.shape[1], outputs, 7, 3))
@@ -113,7 +113,7 @@ def slopes(jets: Array, body: Body) -> Array:
 
 
 def commanded(found: Array, spacing: float, tau: float) -> Array:
-    """(n, rotors) what rotors with the lag `tau` are asked for, F + tau F', of samples `spacing` s apart."""
+    """(n, rotors) commands F + tau F' to rotors with the lag `tau`, for samples `spacing` s apart."""
     forces = found[:, FIRST_ROTOR:]
     if tau == 0.0 or len(forces) < 3:
         return forces

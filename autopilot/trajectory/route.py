@@ -1,7 +1,7 @@
-"""A path of the load through waypoints that a planner of somebody's own has made: what the planner is given,
-what it gives, and what that must be like.
+"""A path of the load through waypoints made by a custom planner: what the planner is given, what it returns,
+and the requirements for its path.
 
-World ENU, m, from home; the load rests at the first point before, and at the last one afterwards.
+World ENU, m, from home; the load rests at the first point before the path, and at the last one afterwards.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from autopilot.trajectory.waypoint_path import Passage, passage_jets
 
 Array = NDArray[np.float64]
 
-FINE_S = 0.01  # between samples of a path that is looked at
-NEAR_M = 0.05  # of each waypoint, that the path must pass
+FINE_S = 0.01  # between the samples at which a path is checked
+NEAR_M = 0.05  # greatest distance at which the path may pass a waypoint
 MOST_PIECES, LONGEST_S = 5000, 3600.0
-# by how much position and derivatives may jump where two pieces meet, and at the ends, where all rests: what
-# jumps less is lost in the errors of any flight
+# how much position and derivatives may jump where two pieces meet, and at the ends, where the load rests: a
+# smaller jump is less than the errors of any flight
 _JUMPS = (("position", 1e-3, "m"), ("velocity", 1e-2, "m/s"), ("acceleration", 5e-2, "m/s^2"))
 _JUMP_JERK = ("jerk", 0.5, "m/s^3")
 
@@ -36,32 +36,32 @@ _JUMP_JERK = ("jerk", 0.5, "m/s^3")
 class Route(NamedTuple):
     """What a planner is given: a stretch from rest to rest."""
 
-    points: tuple[Vec3, ...]  # m: where the load rests, the waypoints to be passed, and where it is to rest
+    points: tuple[Vec3, ...]  # m: where the load rests, the waypoints to pass, and where it must come to rest
     speed_m_s: float  # not to be exceeded: the mission's, or MIS_SPEED
     accel_m_s2: float  # MIS_ACCEL
-    time_optimal: bool  # MIS_TIME_OPT: as quick as the bounds allow, whatever speed and acceleration
-    body: Body  # what the vehicle is: masses, cable, drag, rotors
-    bounds: Bounds  # what rotors, cable and tilt may be asked for
+    time_optimal: bool  # MIS_TIME_OPT: as quick as the bounds allow, without limits on speed and acceleration
+    body: Body  # the vehicle: masses, cable, drag, rotors
+    bounds: Bounds  # limits of the demand on rotors, cable and tilt
 
 
 class Path(NamedTuple):
-    """What a planner gives: pieces of polynomials, and when which waypoint is passed."""
+    """What a planner returns: polynomial pieces, and the times at which it passes the points."""
 
-    table: PieceTable  # rows as `autopilot.trajectory.splines` has them
-    passes_s: tuple[float, ...]  # of each point of the route, from its first on
+    table: PieceTable  # rows as in `autopilot.trajectory.splines`
+    passes_s: tuple[float, ...]  # for each point of the route, beginning with the first
 
 
-Planner = Callable[[Route], Path]  # gives what `check_path` finds nothing wrong with; may raise PlanError
+Planner = Callable[[Route], Path]  # returns a path that `check_path` accepts; may raise PlanError
 
 
 class PlanError(ValueError):
-    """A path cannot be had, or is none that can be flown; the text says why."""
+    """There is no path, or it cannot be flown; the text says why."""
 
 
 def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLike) -> Path:
-    """A path of n polynomials: `coefficients[k][i]` (n, m, 3), with m up to 10, is that of
-    (t - breaks_s[k])^i between breaks_s[k] and breaks_s[k + 1] (n + 1); `passes_s` when each point of the
-    route is passed. ValueError where shapes do not fit."""
+    """A path of n polynomials: `coefficients[k][i]`, of shape (n, m, 3) with m up to 10, belongs to
+    (t - breaks_s[k])^i between breaks_s[k] and breaks_s[k + 1], of n + 1 breaks; `passes_s` are the times at
+    which the points of the route are passed. ValueError if the shapes do not fit."""
     breaks, found = np.asarray(breaks_s, np.float64), np.asarray(coefficients, np.float64)
     if found.ndim != 3 or found.shape[2] != 3 or not 1 <= found.shape[1] <= DEGREE + 1:
         raise ValueError(
@@ -77,8 +77,8 @@ def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLik
 
 
 def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Path:
-    """A path through sampled positions (n, 3) at rising times (n,), n >= 2, from rest to rest: the spline of
-    degree 9 through them. ValueError where shapes do not fit."""
+    """A path through sampled positions (n, 3) at increasing times (n,), n >= 2, from rest to rest: the spline
+    of degree 9 through them. ValueError if shapes do not fit, or times do not increase."""
     times, places = np.asarray(times_s, np.float64), np.asarray(positions, np.float64)
     if times.ndim != 1 or len(times) < 2 or places.shape != (len(times), 3):
         raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
@@ -101,8 +101,8 @@ def slower(path: Path, factor: float) -> Path:
 
 
 def use(path: Path, route: Route) -> float:
-    """How many times as long the path should take, roughly, to keep what the route allows: 1 or less, it
-    keeps it."""
+    """How many times as long, roughly, the path should take to stay within what the route allows; 1 or less
+    if it already does."""
     times, jets = _fine(path)
     asked = 0.0
     if not route.time_optimal:
@@ -113,7 +113,8 @@ def use(path: Path, route: Route) -> float:
 
 
 def check_path(path: Path, route: Route) -> None:
-    """PlanError if it is no path along the route: of no numbers, with jumps, past a waypoint, underground."""
+    """Raise PlanError if the path is not valid for the route: values that are no numbers, wrong times, jumps,
+    a missed waypoint, or a place below the ground."""
     table, passes = path.table, path.passes_s
     if len(passes) != len(route.points):
         raise PlanError(f"passes_s are {len(passes)} times; must be {len(route.points)}, one for each point")
@@ -148,8 +149,8 @@ def check_path(path: Path, route: Route) -> None:
 
 
 def _check_joints(table: PieceTable) -> None:
-    """PlanError where the path jumps, or does not begin and end at rest."""
-    # from the left and from the right of each break; beyond the ends nothing moves
+    """Raise PlanError if the path jumps, or does not begin and end at rest."""
+    # on the left and on the right of each break; beyond the ends the load rests
     starts = _derivatives(table, np.zeros(len(table)))
     ends = _derivatives(table, table[:, 1] - table[:, 0])
     for order, (what, most, unit) in enumerate((*_JUMPS, _JUMP_JERK)):
@@ -162,7 +163,7 @@ def _check_joints(table: PieceTable) -> None:
 
 
 def _derivatives(table: PieceTable, since: Array) -> Array:
-    """(4, n, 3) position to jerk of each piece, so long after its begin."""
+    """(4, n, 3) position to jerk of each piece, `since` s after its beginning."""
     c = table[:, 2:].reshape(len(table), 3, DEGREE + 1)
     powers = np.arange(DEGREE + 1, dtype=np.float64)
     found = np.empty((4, len(table), 3))
@@ -173,7 +174,7 @@ def _derivatives(table: PieceTable, since: Array) -> Array:
 
 
 def trouble_of(path: Path, route: Route) -> str:
-    """What of the bounds the path breaks, in words; empty if it keeps them."""
+    """A bound that the path breaks, in words; empty if it keeps them all."""
     times, jets = _fine(path)
     spacing, bounds = float(times[1] - times[0]), route.bounds
     found = demand(jets, route.body)

@@ -1,14 +1,14 @@
-"""Load signals as the vehicle can fly them: exactly as asked where that can be flown, nearby where it cannot.
+"""Shaping: load signals are flown exactly as requested where the vehicle can, and nearby where it cannot.
 
-At the joints of half-cosine envelopes the acceleration jumps, and to follow a jump would take an unbounded
-moment; elsewhere a path may ask for more than rotors, cable or tilt allow. About each such place a window of
-the path is replaced by a spline, which takes over from the asked path and hands back to it without a jump up
-to the sixth derivative, and stays as near to it as the limits allow (`autopilot.trajectory.convex`). With
-the whole path known, the vehicle gets ready before a jump: a window about the beginning of the signals
-opens before it (the lead), with the load held within `HELD_M` of its place until then, and one about the
-end closes after it (the tail).
+At the joints of half-cosine envelopes the acceleration jumps, and following a jump would require an unbounded
+moment; elsewhere a path may demand more than rotors, cable or tilt allow. Around each such place a window of
+the path is replaced by a spline. It leaves the requested path and returns to it without a jump up to the
+sixth derivative, and stays as near to it as the limits allow (`autopilot.trajectory.convex`). As the whole
+path is known, the vehicle prepares before a jump: a window around the beginning of the signals opens before
+it (the lead), in which the load stays within `HELD_M` of its position; a window around the end closes after
+it (the tail).
 
-Times are seconds from the beginning of the signals as asked; paths are relative to where they begin.
+Times are seconds from the beginning of the requested signals; paths are relative to the position there.
 """
 
 from __future__ import annotations
@@ -29,23 +29,25 @@ from autopilot.trajectory.signals import REST, Jet, SignalTable, evaluate, joint
 from autopilot.trajectory.splines import COLUMNS, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
 from missions.model import Signals
 
-HELD_M = 0.005  # by which the load may leave its place before the signals begin
+HELD_M = 0.005  # how far the load may leave its position before the signals begin
 INTERVAL_S = 0.04  # of the splines
-_HELD_S = 0.005  # between samples of that bound: 10 m/s^2 make 0.03 mm in the middle
+_HELD_S = 0.005  # between samples of that bound: at 10 m/s^2 it is exceeded by 0.03 mm between them
 WINDOW_S = 0.45  # before and after a place that cannot be flown
 LONGEST_S = 15.0  # of one window; a longer one is no local change of the path
-_WIDER = 1.6  # a window whose path exceeds the bounds is tried so many times as wide, ...
-_TRIES = 3  # ... so often, ...
-_LONG_S = 4.0  # ... unless one as long exceeds a bound by a rotor's whole range: its ends are not at fault
+_WIDER = 1.6  # a window whose path exceeds the bounds is widened by this factor, ...
+_TRIES = 3  # ... up to this number of tries, ...
+_LONG_S = 4.0  # ... unless it is longer than this and off by a rotor's whole range: not because of its ends
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
-_INSIDE_N = 0.03  # by which its samples keep within them
-# of the cost: a distance that counts as much as a sixth derivative which takes a rotor half its range
+_INSIDE_N = 0.03  # by which its samples must stay inside them
+# in the cost, this distance counts as much as a sixth derivative that takes a quarter of a rotor's range: the
+# share `_SMOOTH_SHARE` of `full_crackle`
 _DISTANCE_M = 1e-3
 _SMOOTH_SHARE = 0.5
-_SMOOTH_S = 0.02  # in which the sixth derivative may change by as much
-# a jump of the n-th derivative is smoothed over this time; the rotor force that takes says whether it counts
+_SMOOTH_S = 0.02  # the time in which the sixth derivative may change by as much
+# a jump of the n-th derivative counts if smoothing it over `_JUMP_S` takes a share of `full_crackle` of more
+# than `_JUMP_SHARE`
 _JUMP_S = 0.15
 _JUMP_SHARE = 0.01
 _REST_M_S = 1e-2
@@ -54,33 +56,33 @@ _FAR_OFF = 10.0  # times the range of a rotor
 
 @dataclass(frozen=True, slots=True)
 class Shaped:
-    """Signals to be flown: `pieces` where the path is a spline, the asked path elsewhere.
+    """Signals to be flown: `pieces` where the path is a spline, the requested path elsewhere.
 
-    The path begins `lead_s` before the signals as asked and ends `tail_s` after them.
+    The path begins `lead_s` before the requested signals and ends `tail_s` after them.
     """
 
     table: SignalTable
     pieces: PieceTable
-    duration_s: float  # of the signals as asked
+    duration_s: float  # of the requested signals
     lead_s: float
     tail_s: float
-    distance_m: float  # greatest, between the flown and the asked path
-    excess_n: float  # by which a bound is exceeded for all that
-    slowed: float  # the asked signals last so many times as long as in the mission
-    reason: str  # why the path cannot be flown as it is, or ""
+    distance_m: float  # greatest distance between the flown and the requested path
+    excess_n: float  # by which a bound is still exceeded
+    slowed: float  # how many times as long as in the mission the signals last
+    reason: str  # why the path cannot be flown, or ""
 
     def jet(self, t: float) -> Jet:
-        """The path to fly at t (s from the beginning of the asked signals), and its derivatives 1 ... 6."""
+        """The path to fly at t (s from the beginning of the requested signals) with derivatives 1 ... 6."""
         return evaluate_shaped(self.table, self.pieces, self.duration_s, t)
 
     def asked(self, t: float) -> Jet:
-        """The asked path at t."""
+        """The requested path at t."""
         return evaluate_asked(self.table, self.duration_s, t)
 
 
 @kernel
 def evaluate_asked(table: SignalTable, duration: float, t: float) -> Jet:
-    """The signals; at rest before they begin, and where they end if they end at rest."""
+    """The requested path: at rest before the signals begin, and after they end if they end at rest."""
     if t < 0.0:
         return REST
     if t < duration:
@@ -94,7 +96,7 @@ def evaluate_asked(table: SignalTable, duration: float, t: float) -> Jet:
 
 @kernel
 def evaluate_shaped(table: SignalTable, pieces: PieceTable, duration: float, t: float) -> Jet:
-    """The piece that holds t, else the signals as asked."""
+    """The path to fly: the piece that contains t, or else the requested signals."""
     row = find_piece(pieces, t)
     if row >= 0:
         return evaluate_piece(pieces, row, t)
@@ -114,20 +116,20 @@ _NO_PIECES: PieceTable = np.zeros((0, COLUMNS))
 
 
 def unshaped(step: Signals) -> Shaped:
-    """The signals exactly as asked."""
+    """The signals exactly as requested."""
     table = signal_table(step.terms)
     return Shaped(table, _NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
 
 
 def path_jets(shaped: Shaped, times: Array) -> Array:
-    """(7, n, 3) of the path to fly."""
+    """(7, n, 3) jets of the path to fly."""
     out = np.empty((7, times.size, 3))
     _fill(shaped.table, shaped.pieces, shaped.duration_s, times, out)
     return out
 
 
 def asked_jets(table: SignalTable, duration: float, times: Array) -> Array:
-    """(7, n, 3) of the path as asked."""
+    """(7, n, 3) jets of the requested path."""
     out = np.empty((7, times.size, 3))
     _fill(table, _NO_PIECES, duration, times, out)
     return out
@@ -146,7 +148,7 @@ def full_crackle(body: Body, rotor_range: float) -> float:
 
 
 def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
-    """The signals as the vehicle can fly them within the bounds; `reason` says so if it cannot."""
+    """The signals shaped so that the vehicle can fly them within the bounds; `reason` is set if it cannot."""
     asked = unshaped(step)
     table, duration = asked.table, step.duration_s
     end_speed = float(np.linalg.norm(asked_jets(table, duration, np.array([nextafter(duration, -inf)]))[1]))
@@ -162,7 +164,7 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
             text = f"from {max(begin, 0.0):.1f} s to {min(end, duration):.1f} s it exceeds what can be flown"
             return _refused(asked, text)
         if windows and window.begin < windows[-1].end:
-            # widened into its neighbour: one window for both
+            # it overlaps its neighbour after widening: one window for both
             last = len(windows) - 1
             spans[last : last + 2] = [(spans[last][0], end)]
             windows.pop()
@@ -182,7 +184,7 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
 
 
 class _Window(NamedTuple):
-    """A spline from begin to end in place of the asked path."""
+    """A spline from begin to end that replaces the requested path."""
 
     begin: float
     end: float
@@ -193,7 +195,8 @@ class _Window(NamedTuple):
 def _widened(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
 ) -> _Window | None:
-    """The first window about begin and end that keeps the bounds, else the one that exceeds them least."""
+    """The first of increasingly wide windows that keeps the bounds, or else the one that exceeds them least;
+    None if there is none."""
     found: _Window | None = None
     wider = 0.0
     for _ in range(_TRIES):
@@ -211,7 +214,7 @@ def _widened(
 
 
 def _too_much(excess_n: float, bounds: Bounds) -> str:
-    """What a path asks for that could not be brought within the bounds; how far off is told of near ones."""
+    """The excess of a path that could not be brought within the bounds, in words; in N unless it is huge."""
     far = excess_n > _FAR_OFF * _rotor_range(bounds)
     return f"a rotor or the cable is asked for {'far' if far else f'{excess_n:.2f} N'} too much"
 
@@ -230,7 +233,7 @@ def _rotor_range(bounds: Bounds) -> float:
 
 
 def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
-    """Times at which derivatives jump by more than any rotor can follow."""
+    """Times at which derivatives jump by more than the rotors can follow."""
     full = full_crackle(body, _rotor_range(bounds))
     times = {t for t in (*joints(step.terms), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
     for time in sorted(times):
@@ -244,9 +247,9 @@ def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Ite
 def _violations(
     table: SignalTable, duration: float, body: Body, bounds: Bounds
 ) -> Iterable[tuple[float, float]]:
-    """Stretches of the asked path that exceed the bounds."""
+    """Stretches of the requested path that exceed the bounds."""
     times = _span(0.0, duration, _COARSE_S)
-    # samples on both sides of a joint belong to no common slope: the lag is left to the optimisation
+    # samples on both sides of a joint have no common slope: the lag is considered only in the optimisation
     over = excess(demand(asked_jets(table, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0)) > 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], over, [False]]).astype(np.int8)))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
@@ -254,7 +257,7 @@ def _violations(
 
 
 def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple[float, float]]:
-    """Stretches `margin` wider than the places; those that come near each other are one."""
+    """Stretches `margin` wider on each side than the places; stretches near each other are merged."""
     found: list[tuple[float, float]] = []
     for begin, end in places:
         b, e = begin - margin, end + margin
@@ -268,7 +271,7 @@ def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple
 def _solve(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
 ) -> _Window | None:
-    """The spline from begin to end; None if there is none."""
+    """The spline from begin to end; None if the solver finds none."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
     ends = asked_jets(table, step.duration_s, np.array([begin, end]))
@@ -290,7 +293,8 @@ def _solve(
 
 
 def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: Array) -> Rows:
-    """The load stays within HELD_M of its place until the signals begin, and arrives where it is asked to."""
+    """Constraints: the load stays within HELD_M of its position until the signals begin, and each rise with
+    `rise_90_by_s` is nine tenths done by then."""
     times: list[float] = []
     axes: list[int] = []
     low: list[float] = []

@@ -5,8 +5,8 @@ A term is amplitude * envelope * sines. In each stretch of its envelope (rise, h
 
     sin(a) cos(b) = (cos(a + b - pi/2) + cos(a - b - pi/2)) / 2   and so on.
 
-So the whole trajectory is, stretch by stretch, a sum of cosines, and its n-th derivative is the same sum with
-each amplitude times omega^n and each phase plus n pi/2: no product rule is left for the control loop, no
+So the whole trajectory is a sum of cosines in each stretch, and its n-th derivative is the same sum with
+each amplitude times omega^n and each phase plus n pi/2: the control loop needs no product rule, and no
 derivative is approximated. `signal_table` does the expansion once, `evaluate` adds up.
 """
 
@@ -58,7 +58,7 @@ def _half_cosine(begin_s: float, duration_s: float, sign: float) -> tuple[_Cosin
 
 
 def _stretches(term: Term) -> Iterable[tuple[float, float, tuple[_Cosine, ...]]]:
-    """(begin, end, envelope) of rise, hold and fall; those that last no time are left out."""
+    """(begin, end, envelope) of rise, hold and fall; stretches of zero duration are left out."""
     top = term.start_s + term.rise_s
     if term.rise_s > 0.0:
         yield term.start_s, top, _half_cosine(term.start_s, term.rise_s, 1.0)
@@ -85,12 +85,12 @@ def _rows(term: Term) -> Iterable[tuple[float, ...]]:
 
 
 def signal_table(terms: Sequence[Term]) -> SignalTable:
-    """The sum of the terms, laid out for `evaluate`. Cosines of equal frequency are merged into one row."""
+    """The sum of the terms as a table for `evaluate`. Cosines of equal frequency are merged into one row."""
     merged: dict[tuple[float, ...], complex] = {}
     for term in terms:
         for begin, end, *amplitude, omega, phase in _rows(term):
             axis = next((i for i in range(3) if amplitude[i] != 0.0), 0)
-            # cos is even: fold to omega >= 0, so that equal frequencies meet
+            # cos is even: fold to omega >= 0, so that equal frequencies have equal keys
             key = (begin, end, float(axis), abs(omega))
             turn = -phase if omega < 0.0 else phase
             merged[key] = merged.get(key, 0j) + amplitude[axis] * complex(cos(turn), sin(turn))
@@ -106,14 +106,14 @@ def signal_table(terms: Sequence[Term]) -> SignalTable:
 def evaluate(table: SignalTable, t: float) -> Jet:
     """Trajectory at t seconds after its beginning, relative to the anchor, ENU.
 
-    Where two stretches join, the derivatives are those of the stretch that begins.
+    At the joint of two stretches, the derivatives are those of the stretch that begins there.
     """
     d0, d1, d2, d3, d4, d5, d6 = REST
     for i in range(table.shape[0]):
         if table[i, 0] <= t < table[i, 1]:
             amplitude = (table[i, 2], table[i, 3], table[i, 4])
             omega = table[i, 5]
-            # from the beginning of the stretch: long flights lose no digits of the phase
+            # counted from the beginning of the stretch, so that the phase stays accurate in long flights
             angle = table[i, 6] + omega * (t - table[i, 0])
             c = cos(angle)
             s = sin(angle)

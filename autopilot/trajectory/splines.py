@@ -1,15 +1,15 @@
 """Paths as splines: smooth to the eighth derivative, evaluated as polynomials over equal intervals.
 
-A spline of degree 9 over [begin, end] with N equal intervals has N + 9 coefficients for each axis. Its first
-seven and last seven are decided by position and six derivatives at the two ends, so that a spline takes over
-from whatever comes before it, and hands over to what follows, without a jump of a rotor force. The rest is
-free: what an optimisation chooses (`autopilot.trajectory.shaping`, `autopilot.trajectory.waypoint_path`).
+A spline of degree 9 over [begin, end] with N equal intervals has N + 9 coefficients for each axis. The first
+seven and the last seven follow from position and six derivatives at the two ends, so that the spline joins
+the paths before and after it without a jump of a rotor force. The rest are free: an optimisation chooses them
+(`autopilot.trajectory.shaping`, `autopilot.trajectory.waypoint_path`).
 
-SciPy's splines, and its optimiser, are named in full (`scipy.interpolate.BSpline`): it loads them when they
-are first used, which takes a quarter of a second, and most missions need none.
+SciPy's splines and its optimiser are named in full (`scipy.interpolate.BSpline`): SciPy loads them when they
+are first used, which takes a quarter of a second, and most missions need neither.
 
-For flight a spline becomes a table: for each interval the coefficients of (t - t_k)^n, so that `evaluate` is
-Horner's rule with all derivatives at once.
+For flight a spline is converted to a table: for each interval the coefficients of (t - t_k)^n, so that
+`evaluate_piece` is Horner's rule for all derivatives at the same time.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ class Basis:
         self.intervals = intervals
         self.count = intervals + DEGREE
         self.free = slice(ORDERS, self.count - ORDERS)
-        # whole numbers: times are counted in intervals, so that a knot belongs to one piece for certain
+        # times are counted in intervals: knots are then exact integers, each of exactly one piece
         self.spacing = (end - begin) / intervals
         inner = np.arange(intervals + 1, dtype=np.float64)
         knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
         self._one = scipy.interpolate.BSpline(knots, np.eye(self.count), DEGREE)
 
     def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
-        """(orders, n, 10): the derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
+        """(orders, n, 10): derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
         times; (n,): the index of the first of these."""
         u = (times - self.breaks[0]) / self.spacing
         first = np.clip(u.astype(np.int64), 0, self.intervals - 1)
@@ -62,7 +62,7 @@ class Basis:
         return values, first
 
     def ends(self, before: Array, after: Array) -> Array:
-        """(count, 3) coefficients: those that the jets (7, 3) at the two ends decide, 0 for the free ones."""
+        """(count, 3) coefficients: those that follow from the jets (7, 3) at the two ends; the others 0."""
         found = np.zeros((self.count, 3))
         for at, jet, part in ((0.0, before, slice(0, ORDERS)), (1.0, after, slice(-ORDERS, None))):
             u = np.array([at * self.intervals])
@@ -86,7 +86,7 @@ class Basis:
 
 @kernel
 def find_piece(table: PieceTable, t: float) -> int:
-    """The row whose interval holds t, -1 if there is none; rows are in order and may leave gaps."""
+    """The row whose interval contains t, -1 if there is none; rows are in order and may leave gaps."""
     low, high = 0, table.shape[0]
     while low < high:
         middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""The direction that an attitude run asks for, with its first and second derivative."""
+"""The direction that an attitude run commands, with its first and second derivative."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, scale
 def swing(
     tilt_north_rad: float, tilt_east_rad: float, duration_s: float, t: float
 ) -> tuple[Vec3, Vec3, Vec3]:
-    """Unit vector u(t), ENU, that leans from straight up by theta(t) = tilt sin^2(pi t / duration), u', u''.
+    """Unit vector u(t), ENU, tilted from the vertical by theta(t) = tilt sin^2(pi t / duration), u' and u''.
 
-    Straight up and at rest before 0 and after the duration. For a run of the vehicle u is its thrust axis
+    It is vertical and at rest before 0 and after the duration. For a run of the vehicle u is its thrust axis
     R_d e3; for a run of the load u points from load to vehicle: q_cable_d = -u.
     """
     tilt = sqrt(tilt_north_rad * tilt_north_rad + tilt_east_rad * tilt_east_rad)

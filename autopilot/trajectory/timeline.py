@@ -1,9 +1,9 @@
 """Where the load is after each step of a mission, how long its cable is, and how long the step takes.
 
-The one interpreter of steps: upload checks, fence and winch checks before flight, preparation of paths,
-feasibility and the legs of the flight all ask here where a step leads, so that they cannot differ.
+The only interpreter of steps: upload checks, fence and winch checks before flight, preparation of paths,
+feasibility and the legs of the flight all use it to find where a step leads, so that they cannot differ.
 
-Positions are m, ENU. They are the load's until it is released and the vehicle's afterwards.
+Positions are in m, ENU. They are the load's until it is released, and the vehicle's afterwards.
 """
 
 from __future__ import annotations
@@ -30,23 +30,24 @@ from missions.model import (
     Winch,
 )
 
-# Estimates, for progress bars and time-outs only: from arming until the cable is taut, and from the load's
-# touch-down until the rotors stop. Lift and lowering go at this speed or the mission's, whichever is less.
+# Estimates, only for progress bars and time-outs: from arming until the cable is taut, and from the load's
+# touch-down until the rotors stop. Lifting and lowering take place at the speed below or the mission's,
+# whichever is less.
 TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
-REEL_M_S = 0.3  # of a winch as delivered
+REEL_M_S = 0.3  # default speed of a winch
 RELEASE_S = 2.0  # hold after the load was released: the vehicle jumps up and comes back
-# of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
+# of transfers, by default (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
-LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
+LEAST_REEL_M = 1e-4  # a winch this near to its length has nothing to do
 
 
 def cable_trouble(wanted_m: float, shortest_m: float, longest_m: float) -> str:
-    """Why a winch does not make a cable so long, WNC_LEN_MIN and WNC_LEN_MAX given; empty if it does."""
+    """Why a winch refuses this cable length, given WNC_LEN_MIN and WNC_LEN_MAX; empty if it does not."""
     if shortest_m - LEAST_REEL_M <= wanted_m <= longest_m + LEAST_REEL_M:
         return ""
     limits = f"{shortest_m:g} ... {longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
@@ -57,20 +58,20 @@ def cable_trouble(wanted_m: float, shortest_m: float, longest_m: float) -> str:
 class MissionState:
     """The state that the steps of a mission change, between two steps.
 
-    `expected` is the best guess of the position; None: the mission may be begun anywhere. `known` says that
-    it is where a setpoint comes to rest, and not only a guess: after an attitude run nobody knows how far the
-    load has drifted, and a released load leaves the vehicle about a cable length above where it hung.
+    `expected` is the best guess of the position; None: the mission may begin anywhere. `known` says that it
+    is where a setpoint comes to rest, and not only a guess: after an attitude run it is unknown how far the
+    load has drifted, and a release leaves the vehicle about a cable length above where the load hung.
     """
 
     expected: Vec3 | None = ZERO
     known: bool = True
-    cable_m: float | None = None  # None: not told
+    cable_m: float | None = None  # None: not given
     released: bool = False
     speed_m_s: float = SPEED_M_S  # peak speed of transfers
 
     @property
     def position(self) -> Vec3 | None:
-        """Where the setpoint is; None where that is unknown."""
+        """The position of the setpoint; None if it is unknown."""
         return self.expected if self.known else None
 
 
@@ -96,12 +97,12 @@ class TimelineEntry:
 
     @property
     def begin(self) -> Vec3:
-        """The expected position before the step; the origin where nothing is known."""
+        """The expected position before the step; the origin if nothing is known."""
         return self.before.expected or ZERO
 
     @property
     def end(self) -> Vec3:
-        """The expected position after the step; the origin where nothing is known."""
+        """The expected position after the step; the origin if nothing is known."""
         return self.after.expected or ZERO
 
 
@@ -122,7 +123,7 @@ def timeline(
 
 
 def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionState:
-    """The state after a step. A take-off from an unknown place is taken to be from the origin."""
+    """The state after a step. A take-off from an unknown place is assumed to be from the origin."""
     here = before.expected
     match step:
         case Takeoff(altitude_m=altitude):
@@ -160,7 +161,7 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
 
 
 def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
-    """Where a return that is ordered by mode leads: home, or the rally point that is nearer, by the level
+    """Where a return commanded by mode leads: home or a rally point, whichever is nearest in horizontal
     distance. A return among the steps of a mission leads home."""
     return min((home, *rally), key=lambda place: dist(place[:2], here[:2]))
 

@@ -19,7 +19,7 @@ from autopilot.trajectory.signals import Jet
 PEAK_SPEED = 3003.0 / 1024.0
 PEAK_ACCELERATION = 72072.0 * (5.0 / 22.0) ** 5 / sqrt(11.0)
 
-# of u^13 ... u^7; all lower powers are absent
+# of u^13 ... u^7; there are no lower powers
 _COEFFICIENTS = tuple(float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k) for k in range(6, -1, -1))
 
 
@@ -30,11 +30,11 @@ def transfer(p0: Vec3, p1: Vec3, duration: float, t: float) -> Jet:
         return p1, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
     if t <= 0.0:
         return p0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
-    # the second half is the first one seen from the other end: s(u) = 1 - s(1 - u). There the polynomial
-    # itself would lose digits, for its coefficients reach 24024 and alternate.
+    # the second half mirrors the first: s(u) = 1 - s(1 - u). The polynomial itself would lose digits there,
+    # because its coefficients reach 24024 and alternate.
     second = t > 0.5 * duration
     u = (duration - t) / duration if second else t / duration
-    # Horner with all Taylor coefficients at once: s_n = s^(n)(u) / n!
+    # Horner's rule for all Taylor coefficients together: s_n = s^(n)(u) / n!
     s0, s1, s2, s3, s4, s5, s6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(14):
         s6 = s6 * u + s5

@@ -4,9 +4,10 @@ The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint 
 
     integral of |x''''|^2 + tau^4 |x^(6)|^2
 
-x'''' is the snap of the load; x^(6) is what turns the vehicle, and tau the time over which that matters:
-without it the snap alone would leave rest with a jump of the moment. The times at the waypoints are those of
-the least integral for a given whole (`share_times`). The whole follows from the form that was asked for:
+x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
+matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
+are those of the least integral for a given total time (`share_times`). The total follows from the form that
+was requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -45,9 +46,9 @@ _PER_SEGMENT = 8  # intervals to the shortest segment
 _MOST_INTERVALS = 400
 _SAMPLES = 4  # to an interval, of the integral
 _FINE_S = 0.01
-_MOST_FINE = 20_000  # samples, 50 to an interval: a flight of hours takes no more memory than one of minutes
+_MOST_FINE = 20_000  # samples, 50 to an interval: a flight of hours needs no more memory than one of minutes
 _SPLIT_ROUNDS = 6
-_MOST_SPLIT = 8  # segments whose times are optimised; more get those of the rule of thumb
+_MOST_SPLIT = 8  # most segments for which times are optimised; beyond it the rule of thumb applies
 _SCALE_ROUNDS = 8
 _LONGER = 1.15
 _BAND = DEGREE + 1
@@ -55,7 +56,7 @@ _BAND = DEGREE + 1
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """A stretch of a path through waypoints, from `begin_s` to `end_s` on its clock; (m, ENU from home)."""
+    """A stretch of a path through waypoints, from `begin_s` to `end_s` on its clock; m, ENU from home."""
 
     table: PieceTable
     begin_s: float
@@ -87,7 +88,7 @@ def _fill(table: PieceTable, times: Array, out: Array) -> None:
 
 
 def passage_jets(table: PieceTable, times: Array) -> Array:
-    """(7, n, 3) along the path."""
+    """(7, n, 3) jets along the path."""
     out = np.empty((7, times.size, 3))
     _fill(table, times, out)
     return out
@@ -99,7 +100,7 @@ class MinimumSnap:
     def __init__(self, points: Array, times: Array) -> None:
         segments = np.diff(times)
         count = ceil(_PER_SEGMENT * times[-1] / segments.min())
-        # an interval is no longer than a segment's share, however unlike the segments are
+        # `_PER_SEGMENT` intervals to the shortest segment, but within the limits on their number
         intervals = int(np.clip(count, 2 * ORDERS, _MOST_INTERVALS))
         self.basis = basis = Basis(0.0, float(times[-1]), intervals)
         self.origin: Array = points[0]
@@ -116,7 +117,7 @@ class MinimumSnap:
         free, fixed = slice(basis.free.start, basis.free.stop), self.coefficients
         H, A = hessian[free, free], passed[:, free]
         n = H.shape[0]
-        # the scale keeps the two kinds of rows comparable for the pivots
+        # the scale keeps the two kinds of rows comparable in size for pivoting
         scale = float(np.median(H.diagonal()))
         system = sparse.bmat([[H / scale, A.T], [A, None]], format="csc")
         right = np.vstack(
@@ -128,7 +129,7 @@ class MinimumSnap:
         self.coefficients = fixed.copy()
         factor = splu(system)
         solved = factor.solve(right)
-        # once more with what the digits left over: the least integral is small against its terms
+        # one step of refinement with the residual: the least integral is small compared with its terms
         solved += factor.solve(right - system @ solved)
         self.coefficients[free] = solved[:n]
         snap, turn = four @ self.coefficients, six @ self.coefficients
@@ -154,13 +155,13 @@ class MinimumSnap:
         return times, band_jets(values, first, self.coefficients)
 
     def table(self) -> PieceTable:
-        """The path as it is flown."""
+        """The path as a table, as it is flown."""
         return self.basis.pieces(self.coefficients, self.origin)
 
 
 def rule_of_thumb(points: Array) -> Array:
-    """Shares of the whole time for each segment: the time between points as transfers at speed and
-    acceleration 1 would take it, without the stops in between."""
+    """Share of the total time for each segment, about as transfers at speed 1 and acceleration 1 would take
+    them without the stops in between."""
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     times = np.sqrt(lengths) if len(lengths) == 1 else lengths.copy()
     if len(lengths) > 1:
@@ -171,7 +172,7 @@ def rule_of_thumb(points: Array) -> Array:
 
 
 def share_times(points: Array, whole: float) -> Array:
-    """Shares of `whole` seconds for each segment that make the integral least."""
+    """The share of `whole` seconds for each segment that minimises the integral."""
     begin = np.log(rule_of_thumb(points))
     if not 1 < len(begin) <= _MOST_SPLIT:
         return np.exp(begin)
@@ -191,7 +192,7 @@ def share_times(points: Array, whole: float) -> Array:
 
 
 def _clock(shares: Array, whole: float) -> Array:
-    """Times at the points: whole microseconds, so that stretches join exactly on the vehicle's clock."""
+    """Times at the points, in whole microseconds, so that stretches join exactly on the vehicle's clock."""
     times = np.concatenate([[0.0], np.cumsum(shares)]) * whole
     return np.asarray(np.round(times * 1e6) * 1e-6)
 
@@ -206,7 +207,7 @@ def passage(
 ) -> tuple[MinimumSnap, Array]:
     """The path through the points and the times at them.
 
-    `speed` (m/s) and `accel` (m/s^2) are peaks; where it is `time_optimal` only the bounds count.
+    `speed` (m/s) and `accel` (m/s^2) are peaks; if `time_optimal`, only the bounds apply.
     """
     at = np.array(points)
     length = float(sum(dist(a, b) for a, b in pairwise(points)))
@@ -214,7 +215,7 @@ def passage(
     shares = share_times(at, whole)
 
     def tried(seconds: float) -> tuple[MinimumSnap, Array, float]:
-        """... and how many times as long it should take; up to 1 it need not."""
+        """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""
         times = _clock(shares, seconds)
         path = MinimumSnap(at, times)
         fine, jets = path.jets()
@@ -226,7 +227,7 @@ def passage(
 
     path, times, factor = tried(whole)
     if not time_optimal:
-        # peaks scale with time, all but exactly: twice is to a part in a thousand
+        # peaks scale with time almost exactly: two rounds are accurate to one part in a thousand
         for _ in range(2):
             whole *= min(factor, 2.0)
             path, times, factor = tried(whole)

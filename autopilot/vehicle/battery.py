@@ -1,8 +1,8 @@
-"""The battery: voltage by charge and current, and what the rotors draw. One model for truth and belief.
+"""The battery: its voltage by charge and current, and what the rotors draw. One model for truth and belief.
 
-A rotor of force F draws power as momentum theory has it, P ~ F^(3/2), scaled so that rotors that carry the
-bare vehicle draw what it needs in hover. The voltage is that of lithium cells by their charge, less R I; with
-P = (U - R I) I the current follows. What the power exceeds that the battery can give, it does not give.
+A rotor of force F draws power according to momentum theory, P ~ F^(3/2), scaled so that the rotors draw the
+given hover power when they carry the vehicle without its load. The voltage is that of lithium cells at their
+charge, minus R I; P = (U - R I) I gives the current. The battery gives no power beyond its maximum.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CELL = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4
 
 
 class Battery(NamedTuple):
-    """A battery by its numbers."""
+    """Properties of a battery."""
 
     capacity_as: float  # A s
     cells: float
@@ -30,14 +30,14 @@ class Battery(NamedTuple):
 
 @kernel
 def watts_per(hover_w: float, weight: float, rotors: int) -> float:
-    """W / N^(3/2) of one of so many rotors that draw `hover_w` (W) in all while they carry `weight` (N)."""
+    """W / N^(3/2) of each of `rotors` rotors that together draw `hover_w` (W) and carry `weight` (N)."""
     each = weight / rotors
     return hover_w / (rotors * (each * sqrt(each)))
 
 
 @kernel
 def open_voltage(charge: float) -> float:
-    """Open-circuit voltage of a cell with this share of its charge, which counts as 0 ... 1."""
+    """Open-circuit voltage of a cell with this share of its charge, limited to 0 ... 1."""
     found = CELL[0][1]
     for i in range(len(CELL) - 1):
         low, v_low = CELL[i]
@@ -49,21 +49,21 @@ def open_voltage(charge: float) -> float:
 
 @kernel
 def charge_left(used_as: float, battery: Battery) -> float:
-    """Share of the charge that is left when so much (A s) was used."""
+    """Share of the charge that is left after `used_as` (A s) were used."""
     left = 1.0 - used_as / battery.capacity_as
     return if_above(left, 0.0, left, 0.0)
 
 
 @kernel
 def terminal_voltage(used_as: float, current: float, battery: Battery) -> float:
-    """V at the terminals."""
+    """Voltage at the terminals in V."""
     found = battery.cells * open_voltage(charge_left(used_as, battery)) - battery.resistance * current
     return if_above(found, 0.0, found, 0.0)
 
 
 @kernel
 def work_of(forces: Row, rotors: int) -> float:
-    """The sum of F^(3/2) (N^(3/2)) over these rotors; one that pushes the other way does none."""
+    """The sum of F^(3/2) (N^(3/2)) over these rotors; one with a negative force adds nothing."""
     work = 0.0
     for i in range(rotors):
         lifting = if_above(forces[i], 0.0, forces[i], 0.0)
@@ -73,7 +73,7 @@ def work_of(forces: Row, rotors: int) -> float:
 
 @kernel
 def drawn_current(work: float, used_as: float, battery: Battery) -> float:
-    """A, by what `work_of` says and what was used before (A s)."""
+    """Current in A, for the result of `work_of` and the charge used before (A s)."""
     power = ELECTRONICS_W + battery.watts_per * work
     open_v = battery.cells * open_voltage(charge_left(used_as, battery))
     if battery.resistance == 0.0:

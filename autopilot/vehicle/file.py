@@ -1,7 +1,7 @@
 """Vehicle files: TOML in, `Vehicle` out.
 
-A file whose `believed` names another vehicle is the truth beside a belief: what it leaves out is as there,
-the simulator flies it, and the autopilot, and whoever checks missions, goes by the other.
+A file whose `believed` names another vehicle is the true vehicle: the simulator flies it, and keys that it
+leaves out have the other vehicle's values. The autopilot and the checks of missions assume the other vehicle.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from missions.toml_files import shown
 
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
-    """What flies: the vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is
-    wrong."""
+    """The true vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
     keys, where = vehicle_keys(name_or_path)
     found = VEHICLES.record(Vehicle, keys, where)
     wrong = [f"{where}: parameters.{line}" for line in _wrong_parameters(found)]
@@ -31,8 +30,8 @@ def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
 
 
 def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
-    """What the autopilot takes it for, with the parameters of either; a VehicleFileError says what is wrong
-    with one of them."""
+    """The vehicle that the autopilot assumes, with the parameters of both vehicles (those of the true one
+    take precedence); a VehicleFileError says what is wrong with one of them."""
     table, where = _table(name_or_path)
     believed = _believed(table, name_or_path)
     if not believed:
@@ -46,13 +45,13 @@ def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
 
 
 def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
-    """Name or path of the vehicle that is believed: that which is named, or its own."""
+    """Name or path of the assumed vehicle: the one that `believed` names, or the given one."""
     table, _ = _table(name_or_path)
     return _believed(table, name_or_path) or name_or_path
 
 
 def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
-    """What cannot be of the parameters with which a vehicle is delivered."""
+    """What is wrong with the parameters with which a vehicle is delivered."""
     if not vehicle.parameters:
         return
     from autopilot.vehicle.parameters import definitions, vehicle_values
@@ -73,8 +72,8 @@ def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
 
 
 def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
-    """The keys of a file, with those that it leaves out of the vehicle that is believed, if there is one; and
-    where messages about it begin."""
+    """The keys of a file, completed by those of the assumed vehicle if it names one; and the place with which
+    messages about it begin."""
     table, where = _table(name_or_path)
     believed = _believed(table, name_or_path)
     if not believed:
@@ -93,7 +92,7 @@ def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
 
 @contextmanager
 def _told_of(where: str, table: dict[str, Any]) -> Iterator[None]:
-    """A VehicleFileError of the vehicle that is believed names the file and the key that name it."""
+    """Make a VehicleFileError of the assumed vehicle name the file and the key that refer to it."""
     try:
         yield
     except VehicleFileError as error:
@@ -102,7 +101,7 @@ def _told_of(where: str, table: dict[str, Any]) -> Iterator[None]:
 
 
 def _believed(table: dict[str, Any], name_or_path: str | PathLike[str]) -> str:
-    """Name or path of what is believed beside this table; empty: itself."""
+    """Name or path of the vehicle assumed for this table; empty: itself."""
     named = table.get("believed")
     if not isinstance(named, str) or not named or named in VEHICLES.names():
         return named if isinstance(named, str) else ""

@@ -1,7 +1,7 @@
 """Names, numbers and own parameters of the control laws, read from their files without loading them.
 
-A law is one file of `autopilot/control/laws`. It says `LAW = Law(name="...", number=..., ...)`, and, if it
-has parameters of its own, `PARAMETERS` as text in the format of `parameters.toml`. Who only needs names
+A law is one file of `autopilot/control/laws`. It contains `LAW = Law(name="...", number=..., ...)` and, if it
+has its own parameters, `PARAMETERS` as text in the format of `parameters.toml`. Code that only needs names
 (help texts, the range of CTL_LAW, the documentation) reads these lines, and neither imports nor compiles a
 law.
 """
@@ -19,16 +19,16 @@ _PARAMETERS = re.compile(r'^PARAMETERS = """\\?\n(.*?)^"""', re.MULTILINE | re.D
 
 
 class LawFile(NamedTuple):
-    """What a law's file says of itself."""
+    """What a law's file states about the law."""
 
     name: str
     number: int  # of CTL_LAW
-    parameters: dict[str, Any]  # as a document of `parameters.toml`
+    parameters: dict[str, Any]  # as parsed from the format of `parameters.toml`
 
 
 @cache
 def law_files() -> tuple[LawFile, ...]:
-    """All laws, by their numbers. Raises ValueError if these do not count from 0."""
+    """All laws in the order of their numbers. Raises ValueError if these do not count from 0 without gaps."""
     found = []
     for entry in (files("autopilot") / "control" / "laws").iterdir():
         if not entry.name.endswith(".py"):

@@ -1,7 +1,7 @@
 """Where the rotors are and how they differ: the shape of a vehicle, for truth and belief, without its size.
 
-Size and strength are numbers of the vehicle beside it (`arm_m`, `rotor_max_n`, ...), which parameters may
-change: a rotor is told in units of these. `PLUS` is the quadrotor of (2-13). Importing this is cheap.
+Size and strength are separate numbers of the vehicle (`arm_m`, `rotor_max_n`, ...), which parameters may
+change: a rotor is described in units of these. `PLUS` is the quadrotor of (2-13). Importing this is cheap.
 """
 
 from __future__ import annotations
@@ -14,16 +14,14 @@ FEWEST, MOST = 4, 14  # HIL_ACTUATOR_CONTROLS has sixteen controls, of which gri
 
 
 class Rotor(NamedTuple):
-    """One rotor. Its axis stands along the thrust axis; turning counterclockwise, seen from above, it turns
-    the vehicle clockwise."""
+    """One rotor. Its axis is parallel to the thrust axis; if it turns counterclockwise, seen from above, it
+    turns the vehicle clockwise."""
 
-    x: float  # forward of the centre of mass, of `arm_m`
-    y: float  # to its left
-    yaw: (
-        float  # moment about the upward axis, of `torque_ratio_m` times its force; negative: counterclockwise
-    )
-    strength: float = 1.0  # its limits, of `rotor_min_n` and `rotor_max_n`
-    lag: float = 1.0  # of `rotor_tau_s`
+    x: float  # place forward of the centre of mass, in units of `arm_m`
+    y: float  # place to its left
+    yaw: float  # moment about the upward axis / (`torque_ratio_m` * force); negative: turns counterclockwise
+    strength: float = 1.0  # its limits, in units of `rotor_min_n` and `rotor_max_n`
+    lag: float = 1.0  # in units of `rotor_tau_s`
 
 
 Layout = tuple[Rotor, ...]
@@ -37,9 +35,8 @@ PLUS: Layout = (
 
 
 def regular(count: int, ahead: bool, spins: tuple[float, ...]) -> Layout:
-    """Rotors at equal angles on a circle, counterclockwise from the one at the rear; `ahead`: an arm points
-    forward, else the gap between two does. Each of `spins` is the sign of a rotor's moment about the upward
-    axis."""
+    """Rotors at equal angles on a circle, counterclockwise from the rear; `ahead`: an arm points backward,
+    otherwise the gap between two. Each of `spins` is the sign of a rotor's moment about the upward axis."""
     first = pi if ahead else pi - pi / count
     places = [first + 2.0 * pi * i / count for i in range(count)]
     return tuple(
@@ -48,5 +45,5 @@ def regular(count: int, ahead: bool, spins: tuple[float, ...]) -> Layout:
 
 
 def _tidy(value: float) -> float:
-    """Without the rounding of angles, so that what lies on an axis lies there exactly."""
+    """The value without the rounding error of angles, so that a rotor on an axis lies exactly on it."""
     return round(value, 12) + 0.0

@@ -1,7 +1,7 @@
-"""What a vehicle with cable and load is: the record of both truth and belief, and the keys of a vehicle file.
+"""A vehicle with cable and load: the record of both the true and the assumed vehicle, and the keys of a file.
 
-Truth is the value that the simulator loads, belief the one that the autopilot loads. `gcs check` judges
-missions by it. Body frame FLU, SI; a name ends in its unit. `docs/vehicles.md` is made from this class.
+The simulator loads the true vehicle, the autopilot the assumed one, by which `gcs check` judges missions too.
+Body frame FLU, SI; a name ends in its unit. `docs/vehicles.md` is made from this class.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from autopilot.vehicle.rotors import allocate, flies, sizes
 
 LEAST_ROTOR_MAX_N = 0.01
 
-# sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are near
+# sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are similar
 SHARE_OF_ARM = {
     "gear_height_m": 0.5,
     "gear_spread_m": 0.65,
@@ -28,7 +28,7 @@ SHARE_OF_ARM = {
 
 
 def _quantity(unit: str, low: float, high: float, text: str, default: Any = ...) -> Any:
-    """A number of `low` ... `high`, required unless there is a default."""
+    """A number in `low` ... `high`, required unless there is a default."""
     return Field(default, ge=low, le=high, description=text, json_schema_extra={"unit": unit})
 
 
@@ -50,7 +50,7 @@ RotorMax = Annotated[float, _force(inf, LEAST_ROTOR_MAX_N, GREATEST_FORCE_N)]
 
 
 class OneRotor(BaseModel):
-    """A rotor at a place of its own. Its axis stands upright."""
+    """A rotor at any place. Its axis is upright."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -65,7 +65,7 @@ class OneRotor(BaseModel):
 
 
 class Vehicle(BaseModel):
-    """A vehicle, its cable and its load, SI. A Vehicle is within its ranges and consistent, or there is none.
+    """A vehicle, its cable and its load, SI. Values out of range or inconsistent are refused when it is made.
 
     Assumptions: principal axes are the body axes; the cable is massless and inextensible; the rotors' axes
     are upright; drag is -(linear + quadratic |v|) v on the velocity v relative to the air.
@@ -103,7 +103,7 @@ class Vehicle(BaseModel):
         "with names and values; beside a belief they are the autopilot's too",
     )
 
-    # the gains that grow with the mass (QP_) end at 62 kg
+    # the range of the gains that grow with the mass (QP_) ends at 62 kg
     quad_mass_kg: float = _quantity("kg", 0.01, 60.0, "mass of the vehicle without its load")
     load_mass_kg: float = _quantity("kg", 0.001, 100.0, "mass of the load")
     cable_length_m: float = _quantity("m", 0.05, 100.0, "length of the cable")
@@ -150,7 +150,7 @@ class Vehicle(BaseModel):
         "m", 1e-3, 10.0, "height of the load's centre as it rests on the ground", 0.02
     )
 
-    # a cable of links and a load that turns, of the simulated world alone: docs/realism-cable.md
+    # a cable of links and a load that rotates, only in the simulated world: docs/realism-cable.md
     cable_links: int = Field(
         0,
         ge=0,
@@ -193,7 +193,7 @@ class Vehicle(BaseModel):
         "1/s", 1e-3, 600.0, "rate at which friction below the Coulomb limit brakes a slide", 500.0
     )
 
-    # docs/realism-plant.md: what each stands for, and whose numbers they are
+    # docs/realism-plant.md explains each of these and gives the sources of the numbers
     rotor_radius_m: float = _quantity("m", 1e-3, 5.0, "radius of a rotor")
     air_density_kg_m3: float = _quantity("kg/m^3", 0.01, 10.0, "density of the air", 1.225)
     rotor_drag_1_s: float = _quantity(
@@ -234,7 +234,7 @@ class Vehicle(BaseModel):
 
     @property
     def layout(self) -> Layout:
-        """Where its rotors are and how they differ."""
+        """The positions of its rotors and how they differ."""
         if not self.rotor:
             signs = self.spin or ("-+" * MOST)[: self.rotors]
             spins = tuple(1.0 if sign == "+" else -1.0 for sign in signs)
@@ -252,12 +252,12 @@ class Vehicle(BaseModel):
 
     @property
     def greatest_thrust_n(self) -> float:
-        """Thrust at which the first rotor is at its limit."""
+        """Thrust (N) at which the first rotor reaches its limit."""
         return sizes(allocate(self.layout))[0] * self.rotor_max_n
 
     @property
     def limited(self) -> bool:
-        """Whether the force of a rotor has a greatest value."""
+        """Whether the force of a rotor has an upper limit."""
         return self.rotor_max_n < inf
 
     @model_validator(mode="before")
@@ -266,7 +266,7 @@ class Vehicle(BaseModel):
         if not isinstance(table, dict):
             return table
         arm = table.get("arm_m")
-        # an arm that is missing or wrong is told of once, and not for each size that follows it
+        # a missing or wrong arm is reported once, and not for each size derived from it
         length = arm if isinstance(arm, int | float) and 0.01 <= arm <= 5.0 else 1.0
         sizes = {key: share * length for key, share in SHARE_OF_ARM.items()}
         return {**sizes, **table}

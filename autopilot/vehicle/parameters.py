@@ -1,7 +1,7 @@
-"""The autopilot's parameters: what it believes of its vehicle, and how it is tuned.
+"""The autopilot's parameters: what it assumes about its vehicle, and how it is tuned.
 
 `parameters.toml` defines them; here they are given the values of a vehicle. Importing this module is cheap:
-what the definitions are checked with is imported when a table is made.
+the code that checks the definitions is imported when a table is made.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FILE = "parameters.toml"
 
 
 def _document() -> dict[str, Any]:
-    """The file, with the names of the laws and the parameters that they bring along."""
+    """The parsed file, with the names of the laws and the laws' own parameters."""
     document = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
     document["CTL_LAW"]["values"] = {str(law.number): law.name for law in law_files()}
     for law in law_files():
@@ -37,11 +37,11 @@ def _document() -> dict[str, Any]:
 
 _DOCUMENT = _document()
 LAWS = tuple(law.name for law in law_files())  # CTL_LAW is an index into this
-OWN_LAW = len(LAWS)  # CTL_LAW of a law that somebody has brought
+OWN_LAW = len(LAWS)  # CTL_LAW of a custom law
 DEFAULT_LAW = LAWS[_DOCUMENT["CTL_LAW"]["default"]]
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 
-# what a builder measures on the bench: the autopilot is told of it where the world is
+# what a builder measures on the bench: a setting of the simulator's value also sets the autopilot's
 MEASURED = {
     "SIM_ACT_DELAY_MS": "VEH_ACT_DELAY",
     "SIM_ROTOR_TAU_MS": "VEH_ROTOR_TAU",
@@ -50,10 +50,10 @@ MEASURED = {
 
 
 def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]]) -> None:
-    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator.
+    """Set the autopilot's parameters; SIM_ parameters that it does not know belong to the simulator.
 
-    Delay and lag of the rotors and latency of the sensors that are given to the simulator are believed as
-    well, as far as a belief may go, unless the belief is given, too: then the two differ, which is the
+    Delay and lag of the rotors and latency of the sensors that are set for the simulator also set the assumed
+    values, within their range, unless the assumed value is set too: then the two differ, which is the
     experiment.
     """
     given = list(settings)
@@ -68,14 +68,14 @@ def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]])
 
 @cache
 def definitions() -> ParameterFile:
-    """What `parameters.toml` says."""
+    """The definitions in `parameters.toml`."""
     from autopilot.wire.parameter_file import parameter_file
 
     return parameter_file(_DOCUMENT, FILE)
 
 
 class AutopilotParameters(ParameterTable):
-    """The autopilot's table, and what of the believed vehicle no parameter says: where its rotors are."""
+    """The autopilot's table, and the layout of the assumed vehicle's rotors, which no parameter contains."""
 
     def __init__(self, definitions: Iterable[Parameter], layout: Layout = PLUS) -> None:
         super().__init__(definitions)
@@ -87,8 +87,8 @@ def autopilot_parameters(
 ) -> AutopilotParameters:
     """The table, with the vehicle's numbers and the parameters it is delivered with taken from `belief`.
 
-    `law`: the name of a law that somebody has brought, to which CTL_LAW is set. What somebody has brought has
-    `brought` these parameters along; ParameterError if one of them is there already.
+    `law`: the name of a custom law, to which CTL_LAW is set. `brought` are the parameters of custom classes;
+    ParameterError if one of them already exists.
     """
     delivered = belief.parameters
     found = [
@@ -101,7 +101,7 @@ def autopilot_parameters(
 
 
 def _with_law(parameter: Parameter, law: str) -> Parameter:
-    """CTL_LAW, which can be one more, and is."""
+    """CTL_LAW with one more value, that of the custom law, which is its default."""
     number = float(OWN_LAW)
     text = f"{parameter.text}, {OWN_LAW} {law}"
     return replace(parameter, default=number, high=number, text=text)
@@ -111,7 +111,7 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
     """The numbers of the vehicle by the names that `from_vehicle` and `proportional_to` use."""
     from autopilot.wire.convert.simulator import ROTOR_FMAX
 
-    # where there is no limit the parameters keep the forces of Table 4-1 and the mixer ignores them
+    # without limits the parameters keep the forces of Table 4-1, and the mixer ignores them
     rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
     attached_x, attached_y, attached_z = belief.attachment_m

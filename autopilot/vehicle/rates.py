@@ -1,4 +1,4 @@
-"""One clock for everything: the sensors' ticks, and jobs that run on every n-th of them."""
+"""One clock for everything: the sensors' ticks, and jobs that run on every n-th tick."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from autopilot.wire.parameter_table import ParameterTable
 
 
 class RateError(ValueError):
-    """A rate that the tick rate is no multiple of."""
+    """A rate that does not divide the tick rate."""
 
 
 def divider(tick_hz: float, job_hz: float, job: str, least_hz: float = 1.0) -> int:
-    """On every how many-th tick a job runs.
+    """The number n such that a job runs on every n-th tick.
 
-    RateError if that is no whole number: it names both rates, and those from `least_hz` on that there can be.
+    RateError if n is no whole number: it names both rates, and the possible whole rates from `least_hz` on.
     """
     ratio = tick_hz / job_hz
     n = round(ratio)
@@ -27,6 +27,6 @@ def divider(tick_hz: float, job_hz: float, job: str, least_hz: float = 1.0) -> i
 
 
 def control_divider(tick_hz: float, table: ParameterTable) -> int:
-    """On every how many-th tick the control law runs, as CTL_RATE_HZ says; RateError as above."""
+    """The number n such that the control law runs on every n-th tick, by CTL_RATE_HZ; RateError as above."""
     name = "CTL_RATE_HZ"
     return divider(tick_hz, table[name], name, table.describe(name).low)

@@ -1,4 +1,4 @@
-"""What rotors at any places can do together: the columns of a mixer, and which moments they can give."""
+"""What rotors at any places can do together: the columns of a mixer, and the moments that they can give."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 from autopilot.vehicle.layout import Layout
 
-# columns of a mixer's table, one row a rotor: what each does by (2-13), and the columns of the inverse;
-# its last row: what the columns for thrust, roll and pitch do to yaw
+# columns of a mixer's table, one row per rotor: the effect of each rotor by (2-13), and the columns of the
+# inverse; the last row: the effect of the columns for thrust, roll and pitch on yaw
 STRENGTH, ROLL, PITCH, YAW, LIFT_BY, ROLL_BY, PITCH_BY, YAW_BY = range(8)
-ROTOR_MARGIN = 0.15  # of a rotor's range, that paths leave to control: MIS_ROTOR_MARG as delivered
-_LEAST = 1e-9  # a number of the table below this is rounding
-_SHARES = tuple(0.1 * i for i in range(1, 10))  # of the greatest thrust, that are tried
-_LEAST_SHARE = 1e-3  # of a rotor's force: less authority is none
+ROTOR_MARGIN = 0.15  # share of a rotor's range that paths leave to control: default of MIS_ROTOR_MARG
+_LEAST = 1e-9  # a number of the table below this is a rounding error
+_SHARES = tuple(0.1 * i for i in range(1, 10))  # shares of the greatest thrust that are tried
+_LEAST_SHARE = 1e-3  # of a rotor's force: less authority counts as none
 
 
 def allocate(layout: Layout, lost: int = 0) -> NDArray[np.float64]:
-    """The table (n + 1, 8) of a mixer for these rotors without those whose bits are set in `lost`."""
+    """The table (n + 1, 8) of a mixer for these rotors, without the rotors whose bits are set in `lost`."""
     n = len(layout)
     use = np.array([rotor.strength * (0.0 if lost >> i & 1 else 1.0) for i, rotor in enumerate(layout)])
     yaw = use * np.array([rotor.yaw for rotor in layout])
     rows = use * np.array([[1.0] * n, [rotor.y for rotor in layout], [-rotor.x for rotor in layout]])
-    # of efforts u: rotors of different strength are used alike
+    # the inverse gives efforts, so that rotors of different strength are used equally
     columns = rows.T @ np.linalg.pinv(rows @ rows.T, rcond=_LEAST)
     turns = yaw @ columns
     unseen = yaw - turns @ rows
@@ -38,14 +38,14 @@ def allocate(layout: Layout, lost: int = 0) -> NDArray[np.float64]:
     if reach > _LEAST:
         table[:n, YAW_BY] = unseen / reach
     table[n, LIFT_BY : PITCH_BY + 1] = turns
-    # without the rounding of the inverse, so that a row of zeros is one
+    # remove rounding errors of the inverse, so that a row of zeros is exactly zero
     table[np.abs(table) < _LEAST] = 0.0
     return table
 
 
 def columns(layout: Layout) -> tuple[tuple[float, float, float, float], ...]:
-    """By how much each rotor's effort grows with thrust, with roll and pitch moment by `arm_m`, and with yaw
-    moment by `torque_ratio_m`: the least-squares inverse of (2-13)."""
+    """How much each rotor's effort grows with thrust, with roll and pitch moment divided by `arm_m`, and with
+    yaw moment divided by `torque_ratio_m`: the least-squares inverse of (2-13)."""
     table = allocate(layout)
     each, turns = table[:-1], table[-1]
     whole = each[:, LIFT_BY:] - np.outer(each[:, YAW_BY], np.append(turns[LIFT_BY:YAW_BY], 0.0))
@@ -53,21 +53,21 @@ def columns(layout: Layout) -> tuple[tuple[float, float, float, float], ...]:
 
 
 def sizes(table: NDArray[np.float64]) -> tuple[float, float]:
-    """Thrust, and moment about a level axis by `arm_m`, at which the first rotor of a mixer's table reaches
-    an effort, of that effort."""
+    """Thrust, and moment about a level axis divided by `arm_m`, at which the first rotor of a mixer's table
+    reaches a given effort, both as multiples of that effort."""
     return float(1.0 / table[:-1, LIFT_BY].max()), float(1.0 / np.abs(table[:-1, [ROLL_BY, PITCH_BY]]).max())
 
 
 @lru_cache(maxsize=256)
 def authority(layout: Layout, lost: int, thrust: float, low: float, high: float, yaw: bool) -> float:
     """The greatest moment that the rotors without those in `lost` can give in every direction while they give
-    `thrust` (N), each an effort of `low` ... `high` (N): in N, level moments by `arm_m`, yaw moment
-    by `torque_ratio_m`; without `yaw` about level axes only, whatever comes of yaw. Negative: they cannot
-    give this thrust without a moment.
+    `thrust` (N), each with an effort of `low` ... `high` (N). The result is in N: level moments are divided
+    by `arm_m`, the yaw moment by `torque_ratio_m`. Without `yaw` only level axes count, with any yaw moment.
+    Negative: they cannot give this thrust without a moment.
 
-    What all efforts reach together is a zonotope; the thrust without a moment lies so far inside of it as the
-    nearest of its facets says, each of which is spanned by two or three rotors (Du, Quan and others: the
-    degree of controllability of multirotors).
+    The thrusts and moments of all possible efforts form a zonotope; the result is the distance of the thrust
+    without a moment from its nearest facet. Each facet is spanned by two or three rotors (Du, Quan and
+    others: the degree of controllability of multirotors).
     """
     use = [rotor for i, rotor in enumerate(layout) if not lost >> i & 1]
     axes = 4 if yaw else 3
@@ -91,7 +91,7 @@ def authority(layout: Layout, lost: int, thrust: float, low: float, high: float,
 
 
 def flies(layout: Layout) -> bool:
-    """Whether the rotors, each of 0 ... 1 times its strength, can give some thrust with moments in every
-    direction beside it."""
+    """Whether the rotors, each with 0 ... 1 times its strength, can give some thrust together with moments in
+    every direction."""
     most = sum(rotor.strength for rotor in layout)
     return any(authority(layout, 0, share * most, 0.0, 1.0, True) > _LEAST_SHARE for share in _SHARES)

@@ -1,9 +1,9 @@
 """MAVLink frames from messages and back: bytes in, bytes out, no state but a sequence counter.
 
 Layouts (struct format, field order, CRC_EXTRA) are read from pymavlink's own generated classes, so the frames
-are byte for byte those of pymavlink. What is sent often is given as `Fields`, the values of a message in the
-order of the wire, and becomes a frame without ever being an object; what is received becomes one when it is
-asked for. Every datagram is parsed afresh: no rubbish can reach over its end and swallow what comes next.
+are byte for byte those of pymavlink. Messages that are sent often are given as `Fields`, the values of a
+message in the order of the wire, and become a frame without an object in between; a received message becomes
+an object when it is first read. Every datagram is parsed separately, so noise in one cannot swallow the next.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FLOAT32_MAX = 3.4028234663852886e38
 
 
 class Layout:
-    """How one message class lies in a payload, and in a frame."""
+    """The layout of one message class in a payload, and in a frame."""
 
     __slots__ = (
         "attributes",
@@ -65,15 +65,15 @@ class Layout:
         self.id_low = message_type.id & 0xFFFF
         self.id_high = message_type.id >> 16
         payload: str = message_type.unpacker.format
-        # from behind the magic byte to CRC_EXTRA: all that the checksum is taken of
+        # from behind the magic byte to CRC_EXTRA: all bytes that the checksum covers
         self.pack: Callable[..., bytes] = struct.Struct(f"<BBBBBBHB{payload[1:]}B").pack
         self.unpack_from: Callable[[bytes, int], tuple[Any, ...]] = message_type.unpacker.unpack_from
         self.size: int = message_type.unpacker.size
         self.single = len(fields) == 1
 
-        # pymavlink keeps what was given for a char array beside the str that it shows
+        # pymavlink keeps the given bytes of a char array beside the str that it shows
         self.attributes = attrgetter(*(f"_{name}_raw" if name in text else name for name in fields))
-        # arrays of numbers, the last first, so that spreading one does not move the others
+        # arrays of numbers, the last first, so that spreading one does not move those still to be spread
         self.spread = tuple(
             (place, length)
             for place, (name, length) in reversed(list(enumerate(zip(fields, lengths, strict=True))))
@@ -83,7 +83,7 @@ class Layout:
         self.has_text = bool(text)
         orders: list[int] = message_type.orders
         self.reorder = itemgetter(*orders) if orders != sorted(orders) else None
-        # (first value, count or 0) of each field, in the order of the constructor, where there are arrays
+        # (first value, count or 0) of each field, in the order of the constructor, if there are arrays
         self.places: tuple[tuple[int, int], ...] = ()
         if self.spread:
             first = 0
@@ -106,7 +106,7 @@ class Layout:
         return tuple(values)
 
     def number(self, name: str) -> tuple[int, struct.Struct]:
-        """Where in the payload a field that is one number begins, and how it is read."""
+        """The offset in the payload of a field that is a single number, and the struct that reads it."""
         kinds = re.findall(r"\d*[a-zA-Z]", self.type.unpacker.format)
         place = self.type.ordered_fieldnames.index(name)
         return struct.calcsize("<" + "".join(kinds[:place])), struct.Struct("<" + kinds[place])
@@ -143,7 +143,7 @@ def _within_float32(value: Any) -> Any:
 
 
 class FrameWriter:
-    """Makes the MAVLink 2 frames of one component on one link; owns their sequence counter."""
+    """Writes the MAVLink 2 frames of one component on one link, with its sequence counter."""
 
     def __init__(self, system: int, component: int) -> None:
         self.system = system
@@ -170,7 +170,7 @@ class FrameWriter:
         )
         try:
             body = layout.pack(*head, *values, extra)
-        except OverflowError:  # a float that no float32 holds
+        except OverflowError:  # a float beyond float32
             body = layout.pack(*head, *map(_within_float32, values), extra)
         if not body[-2]:
             kept = body[_HEADER_V2 - 1 : -1].rstrip(b"\0") or b"\0"
@@ -181,7 +181,7 @@ class FrameWriter:
 
 
 def announced_length(data: bytes, start: int) -> int:
-    """How long the frame at `start` says it is; 0 if none begins there or the data ends too soon."""
+    """Length of the frame at `start` by its header; 0 if none begins there or the data ends too soon."""
     if start + 2 >= len(data) or data[start] not in MAGICS:
         return 0
     if data[start] == _MAGIC_V1:
@@ -190,7 +190,7 @@ def announced_length(data: bytes, start: int) -> int:
 
 
 def split(frames: bytes) -> list[bytes]:
-    """The frames that stand one behind the other, as we have written them."""
+    """The single frames of bytes in which our own frames follow one another."""
     found, start = [], 0
     while start < len(frames):
         end = start + announced_length(frames, start)
@@ -200,7 +200,7 @@ def split(frames: bytes) -> list[bytes]:
 
 
 def whole_frames(stream: bytes) -> int:
-    """How much of a byte stream can be decoded; what is behind may be the begin of a frame."""
+    """How many bytes of a stream can be decoded; the bytes behind them may be the beginning of a frame."""
     start = 0
     while start < len(stream):
         if stream[start] not in MAGICS:
@@ -214,7 +214,7 @@ def whole_frames(stream: bytes) -> int:
 
 
 class Received:
-    """One message with its origin; `frame` is the whole frame as it arrived, its checksum found right."""
+    """One message with its origin; `frame` is the whole frame as it arrived, with a correct checksum."""
 
     __slots__ = ("_message", "component", "frame", "id", "sequence", "system")
 
@@ -228,7 +228,7 @@ class Received:
 
     @property
     def message(self) -> Any:
-        """pymavlink's object of the message; made when it is first asked for."""
+        """pymavlink's object of the message, created when it is first read."""
         if self._message is None:
             self._message = self._decoded()
         return self._message
@@ -254,13 +254,13 @@ class Received:
 
 
 class Field:
-    """Reads one number of a message from its frame, without the rest."""
+    """Reads one number of a message from its frame without decoding the rest."""
 
     def __init__(self, message_type: Any, name: str) -> None:
         self._offset, self._number = _BY_TYPE[message_type].number(name)
 
     def of(self, frame: bytes) -> Any:
-        """The field of a whole frame; what was cut off the payload is zero."""
+        """The field of a whole frame; bytes that were cut off the payload are zero."""
         body = _HEADER_V2 if frame[0] == _MAGIC_V2 else _HEADER_V1
         begin = body + self._offset
         end = begin + self._number.size
@@ -272,8 +272,8 @@ class Field:
 def message_at(data: bytes, start: int) -> tuple[Received | None, int]:
     """The message whose frame begins at `start`, and where the frame ends.
 
-    None and 0 where no frame begins, or it is cut off, damaged or laid out in a way that is not known; None
-    and its end where it is whole, but of an unknown id, so that it cannot be checked.
+    None and 0 where no frame begins, or the frame is cut off, damaged or has an unknown flag; None and its
+    end where the frame is whole, but of an unknown id, so that it cannot be checked.
     """
     end = len(data)
     magic = data[start]
@@ -303,10 +303,10 @@ def message_at(data: bytes, start: int) -> tuple[Received | None, int]:
 def decode(datagram: bytes, patience: int | None = None) -> tuple[list[Received], int]:
     """The messages of a datagram in their order, and how many of its bytes were not part of one.
 
-    Whatever the bytes are, nothing is raised: behind a byte that begins no frame, or begins one with a wrong
-    checksum, the search goes on at the next byte, at so many bytes as `patience` says if it says anything: to
-    search costs time. A frame of an unknown id cannot be checked; it is stepped over whole where it ends with
-    the datagram or before what may be another frame.
+    Nothing is raised, whatever the bytes are: behind a byte that begins no frame, or a frame with a wrong
+    checksum, the search continues at the next byte. Because searching costs time, it ends when more than
+    `patience` bytes were not part of a message (None: no limit). A frame of an unknown id cannot be checked;
+    it is skipped as a whole if it ends with the datagram or before what may be another frame.
     """
     received: list[Received] = []
     end = len(datagram)

@@ -1,7 +1,7 @@
 """MAVLink 2 frames in machine code: what `codec` does for any message, for those of the simulator link.
 
-A message is given by a type that `wire_record` makes of pymavlink's own class: a NamedTuple of its fields in
-the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those of the generated class.
+A message is given by a type that `wire_record` makes from pymavlink's own class: a NamedTuple of its fields
+in the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those of the generated class.
 
     HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
 
@@ -9,8 +9,8 @@ the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those of t
     if holds(HIL_SENSOR, datagram, start, payload):
         message = taken(HIL_SENSOR, payload)                            # message.time_usec, message.xacc, ...
 
-All of it works in Python as well, with the same bytes. Only plain frames are read here, those of MAVLink 2
-without a signature; whatever else a datagram may hold is left to `codec.decode`.
+All functions also work in Python, with the same bytes. Only plain frames are read here, those of MAVLink 2
+without a signature; anything else in a datagram is left to `codec.decode`.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _CRC_TABLE = _table()
 
 
 class _Layout(NamedTuple):
-    """How a message lies in a frame."""
+    """The layout of a message in a frame."""
 
     message_id: int
     crc_extra: int
@@ -70,7 +70,7 @@ class _Layout(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Who sends a frame: its sequence number, system and component."""
+    """The origin of a frame: its sequence number, and the system and component that send it."""
 
     sequence: int
     system: int
@@ -83,8 +83,8 @@ _LAYOUTS: dict[Any, _Layout] = {}
 def wire_record(message_type: Any, module: str) -> Any:
     """The record type of one of pymavlink's classes; a text in it is a tuple of the numbers of its bytes.
 
-    It must be kept in this module under the name of the message, where numba finds it when it loads machine
-    code.
+    It must be a variable of the module `module` with the name of the message, where numba finds it when it
+    loads machine code.
     """
     kinds = dict(zip(message_type.fieldnames, message_type.fieldtypes, strict=True))
     fields, at = [], 0
@@ -98,7 +98,7 @@ def wire_record(message_type: Any, module: str) -> Any:
 
 
 def _places(layout: _Layout) -> tuple[tuple[int, str], ...]:
-    """Of each number: its first byte, and NumPy's type."""
+    """The first byte and NumPy's type of each number."""
     sizes = {number: np.dtype(number).itemsize for _, _, number in layout.fields}
     return tuple(
         (at + i * sizes[number], number) for at, count, number in layout.fields for i in range(max(count, 1))
@@ -106,11 +106,11 @@ def _places(layout: _Layout) -> tuple[tuple[int, str], ...]:
 
 
 def _numbers(layout: _Layout) -> tuple[str, list[str]]:
-    """Source of the views of `payload` that its numbers are seen through, and of each number."""
+    """Source code of the views of `payload` through which its numbers are accessed, and of each number."""
     views, found = set(), []
     for first, number in _places(layout):
         size = np.dtype(number).itemsize
-        if first % size:  # an extension: they are not laid out by size
+        if first % size:  # an extension field: these are not ordered by size
             found.append(f"payload[{first} : {first + size}].view(np.{number})[0]")
         else:
             views.add(number)
@@ -136,7 +136,7 @@ def _python_putter(record: Any) -> Any:
 
 @cache
 def _kernel_putter(record: Any) -> Any:
-    """The same for kernels: the stores at once, which compiles sooner."""
+    """The same for kernels: all stores together, which compiles faster."""
     layout = _LAYOUTS[record]
     size, message_id, crc_extra = layout.size, layout.message_id, layout.crc_extra
     put_fields = field_putter(_places(layout))
@@ -166,7 +166,7 @@ def _python_taker(record: Any) -> Any:
 
 @cache
 def _kernel_taker(record: Any) -> Any:
-    """The same for kernels: the loads at once."""
+    """The same for kernels: all loads together."""
     layout = _LAYOUTS[record]
     parts = []
     for _, count, number in layout.fields:
@@ -182,7 +182,7 @@ def _kernel_taker(record: Any) -> Any:
 
 @cache
 def _finder(record: Any) -> Any:
-    """find(kind, data, start, payload) for both."""
+    """find(kind, data, start, payload) for Python and for kernels."""
     layout = _LAYOUTS[record]
     known: dict[str, Any] = {"copied": _copied}
     exec(
@@ -195,7 +195,7 @@ def _finder(record: Any) -> Any:
 
 @kernel
 def _checksum(data: Any, first: int, end: int, crc_extra: int) -> int:
-    """CRC-16/MCRF4XX of some bytes and one more."""
+    """CRC-16/MCRF4XX of the bytes from `first` to before `end`, and of `crc_extra`."""
     crc = 0xFFFF
     for i in range(first, end):
         crc = (crc >> 8) ^ _CRC_TABLE[(crc ^ int(data[i])) & 0xFF]
@@ -207,7 +207,7 @@ def _checksum(data: Any, first: int, end: int, crc_extra: int) -> int:
 def _framed(
     payload: Bytes, size: int, message_id: int, crc_extra: int, buffer: Bytes, at: int, origin: Origin
 ) -> int:
-    """Write the frame of a payload of this size; where the next frame may begin."""
+    """Write the frame of a payload of this size; returns where the next frame may begin."""
     length = size
     while length > 1 and payload[length - 1] == 0:
         length -= 1
@@ -233,7 +233,7 @@ def _framed(
 
 @kernel
 def frame_end(data: Any, start: int) -> int:
-    """Where the plain frame ends that begins at `start` of a datagram; 0 if there is none that is whole."""
+    """Where the plain frame ends that begins at `start` of a datagram; 0 if there is no whole one."""
     if start + HEADER + 2 > len(data) or data[start] != _MAGIC or data[start + 2] != 0:
         return 0
     end = start + HEADER + data[start + 1] + 2
@@ -242,7 +242,7 @@ def frame_end(data: Any, start: int) -> int:
 
 @kernel
 def _copied(data: Any, start: int, message_id: int, size: int, crc_extra: int, payload: Bytes) -> bool:
-    """Copy the payload of the whole frame at `start`, if it is of this id and its checksum is right."""
+    """Copy the payload of the whole frame at `start` if its id is this one and its checksum is correct."""
     if data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16 != message_id:
         return False
     length = int(data[start + 1])
@@ -258,7 +258,8 @@ def _copied(data: Any, start: int, message_id: int, size: int, crc_extra: int, p
 
 
 def put_frame(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin) -> int:
-    """Write a frame at `at` of the buffer, trailing zeros of its payload cut; where the next one may begin.
+    """Write a frame at `at` of the buffer, trailing zeros of its payload cut; returns where the next one may
+    begin.
 
     `payload` is scratch. A float beyond float32 is sent as infinite; integers must be within their fields.
     """
@@ -268,13 +269,13 @@ def put_frame(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, or
 def holds(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
     """Whether the frame at `start`, which `frame_end` found whole, is an intact one of this message.
 
-    Then `payload` gets its payload, zeros behind it.
+    If so, its payload is written to `payload`, followed by zeros.
     """
     return bool(_finder(kind)(kind, data, start, payload))
 
 
 def taken(kind: Any, payload: Bytes) -> Any:
-    """The record of this type whose bytes `payload` begins with."""
+    """The record of this type that the bytes at the beginning of `payload` contain."""
     return _python_taker(kind)(kind, payload)
 
 

@@ -1,7 +1,7 @@
-"""The fence: where load and vehicle may be, and rally points: where a return may lead.
+"""The fence: where load and vehicle may be; and rally points: where a return may lead.
 
-As PX4 has it: inside at least one of the inclusion zones where there are any, outside all exclusion zones,
-within a distance and a height of home. Zones are level areas of any height, ENU from home.
+As in PX4: inside at least one of the inclusion zones if there are any, outside all exclusion zones, within a
+distance and a height of home. Zones are horizontal areas that apply at any height, ENU from home.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FRAMES = (
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """An area with straight sides; `inclusion`: stay in it, else out of it."""
+    """An area with straight sides; `inclusion`: stay inside it, otherwise outside it."""
 
     inclusion: bool
     corners: tuple[Spot, ...]
@@ -98,7 +98,7 @@ def _spot(seq: int, item: WireItem, home: Home) -> Spot:
 
 
 def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
-    """The fence that the items describe, or MissionItemError for the first that is no part of one."""
+    """The fence that the items describe, or MissionItemError for the first that cannot be part of one."""
     zones: list[Zone] = []
     corners: list[Spot] = []
     expected, kind = 0, 0

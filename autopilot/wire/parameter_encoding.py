@@ -24,9 +24,10 @@ def on_the_wire(value: float, whole: bool, bytewise: bool) -> tuple[float, int]:
 
 
 def from_the_wire(carried: float, kind: int) -> float:
-    """The value that a PARAM_VALUE or PARAM_SET of this MAV_PARAM_TYPE means.
+    """The value that a PARAM_VALUE or PARAM_SET of this MAV_PARAM_TYPE represents.
 
-    Of an INT32 the encoding shows: the bits of one below 1e9 are no whole number as a float, but for 0.
+    The encoding of an INT32 is recognised: the bits of one below 1e9, read as a float, are not a whole
+    number, except for 0.
     """
     if kind != mavlink.MAV_PARAM_TYPE_INT32 or carried.is_integer() or math.isinf(carried):
         return decimal_from_float32(carried)

@@ -1,7 +1,7 @@
 """Parameter definitions from TOML.
 
 The files: `autopilot/vehicle/parameters.toml`, whose head explains the keys, and `sitl/sim_parameters.toml`.
-A file of wrong keys or values raises ParameterError.
+A file with wrong keys or values raises ParameterError.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ParameterSpec(BaseModel):
 
     @property
     def vehicle_keys(self) -> frozenset[str]:
-        """Names of the vehicle values that the default is taken from."""
+        """Names of the vehicle values from which the default is computed."""
         taken = frozenset(self.proportional_to or ())
         return taken if self.from_vehicle is None else taken | {self.from_vehicle}
 
@@ -95,7 +95,7 @@ class ParameterFile:
     parameters: Mapping[str, ParameterSpec]
 
     def definitions(self, vehicle: Mapping[str, float]) -> list[Parameter]:
-        """All parameters, with the defaults that this vehicle gives; ParameterError if one does not fit."""
+        """All parameters, with their defaults for this vehicle; ParameterError if one does not fit."""
         for name, spec in self.parameters.items():
             for key in sorted(spec.vehicle_keys - vehicle.keys()):
                 known = ", ".join(vehicle)
@@ -109,7 +109,7 @@ def group_of(name: str) -> str:
 
 
 def parameter_file(document: Mapping[str, Any], where: str) -> ParameterFile:
-    """The definitions in a TOML document: the table `groups`, and a table for each parameter."""
+    """The definitions in a TOML document: the table `groups`, and one table per parameter."""
     groups: dict[str, str] = document["groups"]
     parameters: dict[str, ParameterSpec] = {}
     wrong: list[str] = []

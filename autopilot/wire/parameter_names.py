@@ -1,4 +1,4 @@
-"""What is said of a parameter that there is not, wherever it is named."""
+"""The error text for a parameter that does not exist, wherever it is named."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ _MOST_MEANT = 4
 
 
 def unknown_parameter(name: str, names: Iterable[str]) -> str:
-    """That it is none of these names; those that may be meant, or else all that begin as it does.
+    """The text that `name` does not exist, with the names that may be meant, or else all of its group.
 
-    Meant may be the nearest spelling, and what another autopilot calls otherwise: WPNAV_SPEED is MIS_SPEED.
+    These are the nearest spelling, and names that differ only in the group, as those of other autopilots may:
+    WPNAV_SPEED is MIS_SPEED.
     """
     known = sorted(names)
     group, _, quantity = name.partition("_")

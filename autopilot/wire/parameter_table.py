@@ -1,7 +1,7 @@
-"""Named, ranged, validated numbers: what the parameter protocol lists and a parameter file holds.
+"""Named, validated numbers with ranges: what the parameter protocol lists and a parameter file contains.
 
 On the wire every parameter is a float32, so a value set from a ground station passes through
-`decimal_from_float32`, which turns 0.10000000149011612 back into the 0.1 that somebody typed.
+`decimal_from_float32`, which turns 0.10000000149011612 back into the 0.1 that was typed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _EXACT_INTEGER = 2**24  # a float32 holds every integer up to here
 
 
 class ParameterError(ValueError):
-    """A parameter was named or valued wrongly: the fault of whoever set it."""
+    """A parameter was set by a wrong name or to a wrong value: a mistake of the user."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Parameter:
     text: str
     integer: bool = False
     fixed: bool = False  # takes effect at start only
-    stored: bool = True  # outlives the process
+    stored: bool = True  # kept beyond the end of the process
 
     def __post_init__(self) -> None:
         if len(self.name) > NAME_LENGTH or not _NAME.fullmatch(self.name):
@@ -79,7 +79,7 @@ class Parameter:
 
 
 def float32(value: float) -> float:
-    """`value` after a passage through float32; infinite beyond its range."""
+    """`value` rounded to float32; infinite beyond its range."""
     try:
         rounded: float = _FLOAT32.unpack(_FLOAT32.pack(value))[0]
     except OverflowError:
@@ -114,7 +114,7 @@ class ParameterTable:
         self._values = {parameter.name: float(parameter.default) for parameter in listed}
         self._index = {name: index for index, name in enumerate(self.names)}
         self._frozen = False
-        self._remembered: dict[Hashable, bytes] = {}  # made of the table at `_remembered_of`
+        self._remembered: dict[Hashable, bytes] = {}  # made from the table's version `_remembered_of`
         self._remembered_of = self.version
 
     def learn(self, parameter: Parameter) -> None:
@@ -154,7 +154,7 @@ class ParameterTable:
         return self._parameters[name]
 
     def check(self, name: str, value: float) -> float:
-        """What `set` would store; raises as `set` does and changes nothing."""
+        """The value that `set` would store; raises as `set` does and changes nothing."""
         parameter = self.describe(name)
         stored = parameter.checked(value)
         if self._frozen and parameter.fixed and stored != self._values[name]:
@@ -162,14 +162,14 @@ class ParameterTable:
         return stored
 
     def set(self, name: str, value: float) -> float:
-        """Store `value`, counted in `version`; returns what was stored."""
+        """Store `value` and increment `version`; returns the stored value."""
         stored = self.check(name, value)
         self._values[name] = stored
         self.version += 1
         return stored
 
     def remembered(self, what: Hashable, make: Callable[[], bytes]) -> bytes:
-        """The bytes of `what`, which are made of this table, and made again only once it has changed."""
+        """The bytes of `what`, made from this table by `make`, and made again only after it has changed."""
         if self._remembered_of != self.version or len(self._remembered) >= _MOST_REMEMBERED:
             self._remembered, self._remembered_of = {}, self.version
         if what not in self._remembered:
@@ -197,8 +197,8 @@ class ParameterTable:
 def parse_text(text: str) -> dict[str, float]:
     """Names and numbers of a parameter file, unchecked against any table.
 
-    Read are `NAME value` lines (MAVProxy, Mission Planner, also with a comma) and QGroundControl's five
-    columns `vehicle component NAME value type`; `#` begins a comment. The last of two equal names wins.
+    The lines are `NAME value` (MAVProxy, Mission Planner, also with a comma) or QGroundControl's five columns
+    `vehicle component NAME value type`; `#` begins a comment. The last of two equal names wins.
     """
     found: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), start=1):

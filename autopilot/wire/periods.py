@@ -1,4 +1,4 @@
-"""What is done at the multiples of a period, by a clock that counts microseconds."""
+"""Times at the multiples of a period, on a clock that counts microseconds."""
 
 from __future__ import annotations
 

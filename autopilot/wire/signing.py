@@ -1,4 +1,4 @@
-"""MAVLink 2 signatures: who knows the secret key may command.
+"""MAVLink 2 signatures: only senders that know the secret key may command.
 
 A signed frame ends with the number of the link, a time that grows from frame to frame, and the first six
 bytes of SHA-256(key, frame, link, time). Times count 10 us since 2015-01-01 UTC.
@@ -20,21 +20,21 @@ _UNIT_US = 10
 _SIGNATURE = 13  # bytes: link, time, digest
 _DIGEST = 6
 _MAGIC, _SIGNED = 0xFD, 0x01
-_NEW_STREAM_LATE = 60 * UNITS_PER_S  # so far behind us may the first time of a sender be
+_NEW_STREAM_LATE = 60 * UNITS_PER_S  # the first time of a sender may be this far behind ours
 _MOST_STREAMS = 256
 
-# what is heard without a signature: it changes nothing, and radios cannot sign
+# messages accepted without a signature: they change nothing, and radios cannot sign
 ALLOWED_UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_RADIO_STATUS})
 
 Sign = Callable[[bytes], bytes]
 
 
 class NoKeyError(ValueError):
-    """A text that holds no key."""
+    """A text that contains no key."""
 
 
 def timestamp_of(unix_us: int) -> int:
-    """The time of a signature."""
+    """The time of a signature, from a Unix time in us."""
     return min(max((unix_us - _EPOCH_UNIX_US) // _UNIT_US, 0), NEWEST)
 
 
@@ -52,23 +52,23 @@ def key_of_text(text: str) -> bytes:
 
 
 class Signing:
-    """One key with the times of all who use it."""
+    """One key with the latest times of all its users."""
 
     def __init__(self, key: bytes, timestamp: int = 0, floor: int = -1) -> None:
-        """Nothing is heard that was said at `floor` or before."""
+        """Frames signed at the time `floor` or before are not accepted."""
         if len(key) != KEY_BYTES:
             raise ValueError(f"key of {len(key)} bytes; must be {KEY_BYTES}")
         self.key = key
-        self.timestamp = timestamp  # no frame of ours bore a later one
+        self.timestamp = timestamp  # no frame of ours had a later one
         self._floor = floor
         self._heard: dict[tuple[int, int, int], int] = {}  # link, system, component: their last time
 
     def advance(self, timestamp: int) -> None:
-        """The clock: our times do not lag behind it."""
+        """Take over the time of the clock, so that our times do not lag behind it."""
         self.timestamp = max(self.timestamp, timestamp)
 
     def signer(self, link_id: int) -> Sign:
-        """What signs the frames of one link."""
+        """The function that signs the frames of one link."""
 
         def sign(frame: bytes) -> bytes:
             self.timestamp = min(self.timestamp + 1, NEWEST)
@@ -78,7 +78,7 @@ class Signing:
         return sign
 
     def accepts(self, frame: bytes, message_id: int, system: int, component: int) -> bool:
-        """Whether a whole frame, whose checksum is right, is to be heard."""
+        """Whether to accept a whole frame, whose checksum is correct."""
         if frame[0] != _MAGIC or not frame[2] & _SIGNED:
             return message_id in ALLOWED_UNSIGNED
         body, digest = frame[:-_DIGEST], frame[-_DIGEST:]
@@ -89,7 +89,7 @@ class Signing:
         stream = (link_id, system, component)
         last = self._heard.get(stream, max(self.timestamp - _NEW_STREAM_LATE - 1, self._floor))
         if timestamp <= last:
-            return False  # said before
+            return False  # not later than the sender's last frame
         if stream not in self._heard and len(self._heard) >= _MOST_STREAMS:
             return False
         self._heard[stream] = timestamp

@@ -32,7 +32,7 @@ LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
 ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 ESC_STATUS = wire_record(mavlink.MAVLink_esc_status_message, __name__)
 
-_SYSTEM = 5  # where a frame names its sender
+_SYSTEM = 5  # the byte of a frame that names its sender
 
 Answer = tuple[bool, int, Forces, bool, bool, float]
 
@@ -51,8 +51,8 @@ def put_answer(
     gripper_open: bool,
     reel_rate: float,
 ) -> int:
-    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 14, in
-    N; `payload` has PAYLOAD_ROOM bytes to work with."""
+    """Write HIL_ACTUATOR_CONTROLS at the beginning of a buffer; returns its number of bytes. `forces`: 14, in
+    N; `payload` is scratch of PAYLOAD_ROOM bytes."""
     values = hil_actuator_controls_values(
         time_us, forces_in(forces, 0), armed, lockstep, gripper_open, reel_rate
     )
@@ -61,8 +61,8 @@ def put_answer(
 
 @kernel
 def answer_in(datagram: bytes, system: int, payload: Bytes) -> Answer:
-    """Whether a datagram is the plain frame of an answer of this system and no more; and then `time_us`,
-    `forces` (N), `armed`, `gripper_open` and `reel_rate` of it."""
+    """Whether a datagram is exactly the plain frame of an answer of this system; and `time_us`, `forces` (N),
+    `armed`, `gripper_open` and `reel_rate` of this answer."""
     plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
     if not (plain and datagram[_SYSTEM] == system and holds(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)):
         return (False, 0, NO_FORCES, False, False, 0.0)

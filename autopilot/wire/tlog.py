@@ -19,7 +19,7 @@ _DIALECT_ID = mavlink.MAVLINK_MSG_ID_LOAD_STATE >> 8  # of every message of the 
 
 
 class TlogWriter:
-    """Appends records to a binary file that somebody else opens and closes."""
+    """Appends records to a binary file that the caller opens and closes."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -31,7 +31,7 @@ class TlogWriter:
 
 
 def write_common(source: Path, target: Path) -> None:
-    """Copy a log without the messages of the private dialect, at which some tools end."""
+    """Copy a log without the messages of the private dialect, at which some tools stop."""
     with target.open("wb") as file:
         writer = TlogWriter(file)
         for unix_us, received in read_tlog(source):
@@ -42,7 +42,7 @@ def write_common(source: Path, target: Path) -> None:
 def read_tlog(source: Path | str | BinaryIO) -> Iterator[tuple[int, Received]]:
     """(unix_us, message) of each record, in the order of the file.
 
-    A record cut off at the end is left out. Damaged stretches are stepped over, as are frames of unknown ids.
+    A record cut off at the end is left out. Damaged stretches and frames of unknown ids are skipped.
     """
     if isinstance(source, Path | str):
         with Path(source).open("rb") as file:

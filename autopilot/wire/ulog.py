@@ -1,7 +1,7 @@
 """Flight logs in PX4's ULog format, version 1: bytes out, no file.
 
-A log is its definitions (`beginning`), then messages in the order of their time. Flight Review, PlotJuggler
-and pyulog read it.
+A log consists of its definitions (`beginning`), followed by messages in the order of their time. Flight
+Review, PlotJuggler and pyulog read it.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ RECORD_HEAD = 5  # bytes before the time of a record
 
 
 class Topic(NamedTuple):
-    """One kind of record: a name and its fields behind the time, each `type name` or `type[n] name`.
+    """One kind of record: a name and the fields behind its time, each `type name` or `type[n] name`.
 
-    Fields stand in the order of their size, the largest first, as PX4 packs them.
+    Fields are ordered by size, the largest first, as PX4 packs them.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Topic(NamedTuple):
 
     @property
     def format(self) -> str:
-        """The format as it stands in the log."""
+        """The format as written in the log."""
         return f"{self.name}:uint64_t timestamp;" + "".join(f"{field};" for field in self.fields)
 
     @property
@@ -59,7 +59,7 @@ class Topic(NamedTuple):
 
     @property
     def numbers(self) -> tuple[tuple[int, bool, int], ...]:
-        """(bytes, is it a float, first byte in the record) of each number behind the time."""
+        """(size in bytes, whether it is a float, first byte in the record) of each number behind the time."""
         found, at = [], _TIME.size
         for field in self.fields:
             kind, bracket, count = field.split(" ")[0].partition("[")
@@ -87,7 +87,7 @@ class UlogWriter:
         parameters: Mapping[str, float],
         defaults: Mapping[str, float],
     ) -> bytes:
-        """Header, definitions and subscriptions; `defaults` where they differ from the parameters."""
+        """Header, definitions and subscriptions; `defaults` are those that differ from the parameters."""
         parts = [_MAGIC + bytes((_VERSION,)) + _TIME.pack(time_us), _message(b"B", _FLAGS)]
         parts += [_fact(name, value) for name, value in facts.items()]
         parts += [_message(b"F", topic.format.encode()) for topic in self._topics]
@@ -105,19 +105,19 @@ class UlogWriter:
 
 
 def parameter(name: str, value: float) -> bytes:
-    """The value of a parameter from here on."""
+    """A message with the value of a parameter from here on."""
     return _message(b"P", _keyed("float", name, struct.pack("<f", value)))
 
 
 def text(time_us: int, severity: int, line: str) -> bytes:
-    """A line for a person; MAV_SEVERITY 0 ... 7 is the level of the log."""
+    """A logged text; MAV_SEVERITY 0 ... 7 is its level in the log."""
     level = ord("0") + min(max(severity, 0), 7)
     return _message(b"L", bytes((level,)) + _TIME.pack(time_us) + line.encode()[:_LONGEST_TEXT])
 
 
 def dropout(duration_ms: int) -> bytes:
-    """That records of so long a time are missing here."""
-    whole, rest = divmod(duration_ms, 0xFFFF)  # as much as one message can tell
+    """Messages which state that the records of `duration_ms` are missing here."""
+    whole, rest = divmod(duration_ms, 0xFFFF)  # the most that one message can state
     return b"".join(_message(b"O", struct.pack("<H", part)) for part in (*(0xFFFF,) * whole, rest))
 
 

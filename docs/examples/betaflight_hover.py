@@ -1,9 +1,9 @@
 """Flies Betaflight's simulator target with a load, as a pilot with a remote control would: arms, lifts the
 load, hovers in ANGLE mode, rolls at a constant rate (ACRO), sets the load down and lands beside it.
 
-`sitl` and the firmware run already; docs/autopilots.md says how they are started. The firmware is given its
-switches once (`--setup`), with which it ends and is started again. The pilot sees what `sitl` tells as the
-truth, and turns each of its messages into sticks.
+`sitl` and the firmware must already be running; docs/autopilots.md says how to start them. `--setup`
+configures the switches of the firmware, once; the firmware then ends and must be started again. The pilot
+sees the truth that `sitl` sends, and answers each of its messages with stick positions.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from autopilot.wire.convert.telemetry import euler_ned_frd
 from sitl.shell.autopilots import parameter_file
 
 ARM, ANGLE = 4, 5  # channels of the switches, as sitl/interfaces/betaflight.parm has them
-ANGLE_LIMIT_DEG = 60.0  # that a full stick asks for in ANGLE mode: the firmware's angle_limit
-CENTRE_RATE, FULL_RATE = 70.0, 670.0  # degrees/s, of its rates (ACTUAL); both modes follow their curve
-ACCEL_MOST = 2.5  # m/s^2, that the pilot asks for
+ANGLE_LIMIT_DEG = 60.0  # that a full stick commands in ANGLE mode: the firmware's angle_limit
+CENTRE_RATE, FULL_RATE = 70.0, 670.0  # degrees/s, of its rates (ACTUAL); both modes use their curve
+ACCEL_MOST = 2.5  # m/s^2, that the pilot commands
 SPEED_MOST = 0.5  # m/s, up and down
-ROLL_RATE, ROLL_S = 100.0, 0.5  # degrees/s, from one side to the other
-ARMING_S, LOST_S = 20.0, 5.0  # until it is given up: the firmware does not arm, no truth comes
+ROLL_RATE, ROLL_S = 100.0, 0.5  # degrees/s; s, of the roll from one side to the other
+ARMING_S, LOST_S = 20.0, 5.0  # time limits: for arming the firmware, and without any truth
 
 Place = tuple[float, float, float]  # m: east, north, up
 
@@ -41,7 +41,7 @@ class Seen(NamedTuple):
 
     vehicle: HilStateQuaternion
     load: LoadState
-    turning: bool  # any rotor
+    turning: bool  # whether any rotor turns
 
     @property
     def time_s(self) -> float:
@@ -53,7 +53,7 @@ class Seen(NamedTuple):
 
 
 class Sticks(NamedTuple):
-    """What the pilot does: roll right and pitch forward -1 ... 1, throttle 0 ... 1, two switches."""
+    """The pilot's inputs: roll right and pitch forward -1 ... 1, throttle 0 ... 1, two switches."""
 
     roll: float = 0.0
     pitch: float = 0.0
@@ -70,15 +70,15 @@ class Sticks(NamedTuple):
         return struct.pack("<d16H", time_s, *channels)
 
 
-Part = Generator[Sticks, Seen, Seen]  # of a flight: what is seen goes in, sticks come out
+Part = Generator[Sticks, Seen, Seen]  # of a flight: receives what is seen, yields sticks
 
 
 class Pilot:
-    """One flight; `told` is what was seen in it."""
+    """One flight; `told` lists what was observed in it."""
 
     def __init__(self, hover_s: float = 30.0) -> None:
         self._hover_s = hover_s
-        self._throttle = 0.5  # that holds the height, as far as it is known
+        self._throttle = 0.5  # estimate of the throttle that holds the height
         self._before_s = 0.0
         self.told: list[str] = []
 
@@ -108,7 +108,8 @@ class Pilot:
         return seen
 
     def _arm(self, seen: Seen) -> Part:
-        """The firmware refuses for its first five seconds, and heeds the switch as it is turned on."""
+        """The firmware refuses for its first five seconds, and reacts only when the switch is turned on, so
+        it is turned on again and again."""
         begun_s = seen.time_s
         while not seen.turning:
             passed_s = seen.time_s - begun_s
@@ -120,7 +121,7 @@ class Pilot:
         return seen
 
     def _go(self, place: Place, seen: Seen, most_s: float) -> Part:
-        """Until it is there and slow, or so long."""
+        """Fly to a place until the vehicle is there and slow, for `most_s` seconds at most."""
         begun_s = seen.time_s
         while seen.time_s - begun_s < most_s:
             if dist(seen.vehicle.position, place) < 0.05 and hypot(*seen.vehicle.velocity) < 0.05:
@@ -143,7 +144,7 @@ class Pilot:
         return seen
 
     def _roll(self, seen: Seen) -> Part:
-        """To the right, to the left, and back: the rate between the two."""
+        """Roll to the right, to the left, and back, and note the rate from right to left."""
         begun_s, rates = seen.time_s, []
         while (passed_s := seen.time_s - begun_s) < 2.0 * ROLL_S:
             left = 0.5 * ROLL_S <= passed_s < 1.5 * ROLL_S
@@ -158,7 +159,7 @@ class Pilot:
         return seen
 
     def _held(self, place: Place, seen: Seen) -> Sticks:
-        """Sticks towards a place and against the swing: a tilt, and the throttle for the height."""
+        """Sticks that fly to a place and damp the swing: a tilt, and the throttle for the height."""
         (x, y, z), (vx, vy, vz) = seen.vehicle.position, seen.vehicle.velocity
         passed_s, self._before_s = min(seen.time_s - self._before_s, 0.1), seen.time_s
         late = _within(place[2] - z, SPEED_MOST) - vz
@@ -175,7 +176,7 @@ class Pilot:
 
 
 def stick_for(share: float) -> float:
-    """The stick that asks for a share of the greatest rate or angle."""
+    """The stick position that commands a share of the greatest rate or angle."""
     square = FULL_RATE - CENTRE_RATE
     stick = (sqrt(CENTRE_RATE**2 + 4.0 * square * FULL_RATE * abs(share)) - CENTRE_RATE) / (2.0 * square)
     return copysign(stick, share)
@@ -201,7 +202,7 @@ def seen_in(datagram: bytes, home: Home, before: Seen | None) -> Seen | None:
 
 
 def set_up(cli: tuple[str, int]) -> None:
-    """Give the firmware its switches by its command line, and save: it ends."""
+    """Configure the firmware's switches by its command line, and save, which ends the firmware."""
     lines = parameter_file("betaflight").read_text(encoding="utf-8").splitlines()
     with _connected(cli) as line:
         for text in ("#", *(f"{text}\n" for text in lines if not text.startswith("#")), "save\n"):
@@ -213,7 +214,7 @@ def set_up(cli: tuple[str, int]) -> None:
 
 
 def _connected(cli: tuple[str, int]) -> socket.socket:
-    """The firmware may have been started a moment ago."""
+    """A connection to the firmware, which may have been started a moment ago."""
     begun_s = time.monotonic()
     while True:
         try:

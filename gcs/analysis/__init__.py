@@ -1,1 +1,1 @@
-"""Arrays in, numbers out: telemetry as columns, the record of a flight, flight.parquet."""
+"""From arrays to numbers: telemetry as columns, the record of a flight, flight.parquet."""

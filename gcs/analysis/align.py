@@ -1,6 +1,6 @@
 """Columns brought to common time stamps: the last value, straight lines, or cubics through value and rate.
 
-All times are in seconds and rise strictly; values are (n,) or (n, k). Where the source was silent for
+All times are in seconds and strictly increasing; values are (n,) or (n, k). Where the source was silent for
 longer than `max_gap_s`, or has not begun, or has ended, the result is NaN: a report does not invent what
 was not received.
 """
@@ -60,7 +60,8 @@ def hermite(
 def _interpolate(
     stamps_s: Floats, values: Floats, at_s: Floats, max_gap_s: float, between: Between
 ) -> Floats:
-    """The sample where a time meets its stamp, `between` where two stamps enclose it closely enough."""
+    """The sample itself where a time equals its stamp; `between` where it lies between two stamps that are
+    at most `max_gap_s` apart; else NaN."""
     found = np.full((len(at_s), *values.shape[1:]), np.nan)
     if len(stamps_s) == 0:
         return found

@@ -1,4 +1,4 @@
-"""What a log says of what was asked of the vehicle: the mission that was uploaded, and parameters."""
+"""What was requested of the vehicle, read from a log: the uploaded mission, and parameters."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ ASKED = (
 
 
 class Asked:
-    """Collects messages of the kinds `ASKED` from all who speak, in their order."""
+    """Collects messages of the kinds `ASKED` from all senders, in the order of the log."""
 
     def __init__(self) -> None:
         self.parameters: dict[str, float] = {}
-        self.home = Home()  # which the items' places are relative to
+        self.home = Home()  # the reference of the items' positions
         self._items: dict[int, WireItem] = {}
         self._count = 0
 
     def take(self, received: Received) -> None:
-        """Take one message in; what is not of our vehicle, or no number, is passed over."""
+        """Process one message. A parameter or home of another system, and a value that is not finite, are
+        ignored."""
         message = received.message
         if received.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             value = from_the_wire(message.param_value, message.param_type)
@@ -50,7 +51,7 @@ class Asked:
 
     @property
     def mission(self) -> tuple[WireItem, ...]:
-        """The items of the last transfer, upload or download; none unless all are there."""
+        """The items of the last transfer, upload or download; empty unless all were received."""
         if len(self._items) != self._count:
             return ()
         return tuple(self._items[seq] for seq in range(self._count))

@@ -1,4 +1,4 @@
-"""Changes of axes for whole columns: the array forms of `autopilot.geometry.frames`, and angles of them.
+"""Changes of axes for whole columns: the array forms of `autopilot.geometry.frames`, and angles.
 
 Every function takes arrays with the components along the last axis. World ENU, body FLU; the wire is NED
 and FRD.
@@ -27,7 +27,7 @@ def flu_from_frd(v: Floats) -> Floats:
 def quat_enu_flu_from_ned_frd(quat_wxyz: Floats) -> Floats:
     """(..., 4) attitude FRD -> NED rewritten as attitude FLU -> ENU, with w >= 0.
 
-    The product (0, 1, 1, 0)/sqrt(2) * q * (0, 1, 0, 0) written out: half turns on either side.
+    This is the product (0, 1, 1, 0)/sqrt(2) * q * (0, 1, 0, 0), written out: a half turn on each side.
     """
     w, x, y, z = (quat_wxyz[..., i] for i in range(4))
     turned = _HALF * np.stack((w + z, x + y, x - y, w - z), axis=-1)

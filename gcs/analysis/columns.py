@@ -1,4 +1,4 @@
-"""Messages of one type as columns of numbers, read from their frames all at once."""
+"""Messages of one type as columns of numbers, decoded from all their frames in one operation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TYPES = {
 
 @cache
 def _layout(message_id: int) -> np.dtype[Any]:
-    """The fields of a message as they lie in its payload, before trailing zeros are cut."""
+    """The fields of a message in the layout of its payload, before trailing zeros are cut."""
     message: Any = mavlink.mavlink_map[message_id]
     types = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
     fields = zip(message.ordered_fieldnames, message.array_lengths, strict=True)
@@ -32,10 +32,10 @@ def _layout(message_id: int) -> np.dtype[Any]:
 
 
 class Columns:
-    """The fields of n frames of one message type by name: (n,) or, of arrays of k numbers, (n, k)."""
+    """The fields of n frames of one message type by name: (n,), or (n, k) for arrays of k numbers."""
 
     def __init__(self, message_id: int, frames: Sequence[bytes]) -> None:
-        """`frames` are whole and undamaged; a payload that is longer than we know it is cut."""
+        """`frames` are whole and undamaged; a payload that is longer than the dialect defines is cut."""
         layout = _layout(message_id)
         size = layout.itemsize
         self._rows = np.frombuffer(
@@ -48,7 +48,7 @@ class Columns:
 
     def __getitem__(self, names: str) -> Floats:
         """A column as float64, or several of them side by side."""
-        with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN
+        with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN
             columns = [self._rows[name].astype(np.float64) for name in names.split()]
         return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
 

@@ -1,4 +1,4 @@
-"""The figures of a flight record as `metrics.toml` defines them: their meaning, and how people read them."""
+"""The figures of a flight record as `metrics.toml` defines them: their meaning, and their display."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 FILE = "metrics.toml"
 UNKNOWN = "–"
-_ONE_METRE = 1.0  # lengths from here on are shown in metres and not in millimetres
+_ONE_METRE = 1.0  # lengths of this or more are shown in metres, not in millimetres
 
 
 class _Strict(BaseModel):
@@ -32,7 +32,7 @@ class Metric(_Strict):
     better: Literal["less", "more"] | None = None
 
     def read(self, record: Mapping[str, Any]) -> str:
-        """The recorded value as people read it, with its unit; an en dash where it is not known."""
+        """The recorded value as displayed, with its unit; an en dash if it is not known."""
         value = record.get(self.name)
         if value is None:
             return UNKNOWN
@@ -43,7 +43,7 @@ class Metric(_Strict):
         return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
 
     def read_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-        """The values of several records, all in metres where one is a metre or more."""
+        """The values of several records as displayed; all in metres if one is a metre or more."""
         values = [record.get(self.name) for record in records]
         if self._shown_unit != "mm" or not any(
             value is not None and abs(value) >= _ONE_METRE for value in values
@@ -57,7 +57,8 @@ class Metric(_Strict):
 
 
 class Group(_Strict):
-    """Figures that are shown together, and over which part of a flight; `note` is for the documentation."""
+    """Figures that are shown together. `window` is the part of the flight that they cover; `note` is for the
+    documentation."""
 
     title: str
     window: str = ""
@@ -101,8 +102,8 @@ HEADLINE: dict[str, str] = _FILE.headline  # key: label at the top of the report
 
 
 def told(record: Mapping[str, Any]) -> list[tuple[Group, list[Metric]]]:
-    """The groups of which a report tells, each with its metrics that are known; a group in which nothing
-    happened, as where no gust blew, is left out."""
+    """The groups that a report shows, each with its known metrics. A group in which nothing happened (for
+    example if no gust blew) is left out."""
     return [
         (group, [metric for metric in metrics if record.get(metric.name) is not None])
         for group, metrics in GROUPS

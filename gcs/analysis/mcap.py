@@ -1,12 +1,12 @@
-"""flight.mcap: the flight for Foxglove, PlotJuggler and Rerun, as protobuf in Foxglove's schemas and ours.
+"""flight.mcap: the flight for Foxglove, PlotJuggler and Rerun, in protobuf schemas of Foxglove and Plumbline.
 
 | topic | schema | what |
 |---|---|---|
 | /flight | plumbline.Flight | the columns of flight.parquet as fields, at each sample |
 | /tf | foxglove.FrameTransforms | vehicle and load in world |
-| /scene | foxglove.SceneUpdate | vehicle, load and paths at the begin; the cable until the load is let go |
-| /load/flown, /load/asked | foxglove.PosesInFrame | the paths, at the begin |
-| /texts | foxglove.Log | what the vehicle said |
+| /scene | foxglove.SceneUpdate | vehicle, load and paths at the start; the cable until the load is released |
+| /load/flown, /load/asked | foxglove.PosesInFrame | flown and requested path, at the start |
+| /texts | foxglove.Log | status texts of the vehicle |
 
 World ENU, body FLU, SI. Times count from boot.
 """
@@ -27,7 +27,7 @@ from gcs.analysis.tracks import Telemetry
 from gcs.errors import GcsError, from_clone
 
 _WORLD, _VEHICLE, _LOAD = "world", "vehicle", "load"
-_EVERY_S = 0.04  # of the cable
+_EVERY_S = 0.04  # shortest time between two drawings of the cable
 _MOST_POINTS = 4000  # of a path
 _NANO = 1e9
 # colours as red, green, blue, alpha
@@ -48,7 +48,7 @@ class Layout(NamedTuple):
 
 
 def require_libraries() -> None:
-    """GcsError where the libraries that write the file are not installed."""
+    """Raise GcsError if the libraries that write the file are not installed."""
     try:
         import mcap_protobuf.writer  # noqa: F401
     except ImportError:
@@ -56,7 +56,7 @@ def require_libraries() -> None:
 
 
 def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:
-    """Write the file; GcsError where the libraries are not installed."""
+    """Write the file; GcsError if the libraries are not installed."""
     require_libraries()
     from mcap_protobuf.writer import Writer
 
@@ -68,7 +68,7 @@ def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layou
 
 
 def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterator[tuple[float, str, Any]]:
-    """(time, topic, message) of all, in no order."""
+    """(time, topic, message) of all messages, unordered."""
     known = np.isfinite(samples.actual_m).all(axis=1) & np.isfinite(samples.vehicle_m).all(axis=1)
     if known.any():
         begin_s = float(samples.time_s[known][0])
@@ -81,7 +81,7 @@ def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterato
 
 
 def _columns(telemetry: Telemetry, samples: Samples) -> Iterator[tuple[float, str, Any]]:
-    """One message a sample; NaN where something is not known."""
+    """One message per sample; NaN for unknown values."""
     columns = flight_columns(telemetry, samples)
     flight = _flight_class(columns)
     times = columns["time_s"]
@@ -152,7 +152,7 @@ def _paths(samples: Samples, begin_s: float, known: Any) -> Iterator[tuple[float
 
 
 def _bodies(layout: Layout, begin_s: float, samples: Samples, known: Any) -> Any:
-    """What stays in its frame: vehicle, load and the paths."""
+    """The entities that do not move in their frames: vehicle, load and the paths."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
@@ -188,7 +188,7 @@ def _bodies(layout: Layout, begin_s: float, samples: Samples, known: Any) -> Any
 
 
 def _cable(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
-    """Where it hangs, some times a second; taken away where the load is let go."""
+    """The line of the cable every `_EVERY_S`; deleted when the load is released."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 

@@ -1,7 +1,7 @@
-"""Numbers of a flight. Each function gives some keys of the record; None stands for what cannot be known.
+"""Numbers of a flight. Each function returns some keys of the record; None stands for an unknown value.
 
 The mission window (`gcs.analysis.samples.in_window`) is taken at the time stamps of the true load state, or
-of the quantity itself for what the autopilot sends. `metrics.toml` says what every key means.
+of the quantity itself for values that the autopilot sends. `metrics.toml` defines the meaning of every key.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from gcs.analysis.tracks import Telemetry, WindTrack
 Numbers = dict[str, float | int | None]
 
 _LEAD_S = 0.5  # of hold before a step: shows that it begins at rest
-RECOVERED_M = 0.05  # load error within which a gust counts as recovered from
-SNAP_S = 0.5  # after a snap: the time in which its tension is looked for
+RECOVERED_M = 0.05  # once the load error stays below this, the load has recovered from a gust
+SNAP_S = 0.5  # after a snap: the time in which its peak tension is searched
 _WRAP = 65536  # slack_events is a uint16
 _AXES = "xyz"
 
 
 def _over(values: Floats, measure: Callable[[Floats], float]) -> float | None:
-    """`measure` of the finite values, None if there are none."""
+    """`measure` of the finite values; None if there are none."""
     finite = values[np.isfinite(values)]
     return float(measure(finite)) if finite.size else None
 
@@ -46,7 +46,7 @@ def _rms(values: Floats) -> float:
 
 
 def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
-    """Durations on the vehicle's clock, and how they compare with the wall's."""
+    """Durations on the vehicle's clock, and their ratio to wall time."""
     setpoint = telemetry.setpoint
     airborne = np.flatnonzero(np.isin(setpoint.phase, AIRBORNE))
     in_mission = setpoint.phase[:-1] == MISSION
@@ -64,8 +64,8 @@ def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
 
 
 def tracking_numbers(samples: Samples) -> Numbers:
-    """Load position error over the mission window, norm and axes, (3-40), and its two parts: how far the
-    flown path is from the asked one, and the load from the flown one."""
+    """Load position error over the mission window, norm and axes, (3-40), and its two parts: the distance of
+    the shaped path from the requested path, and of the load from the shaped path."""
     error = samples.error_m[samples.position_tracked]
     norm = np.linalg.norm(error, axis=1)
     known = norm[np.isfinite(norm)]
@@ -89,7 +89,8 @@ def tracking_numbers(samples: Samples) -> Numbers:
 
 
 def step_window(samples: Samples) -> NDArray[np.bool_]:
-    """(n,) from half a second before the mission to the end of the hold after it, with a desired path."""
+    """(n,) True from half a second before the mission to the end of the hold after it, where there is a
+    desired path."""
     window = np.zeros(len(samples.time_s), dtype=np.bool_)
     first = np.flatnonzero(samples.in_mission)
     if len(first) == 0:
@@ -105,7 +106,7 @@ def step_window(samples: Samples) -> NDArray[np.bool_]:
 
 
 def step_numbers(samples: Samples) -> Numbers:
-    """Step response, all None unless the mission is one step."""
+    """Step response; all None unless the mission is one step."""
     numbers: Numbers = dict.fromkeys(
         ("step_height_m", "rise_time_90_s", "overshoot_pct", "settling_time_5pct_s")
     )
@@ -131,7 +132,7 @@ def cascade_numbers(telemetry: Telemetry) -> Numbers:
 
 
 def rotor_numbers(telemetry: Telemetry) -> Numbers:
-    """Use of the rotors over the mission window: what the autopilot asked for, and the true forces."""
+    """Use of the rotors over the mission window: saturation of the commands, and the true forces."""
     commanded, true = telemetry.rotors_commanded, telemetry.rotors_truth
     saturated = commanded.saturated[in_window(telemetry, commanded.time_s)] != 0
     force = true.force_n[in_window(telemetry, true.time_s)]
@@ -143,7 +144,7 @@ def rotor_numbers(telemetry: Telemetry) -> Numbers:
 
 
 def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
-    """True attitude, swing and tension over the mission window; slack while the load is carried."""
+    """True tilt, swing and tension over the mission window; slack events while the load is carried."""
     truth = telemetry.load_truth
     window = samples.carried
     tilt_max = _over(tilt(samples.quat_wxyz[samples.in_mission]), np.max)
@@ -160,7 +161,7 @@ def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
 
 
 def gust_intervals(wind: WindTrack) -> list[tuple[float, float]]:
-    """Begin and end (s) of every gust pulse; the end is NaN where the log ends before it."""
+    """Beginning and end (s) of every gust pulse; the end is NaN if the log ends before it."""
     blows = (wind.gust_m_s != 0.0).any(axis=1)
     edges = np.flatnonzero(np.diff(blows, prepend=False))
     times = [float(t) for t in wind.time_s[edges]]
@@ -168,10 +169,10 @@ def gust_intervals(wind: WindTrack) -> list[tuple[float, float]]:
 
 
 def gust_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
-    """What gust pulses did to the load while it was carried.
+    """Effect of gust pulses on the load while it was carried.
 
-    Looked at is each gust that begins and ends while the load is carried and its position is tracked, from
-    its begin until the load is no longer carried or the next gust begins.
+    A gust counts if it begins and ends while the load is carried and its position is tracked. It is
+    evaluated from its beginning until the load is no longer carried or the next gust begins.
     """
     carried = np.isin(samples.phase, CARRIED) & ~np.isin(samples.control_mode, ATTITUDE_MODES)
     carried &= samples.attached
@@ -228,7 +229,7 @@ def estimator_numbers(samples: Samples) -> Numbers:
 
 
 def clock_numbers(telemetry: Telemetry) -> Numbers:
-    """How well the simulator kept its rate; None in lockstep, where there is no wall clock to be late for."""
+    """How well the simulator kept its rate; None in lockstep, where no tick has a wall-clock deadline."""
     status = telemetry.simulation
     timed = status.rate_hz > 0.0
 
@@ -245,7 +246,7 @@ def clock_numbers(telemetry: Telemetry) -> Numbers:
 
 
 def coverage_numbers(samples: Samples) -> Numbers:
-    """How complete the capture is: the numbers above are only as good."""
+    """Completeness of the capture, which limits the accuracy of the numbers above."""
     window = samples.in_mission
     stamps = samples.time_s[window]
     error = samples.error_m[samples.position_tracked]
@@ -256,11 +257,11 @@ def coverage_numbers(samples: Samples) -> Numbers:
     }
 
 
-DIVERGED_M = 2.0  # nearly three cable lengths of the nominal vehicle: nothing is tracked any longer
+DIVERGED_M = 2.0  # nearly three cable lengths of the nominal vehicle: tracking has failed
 
 
 def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
-    """What became of the flight as far as telemetry tells, for logs without a word of who flew it."""
+    """The outcome of the flight judged from telemetry, for logs without a recorded outcome."""
     phase = telemetry.setpoint.phase
     if len(phase) == 0 and len(samples.time_s) == 0:
         return "no telemetry"

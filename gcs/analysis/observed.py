@@ -1,8 +1,9 @@
-"""What a flight asked of the load, where the autopilot knows of none and says nothing: read from its mission.
+"""The requested load path of an autopilot that knows of no load and reports no setpoint, from its mission.
 
-A third-party autopilot flies the vehicle along lines between its waypoints; the load belongs a cable length
-below. What is asked of the load at a time is the nearest point of the line that is being flown: the error is
-the load's distance from the path, whatever the time table. The phases are Plumbline's, seen in the truth.
+A third-party autopilot flies the vehicle along lines between its waypoints; the load should be one cable
+length below. The requested load position at a time is the nearest point of the line that is being flown: the
+error is the load's distance from the path, whatever the timing. The phases are Plumbline's, derived from
+the truth.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ _PLACES = (
     mavlink.MAV_CMD_NAV_TAKEOFF,
     mavlink.MAV_CMD_NAV_LAND,
 )
-_LIFTED_M = 0.01  # above where the load lay
-_TURNS = 0.002  # share of their greatest force that turning rotors give at least
-_EVER = np.inf  # how long ago what holds may have been said
+_LIFTED_M = 0.01  # height above its initial position from which the load counts as lifted
+_TURNS = 0.002  # share of the greatest force above which rotors count as turning
+_EVER = np.inf  # greatest age of a value: it holds until the next is received
 
 
 def observed_setpoint(
     load: LoadTrack, rotors: RotorTrack, current: ItemTrack, items: Sequence[WireItem], home: Home
 ) -> SetpointTrack:
-    """The setpoints at the stamps of the true load; `home` is the origin of the world."""
+    """The setpoints at the time stamps of the true load; `home` is the origin of the world."""
     time_s, position = load.time_s, load.position_m
     item = as_of(current.time_s, current.item.astype(np.float64), time_s, _EVER)
     seq = np.clip(np.nan_to_num(item), 0, len(items) - 1).astype(np.int64)
@@ -73,7 +74,7 @@ def observed_setpoint(
 
 
 def _turning(rotors: RotorTrack, at_s: Floats) -> NDArray[np.bool_]:
-    """(n,) whether the rotors turn."""
+    """(n,) whether the rotors turn; True if no rotor forces were received."""
     if len(rotors.time_s) == 0:
         return np.ones(len(at_s), dtype=np.bool_)
     shares = rotors.force_n.max(axis=1) / rotors.force_max_n
@@ -81,8 +82,8 @@ def _turning(rotors: RotorTrack, at_s: Floats) -> NDArray[np.bool_]:
 
 
 def _last_of_lift(command: Ints, places: Floats, rests: float) -> int:
-    """The item with which the load is lifted: the first that ends above the ground and, where that is the
-    take-off itself, the waypoint in which it comes to rest."""
+    """Index of the last item that lifts the load: the first item that ends above the ground or, if that is
+    the take-off and a waypoint at the same place follows, that waypoint, in which the load comes to rest."""
     raised = np.flatnonzero(places[:, 2] > rests + _LIFTED_M)
     if not len(raised):
         return 0
@@ -96,7 +97,7 @@ def _last_of_lift(command: Ints, places: Floats, rests: float) -> int:
 
 
 def _places(items: Sequence[WireItem], load: LoadTrack, home: Home) -> Floats:
-    """(items, 3) where the load hangs at the end of each item, ENU."""
+    """(items, 3) position of the hanging load at the end of each item, ENU."""
     taut = load.distance_m[load.taut > 0]
     cable_m = float(np.median(taut if len(taut) else load.distance_m))
     stands_m = float(load.position_m[0, 2] - load.distance_m[0] * load.q_cable[0, 2])
@@ -113,7 +114,7 @@ def _places(items: Sequence[WireItem], load: LoadTrack, home: Home) -> Floats:
 
 
 def _nearest(points: Floats, begin: Floats, end: Floats) -> Floats:
-    """(n, 3) the points of the lines from `begin` to `end` that are nearest to `points`."""
+    """(n, 3) the points on the line segments from `begin` to `end` that are nearest to `points`."""
     along = end - begin
     length = np.sum(along * along, axis=1)
     share = np.sum((points - begin) * along, axis=1) / np.where(length > 0.0, length, 1.0)

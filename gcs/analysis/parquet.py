@@ -1,7 +1,7 @@
 """flight.parquet: one table, one row per sample of the true load state, units in the column names.
 
 Everything that the autopilot sent is brought to the times of the truth (`gcs.analysis.samples`): cubics for
-positions, straight lines for errors, the last value for commands and counters. Missing is null.
+positions, straight lines for errors, the last value for commands and counters. A missing value is null.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _spread(name: str, unit: str, values: Floats, parts: tuple[str, ...] = _AXES
 
 
 def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
-    """The columns of flight.parquet but for the name of the phase; ENU and FLU, SI and rad."""
+    """The columns of flight.parquet except the name of the phase; ENU and FLU, SI and rad."""
     t = samples.time_s
     truth, cascade = telemetry.load_truth, telemetry.cascade
     true_rotors, commanded = telemetry.rotors_truth, telemetry.rotors_commanded
@@ -101,7 +101,7 @@ def flight_table(telemetry: Telemetry, samples: Samples, about: dict[str, Any]) 
 
     columns = flight_columns(telemetry, samples)
     arrays: dict[str, Any] = {"time_s": array_of(columns.pop("time_s"))}
-    # codes of a dictionary are what pandas calls a categorical
+    # a dictionary array becomes a categorical in pandas
     names = [PHASE_NAMES[value] for value in range(len(PHASE_NAMES))]
     unknown = (samples.phase < 0) | (samples.phase >= len(names))
     codes = np.where(unknown, 0, samples.phase).astype(np.int8)
@@ -119,7 +119,7 @@ def flight_table(telemetry: Telemetry, samples: Samples, about: dict[str, Any]) 
 
 
 def write_flight(path: Path, telemetry: Telemetry, samples: Samples, about: dict[str, Any]) -> None:
-    """Writes flight.parquet."""
+    """Write flight.parquet."""
     from pyarrow import parquet
 
     parquet.write_table(flight_table(telemetry, samples, about), path, compression="zstd")

@@ -13,26 +13,26 @@ from gcs.analysis.tracks import Telemetry
 
 Record = dict[str, Any]
 
-_DIGITS = 9  # wire values are single precision: what follows is noise of their conversion
+_DIGITS = 9  # wire values are single precision: further digits are noise of the conversion
 
 
 @dataclass(frozen=True)
 class FlightMeta:
-    """What telemetry does not say about a flight; kept as meta.json beside the log. None: not known."""
+    """What telemetry does not contain about a flight; stored as meta.json beside the log. None: not known."""
 
     mission: str | None = None
-    title: str | None = None  # of the mission, for people
+    title: str | None = None  # of the mission, for display
     law: str | None = None
-    estimator: str | None = None  # that somebody has brought
+    estimator: str | None = None  # custom estimator
     planner: str | None = None
     sensors: str | None = None
     vehicle: str | None = None
     seed: int | None = None
-    outcome: str | None = None  # of the client that flew it; else it is judged from telemetry
-    reason: str | None = None  # for that outcome, one line
+    outcome: str | None = None  # reported by the client that flew it; else judged from telemetry
+    reason: str | None = None  # of that outcome, one line
     truth_missing: str | None = None  # why the log has no truth of the simulator, one line
     wall_s: float | None = None  # wall time over which the log was recorded
-    command: str | None = None  # command line that flies it again
+    command: str | None = None  # command line that repeats the flight
     version: str | None = None  # of Plumbline
     settings: dict[str, float | str] = field(default_factory=dict)  # parameters that were changed
 
@@ -42,13 +42,13 @@ class FlightMeta:
 
     @classmethod
     def from_json(cls, values: Record) -> FlightMeta:
-        """The known keys of `values`; unknown ones, of later versions, are passed over."""
+        """The known keys of `values`; unknown keys, of later versions, are ignored."""
         known = {f.name for f in fields(cls)}
         return cls(**{name: value for name, value in values.items() if name in known and value is not None})
 
 
 def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | None = None) -> Record:
-    """Every key of METRICS, in that order, then report_dir (None here); None for what cannot be known."""
+    """Every key of METRICS, in that order, then report_dir (None here); None for unknown values."""
     samples = samples_of(telemetry) if samples is None else samples
     found: Record = {
         "mission": meta.mission,
@@ -75,7 +75,7 @@ def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | Non
 
 
 def jsonable(values: Record) -> Record:
-    """The same with only what JSON knows: None for numbers that are not finite; floats lose their noise."""
+    """The values restricted to JSON: None for numbers that are not finite; floats rounded to nine digits."""
     return {name: _plain(value) for name, value in values.items()}
 
 

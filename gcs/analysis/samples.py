@@ -17,7 +17,7 @@ UNKNOWN = -1
 
 HOLD = mavlink.PLUMBLINE_PHASE_HOLD
 MISSION = mavlink.PLUMBLINE_PHASE_MISSION
-# the load hangs on the cable and nobody lifts or lowers it
+# the load hangs on the cable and is neither lifted nor lowered
 CARRIED = (HOLD, MISSION, mavlink.PLUMBLINE_PHASE_RETURN, mavlink.PLUMBLINE_PHASE_GUIDED)
 AIRBORNE = (
     mavlink.PLUMBLINE_PHASE_TAUTEN,
@@ -53,43 +53,43 @@ class Samples:
     actual_m_s: Floats  # (n, 3) true load velocity
     desired_m: Floats  # (n, 3)
     desired_m_s: Floats  # (n, 3)
-    asked_m: Floats  # (n, 3) what the mission asks for; desired is as near to it as can be flown
+    asked_m: Floats  # (n, 3) requested by the mission; desired is the nearest that can be flown
     asked_m_s: Floats  # (n, 3)
-    estimated_m: Floats  # (n, 3) load position as the autopilot believes it
-    filtered_m: Floats  # (n, 3) the same by the built-in filter, where an estimator of somebody's own flies
+    estimated_m: Floats  # (n, 3) load position as estimated by the autopilot
+    filtered_m: Floats  # (n, 3) the same from the built-in filter, in flights with a custom estimator
     vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
     quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
 
     @property
     def error_m(self) -> Floats:
-        """(n, 3) true minus asked load position, e_x of (3-40)."""
+        """(n, 3) true minus requested load position, e_x of (3-40)."""
         return self.actual_m - self.asked_m
 
     @property
     def error_m_s(self) -> Floats:
-        """(n, 3) true minus asked load velocity."""
+        """(n, 3) true minus requested load velocity."""
         return self.actual_m_s - self.asked_m_s
 
     @property
     def position_tracked(self) -> NDArray[np.bool_]:
-        """(n,) `carried`, and the cascade tracks a position rather than an attitude."""
+        """(n,) `carried`, and the cascade does not track an attitude."""
         return self.carried & ~np.isin(self.control_mode, ATTITUDE_MODES)
 
     @property
     def carried(self) -> NDArray[np.bool_]:
-        """(n,) in the mission window, the load on the cable: what figures of the load count over."""
+        """(n,) in the mission window and the load on the cable: the samples for figures of the load."""
         return self.in_mission & self.attached
 
 
 def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
-    """(n,) the phase of the setpoint in force at each time, UNKNOWN where none is."""
+    """(n,) the phase of the setpoint in force at each time; UNKNOWN where there is none."""
     return _whole_as_of(telemetry, telemetry.setpoint.phase, at_s)
 
 
 def in_window(telemetry: Telemetry, at_s: Floats) -> NDArray[np.bool_]:
-    """(n,) the mission window: the setpoint in force says phase MISSION.
+    """(n,) the mission window: the setpoint in force has phase MISSION.
 
-    Of a flight without that phase (a load that was only lifted and held) phase HOLD is the window.
+    In a flight without that phase (the load was only lifted and held), the window is phase HOLD.
     """
     flown = bool((telemetry.setpoint.phase == MISSION).any())
     return np.asarray(phase_at(telemetry, at_s) == (MISSION if flown else HOLD))
@@ -101,13 +101,14 @@ def _whole_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
 
 
 def samples_of(telemetry: Telemetry) -> Samples:
-    """Setpoint and estimate are sent on the ticks of the truth: then nothing is interpolated."""
+    """The samples of a flight. Setpoint and estimate are sent on the same ticks as the truth; only gaps are
+    interpolated."""
     truth, setpoint, estimate = telemetry.load_truth, telemetry.setpoint, telemetry.load_estimated
     filtered = telemetry.load_filtered
     time_s = truth.time_s
-    # a setpoint without a law that follows it is the estimate, sent so that the message is whole
+    # while no law follows the setpoint, the estimate is sent in its place to complete the message
     tracked = np.isin(_whole_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
-    # the derivative of the desired velocity is sent too, so that it is a cubic between stamps as well
+    # the acceleration is sent too: the desired velocity is therefore also a cubic between stamps
     return Samples(
         time_s=time_s,
         phase=phase_at(telemetry, time_s),

@@ -9,18 +9,18 @@ import numpy as np
 from gcs.analysis.axes import Floats
 
 MIN_HEIGHT_M = 0.01  # below a centimetre the noise of a tracker is a tenth of the step
-_OFF_LINE = 1e-3  # of the height: a path that bends more is no step
+_OFF_LINE = 1e-3  # of the height: a path that deviates more from its line is no step
 _BACK = 1e-4  # of the height: single-precision wire values of a monotone path go back by less
 _BEGUN = 1e-4  # of the height: the desired path has left its start
 _ARRIVED = 1.0 - 1e-4  # of the height
-_PAUSE = 0.01  # of the peak speed: a path that slows down further in between is two moves
-_MIDDLE = (0.02, 0.98)  # of the height: where pauses are looked for
+_PAUSE = 0.01  # of the peak speed: a path that becomes slower than this in between is two moves
+_MIDDLE = (0.02, 0.98)  # of the height: the part that is searched for pauses
 _REST = 0.01  # of the peak speed: at rest
 _HELD_S = 0.5  # a shorter hold says nothing about settling
 
 
 class Step(NamedTuple):
-    """A step-like desired path: where along which line, and when."""
+    """A step-like desired path: its start time, height, origin and direction."""
 
     start_s: float
     height_m: float
@@ -29,7 +29,7 @@ class Step(NamedTuple):
 
 
 class StepResponse(NamedTuple):
-    """Times count from the start of the step; None where the load never got there."""
+    """Times count from the start of the step; None if the load never got there."""
 
     height_m: float
     rise_90_s: float | None  # first time at 90 % of the height
@@ -41,8 +41,8 @@ def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | 
     """The step of a desired path (n,), (n, 3), (n, 3), or None.
 
     A step begins at rest, moves once along one straight line, never back, and holds at least half a second
-    at its end. It starts at the last rest; between samples from position and speed, as for a path that
-    leaves rest with constant acceleration (which is how a half-sine step leaves it).
+    at its end. It starts when it leaves rest. Between samples, this time is computed from position and speed
+    as for a path that leaves rest with constant acceleration (as a half-sine step does).
     """
     if len(time_s) < 3 or not (np.isfinite(desired_m).all() and np.isfinite(desired_m_s).all()):
         return None
@@ -77,7 +77,7 @@ def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | 
 
 
 def step_response(step: Step, time_s: Floats, actual_m: Floats) -> StepResponse:
-    """What the load (n,), (n, 3) made of the step, crossings interpolated between the samples."""
+    """Response of the load (n,), (n, 3) to the step; crossings are interpolated between the samples."""
     known = (time_s >= step.start_s) & np.isfinite(actual_m).all(axis=1)
     t = time_s[known] - step.start_s
     along = (actual_m[known] - step.origin_m) @ step.direction / step.height_m

@@ -1,4 +1,4 @@
-"""Tracks from what was received: messages in, columns out (`gcs.analysis.tracks`)."""
+"""Tracks (`gcs.analysis.tracks`) from received messages."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _MICRO = 1e-6
 
 
 def load_telemetry(tlog: Path) -> Telemetry:
-    """The flight in a .tlog file; a torn tail is left out."""
+    """The flight in a .tlog file; an incomplete record at its end is left out."""
     from autopilot.wire.tlog import read_tlog
 
     return telemetry_of(read_tlog(tlog))
@@ -57,7 +57,7 @@ _READ = (
     mavlink.MAVLINK_MSG_ID_CABLE_SNAP,
     mavlink.MAVLINK_MSG_ID_FILTER_STATE,
 )
-# without a time stamp of their own, and sent by more components than the autopilot
+# without a time stamp of the vehicle; other components than the autopilot send some of them too
 _HEARD = (
     mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
@@ -87,7 +87,7 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
     columns = {message_id: Columns(message_id, found) for message_id, found in frames.items()}
     waited_us = stamps[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]
     if waited_us:
-        # the record that waited least tells best when the vehicle's clock was zero
+        # the message with the shortest delay gives the best estimate of when the vehicle's clock was zero
         sent_us = columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT].raw("time_usec").tolist()
         boot_us = min(heard - sent for heard, sent in zip(waited_us, sent_us, strict=True))
     elif stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME]:
@@ -103,7 +103,7 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
     telemetry = _assemble(columns, heard, _texts(texts, boot_us), asked)
     if len(telemetry.setpoint.time_s) or not (len(telemetry.load_truth.time_s) and telemetry.mission):
         return telemetry
-    # an autopilot that knows of no load; what it calls home is where it stood
+    # an autopilot that knows of no load; its home is where the vehicle stood, not the load
     home = _origin(columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION], telemetry.load_truth) or asked.home
     setpoint = observed_setpoint(
         telemetry.load_truth, telemetry.rotors_truth, telemetry.mission_current, telemetry.mission, home
@@ -112,7 +112,7 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
 
 
 def _origin(hil: Columns, load: LoadTrack) -> Home | None:
-    """The origin of the world: where the true vehicle is in degrees, less where it is in metres."""
+    """The origin of the world: the true vehicle position in degrees minus the same position in metres."""
     hil_us = hil.raw("time_usec")
     load_us = np.round(load.time_s / _MICRO).astype(hil_us.dtype)
     _, ours, theirs = np.intersect1d(load_us, hil_us, return_indices=True)
@@ -121,7 +121,7 @@ def _origin(hil: Columns, load: LoadTrack) -> Home | None:
     vehicle = load.position_m[ours] - load.distance_m[ours, None] * load.q_cable[ours]
     degE7, mm = hil["lat lon"][theirs], hil["alt"][theirs]
     first = Home(1e-7 * float(degE7[0, 0]), 1e-7 * float(degE7[0, 1]), 1e-3 * float(mm[0]))
-    # the first vehicle place as origin, moved by what is left
+    # take the first vehicle position as origin, then move it by the mean difference
     moved = [
         np.subtract(enu_from_geodetic(int(lat), int(lon), int(alt), first), place)
         for (lat, lon), alt, place in zip(degE7, mm, vehicle, strict=True)
@@ -135,7 +135,7 @@ TrackT = TypeVar("TrackT")
 
 
 def _in_order(track: TrackT, keep: NDArray[np.bool_] | None = None) -> TrackT:
-    """The samples to keep, sorted by time, the last received of those with one time stamp."""
+    """The samples to keep, sorted by time; of several with the same time stamp, the last received."""
     columns = {field.name: getattr(track, field.name) for field in fields(track)}  # type: ignore[arg-type]
     time_s = columns["time_s"]
     index = np.arange(len(time_s)) if keep is None else np.flatnonzero(keep)
@@ -167,7 +167,7 @@ def _filtered(c: Columns) -> FilterTrack:
 
 def _setpoint(c: Columns) -> SetpointTrack:
     asked, asked_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
-    if not asked.any():  # a vehicle that does not say: the wire fills extensions with zeros
+    if not asked.any():  # the vehicle does not send it: missing extension fields are decoded as zeros
         asked, asked_m_s = c["x y z"], c["vx vy vz"]
     return _in_order(
         SetpointTrack(
@@ -249,7 +249,7 @@ def _snaps(c: Columns) -> SnapTrack:
 
 
 def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
-    """Chunks of one id joined in the order in which they came; id 0 stands alone."""
+    """Chunks of one id joined in the order of arrival; a text with id 0 is not joined."""
     whole: list[StatusText] = []
     open_id = 0
     for unix_us, message in texts:

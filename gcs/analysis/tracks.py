@@ -1,7 +1,7 @@
 """A flight as named columns, per message type and source, on one clock and in one set of axes.
 
-Times are seconds of the vehicle's clock since boot (`time_usec` / 1e6). Worlds are ENU relative to home,
-bodies FLU, units SI. Each track is sorted by time, one sample per time stamp. A track that was never
+Times are seconds of the vehicle's clock since boot (`time_usec` / 1e6). World axes are ENU relative to home,
+body axes FLU, units SI. Each track is sorted by time, one sample per time stamp. A track that was never
 received has length zero.
 """
 
@@ -37,7 +37,7 @@ class LoadTrack:
 
 @dataclass(frozen=True)
 class FilterTrack:
-    """FILTER_STATE: the built-in filter beside an estimator of somebody's own; n samples."""
+    """FILTER_STATE: the built-in filter, which runs beside a custom estimator; n samples."""
 
     time_s: Floats  # (n,)
     position_m: Floats  # (n, 3) ENU, of the load
@@ -52,7 +52,7 @@ class SetpointTrack:
     position_m: Floats  # (n, 3) ENU, desired
     velocity_m_s: Floats  # (n, 3) ENU, desired
     acceleration_m_s2: Floats  # (n, 3) ENU, desired
-    asked_m: Floats  # (n, 3) ENU, what the mission asks for; desired is as near to it as can be flown
+    asked_m: Floats  # (n, 3) ENU, requested by the mission; desired is the nearest that can be flown
     asked_m_s: Floats  # (n, 3) ENU
     q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
     elapsed_s: Floats  # (n,) since the item or phase began
@@ -75,8 +75,8 @@ class CascadeTrack:
     e_Omega: Floats  # (n, 3) rad/s, FLU
     psi_R: Floats  # (n,) 0 ... 2
     psi_q: Floats  # (n,) 0 ... 2
-    thrust_n: Floats  # (n,) asked of the mixer
-    moment_n_m: Floats  # (n, 3) asked of the mixer, FLU
+    thrust_n: Floats  # (n,) requested from the mixer
+    moment_n_m: Floats  # (n, 3) requested from the mixer, FLU
     control_mode: Ints  # (n,)
 
 
@@ -88,11 +88,11 @@ class RotorTrack:
     force_n: Floats  # (n, rotors)
     force_min_n: Floats  # (n,)
     force_max_n: Floats  # (n,) infinite if unlimited
-    saturated: Ints  # (n,) bit i: the demand on rotor i was cut at a limit
+    saturated: Ints  # (n,) bit i: the command of rotor i was cut at a limit
 
 
 def numbers(rotors: RotorTrack) -> tuple[str, ...]:
-    """What the rotors are called: 1, 2, ..."""
+    """Names of the rotors: 1, 2, ..."""
     return tuple(str(i + 1) for i in range(rotors.force_n.shape[1]))
 
 
@@ -107,7 +107,7 @@ class AttitudeTrack:
 
 @dataclass(frozen=True)
 class HeartbeatTrack:
-    """HEARTBEAT of the autopilot; stamped by the capture, not by the vehicle."""
+    """HEARTBEAT of the autopilot; time stamps of the capture, not of the vehicle."""
 
     time_s: Floats  # (n,)
     base_mode: Ints
@@ -117,7 +117,7 @@ class HeartbeatTrack:
 
 @dataclass(frozen=True)
 class ItemTrack:
-    """MISSION_CURRENT or MISSION_ITEM_REACHED; stamped by the capture."""
+    """MISSION_CURRENT or MISSION_ITEM_REACHED; time stamps of the capture."""
 
     time_s: Floats  # (n,)
     item: Ints  # (n,)
@@ -142,7 +142,7 @@ class SimulationTrack:
 class WindTrack:
     """WIND_STATE."""
 
-    time_s: Floats  # (n,) from when on it holds
+    time_s: Floats  # (n,) from this time on the values hold
     wind_m_s: Floats  # (n, 3) ENU, mean
     gust_m_s: Floats  # (n, 3) ENU, the gust pulse in force
 
@@ -157,7 +157,7 @@ class SnapTrack:
 
 
 class StatusText(NamedTuple):
-    """One whole STATUSTEXT, its chunks joined; stamped by the capture."""
+    """One whole STATUSTEXT, its chunks joined; time stamp of the capture."""
 
     time_s: float
     severity: int  # MAV_SEVERITY, 0 emergency ... 7 debug
@@ -166,7 +166,7 @@ class StatusText(NamedTuple):
 
 @dataclass(frozen=True)
 class Telemetry:
-    """Everything that analysis reads of one flight."""
+    """All data of one flight that the analysis uses."""
 
     load_truth: LoadTrack
     load_estimated: LoadTrack
@@ -184,8 +184,8 @@ class Telemetry:
     wind: WindTrack
     snaps: SnapTrack
     texts: tuple[StatusText, ...]
-    mission: tuple[WireItem, ...]  # what was uploaded last, if all of it is in the log
-    parameters: dict[str, float]  # what the vehicle said of its parameters last
+    mission: tuple[WireItem, ...]  # the last transferred mission, if all of it is in the log
+    parameters: dict[str, float]  # the last values that the vehicle reported
     home: Home  # the origin of the world
 
     @property

@@ -1,1 +1,1 @@
-"""Many flights: which must be flown, who flies them, and what a person sees meanwhile."""
+"""Many flights: which must be flown, which processes fly them, and the display of progress."""

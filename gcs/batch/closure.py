@@ -1,9 +1,9 @@
-"""Which files decide what happens in a flight: everything that the modules that fly import, and its data.
+"""Which files determine what happens in a flight: all modules that the flying modules import, and their data.
 
-The set follows from the imports, read from the source without running it, so that a new module is part of it
-as soon as it is used. Imports inside functions count. A package that finds its modules by `iter_modules`
-imports all of them. Any other module that is loaded by a computed name is not seen: name it among the entry
-points.
+The set follows from the import statements, which are read from the source without running it. A new module is
+therefore part of it as soon as it is used. Imports inside functions count. A package that finds its modules
+by `iter_modules` imports all of them. Any other module that is loaded by a computed name is not found: add it
+to the entry points.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PACKAGES = ("autopilot", "gcs", "missions", "sitl")  # of this project; other li
 ROOT = Path(__file__).resolve().parents[2]
 
 _NO_DATA = (".py", ".pyc", ".html")  # code is found by its imports; pages are templates of reports
-# how an import statement begins; one that begins a line, to its end; one behind another statement
+# the beginning of an import statement; a whole one that begins a line; one after another statement in a line
 _BEGIN = rb"(?:from[ \t]+[\w.]+[ \t]+import\b|import[ \t])"
 _IMPORT = re.compile(rb"^[ \t]*(" + _BEGIN + rb"(?:[^\n(\\]|\\\n|\([^)]*\))*)", re.MULTILINE)
 _WITHIN_A_LINE = re.compile(rb"[:;][ \t]*" + _BEGIN)
@@ -40,7 +40,8 @@ def fingerprint(entries: Iterable[str], root: Path = ROOT) -> str:
 
 
 def closure(entries: Iterable[str], root: Path = ROOT) -> set[Path]:
-    """Source files of the modules `entries` and of all that they import, and data files of their packages."""
+    """Source files of the modules `entries` and of all modules that they import, directly or indirectly, and
+    the data files of their packages."""
     ahead = list(entries)
     for entry in ahead:
         if _source(entry, root) is None:
@@ -58,7 +59,7 @@ def closure(entries: Iterable[str], root: Path = ROOT) -> set[Path]:
         files.add(path)
         if path.name == "__init__.py":
             files.update(_data(path.parent))
-        parent = module.rpartition(".")[0]  # runs before the module does
+        parent = module.rpartition(".")[0]  # is executed before the module
         ahead += [*([parent] if parent else []), *_imports(path, module)]
     return files
 
@@ -74,7 +75,7 @@ def _source(module: str, root: Path) -> Path | None:
 
 
 def _data(package: Path) -> Iterator[Path]:
-    """What lies beside the code of a package, and in its folders that hold no code."""
+    """The data files beside the code of a package, and in its folders that contain no code."""
     for path in package.iterdir():
         if path.name.startswith(".") or path.name == "__pycache__":
             continue
@@ -87,7 +88,7 @@ def _data(package: Path) -> Iterator[Path]:
 def _imports(path: Path, module: str) -> Iterator[str]:
     """Every dotted name that the file imports; `from a import b` gives a and a.b, which may be a module.
 
-    A file that calls `iter_modules` imports what lies beside it.
+    A file that calls `iter_modules` imports all modules beside it.
     """
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     names, finds_modules = _imported(path.read_bytes(), package)
@@ -100,7 +101,7 @@ def _imports(path: Path, module: str) -> Iterator[str]:
 def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
     """Dotted names that a source in this package imports, and whether it calls `iter_modules`."""
     names: list[str] = []
-    with _nothing_collected():  # a tree is of many objects, none of which is garbage
+    with _nothing_collected():  # a syntax tree has many objects, none of which is garbage
         finds_modules = b"iter_modules" in source and any(
             map(_calls_iter_modules, ast.walk(ast.parse(source)))
         )
@@ -119,8 +120,9 @@ def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
 
 
 def _import_statements(source: bytes) -> ast.Module:
-    """A tree with all import statements of a source: parsed alone, which takes a tenth of the time, where
-    each begins a line and what looks like one is one."""
+    """A syntax tree with all import statements of a source. If each of them begins a line, only these lines
+    are parsed, which takes a tenth of the time. The whole source is parsed if this fails, for example because
+    a text looks like an import."""
     if not _WITHIN_A_LINE.search(source):
         with suppress(SyntaxError):
             return ast.parse(b"\n".join(_IMPORT.findall(source)))
@@ -129,7 +131,7 @@ def _import_statements(source: bytes) -> ast.Module:
 
 @contextmanager
 def _nothing_collected() -> Iterator[None]:
-    """Without garbage collection, if there was any."""
+    """Disable garbage collection within the context, if it was enabled."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -147,7 +149,8 @@ def _calls_iter_modules(node: ast.AST) -> bool:
 
 
 def _statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """All statements of a module, nested ones too; expressions hold none, and are most of a tree."""
+    """All statements of a module, nested ones too. Expressions contain none and are skipped, because they
+    make up most of a tree."""
     ahead = [tree]
     while ahead:
         node = ahead.pop()

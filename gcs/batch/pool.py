@@ -1,4 +1,4 @@
-"""Flights as calls of a function: by a pool of processes on all cores, or by a Dask cluster."""
+"""Flights as function calls, in a pool of processes on all cores or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ R = TypeVar("R")
 
 Clock = Callable[[], float]  # seconds
 Stopped = Callable[[], bool]
-# gives the results of those that were flown before it was `Stopped`; must be picklable
+# returns the results of the flights that were flown before `Stopped` returned True; must be picklable
 FlyMany = Callable[[tuple[F, ...], Clock, Stopped], list[R]]
 
 _AHEAD = 2  # groups waiting for each worker
@@ -31,11 +31,11 @@ _POLL_S = 0.2
 
 
 def fly_group(fly: FlyMany[F, R], group: tuple[F, ...]) -> list[R]:
-    """Fly some flights; what a worker runs."""
+    """Fly a group of flights; runs in a worker."""
     return fly(group, time.monotonic, _is_recalled)
 
 
-RECALLED: list[Any] = []  # in a worker of ours: the event that says to begin no more flights
+RECALLED: list[Any] = []  # in a worker of `OwnProcesses`: the event that requests that no more flights begin
 
 
 def _is_recalled() -> bool:
@@ -44,17 +44,18 @@ def _is_recalled() -> bool:
 
 @runtime_checkable
 class Recallable(Protocol):
-    """An executor whose workers begin no more flights when it is recalled, of the groups that they have
-    begun neither."""
+    """An executor that can be recalled: its workers then begin no more flights, not even the remaining
+    flights of groups that they have begun."""
 
     def recall(self) -> None: ...
 
 
 class OwnProcesses(ProcessPoolExecutor):
-    """Processes of our own. They have fetched groups that cannot be cancelled, and are told by an event.
+    """Worker processes on this machine. The groups that they have already fetched cannot be cancelled, so an
+    event recalls them.
 
-    They branch off with what is loaded here, while no thread may hold a lock; else each of them loads it
-    anew, which takes seconds.
+    They are forked, with all modules that are loaded here, if no thread can hold a lock. Otherwise each of
+    them imports the modules again, which takes seconds.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -63,14 +64,14 @@ class OwnProcesses(ProcessPoolExecutor):
         self._recalled = context.Event()
         super().__init__(jobs, mp_context=context, initializer=_begin_worker, initargs=(self._recalled,))
         if branches:
-            self.submit(_nothing)  # begins all of them at once
+            self.submit(_nothing)  # starts all processes now
 
     def recall(self) -> None:
         self._recalled.set()
 
 
 class PoolCrew(Generic[F, R]):
-    """A crew of the `workers` of an executor, each of which calls `fly` with its flights."""
+    """A crew that consists of the `workers` of an executor; each calls `fly` with its flights."""
 
     def __init__(self, executor: Executor, workers: int, fly: FlyMany[F, R]) -> None:
         self._executor, self._workers, self._fly = executor, workers, fly
@@ -97,7 +98,7 @@ class PoolCrew(Generic[F, R]):
         return ()
 
     def recall(self) -> Sequence[R]:
-        """Wait for the flights in the air, one or eight of each worker; a second Ctrl-C does not wait."""
+        """Wait for the flights in progress, one or eight per worker; a second Ctrl-C does not wait."""
         if isinstance(self._executor, Recallable):
             self._executor.recall()
         for future in self._futures:
@@ -109,7 +110,7 @@ class PoolCrew(Generic[F, R]):
 
 @contextmanager
 def own_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
-    """`jobs` processes of our own."""
+    """`jobs` worker processes on this machine."""
     executor = OwnProcesses(jobs)
     try:
         yield executor, jobs
@@ -151,13 +152,13 @@ def _killed_is_an_error() -> Iterator[None]:
 
 
 def _nothing() -> None:
-    """Work that is none."""
+    """Do nothing."""
 
 
 def _begin_worker(recalled: Any) -> None:
-    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends.
+    """Prepare a worker: the parent handles Ctrl-C and a closed terminal; a worker whose parent is gone ends.
 
-    Results are written by the parent: what is printed here, as by a law that somebody has brought, goes to
+    The parent writes the results to stdout. Text printed in a worker, for example by a custom law, goes to
     stderr.
     """
     RECALLED.append(recalled)

@@ -1,4 +1,4 @@
-"""Flights as programs: each a process of its own, kept on one core with everything that it starts."""
+"""Flights as programs: each in a separate process, kept on one core with all processes that it starts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _POLL_S = 0.2
 
 
 class Titled(Protocol):
-    """A flight with a name for people."""
+    """A flight with a title for display."""
 
     @property
     def title(self) -> str: ...
@@ -47,7 +47,7 @@ def cores(most: int | None = None) -> tuple[int, ...]:
 
 
 def keep_on_core(child: Child, core: int) -> Child:
-    """Keep a process and all that it starts on one core, where the system has a call for it."""
+    """Keep a process and all processes that it starts on one core, if the system has a call for it."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(child.pid, {core})
     return child
@@ -93,7 +93,7 @@ class ProgramCrew(Generic[F]):
             del self._programs[core]
             if program.exit_code in (EXIT_DONE, EXIT_NOT_MET):
                 ended.append((flight, program.exit_code == EXIT_DONE))
-            else:  # the first is raised by the next call, so that those which ended well are stored
+            else:  # the next call raises the first failure, so that the flights that ended well are stored
                 self._failure = self._failure or f"{flight.title}: {program.obituary()}"
         return ended
 
@@ -101,7 +101,7 @@ class ProgramCrew(Generic[F]):
         return tuple((flight.title, program.last_line()) for flight, program in self._programs.values())
 
     def recall(self) -> Sequence[tuple[F, bool]]:
-        """End all programs, and what they have started; a flight that was cut short is no result."""
+        """End all programs and the processes that they started; interrupted flights give no result."""
         for _, program in self._programs.values():
             program.terminate()
         for _, program in self._programs.values():

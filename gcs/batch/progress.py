@@ -1,4 +1,4 @@
-"""Progress of a batch: how many flights are flown, how fast, how long it still takes, and which run."""
+"""Progress of a batch: how many flights are flown, how fast, the time remaining, and which flights run."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from rich.progress import ProgressColumn
 
 
-_FIRST_S = 2.0  # after which a person wonders
-_MINUTES_S = 120.0  # from here on times are told in minutes
+_FIRST_S = 2.0  # after this time without a flight, the display says that the first are on their way
+_MINUTES_S = 120.0  # times of this or more are shown in minutes
 
 
 class BatchDisplay(LiveBars):
-    """A bar for all flights, and a line for each that runs and says where it is."""
+    """A bar for all flights, and for each running flight a line with its progress."""
 
     def __init__(self, stored: int, total: int, quiet: bool) -> None:
         """`stored` flights of `total` are reused from an earlier run."""
@@ -25,8 +25,8 @@ class BatchDisplay(LiveBars):
         self._stored, self._total = stored, total
         self._began_s = time.monotonic()
         self.flown = 0  # in this run
-        self.completed = 0  # of them
-        self._told = -1  # flown at the last plain line
+        self.completed = 0  # of these
+        self._told = -1  # `flown` at the last plain line
 
     @property
     def elapsed_s(self) -> float:
@@ -34,7 +34,7 @@ class BatchDisplay(LiveBars):
         return time.monotonic() - self._began_s
 
     def add(self, flown: int, completed: int, running: Running = ()) -> None:
-        """So many more flights are flown, so many of them completed; `running` run now."""
+        """Count `flown` more flights, of which `completed` completed; `running` are running now."""
         self.flown += flown
         self.completed += completed
         last = flown > 0 and self._stored + self.flown == self._total
@@ -81,7 +81,7 @@ class BatchDisplay(LiveBars):
 
 
 def pace(flights_per_s: float) -> str:
-    """In the unit that a person counts in."""
+    """The rate per second or, below one, per minute."""
     if flights_per_s >= 1.0:
         return f"{flights_per_s:.1f} flights/s"
     return f"{60.0 * flights_per_s:.1f} flights/min"

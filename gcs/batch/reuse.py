@@ -1,8 +1,8 @@
 """The rule by which a stored flight is reused: same settings, same version, same code.
 
-`gcs sweep` and `gcs experiments` share it. Settings are everything that the user chose, with the content of
-the files that were named; the version is that of Plumbline; the code is a fingerprint of all files that
-decide what happens in a flight (`gcs.batch.closure`).
+`gcs sweep` and `gcs experiments` share it. The settings are everything that the user chose, with the content
+of the named files; the version is that of Plumbline; the code is a fingerprint of all files that determine
+what happens in a flight (`gcs.batch.closure`).
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from gcs.batch.closure import fingerprint
 
 @dataclass(frozen=True)
 class Origin:
-    """What the result of a flight follows from: flights of equal origin have equal results."""
+    """All that determines the result of a flight: flights of equal origin have equal results."""
 
     settings: Mapping[str, Any]  # plain JSON values
     version: str
     code: str
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, as JSON gives them back."""
+        """Plain values, as they are after a round trip through JSON."""
         return json.loads(json.dumps(asdict(self)))  # type: ignore[no-any-return]
 
     def differences(self, stored: object) -> tuple[str, ...]:
         """Which of `settings`, `version` and `code` differ from those stored; empty if the flight is reused.
 
-        `stored` is what was read from a file; one that is not of the form of `to_json` differs in all three.
+        `stored` was read from a file; if it does not have the form of `to_json`, all three differ.
         """
         mine = self.to_json()
         theirs = stored if isinstance(stored, Mapping) else {}
@@ -42,18 +42,19 @@ class Origin:
 
 
 def origin_of(settings: Mapping[str, Any], entries: Iterable[str]) -> Origin:
-    """The origin of flights that are flown now, by the modules `entries`, under `settings`."""
+    """The origin of flights that the modules `entries` fly now under `settings`."""
     return Origin(settings, version("plumbline"), code_of(tuple(entries)))
 
 
 @cache
 def code_of(entries: tuple[str, ...]) -> str:
-    """The fingerprint of the sources that these modules reach, read once in a run."""
+    """The fingerprint of these modules and all that they import; the files are read once per run."""
     return fingerprint(entries)
 
 
 def file_digests(names: Iterable[str]) -> dict[str, str]:
-    """A hash of the content of each name that is the path of a file. Shipped files are part of the code."""
+    """A hash of the content for each name that is the path of a file. Names of shipped files need none: these
+    files are part of the code."""
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
         for name in names

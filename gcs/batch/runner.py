@@ -1,7 +1,7 @@
 """The loop in which many flights are flown: start, collect, store, report progress, stop without loss.
 
-Who flies is a crew: `gcs.batch.pool` (processes of our own, or a Dask cluster) or `gcs.batch.programs` (a
-program for each flight). The loop runs in the calling thread, and results are stored by it.
+A crew flies: `gcs.batch.pool` (processes on this machine, or a Dask cluster) or `gcs.batch.programs` (a
+program for each flight). The loop runs in the calling thread, which also stores the results.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ R = TypeVar("R")
 F_contra = TypeVar("F_contra", contravariant=True)
 R_co = TypeVar("R_co", covariant=True)
 
-Running = tuple[tuple[str, str], ...]  # of each flight that runs: its title, the last line that it wrote
+Running = tuple[tuple[str, str], ...]  # of each running flight: its title, the last line that it wrote
 _MOST_KEPT = 1000  # results held in memory
 
 
 class Crew(Protocol[F_contra, R_co]):
-    """Who flies. Flights are handed over in groups."""
+    """What flies the flights, which are handed over in groups."""
 
     @property
     def has_room(self) -> bool:
@@ -34,17 +34,17 @@ class Crew(Protocol[F_contra, R_co]):
         """Start a group of flights."""
 
     def collect(self) -> Sequence[R_co]:
-        """Wait a moment; return the results of what has ended. GcsError if a flight could not be flown."""
+        """Wait a moment; return the results of ended flights. GcsError if a flight could not be flown."""
 
     def running(self) -> Running:
-        """What runs now, as far as it is known here."""
+        """The flights that run now, as far as they are known in this process."""
 
     def recall(self) -> Sequence[R_co]:
-        """Start nothing more and end what runs; return the results that are whole."""
+        """Start nothing more and end what runs; return the complete results."""
 
 
 class _Buffer(Generic[R]):
-    """Results on their way to the store, which is called at most every `keep_s` seconds."""
+    """Buffered results for the store, which is called at most every `keep_s` seconds."""
 
     def __init__(self, store: Callable[[Sequence[R]], None], keep_s: float) -> None:
         self._store, self._keep_s = store, keep_s
@@ -52,13 +52,13 @@ class _Buffer(Generic[R]):
         self._stored_s = time.monotonic()
 
     def add(self, results: Sequence[R]) -> None:
-        """Keep results, and store all that is kept if it is time."""
+        """Buffer results; store all buffered results if it is time or there are `_MOST_KEPT`."""
         self._kept += results
         if len(self._kept) >= _MOST_KEPT or time.monotonic() - self._stored_s >= self._keep_s:
             self.flush()
 
     def flush(self) -> None:
-        """Store all that is kept."""
+        """Store all buffered results."""
         kept, self._kept, self._stored_s = self._kept, [], time.monotonic()
         if kept:
             self._store(kept)
@@ -74,9 +74,9 @@ def fly_all(
 ) -> bool:
     """Fly all groups of flights; False if it was stopped before the end.
 
-    `store` is given every result once, at most every `keep_s` seconds, also when the loop ends by a request
-    to stop or by an exception. `tell` is given the results since the last call and what runs now; it is
-    called several times a second.
+    `store` receives every result once, at most every `keep_s` seconds, also if the loop ends by a request to
+    stop or by an exception. `tell` receives the results since its last call and the flights that run now; it
+    is called several times a second.
     """
     waiting = iter(groups)
     exhausted = False
@@ -97,7 +97,7 @@ def fly_all(
             tell(results, crew.running())
         return False
     finally:
-        buffer.flush()  # before waiting for what still runs, which a second Ctrl-C abandons
+        buffer.flush()  # before waiting for running flights, which a second Ctrl-C abandons
         results = crew.recall()
         buffer.add(results)
         buffer.flush()

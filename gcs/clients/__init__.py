@@ -1,1 +1,2 @@
-"""Ground ends of the MAVLink services: machines without socket or clock, fed with datagrams and `now_us`."""
+"""The ground side of the MAVLink services: state machines without socket or clock, whose inputs are datagrams
+and `now_us`."""

@@ -1,9 +1,9 @@
-"""Telemetry into a .tlog, in an order that depends on nothing but what was said.
+"""Writes telemetry into a .tlog, in an order that depends only on the content of the messages.
 
-Within a sync window (what lies between two `flush`es) the truth comes first, then the vehicle, then what the
-ground sent; all records of a window carry its time. So a flight captured from byte queues in one process and
-one captured over UDP in lockstep are the same file. TIMESYNC, which only one of them has, is left
-out, and SIM_BOOT, which is another one in every run.
+Within a sync window (between two calls of `flush`) the messages of the truth come first, then those of the
+vehicle, then those that the ground sent; all records of a window carry its time. A flight captured from byte
+queues in one process and the same flight captured over UDP in lockstep therefore give the same file. TIMESYNC
+is left out because only one of the two has it, and SIM_BOOT because it differs in every run.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Protocol
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.datagrams import messages
 
-LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: lockstep has no wall clock of its own
+LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: there is no wall clock in lockstep
 
 _LEFT_OUT = {mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_SIM_BOOT}
 
 
 class FrameLog(Protocol):
-    """What the capture writes into: autopilot.wire.tlog.TlogWriter."""
+    """The destination of the capture: autopilot.wire.tlog.TlogWriter."""
 
     def write(self, unix_us: int, *frames: bytes) -> None:
         """Append a record of this time for each frame."""
@@ -37,15 +37,15 @@ class Capture:
         self._sent: list[bytes] = []
 
     def on_truth(self, datagram: bytes) -> None:
-        """A datagram of the simulated world."""
+        """Add a datagram of the simulated world."""
         self._truth.append(datagram)
 
     def on_vehicle(self, datagram: bytes) -> None:
-        """A datagram of the vehicle."""
+        """Add a datagram of the vehicle."""
         self._vehicle.append(datagram)
 
     def on_sent(self, datagram: bytes) -> None:
-        """A datagram of ours."""
+        """Add a datagram that the ground station sent."""
         self._sent.append(datagram)
 
     def flush(self, now_us: int) -> None:

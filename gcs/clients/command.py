@@ -1,4 +1,4 @@
-"""The command protocol: COMMAND_LONG until a COMMAND_ACK says how it ended."""
+"""The command protocol: COMMAND_LONG is repeated until a COMMAND_ACK gives the result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcs.clients.operation import GROUND, Result, Retry, Status, Target, address
 RETRY_US = 500_000
 SENDS = 5
 PATIENCE_US = 5_000_000  # after IN_PROGRESS
-FORCE = 21196.0  # the number that makes arming and disarming unconditional
+FORCE = 21196.0  # the MAVLink number that makes arming and disarming unconditional
 UNUSED = math.nan
 
 _RESULTS = {
@@ -22,7 +22,7 @@ _RESULTS = {
 
 
 class CommandOperation:
-    """One command. `name` is what a person calls it; `percent` what the vehicle says of its progress."""
+    """One command. `name` is its name in texts; `percent` is the progress that the vehicle reports."""
 
     def __init__(
         self, target: Target, name: str, command: int, parameters: Sequence[float] = (), sends: int = SENDS
@@ -74,7 +74,7 @@ class CommandOperation:
 
 
 class RepositionOperation(CommandOperation):
-    """Take the load to a place: COMMAND_INT, because a float32 knows degrees to a metre only."""
+    """Fly the load to a place by COMMAND_INT, because a float32 resolves degrees only to a metre."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class RepositionOperation(CommandOperation):
         self._latitude_degE7 = latitude_degE7
         self._longitude_degE7 = longitude_degE7
         self._height_m = height_m
-        self._speed_m_s = -1.0 if speed_m_s is None else speed_m_s  # -1: the vehicle's own
+        self._speed_m_s = -1.0 if speed_m_s is None else speed_m_s  # -1: the vehicle's default
 
     def _message(self, confirmation: int) -> Any:
         change_mode, radius = 1.0, 0.0
@@ -112,13 +112,13 @@ def arm(target: Target, force: bool = False) -> CommandOperation:
 
 
 def disarm(target: Target, force: bool = False) -> CommandOperation:
-    """Stop the rotors; in the air only by force."""
+    """Stop the rotors; in the air only with `force`."""
     parameters = (0.0, FORCE if force else 0.0)
     return CommandOperation(target, "disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, parameters)
 
 
 def run_prearm_checks(target: Target) -> CommandOperation:
-    """Have the vehicle say in texts what keeps it from being armed."""
+    """Have the vehicle report in status texts what prevents arming."""
     return CommandOperation(target, "pre-arm checks", mavlink.MAV_CMD_RUN_PREARM_CHECKS)
 
 
@@ -133,12 +133,12 @@ def pause(target: Target) -> CommandOperation:
 
 
 def resume(target: Target) -> CommandOperation:
-    """Go on with a paused mission."""
+    """Continue a paused mission."""
     return CommandOperation(target, "resume", mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (1.0,))
 
 
 def takeoff(target: Target, altitude_amsl_m: float = UNUSED) -> CommandOperation:
-    """Lift the load; NaN leaves the height to the vehicle's parameter."""
+    """Lift the load; NaN: to the height of the vehicle's parameter."""
     parameters = (UNUSED, UNUSED, UNUSED, UNUSED, UNUSED, UNUSED, altitude_amsl_m)
     return CommandOperation(target, "takeoff", mavlink.MAV_CMD_NAV_TAKEOFF, parameters)
 
@@ -155,8 +155,8 @@ def reposition(
     height_m: float,
     speed_m_s: float | None = None,
 ) -> RepositionOperation:
-    """Take the load there and hold it, `height_m` above the origin (NaN: at its height), at this speed (None:
-    the vehicle's own)."""
+    """Fly the load to this place and hold it, `height_m` above the origin (NaN: at its present height), at
+    this speed (None: the vehicle's default)."""
     return RepositionOperation(target, latitude_degE7, longitude_degE7, height_m, speed_m_s)
 
 
@@ -169,7 +169,7 @@ def set_mode(target: Target, name: str, main: int, sub: int, armed: bool) -> Com
 
 
 def message_interval(target: Target, message_id: int, interval_us: int) -> CommandOperation:
-    """Ask for a message every `interval_us` of the vehicle's time."""
+    """Request a message every `interval_us` of the vehicle's time."""
     name = mavlink.mavlink_map[message_id].msgname
     return CommandOperation(
         target,
@@ -180,7 +180,7 @@ def message_interval(target: Target, message_id: int, interval_us: int) -> Comma
 
 
 def request_message(target: Target, message_id: int) -> CommandOperation:
-    """Ask for a message once."""
+    """Request a message once."""
     name = mavlink.mavlink_map[message_id].msgname
     return CommandOperation(
         target, f"request of {name}", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),)

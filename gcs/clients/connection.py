@@ -1,4 +1,4 @@
-"""The ground's end of one link: our frames and heartbeat, and which vehicle is at the other end."""
+"""The ground's end of one link: its frames and heartbeat, and which vehicle is at the other end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOT_A_VEHICLE = {mavlink.MAV_TYPE_GCS, mavlink.MAV_TYPE_ONBOARD_CONTROLLER}
 
 
 class Connection:
-    """Learns the vehicle from its first heartbeat and hears no other system from then on."""
+    """Takes the first heartbeat of a vehicle as the vehicle of this link and ignores all other systems."""
 
     def __init__(self, link_timeout_us: int = LINK_TIMEOUT_US) -> None:
         self._sign: Sign | None = None
@@ -30,12 +30,12 @@ class Connection:
         self._heard_us: int | None = None
 
     def sign_with(self, signing: Signing) -> None:
-        """From now on our frames are signed, and of the vehicle only signed ones are heard."""
+        """From now on sign our frames, and accept only signed frames of the vehicle."""
         self.signatures = Signatures(signing)
         self._sign = signing.signer(0)
 
     def receive(self, datagram: bytes, now_us: int) -> list[Received]:
-        """The vehicle's messages in `datagram`; whatever else it holds is dropped."""
+        """The vehicle's messages in `datagram`; all other contents are dropped."""
         received, junk = messages(datagram)
         self.junk_bytes += junk
         ours = []
@@ -74,14 +74,14 @@ class Connection:
         return [self.frame(heartbeat)]
 
     def frame(self, message: Any) -> bytes:
-        """`message` as one datagram of ours."""
+        """`message` as one datagram from the ground station."""
         return self._writer.frame(message, self._sign)
 
     def lost(self, now_us: int) -> bool:
-        """True when the vehicle was there and has been silent for longer than the link may be."""
+        """True if a vehicle was heard and has been silent for longer than the link timeout."""
         return self._heard_us is not None and now_us - self._heard_us > self._link_timeout_us
 
 
 def is_vehicle(heartbeat: Any) -> bool:
-    """Whether it is of a vehicle, not of a ground station or a companion computer."""
+    """Whether a heartbeat is from a vehicle, not from a ground station or a companion computer."""
     return heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID and heartbeat.type not in _NOT_A_VEHICLE

@@ -1,4 +1,4 @@
-"""Datagrams as messages, decoded once for all who look at them."""
+"""Datagrams as messages, decoded once for all their readers."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from functools import lru_cache
 
 from autopilot.wire.codec import Received, decode
 
-# the client, the capture and lockstep look at each datagram within one window of some ten datagrams
+# the client, the capture and lockstep read each datagram within one window of some ten datagrams
 _REMEMBERED = 128
 
 
 @lru_cache(maxsize=_REMEMBERED)
 def messages(datagram: bytes) -> tuple[tuple[Received, ...], int]:
-    """`decode(datagram)`: the messages, not to be changed, and how many bytes were none.
+    """`decode(datagram)`: the messages, which must not be changed, and the number of bytes outside messages.
 
-    What is only recorded, or only the newest of which counts, is never made an object of.
+    A message that is only recorded, or replaced by a newer one before it is read, never becomes an object.
     """
     received, junk = decode(datagram)
     return tuple(received), junk

@@ -1,7 +1,7 @@
-"""A flight by an autopilot that knows of no load: found, uploaded, armed, flown and landed by its messages.
+"""A flight by an autopilot that knows of no load: find it, upload, arm, fly and land, judged by its messages.
 
-Unlike Plumbline's it tells no phases: that it flies is told by EXTENDED_SYS_STATE, where it is by
-MISSION_CURRENT, and the load is seen by the simulator alone.
+Unlike Plumbline's autopilot, it reports no phases: EXTENDED_SYS_STATE says whether it flies, MISSION_CURRENT
+says at which item it is, and only the simulator knows about the load.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Target
 
 READY_LIMIT_US = 120_000_000  # its estimator settles for half a minute of its own time
-AGAIN_US = 500_000  # after a refusal: it answers before it is ready, and may say to be ready before it is
+AGAIN_US = 500_000  # after a refusal: it answers, and may report that it is ready, before it is
 _STREAMS_US = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 50_000,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000,
@@ -48,12 +48,12 @@ _WATCHED = frozenset(
 
 @dataclass(frozen=True)
 class Firmware:
-    """What one autopilot wants that others do not."""
+    """What distinguishes one third-party autopilot from others."""
 
     title: str
     begins_with_home: bool  # item 0 of a mission is home
-    takes_off_low: bool  # lets a mission begin below the length of a cable
-    tells_ready: bool  # by the pre-arm bit of SYS_STATUS
+    takes_off_low: bool  # accepts a take-off to less than the length of the cable
+    tells_ready: bool  # reports readiness by the pre-arm bit of SYS_STATUS
     before_arming: Callable[[Target], Operation]  # the mode in which it is armed
 
 
@@ -71,7 +71,7 @@ FIRMWARES = {"ardupilot": ARDUPILOT, "px4": PX4}
 
 
 class FirmwareFlight(FlightClient):
-    """Flies `items`, which begin with a take-off and end with a landing, by a firmware of others."""
+    """Flies `items`, which begin with a take-off and end with a landing, with a third-party firmware."""
 
     def __init__(
         self,

@@ -1,6 +1,7 @@
-"""A mission of the load as one of the vehicle: what autopilots fly that know of no load.
+"""Converts a mission of the load into a mission of the vehicle, for autopilots that know of no load.
 
-Each place of the load becomes one of the vehicle, a cable length above it. What cannot be said so is refused.
+Each place of the load becomes a place of the vehicle, a cable length above it. Steps that cannot be expressed
+in this way are refused.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE
 from missions.model import Delay, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint
 
-SLACK_SHARE = 0.6  # of the cable's length: how high the vehicle goes over the load that lies on the ground
-SETTLE_S = 2.0  # over it, and once it hangs
-_GROUND_SPEED = 1.0  # of DO_CHANGE_SPEED
+SLACK_SHARE = 0.6  # of the cable's length: height of the vehicle above the load that lies on the ground
+SETTLE_S = 2.0  # hold time above the load on the ground, and again once it hangs
+_GROUND_SPEED = 1.0  # speed type of DO_CHANGE_SPEED
 _UNCHANGED = -1.0  # throttle
 _NAMES = {
     "Winch": "the winch",
@@ -26,7 +27,7 @@ _NAMES = {
 
 
 class FirmwareMissionError(ValueError):
-    """A step that firmwares cannot fly."""
+    """A step that third-party firmware cannot fly."""
 
 
 def firmware_items(
@@ -39,9 +40,10 @@ def firmware_items(
 ) -> tuple[WireItem, ...]:
     """The items of these steps, for a vehicle that stands `stands_m` (its centre of mass) above the ground.
 
-    Heights of the items are above where it stood, as firmwares take them. `begins_with_home`: item 0 is home
-    and is not flown, as with ArduPilot. `takes_off_low`: it goes over the load with the cable slack first;
-    else it lifts it from beside. After a release the places are the vehicle's own.
+    Heights of the items are relative to where the vehicle stood, as firmware interprets them.
+    `begins_with_home`: item 0 is home and is not flown, as with ArduPilot. `takes_off_low`: the vehicle first
+    flies above the load with the cable slack; else it lifts the load from beside it. After a release, the
+    places are those of the vehicle.
     """
     items: list[WireItem] = []
     if begins_with_home:
@@ -55,7 +57,7 @@ def firmware_items(
         match step:
             case Takeoff():
                 height = step.altitude_m
-                # the vehicle stands beside the load: it goes over it with the cable slack, then lifts
+                # the vehicle stands beside the load: it flies above it with the cable slack, then lifts it
                 low = (east, north, max(SLACK_SHARE * cable_m - stands_m, 0.0))
                 first = low if takes_off_low else here()
                 items.append(_item(mavlink.MAV_CMD_NAV_TAKEOFF, place=first, home=home))

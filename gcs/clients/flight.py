@@ -1,18 +1,19 @@
-"""One whole flight as a machine: find the vehicle, upload, arm, fly, and say how it ended.
+"""One whole flight as a state machine: find the vehicle, upload, arm, fly, and report how it ended.
 
     stage     what happens                               then      if the vehicle refuses
-    FIND      its heartbeat is awaited                    STREAMS   -
-    STREAMS   the fast messages of the report are asked   UPLOAD    UPLOAD
-    UPLOAD    the mission                                 READY     OVER refused
-    READY     its pre-arm health bit is awaited, a while  ARM       -
+    FIND      wait for its heartbeat                      STREAMS   -
+    STREAMS   request the fast messages of the report     UPLOAD    UPLOAD
+    UPLOAD    upload the mission                          READY     OVER refused
+    READY     wait for its pre-arm health bit, a while    ARM       -
     ARM       rotors on                                   START     OVER refused
-    START     the mission is started                      FLY       DISARM
+    START     start the mission                           FLY       DISARM
     FLY       until landed and disarmed, or lost          OVER      -
     DISARM    rotors off again                            OVER      OVER
 
-Time limits run on the vehicle's clock once it flies, so that they hold at any speed of simulation.
+Once the vehicle flies, time limits run on its clock, so that they hold at any speed of simulation.
 
-From STREAMS until it flies the vehicle is also asked for its parameters, for the record; nothing waits.
+From STREAMS until the vehicle flies, its parameters are also requested, for the record; no stage waits for
+them.
 """
 
 from __future__ import annotations
@@ -44,27 +45,27 @@ REPORT_MESSAGES = (
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
 )
 FIND_LIMIT_US = 30_000_000
-READY_LIMIT_US = 20_000_000  # then it is asked to arm all the same, and says what is wrong
+READY_LIMIT_US = 20_000_000  # then arming is requested nevertheless, and the vehicle reports what is wrong
 AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the pictures
-TIME_FACTOR = 1.5  # a flight may take this many times what was expected,
-TIME_MARGIN_S = 60.0  # and this much more
+TIME_FACTOR = 1.5  # a flight may take this many times the expected time,
+TIME_MARGIN_S = 60.0  # plus this margin
 
 OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the flight ended, and why if not well."""
+    """How the flight ended, and the reason if it did not complete."""
 
     name: OutcomeName
     reason: str = ""
 
     def because(self, why: str) -> Outcome:
-        """The outcome with another reason beside its own, if there is one."""
+        """The outcome with `why`, if not empty, in front of its reason."""
         return replace(self, reason="; ".join(filter(None, (why, self.reason)))) if why else self
 
     def of_mission(self, mission: Mission) -> Outcome:
-        """With its reason in the mission's terms; the vehicle counts items as they are uploaded."""
+        """The outcome with its reason in the mission's terms; the vehicle counts the uploaded items."""
         return replace(self, reason=of_mission(self.reason, mission))
 
 
@@ -82,7 +83,7 @@ class Stage(Enum):
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the flight is. `phase` is the stage until the vehicle flies, then the phase it reports."""
+    """Progress of the flight. `phase` is the stage until the vehicle flies, then the phase it reports."""
 
     stage: Stage
     phase: str
@@ -92,7 +93,7 @@ class Progress:
     load_error_m: float | None
     rotor_use: float | None  # 1.0: a rotor at its limit
     sim_time_s: float  # the vehicle's clock
-    text: str  # what the vehicle said last
+    text: str  # the last status text of the vehicle
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,8 @@ class Row:
     after: Stage
     refused: Stage = Stage.OVER
     operations: Callable[[FlightClient], Sequence[Operation]] | None = None
-    done: Callable[[FlightClient], bool] | None = None  # awaited when the operations have ended
-    barred: Callable[[FlightClient], str] | None = None  # why the flight cannot go on from here, or empty
+    done: Callable[[FlightClient], bool] | None = None  # awaited after the operations have ended
+    barred: Callable[[FlightClient], str] | None = None  # why the flight cannot continue from here, or empty
     limit_us: int | None = None
     late: Callable[[FlightClient], Outcome] | None = None
 
@@ -111,8 +112,8 @@ class Row:
 class FlightClient:
     """Flies `items`, which begin with a take-off and end with a landing.
 
-    `expected_s` is how long the flight should take and `limit_s` how long it may, by the vehicle's clock;
-    `link_timeout_us` is how long the vehicle may be silent by ours.
+    `expected_s` is how long the flight should take and `limit_s` how long it may take, by the vehicle's
+    clock; `link_timeout_us` is how long the vehicle may be silent, by the ground station's clock.
     """
 
     def __init__(
@@ -123,7 +124,7 @@ class FlightClient:
         link_timeout_us: int = LINK_TIMEOUT_US,
     ) -> None:
         self.outcome: Outcome | None = None
-        self.fell_silent = False  # the vehicle did, which ended the flight
+        self.fell_silent = False  # the vehicle fell silent, which ended the flight
         self.begun = False  # the vehicle was armed
         self.stage = Stage.FIND
         self.view = VehicleView()
@@ -132,21 +133,21 @@ class FlightClient:
         self._expected_s = expected_s
         self._limit_s = limit_s if limit_s is not None else expected_s * TIME_FACTOR + TIME_MARGIN_S
         self._operations: list[Operation] = []
-        self._parameters: ParameterList | None = None  # while they are asked for
-        self._stage_began_us: int | None = None  # our clock
+        self._parameters: ParameterList | None = None  # while they are being requested
+        self._stage_began_us: int | None = None  # the ground station's clock
         self._flight_began_us: int | None = None  # the vehicle's clock
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
         self._texts_armed = 0  # texts that came before arming
         self._was_armed = False
         self._was_airborne = False
         self._mission_over = False
-        self._by_hand = False  # somebody leads the flight through us
-        self._beat: bytes | None = None  # the last heartbeat that was watched
+        self._by_hand = False  # the user controls the flight through this client
+        self._beat: bytes | None = None  # the last heartbeat that was examined
         self._in_mission = False  # the vehicle has flown the mission
         self._left_for = ""  # the mode for which it has left the mission
-        self._texts_in_mission = 0  # that came while it flew the mission
+        self._texts_in_mission = 0  # texts that came before the last heartbeat in mission mode
         self._item_flown = 0  # the last one in the air
-        self._setpoint: tuple[int, int] | None = None  # phase and item that were watched last
+        self._setpoint: tuple[int, int] | None = None  # phase and item of the last setpoint
         self._given_up_us: int | None = None  # the vehicle's clock at the failure
         self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
 
@@ -154,17 +155,17 @@ class FlightClient:
 
     @property
     def watched(self) -> frozenset[int]:
-        """Messages that may tell how the flight goes."""
+        """Messages from which the state of the flight is derived."""
         return _WATCHED
 
     def row(self, stage: Stage) -> Row:
-        """The table above."""
+        """The row of the table above."""
         return _TABLE[stage]
 
     # ---- in and out
 
     def receive(self, datagram: bytes, now_us: int) -> None:
-        """Take a datagram of the vehicle in."""
+        """Process a datagram of the vehicle."""
         for one in self.connection.receive(datagram, now_us):
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and (
                 one.component != getattr(self.connection.target, "component", None)
@@ -179,7 +180,7 @@ class FlightClient:
                 self._watch()
 
     def poll(self, now_us: int) -> list[bytes]:
-        """Let time pass; the datagrams to send now."""
+        """Advance to `now_us`; return the datagrams to send now."""
         if self.outcome is not None:
             return []
         datagrams = self.connection.poll(now_us)
@@ -196,16 +197,17 @@ class FlightClient:
 
     @property
     def silent_until_us(self) -> int:
-        """Until when, by our clock, `poll` sends nothing, whatever is received; 0: that is not known."""
+        """Time on the ground station's clock until which `poll` sends nothing, whatever is received; 0: not
+        known."""
         return self.connection.next_heartbeat_us if self.stage is Stage.FLY else 0
 
     def fly_on(self) -> None:
-        """Somebody leads the flight by hand: it may take as long as it likes."""
+        """The user takes control of the flight: it has no time limit from now on."""
         self._limit_s = math.inf
         self._by_hand = True
 
     def interrupt(self, reason: str = "stopped by the user") -> None:
-        """End the flight from outside, if it is not over."""
+        """End the flight from outside, if it has not ended."""
         if self.outcome is None:
             self._end(self._pending or Outcome("interrupted", reason))
 
@@ -215,14 +217,14 @@ class FlightClient:
             self._end((self._pending or Outcome("lost")).because(reason))
 
     def explain_silence(self, why: str) -> None:
-        """Why the vehicle fell silent, if it did and that is known."""
+        """Add to the outcome why the vehicle fell silent, if it did; `why` is empty if that is not known."""
         if self.fell_silent and self.outcome is not None:
             self.outcome = self.outcome.because(why)
 
     # ---- the table at work
 
     def _advance(self, now_us: int) -> bool:
-        """Finish an operation or a stage if it is at its end; True if something changed."""
+        """Finish the current operation or stage if it has ended; True if something changed."""
         if self.stage is Stage.FLY:
             return self._judge()
         row = self.row(self.stage)
@@ -255,7 +257,7 @@ class FlightClient:
         return False
 
     def _refused(self, row: Row, result: Result, now_us: int) -> None:
-        if row.refused is row.after:  # the flight goes on without it
+        if row.refused is row.after:  # the flight continues without it
             self._operations.pop(0)
             return
         reasons = self.view.complaints_since(self._texts_before)
@@ -293,14 +295,14 @@ class FlightClient:
     # ---- the flight itself
 
     def _is_news(self, one: Received) -> bool:
-        """Whether a watched message may tell something else than the last of its kind did."""
+        """Whether a watched message may contain something new compared with the last of its kind."""
         if one.id != mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
             return True
         before, self._setpoint = self._setpoint, (_PHASE.of(one.frame), _SEQ.of(one.frame))
         return self._setpoint != before
 
     def _watch(self) -> None:
-        """Note what one message may have told and the next may hide."""
+        """Record facts from the latest messages, which the next messages may no longer contain."""
         view = self.view
         phase = view.phase
         self._watch_mode()
@@ -325,7 +327,8 @@ class FlightClient:
                 self._given_up_us = view.time_us or 0
 
     def _watch_mode(self) -> None:
-        """Note that the vehicle has left the mission, which we never ask for, and for what."""
+        """Record if the vehicle leaves the mission mode, which this client never requests, and for which
+        mode."""
         view = self.view
         beat = view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         if beat == self._beat or not view.armed:
@@ -337,7 +340,8 @@ class FlightClient:
             self._left_for = view.mode or ""
 
     def _who_ended_it(self) -> str:
-        """What made the vehicle leave the mission: the vehicle, if it says why, or else somebody else."""
+        """Why the vehicle left the mission: its own reason if it reported one, else a command by another
+        ground station."""
         if not self._left_for or self._by_hand:
             return ""
         said = self.view.complaints_since(self._texts_in_mission)
@@ -345,7 +349,7 @@ class FlightClient:
         return "; ".join(said) or f"{what} commanded by another ground station"
 
     def _trouble(self) -> str:
-        """Why the autopilot has given up, empty while it has not."""
+        """Why the autopilot has given up; empty if it has not."""
         if self.view.phase == _FAILSAFE:
             cries = self.view.complaints_since(self._texts_armed, mavlink.MAV_SEVERITY_CRITICAL)
             return "; ".join(cries) or "the autopilot went into failsafe"
@@ -354,7 +358,7 @@ class FlightClient:
         return ""
 
     def _judge(self) -> bool:
-        """End the flight if it is over; True if it is."""
+        """End the flight if an end condition holds; True if it does."""
         view = self.view
         now_us = view.time_us
         if now_us is None:
@@ -387,7 +391,7 @@ class FlightClient:
         reasons = self.view.complaints_since(self._texts_armed)
         return Outcome("refused", "; ".join(["the vehicle disarmed before take-off", *reasons]))
 
-    # ---- what a person sees
+    # ---- progress for display
 
     @property
     def progress(self) -> Progress:

@@ -1,4 +1,4 @@
-"""An exchange that is begun anew where the vehicle refuses it, until a time is over."""
+"""An exchange that is repeated while the vehicle refuses it, up to a time limit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gcs.clients.operation import Operation, Result, Status
 
 
 class Insisting:
-    """Runs what `make` makes; after a refusal again `pause_us` later, for no longer than `limit_us`."""
+    """Runs the operation that `make` returns and, `pause_us` after a refusal, a new one, until `limit_us`."""
 
     def __init__(self, make: Callable[[], Operation], pause_us: int, limit_us: int) -> None:
         self.result: Result | None = None

@@ -1,8 +1,9 @@
-"""The ground's half of lockstep: the vehicle's TIMESYNC opens our turn, our answer ends it.
+"""The ground station's part of lockstep: the vehicle's TIMESYNC begins its turn, its answer ends the turn.
 
-The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 > ts1), so
-whatever we send before the answer is handled at that very tick. A later tc1 is a promise that we send nothing
-before that time: until then the vehicle asks, but does not wait for answers, and gets none.
+The vehicle waits between its question (tc1 = 0, ts1 = its time in ns) and the answer (tc1 > ts1), so it
+processes whatever the ground station sends before the answer at that same tick. A later tc1 promises that the
+ground station sends nothing before that time: until then the vehicle asks, but does not wait for answers, and
+gets none.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ _TIMES = {
 class LockstepTurns:
     """Finds the vehicle's questions and makes each answer once.
 
-    The answers have a sequence counter of their own: in one process there are none, and the numbers of the
-    other frames must not depend on that.
+    The answers have a separate sequence counter: if everything runs in one process there are no answers, and
+    the sequence numbers of the other frames must be the same in both cases.
     """
 
     def __init__(self) -> None:
@@ -38,20 +39,22 @@ class LockstepTurns:
         self._answer = b""
 
     def question(self, datagram: bytes) -> int | None:
-        """The vehicle's time in ns if `datagram` holds its question, else None."""
+        """The vehicle's time in ns if `datagram` contains its question, else None."""
         for one in messages(datagram)[0]:
             if one.id == mavlink.MAVLINK_MSG_ID_TIMESYNC and _TC1.of(one.frame) == 0:
                 return int(_TS1.of(one.frame))
         return None
 
     def repeated(self, question_ns: int) -> bytes | None:
-        """The answer given before, if this very question, or an older one, was answered."""
+        """The earlier answer if this question was already answered; empty if it is older than the last
+        answered question; None if it is new."""
         if self._answered_ns is None or question_ns > self._answered_ns:
             return None
         return self._answer if question_ns == self._answered_ns else b""
 
     def answer(self, question_ns: int, silent_until_us: int = 0) -> bytes:
-        """The datagram that ends our turn, and the promise to send nothing before a time."""
+        """The datagram that ends the ground station's turn and promises to send nothing before
+        `silent_until_us`."""
         self._answered_ns = question_ns
         silent_until_ns = max(question_ns + 1, silent_until_us * 1000)
         self._answer = self._writer.frame((_TIMESYNC, (silent_until_ns, question_ns)))
@@ -59,24 +62,24 @@ class LockstepTurns:
 
 
 class TruthQueue:
-    """Holds truth datagrams back until their own time has come.
+    """Holds truth datagrams back until the time that they carry is reached.
 
-    The simulator may already be at a later tick when the ground reads what it sent: what belongs to a later
-    window must not land in this one.
+    The simulator may already be at a later tick when the ground station reads its datagrams: a datagram of a
+    later window must not be recorded in this one.
     """
 
     def __init__(self) -> None:
         self._waiting: list[tuple[int, bytes]] = []
 
     def put(self, datagrams: Iterable[bytes]) -> None:
-        """Take datagrams in, in the order of their arrival."""
+        """Add datagrams in the order of their arrival."""
         for datagram in datagrams:
             received, _ = messages(datagram)
             times = [_TIMES[one.id].of(one.frame) for one in received if one.id in _TIMES]
             self._waiting.append((max(times, default=0), datagram))
 
     def until(self, now_us: int) -> list[bytes]:
-        """The datagrams that tell of times up to `now_us`, taken out."""
+        """Remove and return the datagrams whose times are at most `now_us`."""
         ready = [datagram for time_us, datagram in self._waiting if time_us <= now_us]
         self._waiting = [(time_us, datagram) for time_us, datagram in self._waiting if time_us > now_us]
         return ready
@@ -85,7 +88,8 @@ class TruthQueue:
 def ground_turn(
     client: FlightClient, capture: Capture, truth: list[bytes], vehicle: list[bytes], now_us: int
 ) -> list[bytes]:
-    """The ground station's turn: hears the vehicle, answers, and keeps a record of both and of the truth."""
+    """The ground station's turn: process the vehicle's datagrams, return those to send, and capture both and
+    the truth."""
     for datagram in truth:
         capture.on_truth(datagram)
     for datagram in vehicle:

@@ -1,4 +1,4 @@
-"""The mission protocol: upload, download, clear, over a link that loses, doubles and reorders datagrams."""
+"""The mission protocol: upload, download, clear, on a link that loses, duplicates and reorders datagrams."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from autopilot.wire.items import WireItem
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
 
 RETRY_US = 300_000
-SENDS = 12  # of one message; with 20 % lost each way all twelve fail once in two hundred thousand
+SENDS = 12  # of one message; with 20 % lost each way, all twelve fail once in two hundred thousand
 RESTARTS = 3  # of a whole upload
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _NAMES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence", mavlink.MAV_MISSION_TYPE_RALLY: "rally points"}
@@ -28,10 +28,11 @@ def _ours(message: Any, kind: int = _MISSION) -> bool:
 
 
 class MissionUpload:
-    """Put `items` on the vehicle: COUNT, one ITEM for each REQUEST, ACK.
+    """Upload `items` to the vehicle: COUNT, one ITEM for each REQUEST, ACK.
 
-    The vehicle leads: it asks for what it lacks. We speak up only when it is silent: with the count while no
-    item was asked for, with the last item asked for later on, and from the start when that is of no use.
+    The vehicle leads: it requests the items that it lacks. The ground station sends unrequested messages only
+    while the vehicle is silent: the count until an item is requested, later the last requested item, and if
+    that does not help, the upload starts again.
     """
 
     def __init__(self, target: Target, items: Sequence[WireItem], kind: int = _MISSION) -> None:
@@ -40,9 +41,9 @@ class MissionUpload:
         self._items = tuple(items)
         self._kind = kind  # MAV_MISSION_TYPE
         self._name = _NAMES.get(kind, "upload")
-        self._asked: list[int] = []  # items asked for and not yet sent
+        self._asked: list[int] = []  # items requested and not yet sent
         self._last: int | None = None
-        self._next = 0  # items 0 ... next-1 were asked for
+        self._next = 0  # items 0 ... next-1 were requested
         self._restarts = 0
         self._retry = Retry(RETRY_US, SENDS)
 
@@ -68,7 +69,7 @@ class MissionUpload:
             if self._next == len(self._items):  # else it belongs to an older transfer
                 self.result = Result(Status.DONE, f"{self._name}: {len(self._items)} items accepted")
         elif result == mavlink.MAV_MISSION_INVALID_SEQUENCE:
-            return  # an item that came twice or too late; the vehicle asks again for what it lacks
+            return  # an item that came twice or too late; the vehicle requests again what it lacks
         elif result == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._restart()
         else:
@@ -106,7 +107,8 @@ class MissionUpload:
         return [self._item(self._last)]
 
     def _item(self, seq: int) -> Any:
-        """With the place in whole numbers, however it was asked for: a float32 knows it to a metre."""
+        """Item `seq` with its place in whole numbers, whichever request came: a float32 resolves it only to a
+        metre."""
         item = self._items[seq]
         return mavlink.MAVLink_mission_item_int_message(
             *self._target,
@@ -124,7 +126,7 @@ class MissionUpload:
 
 
 class MissionDownload:
-    """Fetch the mission: REQUEST_LIST, COUNT, one REQUEST_INT for each item, our ACK. `items` when done."""
+    """Download the mission: REQUEST_LIST, COUNT, a REQUEST_INT for each item, our ACK. `items` when done."""
 
     def __init__(self, target: Target, kind: int = _MISSION) -> None:
         self.result: Result | None = None

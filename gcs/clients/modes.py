@@ -1,5 +1,5 @@
-"""Flight modes in plain words, and their numbers by the autopilot that HEARTBEAT names: PX4's pairs of main
-mode and sub-mode, which all but ArduPilot use here, or the numbers of ArduPilot's Copter."""
+"""Names of flight modes, and their numbers, which depend on the autopilot that HEARTBEAT names: pairs of main
+mode and sub-mode as in PX4, which all but ArduPilot use here, or the numbers of ArduPilot's Copter."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ _AUTO_MODES = {
     9: "precision-land",
 }
 _FLOWN = ("position", "offboard", "takeoff", "hold", "mission", "return", "land")
-# by this vehicle: main mode and sub-mode
+# the modes of `_FLOWN`: main mode and sub-mode
 _PX4: dict[str, tuple[int, int]] = {
     **{name: (main, 0) for main, name in _MAIN_MODES.items() if name in _FLOWN},
     **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _FLOWN},
 }
 MODES = tuple(sorted(_PX4))
-# as clients of ArduPilot, and PX4's own names in MAVLink, call some of them
+# other names of some modes: those of ArduPilot's clients, and PX4's names in MAVLink
 ALIASES = {"auto": "mission", "guided": "hold", "loiter": "hold", "poshold": "position", "rtl": "return"}
 _COPTER_MODES = {
     0: "stabilize",
@@ -54,12 +54,12 @@ _COPTER_MODES = {
     16: "poshold",
     17: "brake",
 }
-# a vehicle in GUIDED holds until it is led, as after a take-off, which is a command and no mode there
+# in GUIDED the vehicle holds until it gets a target, as after take-off, which is a command and no mode there
 _COPTER: dict[str, int] = {"hold": 4, "mission": 3, "return": 6, "land": 9, "position": 16}
 
 
 def mode_name(heartbeat: Any) -> str:
-    """The name of the mode that a HEARTBEAT tells."""
+    """The name of the mode in a HEARTBEAT."""
     number = heartbeat.custom_mode
     if heartbeat.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA:
         return _COPTER_MODES.get(number, f"mode {number}")
@@ -69,7 +69,7 @@ def mode_name(heartbeat: Any) -> str:
 
 
 def change_mode(target: Target, name: str, heartbeat: Any) -> CommandOperation:
-    """Change to one of `MODES` or `ALIASES`, of the vehicle that has sent this HEARTBEAT.
+    """Change the mode of the vehicle that sent this HEARTBEAT to one of `MODES` or `ALIASES`.
 
     InputError if it has no such mode.
     """

@@ -1,7 +1,7 @@
-"""What every exchange with the vehicle has in common: messages and `now_us` in, messages out, one result.
+"""The common parts of all exchanges with the vehicle: messages and `now_us` in, messages out, one result.
 
-An operation asks, waits, asks again and ends in a `Result`. It knows neither frames nor links: the owner
-hands it each message of the vehicle and sends what `poll` returns.
+An operation asks, waits, asks again and ends in a `Result`. It knows neither frames nor links: its owner
+passes it each message of the vehicle and sends the messages that `poll` returns.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, Protocol
 
 _REFUSING = ("denied", "refused", "rejected", "mission item")  # in the words of vehicles
 
-_STEM = 3  # letters, by which the vehicle's word for a thing is known as ours
+_STEM = 3  # letters: a vehicle's text that begins with the same letters as the subject names the subject
 
 
 class Target(NamedTuple):
-    """Whom a message is for."""
+    """The addressee of a message."""
 
     system: int
     component: int
@@ -27,16 +27,16 @@ class Status(Enum):
     """How an operation ended."""
 
     DONE = "done"
-    REFUSED = "refused"  # the vehicle said no
-    UNANSWERED = "unanswered"  # it said nothing, however often it was asked
+    REFUSED = "refused"  # the vehicle refused
+    UNANSWERED = "unanswered"  # the vehicle did not answer any of the tries
 
 
 @dataclass(frozen=True)
 class Result:
-    """How an operation ended; `text` is for a person.
+    """How an operation ended; `text` is for display.
 
-    `subject`: what was asked of the vehicle, with which its own words of a refusal begin.
-    `guess`: why no answer came, perhaps, where nothing better is known.
+    `subject`: what was requested; the vehicle's own text of a refusal begins with it.
+    `guess`: a possible reason why no answer came, used if no better one is known.
     """
 
     status: Status
@@ -49,7 +49,8 @@ class Result:
         return self.status is Status.DONE
 
     def refusal(self, words: Sequence[str]) -> str:
-        """A refusal in the vehicle's own words, if it has given some; what else it has said follows."""
+        """The text of a refusal: first those of the vehicle's texts `words` that refuse, then the others. If
+        none of them refuses, `text` comes first."""
         own = [one for one in words if self.subject and self._refuses(one)]
         if not own:
             return "; ".join([self.text, *words])
@@ -61,7 +62,7 @@ class Result:
         return words.startswith(self.subject) or any(one in words.lower() for one in _REFUSING)
 
     def silence(self, trouble: str) -> str:
-        """That no answer came, and why: `trouble` that is known of the link, or else a guess."""
+        """The text if no answer came, with a reason: the known `trouble` of the link, or else the guess."""
         return "; ".join(filter(None, (self.text, trouble or self.guess)))
 
 
@@ -71,14 +72,14 @@ class Operation(Protocol):
     result: Result | None
 
     def receive(self, message: Any, now_us: int) -> None:
-        """Take a message of the vehicle in."""
+        """Process a message of the vehicle."""
 
     def poll(self, now_us: int) -> list[Any]:
         """The messages to send now."""
 
     @property
     def progress(self) -> tuple[int, int]:
-        """(done, of how many); (0, 0) while that is not known."""
+        """(done, total); (0, 0) while that is not known."""
 
 
 class Retry:
@@ -91,31 +92,31 @@ class Retry:
         self._next_us: int | None = None
 
     def due(self, now_us: int) -> bool:
-        """True if it is time to ask, or to find that asking is of no use (see `exhausted`)."""
+        """True if it is time to ask again or, if `exhausted`, to give up."""
         return self._next_us is None or now_us >= self._next_us
 
     @property
     def exhausted(self) -> bool:
-        """Asked as often as may be; if `due` too, the last answer did not come."""
+        """True if no tries are left; if also `due`, the last try was not answered."""
         return self.sent >= self.sends
 
     def asked(self, now_us: int) -> None:
-        """Note that the question went out."""
+        """Record that the question was sent."""
         self.sent += 1
         self._next_us = now_us + self.interval_us
 
     def wait(self, now_us: int, interval_us: int) -> None:
-        """The vehicle is at work: ask no sooner than in `interval_us`."""
+        """The vehicle is working on it: do not ask again before `interval_us` has passed."""
         self._next_us = now_us + interval_us
 
     def restart(self) -> None:
-        """An answer came: the next question is due at once, and may be asked as often again."""
+        """An answer came: the next question is due immediately and has all its tries."""
         self.sent = 0
         self._next_us = None
 
 
 def addressed(message: Any, ground: Target) -> bool:
-    """True if `message` is for everybody or for us (0 means everybody)."""
+    """True if `message` is addressed to `ground` or to all systems (0 means all)."""
     system = getattr(message, "target_system", 0)
     component = getattr(message, "target_component", 0)
     return system in (0, ground.system) and component in (0, ground.component)

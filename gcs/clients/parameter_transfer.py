@@ -1,6 +1,6 @@
-"""The parameter protocol: the whole list with its gaps filled, one by name, and setting one for certain.
+"""The parameter protocol: read the whole list and fill its gaps, read one by name, set one and verify it.
 
-A value is sent as the float32 nearest to what was typed, also where the vehicle tells it as an INT32.
+A value is sent as the float32 nearest to the typed number, also if the vehicle sends it as an INT32.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gcs.clients.operation import GROUND, Result, Retry, Status, Target, address
 
 RETRY_US = 500_000
 SENDS = 6
-BURST = 20  # gaps of the list asked for at once
+BURST = 20  # missing parameters of the list requested in one go
 _ERRORS = {
     mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST: "no such parameter",
     mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE: "out of range",
@@ -25,7 +25,7 @@ _ERRORS = {
 
 
 class ParameterList:
-    """Every parameter; `values` by name in the vehicle's order when done."""
+    """Read every parameter; `values` by name in the vehicle's order when done."""
 
     def __init__(self, target: Target) -> None:
         self.result: Result | None = None
@@ -45,7 +45,7 @@ class ParameterList:
     def receive(self, message: Any, now_us: int) -> None:
         if self.result is not None or message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             return
-        if message.param_index >= message.param_count:  # 65535: the answer to somebody's PARAM_SET
+        if message.param_index >= message.param_count:  # 65535: the answer to a PARAM_SET
             return
         self._count = message.param_count
         if message.param_index not in self._found:
@@ -73,7 +73,7 @@ class ParameterList:
 
 
 class ParameterGet:
-    """One parameter by name; `value` when done."""
+    """Read one parameter by name; `value` when done."""
 
     def __init__(self, target: Target, name: str) -> None:
         self.result: Result | None = None
@@ -110,7 +110,7 @@ class ParameterGet:
 
 
 class ParameterSet:
-    """Set one parameter and see that the vehicle stored it."""
+    """Set one parameter and verify that the vehicle stored it."""
 
     def __init__(self, target: Target, name: str, value: float) -> None:
         self.result: Result | None = None
@@ -136,7 +136,7 @@ class ParameterSet:
             held = from_the_wire(message.param_value, message.param_type)
             if float32(held) == self._value:
                 self.result = Result(Status.DONE, f"{self.name} = {decimal_from_float32(self._value):.9g}")
-            else:  # refused, or an answer to an older question: the next tries will tell
+            else:  # refused, or an answer to an older question: the next tries decide which
                 self._held = held
 
     def poll(self, now_us: int) -> list[Any]:
@@ -168,7 +168,7 @@ def _is_value(message: Any, name: str) -> bool:
 
 
 def _error(message: Any, name: str) -> str | None:
-    """What a PARAM_ERROR about `name` says, None if `message` is none."""
+    """The text of a PARAM_ERROR about `name`; None if `message` is something else."""
     if message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_ERROR:
         return None
     if message.param_id != name or not addressed(message, GROUND):

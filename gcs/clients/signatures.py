@@ -1,4 +1,4 @@
-"""Which frames of a vehicle are heard where messages are signed, and why it is not heard or not answered."""
+"""Which frames of a vehicle are accepted if messages are signed, and why there is no contact or no answer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UNSIGNED = (
 
 
 class Signatures:
-    """Judges the frames of one vehicle."""
+    """Checks the signatures of the frames of one vehicle."""
 
     def __init__(self, signing: Signing | None = None) -> None:
         self._signing = signing
@@ -32,7 +32,7 @@ class Signatures:
         self._trouble = ""
 
     def accepts(self, one: Received) -> bool:
-        """Whether it is to be heard."""
+        """Whether the message is accepted."""
         signing = self._signing
         is_signed = one.frame[0] == _V2 and bool(one.frame[2] & mavlink.MAVLINK_IFLAG_SIGNED)
         if signing is None:
@@ -46,17 +46,17 @@ class Signatures:
             if one.id != mavlink.MAVLINK_MSG_ID_RADIO_STATUS:  # radios cannot sign
                 self._trouble = _UNSIGNED
         else:
-            # heard by one who remembers no earlier time: it is not the key
+            # if a signing state without earlier time stamps accepts it, the key is right
             by_key = Signing(signing.key).accepts(one.frame, one.id, one.system, one.component)
             self._trouble = _OTHER_TIME if by_key else _OTHER_KEY
         return heard
 
     @property
     def met(self) -> bool:
-        """Whether more than unsigned heartbeats is heard of the vehicle, where all shall be signed."""
+        """Whether a signed frame of the vehicle was accepted, or no signatures are required."""
         return self._signing is None or self._verified
 
     @property
     def trouble(self) -> str:
-        """What does not match, and what to do; empty where nothing is known to be wrong."""
+        """What does not match, and what to do; empty if no problem is known."""
         return "" if self._verified else self._trouble

@@ -1,7 +1,8 @@
-"""Whose truth it is: of the simulators that tell theirs at one port, only the vehicle's own is heard.
+"""Which truth belongs to the vehicle: of several simulators that send to one port, only its own is accepted.
 
-A simulator says in SIM_BOOT which run of the world it is: to the autopilot, which tells it on request, and
-among the truth. Several simulators may tell theirs at one port; they are told apart by where it comes from.
+A simulator identifies its run of the world by SIM_BOOT. It sends it to the autopilot, which reports it on
+request, and together with the truth. Several simulators may send to one port; they are distinguished by the
+address of the sender.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _OTHER = "--truth PORT names the port to which the vehicle's simulator sends it 
 
 
 class Worlds:
-    """The simulators that tell their truth at one port."""
+    """The simulators that send their truth to one port."""
 
     def __init__(self) -> None:
         self._runs: dict[Sender, int | None] = {}
@@ -29,17 +30,17 @@ class Worlds:
         return len(self._runs)
 
     def run(self, datagram: bytes, sender: Sender) -> int | None:
-        """Which run of the world a datagram tells of; None: its sender has not said."""
+        """The run of the world that a datagram belongs to; None: its sender has not identified it."""
         said = [_RUN.of(one.frame) for one in messages(datagram)[0] if one.id == _SIM_BOOT]
         self._runs[sender] = int(said[-1]) if said else self._runs.get(sender)
         return self._runs[sender]
 
 
 class Truth:
-    """Passes on the truth of the world that the vehicle flies in, and drops all other.
+    """Passes on the truth of the world that the vehicle flies in, and drops all other truth.
 
-    `vouched`: somebody has named the place at which it is told; a vehicle that cannot say which world it
-    flies in is then taken to fly in the one that tells there, while it is the only one.
+    `vouched`: the user has named the port to which the vehicle's simulator sends. A vehicle that cannot
+    report its world is then assumed to fly in the one whose simulator sends there, if only one does.
     """
 
     def __init__(self, where: str, vouched: bool) -> None:
@@ -48,15 +49,15 @@ class Truth:
         self._worlds = Worlds()
         self._run: int | None = None  # of the vehicle
         self._silent = ""  # why the vehicle did not answer
-        self.heard = False  # the vehicle's own
+        self.heard = False  # truth of the vehicle's world was received
 
     def of_vehicle(self, run: int | None, silent: str = "") -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say, or has not answered
-        and `silent` says why."""
+        """Set the run of the world that the vehicle reports; None: it does not report one, or it has not
+        answered and `silent` says why."""
         self._run, self._silent = run, silent
 
     def take(self, datagrams: Iterable[tuple[bytes, Sender]]) -> list[bytes]:
-        """Of datagrams with their senders those that tell of the vehicle's world."""
+        """Of datagrams with their senders, those of the vehicle's world."""
         own = []
         for datagram, sender in datagrams:
             run = self._worlds.run(datagram, sender)
@@ -68,7 +69,7 @@ class Truth:
 
     @property
     def missing(self) -> str:
-        """Why there is no truth of the vehicle's world, and what to do; empty where there is."""
+        """Why there is no truth of the vehicle's world, and what to do; empty if there is."""
         where = f"UDP {self._where}"
         if self.heard:
             return ""

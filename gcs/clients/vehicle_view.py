@@ -1,4 +1,4 @@
-"""What the ground knows of the vehicle: the newest message of each kind, and what it means."""
+"""What the ground station knows of the vehicle: the newest message of each kind, and its meaning."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gcs.clients.modes import mode_name
 BOOT_CLOCK = "SYSTEM_TIME"
 _TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
 
-# how a vehicle begins a text that it was asked for again: which of how many, and how old
+# the beginning of an earlier text that the vehicle sends again on request: number, total, and age
 _RECALLED = re.compile(r"\[(\d+)/(\d+), (-?\d+\.\d) s ago\] (.*)", re.DOTALL)
 _STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
 _IDS = {kind.msgname: message_id for message_id, kind in mavlink.mavlink_map.items()}
@@ -55,7 +55,7 @@ _MISSION_STATES = {
 
 
 class Text(NamedTuple):
-    """A STATUSTEXT, and when it was said by our clock."""
+    """A STATUSTEXT, and its time on the ground station's clock."""
 
     now_us: int
     severity: int
@@ -63,17 +63,17 @@ class Text(NamedTuple):
 
 
 class Newest(Mapping[str, Any]):
-    """The newest message of each name; it is decoded when it is looked at."""
+    """The newest message of each name; a message is decoded only when it is read."""
 
     def __init__(self) -> None:
         self._received: dict[int, Received] = {}
 
     def put(self, received: Received) -> None:
-        """It takes the place of the one before."""
+        """Store a message in place of the previous one of its kind."""
         self._received[received.id] = received
 
     def frame(self, message_id: int) -> bytes | None:
-        """The newest as it came."""
+        """The frame of the newest message as it was received, None if there is none."""
         received = self._received.get(message_id)
         return None if received is None else received.frame
 
@@ -88,18 +88,18 @@ class Newest(Mapping[str, Any]):
 
 
 class VehicleView:
-    """Kept up to date by `update`; every property is None until the vehicle has told it."""
+    """The state of the vehicle, updated by `update`; a property is None until the vehicle has sent it."""
 
     def __init__(self) -> None:
         self.latest = Newest()  # of the vehicle
         self.truth = Newest()  # of the simulated world
         self.texts: list[Text] = []
-        self.recalled: list[Text] = []  # said earlier, and told again because somebody asked
+        self.recalled: list[Text] = []  # earlier texts that the vehicle sent again on request
         self.recalled_all = False  # the last of these has come
         self._chunks: dict[int, list[str]] = {}
 
     def update(self, received: Received, now_us: int) -> None:
-        """Take one message of the vehicle in."""
+        """Process one message of the vehicle."""
         if received.id == _STATUSTEXT:
             self._text(received.message, now_us)
             return
@@ -130,7 +130,7 @@ class VehicleView:
         self.recalled_all = number == total
 
     def complaints_since(self, count: int, severity: int = mavlink.MAV_SEVERITY_WARNING) -> list[str]:
-        """Texts at least as severe as `severity`, without those there were when `len(texts)` was `count`."""
+        """Texts at least as severe as `severity` that came after the first `count` texts, without repeats."""
         found = [text.text for text in self.texts[count:] if text.severity <= severity]
         return list(dict.fromkeys(found))
 
@@ -185,7 +185,7 @@ class VehicleView:
 
     @property
     def time_us(self) -> int | None:
-        """The vehicle's clock since boot, as its fastest messages tell it."""
+        """The vehicle's clock since boot, from its most frequent messages if there are any."""
         frames = [(clock, self.latest.frame(message_id)) for message_id, clock in _CLOCKS]
         times = [clock.of(frame) for clock, frame in frames if frame is not None]
         if times:

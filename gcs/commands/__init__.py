@@ -1,1 +1,1 @@
-"""The commands of the command line: arguments in, exit code and text out."""
+"""The commands of the command line: they take arguments, print text and return an exit code."""

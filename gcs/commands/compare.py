@@ -22,9 +22,9 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
     """Compare flights: figures, settings, tracks and errors.
 
     RUN is the output of gcs fly or gcs capture, or any telemetry log of a Plumbline vehicle. The figures
-    are listed side by side, the best of each marked, with what differed in mission, law, sensors, seed and
-    parameters; the page lays tracks and errors over each other. Of more flights than the terminal has columns
-    for, the main figures are shown, a row for each flight.
+    are listed side by side with the best of each marked, and with the differences in mission, law, sensors,
+    seed and parameters; the page overlays tracks and errors. If there are more flights than the terminal has
+    columns for, only the main figures are shown, in a row for each flight.
 
     \b
     gcs compare flights/plumbline flights/thesis

@@ -1,4 +1,4 @@
-"""gcs arm, disarm, start, pause, resume, takeoff, goto, land, mode: one command to a running vehicle each."""
+"""gcs arm, disarm, start, pause, resume, takeoff, goto, land, mode: each sends one command to the vehicle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gcs.shell.session import Session
 
 
 def _send(address: Address, make: Callable[[Session], Operation], begins: bool = False) -> None:
-    """`begins`: what is asked for begins with arming if the vehicle is not armed."""
+    """Send one command and print the answer. `begins`: a disarmed vehicle executes it once it is armed."""
     with Session(address) as session:
         session.find()
         text = session.run(make(session)).text
@@ -129,8 +129,8 @@ def goto_command(
     """Move the load to a position and hold it there.
 
     EAST, NORTH and UP are the position of the load in m; without UP it keeps its height. The vehicle must be
-    flying. The distance to go is printed; the vehicle refuses what is more than 100 km off, or beyond its
-    fence.
+    flying. The distance to go is printed; the vehicle refuses a position that is more than 100 km away, or
+    beyond its fence.
     """
     from gcs.workflows.reposition import reposition
 
@@ -154,8 +154,8 @@ def land_command(address: Address) -> None:
 def mode_command(name: str, address: Address) -> None:
     """Change the flight mode.
 
-    MODE is one that the vehicle has: hold, land, mission, offboard, position, return or takeoff; guided,
-    loiter (both hold), auto (mission), poshold and rtl are understood too. With ArduPilot's identity
-    (MAV_IDENTITY 1) there is no offboard and takeoff.
+    MODE is a mode of the vehicle: hold, land, mission, offboard, position, return or takeoff; guided, loiter
+    (both mean hold), auto (mission), poshold (position) and rtl (return) are understood too. With ArduPilot's
+    identity (MAV_IDENTITY 1) there are no modes offboard and takeoff.
     """
     _send(address, lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))

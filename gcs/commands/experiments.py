@@ -42,9 +42,9 @@ def thesis_command(
 ) -> None:
     """Fly every experiment of chapter 4: four cases, NGC and LQR, the idealised and the true vehicle.
 
-    Sixteen flights through the real processes in lockstep, with ideal sensors; then tables, results.json, a
-    figure for each of the thesis's, and index.html that shows them all. A flight that was flown already by
-    the same code is used again: after Ctrl-C the same command continues.
+    Flies sixteen flights with the real processes in lockstep, with ideal sensors; then writes tables,
+    results.json, a figure for each figure of the thesis, and index.html, which shows them all. Flights that
+    the same code has already flown are reused: after Ctrl-C the same command continues.
 
     \b
     gcs experiments thesis

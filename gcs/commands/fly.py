@@ -44,7 +44,7 @@ _OWN = (
     "speed",
     "real_time",
     "settings",
-)  # nothing to a vehicle that runs already
+)  # options that have no effect on a vehicle that is already running
 
 
 @click.command("fly")
@@ -191,8 +191,8 @@ def fly_command(
 
     processes = ctx.with_resource(Processes())
     if connect is None and firmware is None:
-        for name in ("autopilot", "sitl"):  # the longer one first
-            processes.load(name)  # while we load ourselves
+        for name in ("autopilot", "sitl"):  # first the one that takes longer
+            processes.load(name)  # while this process loads its own modules
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
@@ -212,7 +212,7 @@ def fly_command(
                 to_reader(lambda: print_json(record))
             elif not quiet:
                 to_reader(lambda: print_record(record))
-        except OSError as error:  # of stdout, as on a full disk: the report is made all the same
+        except OSError as error:  # of stdout, for example on a full disk: the report is made nevertheless
             unread.append(error)
         reason = f": {outcome.reason}" if outcome.reason else ""
         say(f"{mission}: {outcome.name}{reason}")

@@ -63,10 +63,10 @@ def check_command(
 
     MISSION is a shipped name or the path of a mission file. Every limit that it breaks is printed, with the
     time and the excess; the exit code is 1 if there is any. Otherwise the duration of each path, its distance
-    from the asked path, and its peaks of rotor force, tension and tilt are printed. With --as-asked the paths
-    are judged as the laws thesis and lqr fly them, not shaped to what can be flown; how near such a law keeps
-    to them is not judged. With --planner the paths through waypoints are those of a planner of your own,
-    whose errors are printed.
+    from the requested path, and its peaks of rotor force, tension and tilt are printed. With --as-asked the
+    paths are judged as the laws thesis and lqr fly them, without shaping; how closely such a law follows them
+    is not judged. With --planner the paths through waypoints are those of your own planner, whose errors are
+    printed.
     """
     if law is not None:
         raise click.UsageError(

@@ -1,4 +1,4 @@
-"""gcs new: a file of your own to begin with."""
+"""gcs new: writes a template for a file of your own."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ Completing = Callable[[click.Context, click.Parameter, str], list[CompletionItem
 
 
 def names_or_files(names: Callable[[], Iterable[str]]) -> Completing:
-    """What a shell completes of a word that is one of these names, or the path of a file."""
+    """Shell completion of a word that is one of these names, or the path of a file."""
 
     def complete(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
@@ -47,7 +47,7 @@ def mission_argument(function: F) -> F:
 
 
 class AddressType(click.ParamType):  # type: ignore[type-arg]
-    """Where to meet a vehicle."""
+    """The address of a connection to a vehicle."""
 
     name = "ADDRESS"
 
@@ -62,7 +62,7 @@ class AddressType(click.ParamType):  # type: ignore[type-arg]
 
 
 class TruthType(click.ParamType):  # type: ignore[type-arg]
-    """Where a simulator tells what is true."""
+    """The address to which a simulator sends the true state."""
 
     name = "ADDRESS"
 
@@ -77,7 +77,7 @@ class TruthType(click.ParamType):  # type: ignore[type-arg]
 
 
 class OutputPath(NamedPath):
-    """Where a command writes: refused before anything is done where nothing can be written."""
+    """The path that a command writes to; refused before anything is done if it cannot be written."""
 
     def __init__(self, is_folder: bool) -> None:
         super().__init__(file_okay=not is_folder, dir_okay=is_folder, path_type=Path)
@@ -94,7 +94,7 @@ OUTPUT_FOLDER, OUTPUT_FILE = OutputPath(is_folder=True), OutputPath(is_folder=Fa
 
 
 class OptionalArgument(click.Argument):
-    """An argument that may be left out; an error names it without the brackets of the usage line."""
+    """An optional argument; errors name it without the brackets of the usage line."""
 
     def get_error_hint(self, ctx: click.Context | None) -> str:
         return f"'{self.human_readable_name}'"
@@ -153,7 +153,7 @@ class SettingType(click.ParamType):  # type: ignore[type-arg]
 
 
 def connect_option(function: F) -> F:
-    """--connect of every command that speaks to a running vehicle."""
+    """--connect of every command that communicates with a running vehicle."""
     return click.option(
         "--connect",
         "address",
@@ -165,7 +165,7 @@ def connect_option(function: F) -> F:
 
 
 def truth_option(function: F) -> F:
-    """--truth of every command that hears the simulator of a running vehicle."""
+    """--truth of every command that listens to the simulator of a running vehicle."""
     return click.option(
         "--truth",
         "truth_at",
@@ -211,7 +211,7 @@ def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable
 
 
 class LawType(click.ParamType):  # type: ignore[type-arg]
-    """The name of a shipped control law, or one that somebody brings."""
+    """The name of a shipped control law, or a reference to a custom one."""
 
     name = "NAME|FILE:CLASS"
 
@@ -237,7 +237,7 @@ class LawType(click.ParamType):  # type: ignore[type-arg]
 
 
 def law_help() -> str:
-    """What can be given to --law."""
+    """The help text of --law."""
     from autopilot.vehicle.parameters import LAWS
 
     return f"Control law to fly with: {', '.join(LAWS)}, or your own (docs/laws.md)."
@@ -253,12 +253,12 @@ def law_option(function: F) -> F:
 
 
 def _unusable(error: Exception, param: click.Parameter | None) -> InputError:
-    """What is wrong with a file of somebody's own, of which the command's help says nothing."""
+    """The error for an unusable custom class; no usage error, as the command's help does not explain it."""
     return InputError(f"{param.opts[0]} {error}" if param else str(error))
 
 
 class OwnType(click.ParamType):  # type: ignore[type-arg]
-    """A class that somebody brings."""
+    """A reference to a custom class."""
 
     name = "FILE:CLASS"
 
@@ -339,7 +339,7 @@ def require_options(function: F) -> F:
 
 
 def fresh_option(function: F) -> F:
-    """--fresh of what goes on where it was stopped; --overwrite as of the others."""
+    """--fresh of commands that continue where they were stopped; also --overwrite, as in other commands."""
     text = "Fly everything again and discard the results in --out."
     return click.option("--fresh", "--overwrite", "fresh", is_flag=True, help=text)(function)
 
@@ -350,21 +350,21 @@ def json_option(function: F) -> F:
         "--json",
         "as_json",
         is_flag=True,
-        is_eager=True,  # before a class is loaded that somebody has brought, which may print
+        is_eager=True,  # before a custom class is loaded, which may print
         callback=_json_alone,
         help="Print only the result, as JSON.",
     )(function)
 
 
 def _json_alone(ctx: click.Context, _: click.Parameter, as_json: bool) -> bool:
-    # what a law prints that a sweep flies in this process comes from flights of which nobody reads
-    if (as_json or ctx.info_name == "sweep") and not ctx.resilient_parsing:  # which a shell asks to complete
+    # a sweep also flies in this process: what a custom law prints in its flights does not belong on stdout
+    if (as_json or ctx.info_name == "sweep") and not ctx.resilient_parsing:  # set during completion
         keep_stdout_for_results()
     return as_json
 
 
 def print_json(record: Mapping[str, Any] | Sequence[Any]) -> None:
-    """`record` on stdout; what JSON has no number for becomes null."""
+    """Print `record` on stdout; numbers that JSON cannot express become null."""
     with to_results():
         click.echo(json.dumps(_plain(record), indent=2, allow_nan=False))
 
@@ -380,13 +380,13 @@ def _plain(value: Any) -> Any:
 
 
 def spoken(key: str) -> str:
-    """A key of a record as people read it: `cable_tension_n` is `cable tension (N)`."""
+    """A key of a record as displayed: `cable_tension_n` is `cable tension (N)`."""
     name, unit = split_unit(key)
     return name.replace("_", " ") + (f" ({unit.sign})" if unit else "")
 
 
 def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> None:
-    """Columns of text on stdout, each as wide as its widest cell."""
+    """Print columns of text on stdout, each as wide as its widest cell."""
     lines = [list(header), *map(list, rows)] if header else [list(row) for row in rows]
     if not lines:
         return

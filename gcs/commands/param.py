@@ -33,7 +33,7 @@ def param_command() -> None:
 def list_command(pattern: str, as_json: bool, address: Address) -> None:
     """List parameters with their values.
 
-    PATTERN picks some, e.g. 'NGC_*'.
+    PATTERN selects some of them, e.g. 'NGC_*'.
     """
     found = list_parameters(pattern, address)
     if as_json:
@@ -70,8 +70,8 @@ def set_command(name: str, value: float, address: Address) -> None:
 def save_command(file: Path, address: Address) -> None:
     """Save all parameters to FILE.
 
-    QGroundControl's columns if FILE ends in .params, else one `NAME value` line each, as MAVProxy and Mission
-    Planner read them.
+    If FILE ends in .params, it has QGroundControl's columns, else one line `NAME value` for each parameter,
+    as MAVProxy and Mission Planner read them.
     """
     click.echo(f"{save_parameters(file, address)} parameters saved to {file}")
 

@@ -15,7 +15,7 @@ from gcs.shell.display import say
 F = TypeVar("F", bound=Callable[..., Any])
 
 _MOST_DECIMALS = 6
-_NUMBERS = {  # what is identified, as people read it
+_NUMBERS = {  # the identified quantities as displayed
     "tracked_length_m": "cable length, by the distance of the load (m)",
     "length_m": "cable length, by the swing (m)",
     "drag_per_m": "quadratic drag / mass of the load (1/m)",
@@ -40,7 +40,7 @@ _WORDS = {
 
 
 def columns_option(command: F) -> F:
-    """--columns: what the recording's columns are."""
+    """--columns: the meaning of the recording's columns."""
     return click.option(
         "--columns",
         metavar="MAP",
@@ -55,10 +55,10 @@ def columns_option(command: F) -> F:
 def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     """Find cable, load and drag from a recorded flight.
 
-    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), of which the true states are read, or
-    rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. Each number comes with its
-    95 % interval; a warning says which ones the recording does not tell, since load or vehicle move too
-    little.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), from which the true states are read,
+    or rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. Each number comes with its
+    95 % interval; a warning lists those that the recording does not determine because load or vehicle move
+    too little.
 
     \b
     gcs identify flight-15.csv.gz --columns motion-capture
@@ -99,10 +99,10 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:
     """Estimate the load of a recorded flight, and score it.
 
-    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), of which the true states are read, or
-    rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. The load is estimated from
-    the vehicle's pose alone (load.csv, load.png) and, where it was measured, predicted 2 s and 5 s ahead,
-    with innovations, errors, and the share of them within the stated bounds.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), from which the true states are read,
+    or rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. The load is estimated from
+    the vehicle's pose alone (load.csv, load.png) and, if it was measured, predicted 2 s and 5 s ahead. The
+    score consists of innovations, errors, and the share of errors within the stated bounds.
     """
     from gcs.workflows.recorded import replay
 
@@ -133,7 +133,8 @@ def _print_rows(record: dict[str, Any]) -> None:
 
 
 def with_interval(value: float, half_width: float) -> tuple[str, str]:
-    """A number and +- half its interval, to two digits of the latter; of a narrow one these alone."""
+    """A number and +- half its interval, both to two digits of the latter and at most `_MOST_DECIMALS`
+    decimals; a half interval that needs more decimals is written with an exponent."""
     if not math.isfinite(half_width):
         return f"{value:z.4f}", "+- ?"
     digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else _MOST_DECIMALS

@@ -117,12 +117,12 @@ def sweep_command(
     """Fly a mission thousands of times under varied conditions.
 
     The flights are those of gcs fly --lockstep without the UDP link, ten to twenty per second on each core.
-    Every parameter of the simulator and of the autopilot can be varied. The folder then holds flights.parquet
-    (a row for each flight), report.html with its plots, and plan.json. The same command continues a sweep
-    that was stopped.
+    Every parameter of the simulator and of the autopilot can be varied. Afterwards, the folder contains
+    flights.parquet (a row for each flight), report.html with plots, and plan.json. The same command continues
+    a sweep that was stopped.
 
-    The mission is not checked beforehand; gcs check MISSION tells whether the vehicle can fly it. A path that
-    the autopilot refuses is flown as asked with --set MIS_INFEASIBLE=0, and slower with 1.
+    The mission is not checked beforehand; gcs check MISSION shows whether the vehicle can fly it. A path that
+    the autopilot refuses is flown as requested with --set MIS_INFEASIBLE=0, and slower with 1.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

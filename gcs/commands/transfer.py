@@ -46,7 +46,7 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
 
     MISSION is a shipped name, the path of a mission file, or a .plan or .waypoints file of another ground
     station. The old mission stays in force until the new one has arrived completely. A .plan replaces fence
-    and rally points too, as it does from QGroundControl.
+    and rally points too, as an upload from QGroundControl does.
     """
     upload(mission, vehicle, force, skip, address, click.echo)
 
@@ -58,9 +58,9 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
 def download_command(file: Path | None, as_json: bool, address: Address) -> None:
     """Download the mission from the vehicle.
 
-    Each line is one mission item as it travels; null and - stand for values that are not given. With FILE,
-    which ends in .plan or .waypoints, it is written for other ground stations, a .plan with fence and rally
-    points.
+    Each line is one mission item as transferred; null and - stand for values that are not given. With FILE,
+    which must end in .plan or .waypoints, the mission is written for other ground stations, a .plan with
+    fence and rally points.
     """
     if file is not None and not is_foreign(file):
         raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")

@@ -39,8 +39,8 @@ def view_command(
     """Show running vehicles live in a browser.
 
     A page on this machine shows vehicle, cable and load in 3-D with their figures, and sends commands.
-    Its address is printed; everyone who knows it can use the page. Several vehicles are distinguished by
-    their system ids.
+    Its address is printed; everyone who knows the address can use the page. Several vehicles are
+    distinguished by their system ids.
 
     \b
     gcs view

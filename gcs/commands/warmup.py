@@ -20,11 +20,11 @@ from gcs.commands.options import law_option
 def warmup_command(law: str, all_laws: bool, sweeps: bool, quiet: bool) -> None:
     """Compile the flight software before the first flight.
 
-    The machine code is kept, for this version of the sources and this processor: later flights, and those of
-    other checkouts of the same version, load it. gcs fly does the same when it has to.
+    The machine code is stored for this version of the sources and this processor: later flights, and those of
+    other checkouts of the same version, load it. gcs fly compiles too, if necessary.
 
-    A sweep of fewer than a thousand flights with a law flies them eight at once, which is faster, only if
-    that has been compiled already: by --sweeps, or by a greater sweep.
+    Sweeps fly eight flights at the same time, which is faster. With fewer than a thousand flights for a law,
+    they do so only if the code for this is already compiled: by --sweeps, or by a larger sweep.
     """
     from gcs.workflows.warmup import all_sweep_parts, parts_here, warm_up
 

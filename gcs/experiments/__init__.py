@@ -1,1 +1,1 @@
-"""Published experiments, flown again: a plan of flights in, a table, figures and a page out."""
+"""Published experiments, flown again: from a plan of flights to tables, figures and a page."""

@@ -1,4 +1,4 @@
-"""Do error functions go to zero, and how fast: the bound alpha e^(-beta t) of (3-26), (3-39), fitted."""
+"""Whether error functions go to zero, and how fast: fits the bound alpha e^(-beta t) of (3-26), (3-39)."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 
 from gcs.analysis.axes import Floats
 
-DEPTH = 1e-3  # of the peak: the fit ends there, so that no long tail of rounding decides it
-_TAIL_S = 0.25  # of the end: what is left there is the final value
-_ZERO = 0.02  # of the greatest value of the mission: less at the end is zero
+DEPTH = 1e-3  # of the peak: the fit ends there, so that a long tail of rounding errors does not dominate it
+_TAIL_S = 0.25  # at the end: the greatest value in this time is the final value
+_ZERO = 0.02  # of the greatest value of the mission: a smaller final value counts as zero
 _LEAST = 10  # samples of a fit
-_SPREAD = 5.0  # the peak over the resolution: less says nothing about a rate
+_SPREAD = 5.0  # ratio of peak to resolution: below this no rate can be determined
 
 
 class Decay(NamedTuple):
-    """What became of one error function after the last motion of the reference."""
+    """The decay of one error function after the last motion of the reference."""
 
     greatest: float | None  # in the whole mission
     final: float | None  # greatest of the last quarter of a second
-    decays: bool | None  # final is nothing beside greatest, or below what telemetry resolves
+    decays: bool | None  # final is negligible compared with greatest, or below the resolution of telemetry
     rate_1_s: float | None  # beta
     scale: float | None  # alpha, at the last motion; the bound holds wherever it is fitted
 
 
 def decay_of(time_s: Floats, values: Floats, rest_s: float, resolution: float, depth: float = DEPTH) -> Decay:
-    """Of a norm or error function (n,) >= 0 over the mission; the reference rests from `rest_s` on.
+    """The decay of a norm or error function (n,) >= 0 over the mission; the reference rests from `rest_s` on.
 
-    No rate where the peak after that is within a few times the `resolution`: there is nothing to fit.
+    The rate is None if the peak after that is only a few times the `resolution`: there is nothing to fit.
     """
     known = np.isfinite(values)
     t, v = time_s[known], values[known]
@@ -36,7 +36,7 @@ def decay_of(time_s: Floats, values: Floats, rest_s: float, resolution: float, d
         return Decay(None, None, None, None, None)
     greatest = float(v.max())
     after = t >= rest_s
-    if not after.any():  # lost before
+    if not after.any():  # the flight was lost before
         return Decay(greatest, float(v[-1]), False, None, None)
     final = float(v[t >= t[-1] - _TAIL_S].max())
     decays = bool(final <= max(_ZERO * greatest, resolution))
@@ -47,10 +47,11 @@ def decay_of(time_s: Floats, values: Floats, rest_s: float, resolution: float, d
 def fit_bound(
     t: Floats, v: Floats, resolution: float, depth: float = DEPTH
 ) -> tuple[float | None, float | None]:
-    """(beta, alpha): least squares through the logarithm of the envelope, lifted until it bounds `v`.
+    """(beta, alpha): a least-squares line through the logarithm of the envelope, raised until it bounds `v`.
 
-    The envelope is the greatest value still to come, so that a swinging error is judged by its crests. It is
-    fitted, and bounds, from the peak down to `depth` of it, or to the resolution, or to the last crest.
+    The envelope is the greatest of the present and all later values, so that an oscillating error is judged
+    by its crests. The range of the fit and of the bound is from the peak down to `depth` of the peak, or to
+    the resolution, or to the last crest.
     """
     peak = int(np.argmax(v))
     if v[peak] < _SPREAD * resolution:
@@ -60,7 +61,7 @@ def fit_bound(
     end = peak + int(below[0]) if len(below) else len(v)
     crests = peak + 1 + np.flatnonzero((v[peak + 1 : -1] > v[peak:-2]) & (v[peak + 1 : -1] >= v[peak + 2 :]))
     crests = crests[crests < end]
-    if len(crests) > 1 and not len(below):  # the envelope of the last, broken wave ends at nothing
+    if len(crests) > 1 and not len(below):  # the last wave is incomplete, and its envelope falls to zero
         end = int(crests[-1]) + 1
     if end - peak < _LEAST:
         return None, None

@@ -1,4 +1,4 @@
-"""One flown experiment, read from its telemetry, with the times that cut it."""
+"""One flown experiment, read from its telemetry, with the times that divide it."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _AT_REST_M_S = 1e-6  # desired speeds are single precision
 
 @dataclass(frozen=True)
 class Flown:
-    """Times are the vehicle's clock; in figures they count from `start_s`."""
+    """A flown experiment. Times are on the vehicle's clock; in figures they count from `start_s`."""
 
     experiment: Experiment
     meta: FlightMeta
     telemetry: Telemetry
     samples: Samples
     start_s: float  # the signals begin
-    rest_s: float  # the reference moves no more
-    end_s: float  # the load is lowered, or the flight is lost
-    lost: bool  # the error left all bounds, or the autopilot gave up
+    rest_s: float  # the reference stops moving
+    end_s: float  # the load begins to be lowered, or the flight is lost
+    lost: bool  # the error exceeded DIVERGED_M, or the autopilot gave up
 
     def clock(self, time_s: Floats) -> Floats:
         """Seconds since the signals began."""
@@ -55,7 +55,7 @@ def read_flown(directory: Path, experiment: Experiment) -> Flown:
 
 
 def flown_of(telemetry: Telemetry, experiment: Experiment, meta: FlightMeta) -> Flown:
-    """The same from telemetry that has been read."""
+    """The flight from telemetry that has already been read."""
     samples = samples_of(telemetry)
     setpoint = telemetry.setpoint
     speed = np.linalg.norm(setpoint.velocity_m_s, axis=1)
@@ -74,7 +74,8 @@ def flown_of(telemetry: Telemetry, experiment: Experiment, meta: FlightMeta) -> 
 
 
 def _end(telemetry: Telemetry, samples: Samples, start_s: float, last_s: float) -> tuple[float, bool]:
-    """When the load is no longer carried, and whether that is because the flight was lost."""
+    """The end of the flight, and whether it was lost: the last time at which the load is carried or, if
+    earlier, the time at which it diverged."""
     setpoint = telemetry.setpoint
     over = (setpoint.time_s >= start_s) & ~np.isin(setpoint.phase, CARRIED)
     end = float(setpoint.time_s[int(np.argmax(over)) - 1]) if over.any() else last_s

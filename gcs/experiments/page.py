@@ -1,4 +1,4 @@
-"""index.html: tables and figures on one page, for a reader of the thesis."""
+"""index.html: tables and figures on one page, for readers of the thesis."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TEMPLATE = "thesis.html"
 def render_page(
     records: Sequence[Record], drawn: Sequence[Drawn], folder: str, version: str, code: str
 ) -> str:
-    """The page; pictures are linked from `folder`, reports from where the records say."""
+    """The page; it links pictures in `folder`, and reports at the locations given in the records."""
     from jinja2 import Environment
 
     source = files("gcs.experiments").joinpath(_TEMPLATE).read_text(encoding="utf-8")
@@ -38,7 +38,7 @@ def render_page(
 
 def _case(case: str, records: Sequence[Record], drawn: Sequence[Drawn], folder: str) -> dict[str, object]:
     mission = load_mission(case)
-    # the idealised vehicle on the left, the true one beside it
+    # the idealised vehicle on the left, the true one on the right
     rows = []
     for figure in FIGURES:
         row = [

@@ -1,4 +1,4 @@
-"""The experiments of chapter 4 of the thesis: which flights, and what the thesis prints of them."""
+"""The experiments of chapter 4 of the thesis: the flights, and the results that the thesis prints."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Experiment(NamedTuple):
 
     @property
     def title(self) -> str:
-        """For people."""
+        """Its title for display."""
         return f"{CASE_NAMES[self.case]}, {LAW_NAMES[self.law]}, {VEHICLE_SHORT[self.vehicle]} vehicle"
 
 
@@ -51,19 +51,20 @@ _PRINTED: dict[tuple[str, str], dict[str, float]] = {
 
 
 def printed(experiment: Experiment) -> dict[str, float]:
-    """What the thesis prints of this case and law; it had one vehicle, both ours are held against it."""
+    """The printed results for this case and law. The thesis had one vehicle; both vehicles here are compared
+    with it."""
     return dict(_PRINTED.get((experiment.case, experiment.law), {}))
 
 
 def experiments() -> tuple[Experiment, ...]:
-    """All of them. The long flights begin first, so that no core is left with one at the end."""
+    """All experiments. The long flights come first, so that no core starts one near the end."""
     return tuple(
         Experiment(case, law, vehicle) for case in reversed(CASES) for vehicle in VEHICLES for law in LAWS
     )
 
 
 def in_reading_order(experiment: Experiment) -> tuple[int, int, int]:
-    """Key to sort by: case, then vehicle, then law, as the tables stand."""
+    """Sort key: case, then vehicle, then law, as in the tables."""
     return (
         CASES.index(experiment.case),
         VEHICLES.index(experiment.vehicle),

@@ -14,8 +14,8 @@ from gcs.experiments.decay import DEPTH, Decay, decay_of
 from gcs.experiments.flown import Flown
 from gcs.experiments.plan import printed
 
-# error function: unit; what cannot be told from zero (single precision on the wire, 20 m from home); how deep
-# below its peak the fit goes: the configuration errors are squares of the others
+# error function: unit; resolution (single precision on the wire, 20 m from home), below which it counts as
+# zero; depth below its peak to which the fit goes: the configuration errors are squares of the others
 ERROR_FUNCTIONS: dict[str, tuple[str, float, float]] = {
     "e_x": ("m", 4e-6, DEPTH),
     "e_v": ("m/s", 4e-6, DEPTH),
@@ -29,7 +29,8 @@ ERROR_FUNCTIONS: dict[str, tuple[str, float, float]] = {
 
 
 def error_values(flown: Flown, name: str) -> tuple[Floats, Floats]:
-    """(n,) times and (n,) norms of an error function of the cascade, from the beginning of the signals on."""
+    """(n,) times and (n,) norms of an error function of the cascade, from the beginning of the signals to the
+    end."""
     cascade = flown.telemetry.cascade
     values = getattr(cascade, name)
     seen = flown.seen(cascade.time_s)
@@ -46,7 +47,8 @@ def decays(flown: Flown) -> dict[str, Decay]:
 
 
 def result(flown: Flown, report_dir: str) -> Record:
-    """case, law, vehicle; the keys of the flight record; error_functions; printed and difference."""
+    """The record of an experiment: case, law, vehicle; the keys of the flight record; lost_after_s;
+    error_functions; printed and difference."""
     record = flight_record(flown.telemetry, flown.meta, flown.samples)
     record["report_dir"] = report_dir
     experiment = flown.experiment
@@ -71,6 +73,6 @@ def result(flown: Flown, report_dir: str) -> Record:
 
 
 def write_results(path: Path, records: Iterable[Record]) -> None:
-    """Writes results.json."""
+    """Write results.json."""
     text = json.dumps(list(records), indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")

@@ -13,22 +13,22 @@ from gcs.experiments.plan import SEED, SENSORS, Experiment
 from gcs.shell.processes import Child
 
 LOG_FILE = "gcs.log"
-Ended = tuple[Experiment, bool]  # and whether the flight was completed
+Ended = tuple[Experiment, bool]  # an ended flight, and whether it was completed
 
 
 def start(experiment: Experiment, directory: Path, core: int) -> Child:
-    """Start the flight of an experiment into `directory`; what it says goes to gcs.log there."""
+    """Start the flight of an experiment; results go to `directory`, and its output to gcs.log there."""
     store.begin(directory)
     arguments = ["fly", experiment.case, "--law", experiment.law, "--vehicle", experiment.vehicle]
     arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force", "--overwrite"]
     program = [sys.executable, "-m", "gcs"]
     child = Child("gcs", [*program, *arguments, "--out", str(directory)], directory / LOG_FILE)
-    # it and its own children share one core while they are in lockstep: not the one of its neighbour
+    # in lockstep it and its children take turns, so they share one core, which no other flight uses
     return keep_on_core(child, core)
 
 
 def missing(plan: Sequence[Experiment], directory: Path, fresh: bool) -> list[Experiment]:
-    """What must be flown into `directory`/NAME: all if `fresh`, else what is not stored there."""
+    """The experiments that must be flown: all if `fresh`, else those not stored in `directory`/NAME."""
     return [e for e in plan if fresh or not store.is_flown(directory / e.name, store.experiment_origin(e))]
 
 
@@ -39,7 +39,7 @@ def fly_missing(
     tell: Callable[[Sequence[Ended], Running], None],
     stopped: Callable[[], bool],
 ) -> bool:
-    """Fly what waits into `directory`/NAME; False if it was stopped before the end."""
+    """Fly the `waiting` experiments into `directory`/NAME; False if it was stopped before the end."""
 
     def keep(ended: Sequence[Ended]) -> None:
         for experiment, _ in ended:

@@ -1,4 +1,4 @@
-"""flights/CASE-LAW-VEHICLE of the experiments: what lies there, and whether it need not be flown again."""
+"""flights/CASE-LAW-VEHICLE of the experiments: whether a flight stored there can be reused."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from gcs.experiments.plan import SEED, SENSORS, Experiment
 from gcs.folders import TLOG_FILE
 from gcs.report.build import META_FILE, ReportError, load_meta
 
-MARK_FILE = "flown.json"  # written when a flight is whole; says which code flew it
-_WHOLE = ("completed", "diverged", "timeout")  # outcomes that say something about the experiment
-# of the code that flies an experiment: `gcs fly` once it has read a mission file, and what it starts
+MARK_FILE = "flown.json"  # written when a flight is complete; says which code flew it
+_WHOLE = ("completed", "diverged", "timeout")  # outcomes that are results of the experiment
+# entry points of the code that flies an experiment: `gcs fly` from reading the mission file on, and the
+# programs that it starts
 ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.__main__", "autopilot.__main__")
 
 
 def experiment_origin(experiment: Experiment) -> Origin:
-    """What an experiment follows from when it is flown now."""
+    """The origin of the result of an experiment that is flown now."""
     case, law, vehicle = experiment
     return origin_of(_settings(case, law, vehicle, SENSORS, SEED, {}), ENTRIES)
 
 
 def is_flown(directory: Path, origin: Origin) -> bool:
-    """True if `directory` holds a whole flight of this origin, with its telemetry."""
+    """True if `directory` contains a complete flight of this origin, with its telemetry."""
     try:
         mark = json.loads((directory / MARK_FILE).read_text(encoding="utf-8"))
         meta = load_meta(directory / META_FILE)
     except (OSError, json.JSONDecodeError, UnicodeDecodeError, ReportError):
         return False
-    # settings and version are those of the record: another flight may have been flown into the directory
+    # settings and version are read from meta.json: another flight may have been flown into the directory
     settings = _settings(meta.mission, meta.law, meta.vehicle, meta.sensors, meta.seed, meta.settings)
     code = mark.get("code") if isinstance(mark, dict) else None
     stored = {"settings": settings, "version": meta.version, "code": code}
@@ -38,13 +39,13 @@ def is_flown(directory: Path, origin: Origin) -> bool:
 
 
 def begin(directory: Path) -> None:
-    """Before a flight: what lies there from an earlier one no longer counts."""
+    """Prepare a flight: create `directory`, and invalidate an earlier flight in it."""
     directory.mkdir(parents=True, exist_ok=True)
     (directory / MARK_FILE).unlink(missing_ok=True)
 
 
 def finish(directory: Path, origin: Origin) -> None:
-    """After a flight that came to an end: it may be reused."""
+    """Mark a flight that has ended as reusable."""
     (directory / MARK_FILE).write_text(json.dumps({"code": origin.code}) + "\n", encoding="utf-8")
 
 

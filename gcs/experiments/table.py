@@ -1,4 +1,4 @@
-"""The results as tables: one shape, written as Markdown, HTML or for the terminal."""
+"""The results as tables of one type, written as Markdown, as HTML or for the terminal."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _WORDS = (*_WHO, "outcome", "number")  # columns that hold no numbers
 
 @dataclass(frozen=True)
 class Table:
-    """A title, what to know to read it, and cells of text."""
+    """A table: a title, a note for the reader, and cells of text."""
 
     title: str
     note: str
@@ -46,14 +46,14 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
     def markdown(self) -> str:
-        """As Markdown; the first columns name things, the others hold numbers."""
+        """The table as Markdown; the first columns contain names, the others numbers."""
         names = sum(cell in _WORDS for cell in self.header)
         rule = ["---"] * names + ["---:"] * (len(self.header) - names)
         lines = [f"| {' | '.join(cells)} |" for cells in (self.header, rule, *self.rows)]
         return f"### {self.title}\n\n{self.note}\n\n" + "\n".join(lines) + "\n"
 
     def rich(self) -> RichTable:
-        """For the terminal."""
+        """The table for the terminal."""
         from rich.box import SIMPLE_HEAD
         from rich.table import Table as Rich
         from rich.text import Text
@@ -115,7 +115,7 @@ def error_table(records: Sequence[Record]) -> Table:
 
 
 def decay_table(records: Sequence[Record]) -> Table:
-    """Error functions: do they go to zero after the last motion of the reference, and how fast."""
+    """Error functions: whether they go to zero after the last motion of the reference, and how fast."""
     rows = tuple(
         (
             *_who(r),
@@ -136,7 +136,7 @@ def decay_table(records: Sequence[Record]) -> Table:
 
 
 def saturation_table(records: Sequence[Record]) -> Table:
-    """What was asked of the rotors."""
+    """Saturation and forces of the rotors, tilt, swing and slack events."""
     rows = tuple(
         (
             *_who(r),
@@ -181,7 +181,7 @@ def comparison_table(records: Sequence[Record]) -> Table:
 
 
 def better(ngc: Record, lqr: Record, key: str) -> str:
-    """Whose number is better; a flight that was lost is worse than any number."""
+    """The law with the better number; a flight that was not completed is worse than any number."""
     sign = -1.0 if METRICS[key].better == "more" else 1.0
 
     def cost(record: Record) -> float:
@@ -194,7 +194,7 @@ def better(ngc: Record, lqr: Record, key: str) -> str:
 
 
 def markdown(records: Sequence[Record]) -> str:
-    """All tables, as in table.md."""
+    """All tables as Markdown, the content of table.md."""
     return "\n".join(table.markdown() for table in tables(records))
 
 

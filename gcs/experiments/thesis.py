@@ -1,4 +1,4 @@
-"""`gcs experiments thesis`: fly what is missing, read it, and write results, tables, figures and the page."""
+"""`gcs experiments thesis`: reads the flights, and writes results, tables, figures and the page."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ FLIGHTS = "flights"
 FIGURES = "figures"
 TABLE_FILE = "table.md"
 
-# figures drawn, figures in all, the one that is next
+# figures drawn, figures in total, the file drawn last
 Tell = Callable[[int, int, str], None]
 
 
 class Report(NamedTuple):
-    """What lies in the output directory."""
+    """The content of the output directory."""
 
     records: tuple[Record, ...]
     drawn: tuple[Drawn, ...]
 
 
 def write_report(out: Path, code: str, tell: Tell) -> Report:
-    """From the flights in `out`/flights, all of them, to everything else in `out`."""
+    """Read all flights in `out`/flights and write everything else in `out`."""
     scenes = [(case, vehicle) for case in CASES for vehicle in VEHICLES]
     total = sum(1 for case, vehicle in scenes for _ in wanted(case, vehicle))
     records: list[Record] = []
@@ -65,7 +65,7 @@ def _order(record: Record) -> tuple[int, int, int]:
 
 
 def make_directory(out: Path) -> None:
-    """`out`, or one line on why not."""
+    """Create `out`; a GcsError says in one line why that is impossible."""
     keep_others(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(out / FLIGHTS, out)
 
@@ -83,11 +83,11 @@ KEY_FIGURES = (
     "fig-4-25-angles-case-c.png",
     "fig-4-24-comparison-case-c-bebop.png",
 )
-_COLOURS = 192  # of a line drawing: half the bytes, and the eye sees no difference
+_COLOURS = 192  # of a line drawing: halves the file without a visible difference
 
 
 def around_tables(page: Path) -> tuple[str, str]:
-    """What stands before and behind the markers of a page of the documentation; InputError if it has none."""
+    """The text before and after the markers of a page of the documentation; InputError if it has none."""
     try:
         text = page.read_text(encoding="utf-8")
     except OSError as error:

@@ -1,6 +1,6 @@
-"""Arrow's arrays from their buffers.
+"""Builds Arrow arrays from buffers.
 
-`pyarrow.array`, `table`, `read_table`, `to_numpy` and what sorts import pandas wherever it is installed,
+`pyarrow.array`, `table`, `read_table`, `to_numpy` and the sorting functions import pandas if it is installed,
 which takes as long as a report.
 """
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def array_of(values: Any, missing: Any = None) -> pyarrow.Array:
-    """(n,) numbers or truth values, null where `missing` (n,) is true."""
+    """(n,) numbers or Booleans, null where `missing` (n,) is true."""
     import pyarrow as pa
 
     valid = None if missing is None or not missing.any() else pa.py_buffer(_bits(~missing))
@@ -26,7 +26,7 @@ def array_of(values: Any, missing: Any = None) -> pyarrow.Array:
 
 
 def text_array(texts: Sequence[str | None]) -> pyarrow.Array:
-    """Texts, null where there is none."""
+    """Texts, with null for None."""
     import pyarrow as pa
 
     coded = [(text or "").encode() for text in texts]

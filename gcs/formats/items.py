@@ -1,4 +1,4 @@
-"""What mission files have in common: numbers as people write them, and items with where they came from."""
+"""The common parts of mission files: conversion of their numbers, and items with their place in the file."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _LOCAL = frozenset(
 
 
 class FormatError(InputError):
-    """A file that is not what it should be; says where and what."""
+    """An invalid file; the text says where and what."""
 
 
 class FileItem(NamedTuple):
-    """A mission item and where in its file it stands."""
+    """A mission item and its place in the file."""
 
     item: WireItem
     where: str
@@ -53,7 +53,7 @@ def item_of(
 
 
 def params_of(item: WireItem) -> list[float]:
-    """The seven parameters of an item in degrees and metres, with the digits that give the item again."""
+    """The seven parameters of an item in degrees and metres, with enough digits to restore the item."""
     floats = [decimal_from_float32(value) for value in (item.param1, item.param2, item.param3, item.param4)]
     scale = _scale(item.frame)
     places = [math.nan if value == NO_INT else value / scale for value in (item.x, item.y)]
@@ -70,7 +70,7 @@ def command_name(command: int) -> str:
 
 
 def _scale(frame: int) -> float:
-    """What MISSION_ITEM_INT multiplies its coordinates by: degrees, metres, or numbers as they are."""
+    """The factor of MISSION_ITEM_INT for its coordinates: for degrees, metres, or other numbers."""
     if frame in _GLOBAL:
         return 1e7
     return 1e4 if frame in _LOCAL else 1.0

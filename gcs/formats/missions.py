@@ -1,4 +1,4 @@
-"""Missions of other ground stations for our vehicle: read, told what cannot be flown, and written."""
+"""Missions of other ground stations: reads and writes their files, and finds what the vehicle cannot fly."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
 
 
 class Judged(NamedTuple):
-    """What can be sent to the vehicle of a file; a line for each thing that must be left out, and for what
-    the vehicle keeps without doing it."""
+    """The items of a file that can be sent to the vehicle; a line for each part that must be left out, and
+    for the items that the vehicle keeps but does not execute."""
 
     items: tuple[WireItem, ...]
     left_out: list[str]
@@ -28,12 +28,12 @@ class Judged(NamedTuple):
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a mission file is another ground station's, by its ending."""
+    """Whether a mission file is in the format of another ground station, judged by its ending."""
     return path.suffix.lower() in (PLAN_ENDING, *WAYPOINT_ENDINGS)
 
 
 def read_foreign(path: Path) -> Plan:
-    """What is in a .plan or .waypoints file; FormatError says what is wrong with it."""
+    """The content of a .plan or .waypoints file; FormatError says what is wrong with it."""
     try:
         text = text_of(path)
     except TextFileError as error:
@@ -53,8 +53,8 @@ def write_foreign(
     fence: Sequence[WireItem] = (),
     rally: Sequence[WireItem] = (),
 ) -> None:
-    """Write the items as the ending says; what was there is replaced once the new file is whole. Fence and
-    rally points have a place in a .plan only."""
+    """Write the items in the format of the ending; an old file is replaced once the new one is complete. Only
+    a .plan can contain fence and rally points."""
     if not is_foreign(path):
         endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
@@ -69,10 +69,10 @@ def write_foreign(
 
 
 def judge(plan: Plan, home: Home) -> Judged:
-    """What the vehicle would take of a plan, and all that it would not do of it.
+    """The parts of a plan that the vehicle would accept, and those that it would not execute.
 
-    Commands that the vehicle keeps and passes over (camera, gimbal ...) stay among the items; those that it
-    would refuse are left out.
+    Commands that the vehicle keeps and skips (camera, gimbal ...) stay among the items; those that it would
+    refuse are left out.
     """
     left = list(plan.items)
     numbers = list(range(len(left)))
@@ -103,7 +103,7 @@ def judge(plan: Plan, home: Home) -> Judged:
 
 
 def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
-    """Whether the list begins with a home, as Mission Planner writes it, that is not the vehicle's."""
+    """Whether the list begins with a home item, as Mission Planner writes it, that is not the vehicle's."""
     if len(plan.items) < 2:
         return False
     (first, _), (second, _) = plan.items[:2]
@@ -116,7 +116,7 @@ def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
 
 
 def _is_no_home(item: WireItem, home: Home) -> bool:
-    """Whether the vehicle would fly it as an item of its own, or refuse it."""
+    """Whether the vehicle would fly the item as a step, or refuse it, instead of taking it as its home."""
     try:
         return bool(located_steps([item], home))
     except MissionItemError:

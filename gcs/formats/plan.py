@@ -12,7 +12,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
-_TRANSECT = "TransectStyleComplexItem"  # surveys and corridors hold the items they stand for
+_TRANSECT = "TransectStyleComplexItem"  # surveys and corridors contain the simple items that they consist of
 _PARAMS = 7
 _ON_SEA, _ABOVE_HOME = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
 _INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
@@ -23,9 +23,9 @@ _RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 
 
 class Plan(NamedTuple):
-    """What is in a file; `lost` are the parts for which there are no mission items, a line each.
+    """The content of a file; `lost` has a line for each part for which there are no mission items.
 
-    Fence and rally points are None where the file does not speak of them.
+    Fence and rally points are None if the file does not mention them.
     """
 
     items: list[FileItem]
@@ -35,7 +35,7 @@ class Plan(NamedTuple):
 
 
 def read_plan(text: str) -> Plan:
-    """The items of a plan, complex ones taken apart into the simple ones that QGroundControl has stored."""
+    """The items of a plan; complex items are replaced by the simple ones that QGroundControl has stored."""
     try:
         record = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -61,7 +61,7 @@ def read_plan(text: str) -> Plan:
 def write_plan(
     items: Sequence[WireItem], home: Home, fence: Sequence[WireItem] = (), rally: Sequence[WireItem] = ()
 ) -> str:
-    """The plan of the items, all of them simple, with fence and rally points."""
+    """The text of a plan with these items, all of them simple, and fence and rally points."""
     place = [home.latitude_deg, home.longitude_deg, home.altitude_m]
     entries = [
         {
@@ -125,7 +125,7 @@ def _complex(entry: dict[str, Any], where: str, lost: list[str]) -> Iterator[Fil
 
 
 def _fence(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
-    """The items of the fence, as QGroundControl makes them."""
+    """The items of the fence, as QGroundControl creates them; None if the file has no fence."""
     if "geoFence" not in record:
         return None
     fence = _member(record, "geoFence", dict, "geoFence")
@@ -190,7 +190,7 @@ def _area_item(frame: int, command: int, first: float, place: Sequence[float], w
 
 
 def _spot(value: Any, size: int, where: str) -> list[float]:
-    """Latitude, longitude and, of three, height."""
+    """Latitude, longitude and, if `size` is three, height."""
     if not isinstance(value, list) or len(value) != size:
         raise FormatError(f"{where}: must be a list of {size} numbers")
     numbers = [_number(one, where) for one in value]
@@ -200,7 +200,7 @@ def _spot(value: Any, size: int, where: str) -> list[float]:
 
 
 def _listed(record: dict[str, Any], name: str, where: str) -> list[Any]:
-    """A list that need not be there."""
+    """A member that is a list; empty if it is missing."""
     value: list[Any] = _member(record, name, list, f"{where}.{name}") if name in record else []
     return value
 

@@ -1,4 +1,4 @@
-"""QGC WPL 110: one item a line, twelve columns; Mission Planner, MAVProxy and QGroundControl know it."""
+"""QGC WPL 110: one item per line, twelve columns; Mission Planner, MAVProxy and QGroundControl read it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _COLUMNS = 12
 
 
 def read_waypoints(text: str) -> list[FileItem]:
-    """The items of a file; columns may be parted by tabs or spaces, `#` begins a comment."""
+    """The items of a file; columns are separated by tabs or spaces, `#` begins a comment."""
     lines = text.splitlines()
     if not lines or lines[0].split() != HEAD.split():
         first = lines[0].strip()[:40] if lines else ""
@@ -37,7 +37,7 @@ def read_waypoints(text: str) -> list[FileItem]:
 
 
 def write_waypoints(items: Sequence[WireItem]) -> str:
-    """The file of the items; every number with the digits that give the same item again."""
+    """The text of a file with these items; numbers have enough digits to restore the same items."""
     lines = [HEAD]
     for seq, item in enumerate(items):
         params = map(repr, params_of(item))

@@ -1,1 +1,1 @@
-"""Recorded flights of other people's vehicles: their motion, their load, and what can be learnt from both."""
+"""Recorded flights of other vehicles: their motion, their load, and parameters identified from both."""

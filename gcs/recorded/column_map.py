@@ -1,4 +1,4 @@
-"""What is in which column of a recording, how it was taken, and what is believed of the load: a TOML file."""
+"""The column map of a recording, a TOML file: its columns, how it was recorded, and the assumed load."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Any = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class MapError(FileError):
-    """The column map is at fault."""
+    """The column map is wrong."""
 
 
 class _Table(BaseModel):
@@ -42,22 +42,22 @@ class LoadColumns(_Table):
 
 
 class Tracking(_Table):
-    """How well poses are measured, and how lively they are."""
+    """Noise of the measured poses, and of the jerk of the motion."""
 
-    noise_m: Positive = 1e-3  # of what the smoothed course leaves out
+    noise_m: Positive = 1e-3  # of the difference between measured and smoothed course
     grid_noise_m: Positive = 4e-4  # the same while times of rows are inferred
     jerk_density: Positive = 100.0  # m^2/s^5
 
 
 class Attachment(_Table):
-    """Where the cable is attached, and where the thrust points, in the tracked body."""
+    """Attachment point of the cable and direction of the thrust, in the tracked body."""
 
     below_m: Any = 0.0
     thrust_tilt: Annotated[list[Any], Field(min_length=2, max_length=2)] = [0.0, 0.0]
 
 
 class ModelTable(_Table):
-    """Numbers of `LoadModel`; without a length it is the median distance from attachment to load."""
+    """Parameters of `LoadModel`; the default length is the median distance from attachment to load."""
 
     length_m: Positive | None = None
     drag_per_m: Any = 0.0
@@ -95,7 +95,7 @@ Name = Literal[
 
 
 class Identify(_Table):
-    """Which numbers of the load `gcs identify` looks for."""
+    """The parameters of the load that `gcs identify` estimates."""
 
     parameters: Annotated[list[Name], Field(min_length=1)] = ["length_m", "drag_per_m"]
 
@@ -138,7 +138,7 @@ class ColumnMap(_Table):
             yield from ((f"{name}[{i}]", column) for i, column in enumerate(columns))
 
     def load_model(self, length_m: float) -> LoadModel:
-        """The model; `length_m` counts where the map names no length."""
+        """The model; `length_m` is used if the map gives no length."""
         given = self.model.model_dump()
         given["length_m"] = given["length_m"] or length_m
         return LoadModel(gravity_m_s2=self.gravity_m_s2, **given)
@@ -148,6 +148,6 @@ MAPS = TomlFiles("column map", MapError, "gcs.recorded.maps")
 
 
 def load_map(name_or_path: str | PathLike[str]) -> ColumnMap:
-    """A shipped map by its name, or a file; MapError if there is none, or it is at fault."""
+    """The map of a shipped name or of a file; MapError if there is none, or it is wrong."""
     read = MAPS.read(name_or_path)
     return MAPS.record(ColumnMap, MAPS.table(read.text, read.where), read.where)

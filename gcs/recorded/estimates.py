@@ -14,7 +14,7 @@ from gcs.recorded.smoothing import Floats
 
 
 class Estimates(NamedTuple):
-    """Of each row: states (n, 8), covariances (n, 8, 8), innovations squared (n, 2)."""
+    """For each row: states (n, 8), covariances (n, 8, 8), normalised squares of innovations (n, 2)."""
 
     states: Floats
     covariances: Floats
@@ -31,12 +31,12 @@ class Rows(NamedTuple):
 
 
 def rows_of(motion: Motion, model: LoadModel) -> Rows:
-    """The rows of a motion; they depend on the model by its length and the delay of the wash."""
+    """The rows of a motion; of the model they use the length and the delay of the wash."""
     return Rows(motion.time_s, drive_rows(motion, model), slow_rows(motion), sight_rows(motion))
 
 
 def filtered(rows: Rows, model: LoadModel, *, load: bool, tilt: bool, smoothed: bool = False) -> Estimates:
-    """Estimates from the load's position, the vehicle's attitude, or both; `smoothed`: by all rows."""
+    """Estimates from the load's position, the vehicle's attitude, or both; `smoothed`: each from all rows."""
     n = len(rows.time_s)
     states, forecasts = np.zeros((2, n, SIZE))
     covariances, before, transitions = np.zeros((3, n, SIZE, SIZE))
@@ -88,7 +88,7 @@ def predicted(
     *,
     tilt: bool,
 ) -> list[Window]:
-    """Predictions from rows `begins` on, by the vehicle's motion alone, as far as the rows reach."""
+    """Predictions from rows `begins` on, by the vehicle's motion alone; stops where the rows end."""
     windows = []
     work = np.zeros((WORK + SIZE, SIZE))
     for begin in begins:
@@ -112,7 +112,7 @@ def predicted(
 
 
 def load_position(motion: Motion, model: LoadModel, row: NDArray[np.intp], direction: Floats) -> Floats:
-    """Where the load is (k, 3) at rows `row` if the cable points to `direction` (k, 2)."""
+    """Position of the load (k, 3) at rows `row` if the cable has the direction `direction` (k, 2)."""
     below = -np.sqrt(np.maximum(0.0, 1.0 - np.sum(direction**2, axis=1)))
     at: Floats = motion.attachment.position[row] + model.length_m * np.column_stack([direction, below])
     return at

@@ -1,8 +1,8 @@
-"""Rows that are missing from a recording, found by the way that the vehicle went meanwhile.
+"""Rows that are missing from a recording, found by the distance that the vehicle moved meanwhile.
 
-A step several times as long as its neighbours is a tracker that stalled and caught up, or rows that are
-missing. A polynomial through the rows on both sides says which, and how many; where none fits, nobody can say
-how long it was, and the recording is broken there: what comes after is estimated anew.
+A step several times as long as its neighbours means that the tracker stalled and caught up, or that rows are
+missing. A polynomial through the rows on both sides shows which, and how many; where none fits, the duration
+is unknown and the recording is broken there: the rows after it are estimated anew.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from gcs.recorded.smoothing import Floats
 
-UNKNOWN = 30  # rows that are left out where nobody knows how many are missing: about a second
+UNKNOWN = 30  # missing rows assumed where their number is unknown: about a second
 
 _LONG = 2.2  # usual steps
 _LEAST_M = 0.05
 _SIDE = 9  # rows on each side
-_MOST = 15  # missing rows that are looked for
+_MOST = 15  # greatest number of missing rows that is tried
 _DEGREE = 4
-_BETTER = 5.0  # by this factor must fit what is no even grid
-_FITS_ROWS = 0.6  # root mean square that fits, in usual steps
+_BETTER = 5.0  # factor by which a gap must fit better than an even grid
+_FITS_ROWS = 0.6  # greatest root mean square that counts as a fit, in usual steps
 
 
 def gaps(position: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -48,7 +48,7 @@ def gaps(position: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _misfit(rows: Floats, fresh: NDArray[np.bool_], count: int) -> float:
-    """Mean square distance of fresh rows from a smooth course that leaves out `count` in their middle."""
+    """Mean square distance of fresh rows from a smooth course if `count` rows are missing in their middle."""
     index = np.arange(len(rows), dtype=np.float64)
     index[_SIDE:] += count
     middle = 0.5 * (index[0] + index[-1])

@@ -1,15 +1,15 @@
-"""What a recording says of cable, load and vehicle, with intervals of 95 %.
+"""Parameters of cable, load and vehicle identified from a recording, with intervals of 95 %.
 
-The length is found twice: by the distance between the tracked points, and by the swing alone. Numbers of the
-load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's weights) by Gauss and
-Newton. Those of the vehicle are a linear regression: its thrust lies along its axis, so that the horizontal
-momentum of vehicle and load shows in the tilt.
+The length is found twice: from the distance between the tracked points, and from the swing alone. The
+parameters of the load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's
+weights) by Gauss-Newton. Those of the vehicle come from a linear regression: its thrust lies along its axis,
+so the horizontal acceleration of vehicle and load shows in the tilt.
 
 Intervals come from a jackknife: the recording is cut into blocks of ten seconds (neighbouring residuals are
-alike, those of different blocks are not), and the numbers are found again without each block, by one step of
-Gauss and Newton. How far they scatter says how well the recording tells them, and Student's t how well so few
-blocks tell the scatter. A sandwich of sums of gradients does not do: in the optimum these sums cancel, and of
-three blocks hardly anything is left.
+correlated, those of different blocks are not), and the parameters are estimated again without each block, by
+one step of Gauss-Newton. Their scatter shows how well the recording determines them; Student's t accounts for
+the small number of blocks. A sandwich estimator with sums of gradients is not suitable: at the optimum these
+sums cancel, and with three blocks hardly anything is left.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion
 from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
 from gcs.recorded.smoothing import Floats, smooth
 
-_BLOCK_S = 10.0  # residuals further apart are taken as independent
-_EVERY_S = 1.0  # a prediction begins
+_BLOCK_S = 10.0  # residuals further apart are assumed independent
+_EVERY_S = 1.0  # between the beginnings of predictions
 _ROUNDS = 6
-_BEND_M = 0.03  # errors beyond count by their size, not their square
+_BEND_M = 0.03  # larger errors count by their size, not their square
 _FAR_WEIGHT = 0.35  # of the longer horizon
-_PART = 0.3  # of a step, for differences
-_HELD_STEPS = 100.0  # how far what the recording says nothing of may go: what begins there stays there
+_PART = 0.3  # share of a step, for finite differences
+_HELD_STEPS = 100.0  # damping, in steps: an undetermined parameter stays where it began
 _SHORTENED = (1.0, 0.5, 0.25)
-_ABOVE_SWING = 4.0  # times the pendulum's frequency is left of the tilt, the rest filtered
-_EDGE_S = 5.0  # left out at both ends of what is filtered
+_ABOVE_SWING = 4.0  # times the pendulum's frequency: cut-off of the low-pass
+_EDGE_S = 5.0  # left out at both ends of the filtered signals
 
 _STEPS = {
     "length_m": 0.01,
@@ -50,7 +50,7 @@ _STEPS = {
     "push_x_m_s2": 0.01,
     "push_y_m_s2": 0.01,
 }
-# of what may be zero: an interval within it tells that it is, as far as anybody would notice
+# for parameters that may be zero: a half width up to this also counts as determined
 _SMALL = {
     "drag_per_m": 1e-3,
     "wash_per_s2": 0.05,
@@ -63,25 +63,25 @@ _SMALL = {
     "attitude_delay_s": 0.01,
     "vehicle_drag_per_m": 5e-3,
 }
-_LEAST = {"length_m": 0.01, "wash_radius_m": 0.01, "wash_delay_s": 0.0}  # of what cannot be negative
+_LEAST = {"length_m": 0.01, "wash_radius_m": 0.01, "wash_delay_s": 0.0}  # parameters that cannot be negative
 
-# shortest recording that something can be told from: the edges, and one block between them
+# shortest recording that can be evaluated: the edges, and one block between them
 LEAST_S = 2.0 * _EDGE_S + _BLOCK_S
 
 
-_TILT_SHARE = (0.5, 2.0)  # of a vehicle that leans by its thrust, as all multirotors do
+_TILT_SHARE = (0.5, 2.0)  # of a vehicle that tilts to accelerate, as all multirotors do
 
 
 class TooLittleMotionError(ValueError):
-    """The recording does not tell the numbers of the vehicle apart."""
+    """The recording does not determine the parameters of the vehicle separately."""
 
 
 class NoLoadError(ValueError):
-    """Nothing predicts what is said to be the load."""
+    """No model predicts the positions that are given as those of the load."""
 
 
 class Identified(NamedTuple):
-    """A number, and half the width of its 95 % interval; in the unit that its name ends with."""
+    """A parameter, and half the width of its 95 % interval; in the unit with which its name ends."""
 
     name: str
     value: float
@@ -89,7 +89,7 @@ class Identified(NamedTuple):
 
     @property
     def is_told(self) -> bool:
-        """Whether the recording tells it: the interval is narrower than the number, or than what matters."""
+        """Whether the recording determines it: the half width is at most the value, or what matters."""
         return self.half_width <= max(abs(self.value), _SMALL.get(self.name, 0.0))
 
 
@@ -110,10 +110,10 @@ def identify_load(
     names: Sequence[str],
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Identified]:
-    """The numbers `names` of the model that predict this load best; the rest stays as it is in `model`.
-    NoLoadError if none does.
+    """The parameters `names` of the model that predict this load best; the others stay as in `model`.
+    NoLoadError if none do.
 
-    `progress` is told how many predictions of the recording are done, and how many there are at most.
+    `progress` receives the number of predictions of the recording that are done, and their greatest number.
     """
     total = 1 + _ROUNDS * (len(names) + len(_SHORTENED))
     done = 0
@@ -163,9 +163,10 @@ def identify_load(
 
 
 def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
-    """Mass ratio (load / vehicle), drag of the vehicle, share of its acceleration in the tilt, its delay.
+    """Mass ratio (load / vehicle), linear drag of the vehicle, share of its acceleration in the tilt, delay
+    of the attitude, quadratic drag of the vehicle.
 
-    TooLittleMotionError where the recording does not tell them apart.
+    TooLittleMotionError if the recording does not determine them separately.
     """
     time, slow = motion.time_s, motion.slow
     load = smooth(time, motion.load, SLOW_NOISE_M**2 / motion.times.sure, SLOW_DENSITY)
@@ -204,7 +205,7 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
 
 
 def map_doubt(vehicle: Sequence[Identified]) -> str:
-    """Why the column map may not be the recording's, by the numbers of the vehicle; empty: it may be."""
+    """Why the column map may not fit the recording, by the parameters of the vehicle; empty: it may fit."""
     share = next(one for one in vehicle if one.name == "tilt_share")
     least, most = _TILT_SHARE
     if share.value + share.half_width >= least and share.value - share.half_width <= most:
@@ -232,7 +233,7 @@ def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
 
 
 def _weights(errors: Floats) -> Floats:
-    """Of each error (k, horizons): one up to the bend, then falling with its size."""
+    """Weights of errors (k, horizons): constant up to the bend, then inversely proportional to the size."""
     size = np.linalg.norm(errors, axis=2)
     weights: Floats = np.array([1.0, _FAR_WEIGHT]) * _BEND_M / np.maximum(size, _BEND_M)
     return weights
@@ -245,8 +246,8 @@ def _cost(errors: Floats) -> float:
 
 
 def _prior(errors: Floats) -> float:
-    """Of a step squared, for what the recording says nothing of: the weight of an error that is a hundred
-    steps off, so that errors of the size of these ones tell more as soon as they tell anything."""
+    """Weight of a squared step, for parameters that the recording does not determine: a change of a hundred
+    steps costs as much as a mean error, so any dependence of the errors on a parameter outweighs it."""
     size = np.linalg.norm(errors, axis=2)
     return float(np.mean(_weights(errors) * size**2)) / _HELD_STEPS**2
 
@@ -260,15 +261,15 @@ def _blocks(time: Floats) -> NDArray[np.intp]:
 
 
 def _student(blocks: int) -> float:
-    """Half the width of a 95 % interval in standard deviations that were told from so many blocks."""
+    """Half the width of a 95 % interval in standard deviations that were estimated from so many blocks."""
     return float(stdtrit(blocks - 1, 0.975)) if blocks > 1 else float("nan")
 
 
 def half_widths(normal: Floats, gradient: Floats, time: Floats) -> Floats:
-    """Of 95 % intervals (j,) of least squares numbers, by leaving out one block after the other.
+    """Half widths of 95 % intervals (j,) of least squares parameters, by leaving out one block at a time.
 
-    `normal` (k, j, j) and `gradient` (k, j) are what each row adds. Infinite where the rows that are left do
-    not tell the numbers.
+    `normal` (k, j, j) and `gradient` (k, j) are the contributions of each row. Infinite if the remaining rows
+    do not determine the parameters.
     """
     blocks = _blocks(time)
     count = int(blocks[-1]) + 1

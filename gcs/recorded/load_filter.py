@@ -1,9 +1,9 @@
 """Kalman filter of the load: from its measured position, from the vehicle's attitude, from both, or neither.
 
-Errors of eight states: cable direction (2), its rate (2), turbulence (2), bias of the thrust's direction (2).
+Eight states: cable direction (2), its rate (2), turbulence (2), bias of the thrust's direction (2).
 The rows of `drive` hold the vehicle's motion (`load_model.Drive`), those of `slow` the same smoothed as
-strongly as the attitude, and `sight` what is measured: load from attachment (2, m), direction of the thrust
-(2), weight of the row, whether the time since the row before is unknown.
+strongly as the attitude, and those of `sight` the measurements: load relative to attachment (2, m), direction
+of the thrust (2), weight of the row, whether the time since the row before is unknown.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from gcs.recorded.load_model import Drive, LoadModel, LoadState, step_load, thru
 from gcs.recorded.smoothing import Floats
 
 SIZE = 8
-WORK = 3 * SIZE + 4  # rows of SIZE numbers that the kernels work with
-_LITTLE = 1e-5  # of differences
-_GATE_LOAD = 60.0  # squared, in standard deviations
+WORK = 3 * SIZE + 4  # rows of SIZE numbers, working memory of the kernels
+_LITTLE = 1e-5  # step of finite differences
+_GATE_LOAD = 60.0  # greatest normalised square of an innovation
 _GATE_TILT = 30.0
-_LOST_ROWS = 8  # refused in a row: the load is looked for anew
-_SEEN_SD = 0.01  # of a direction and a rate to begin with
+_LOST_ROWS = 8  # after more refusals in succession the filter starts anew
+_SEEN_SD = 0.01  # of a measured direction at the start; `_RATE_SD`: of its rate
 _RATE_SD = 1.0
-_UNSEEN_SD = 0.15  # of a direction that is not seen; its rate as in a swing
+_UNSEEN_SD = 0.15  # of a direction at the start that is not measured; its rate as in a swing
 _BIAS_SD = 5e-3  # of the thrust's direction
 
 
@@ -60,7 +60,7 @@ def _nudged(s: LoadState, j: int) -> LoadState:
 def forecast(
     x: Floats, p: Floats, f: Floats, h: float, before: Drive, after: Drive, m: LoadModel, work: Floats
 ) -> None:
-    """Move state x (8,) and covariance p (8, 8) on by h; f (8, 8) becomes the transition matrix."""
+    """Advance state x (8,) and covariance p (8, 8) by h (s); f (8, 8) becomes the transition matrix."""
     s = _state(x)
     new = step_load(s, h, before, after, m)
     for i in range(SIZE):
@@ -111,7 +111,7 @@ def _correct(
     gate: float,
     work: Floats,
 ) -> float:
-    """Correct by two numbers whose Jacobian is h (2, 8); their normalised square, negative if refused."""
+    """Correct by two innovations with Jacobian h (2, 8); the normalised square, negative if refused."""
     s00, s01, s11 = r00, r01, r11
     for i in range(SIZE):
         a = 0.0
@@ -142,7 +142,7 @@ def _correct(
 
 @kernel
 def see_load(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, work: Floats) -> float:
-    """Correct by the load's position of row k; the normalised square, negative if refused."""
+    """Correct by the load's position of row k; return the normalised square, negative if refused."""
     h = work[:2]
     for i in range(2):
         for j in range(SIZE):
@@ -166,7 +166,7 @@ def see_load(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, work: Fl
 
 @kernel
 def see_tilt(x: Floats, p: Floats, sight: Floats, slow: Floats, k: int, m: LoadModel, work: Floats) -> float:
-    """Correct by the thrust's direction of row k; the normalised square, negative if refused."""
+    """Correct by the thrust's direction of row k; return the normalised square, negative if refused."""
     h = work[:2]
     s, u = _state(x), _drive(slow, k)
     tx, ty = thrust_tilt(s, u, m)
@@ -185,7 +185,7 @@ def see_tilt(x: Floats, p: Floats, sight: Floats, slow: Floats, k: int, m: LoadM
 
 @kernel
 def start(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, with_load: bool) -> None:
-    """A state of which no more is known than the cable's direction in row k, or not even that."""
+    """Start the filter from the cable's direction in row k alone, or without any measurement."""
     for i in range(SIZE):
         x[i] = 0.0
         for j in range(SIZE):
@@ -217,7 +217,7 @@ def run_filter(
     work: Floats,
 ) -> None:
     """Estimates (n, 8), (n, 8, 8) of all rows, with the forecasts before each correction and the normalised
-    squares of what the load's position (squares[:, 0]) and the thrust's direction (squares[:, 1]) said anew.
+    squares of the innovations of load position (squares[:, 0]) and thrust direction (squares[:, 1]).
     """
     n = len(time)
     x, p, rest = work[0], work[1 : 1 + SIZE], work[1 + SIZE :]
@@ -227,7 +227,7 @@ def run_filter(
             start(x, p, sight, k, m, with_load)
             for i in range(SIZE):
                 for j in range(SIZE):
-                    transitions[k, i, j] = 0.0  # nothing is carried on, nor back
+                    transitions[k, i, j] = 0.0  # no information is passed on, forwards or backwards
         else:
             forecast(
                 x, p, transitions[k], time[k] - time[k - 1], _drive(drive, k - 1), _drive(drive, k), m, rest
@@ -265,7 +265,7 @@ def look_ahead(
     found: Floats,
     work: Floats,
 ) -> None:
-    """From the estimate of row `begin` on without the load: directions and their covariance at rows `ends`.
+    """Predict from the estimate of row `begin` without the load: directions and covariances at rows `ends`.
 
     found (len(ends), 5) becomes q_x, q_y, and the covariance xx, xy, yy.
     """

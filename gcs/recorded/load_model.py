@@ -1,17 +1,17 @@
-"""A load on a cable that is driven by a vehicle whose motion is known: its forces and equations of motion.
+"""A load on a cable below a vehicle whose motion is known: its forces and equations of motion.
 
     L q'' = -(I - q q') (a + g e_3 - f / m_L) - L |q'|^2 q
 
 with the cable's direction q (from vehicle to load), the vehicle's acceleration a, and the forces f on the
-load beside weight and cable, here as accelerations f / m_L:
+load besides weight and cable, here as accelerations f / m_L:
 
     -c |v_L| v_L                        drag, of the load's velocity v_L
     (k o + s e_3 x o) w(|o| / r)        wash of the rotors, w(u) = u / (1 + u^4), which spreads over the
-                                        ground and pushes outwards, and around; o is where the load is,
-                                        horizontally, from where the wash comes down: the vehicle's thrust
-                                        axis of some tenths of a second ago
-    -e a                                what grows with the vehicle's acceleration
-    p                                   a constant push, for instance by a frame that is not quite level
+                                        ground and pushes outwards and tangentially; o is the horizontal
+                                        position of the load relative to the point where the wash comes
+                                        down, on the vehicle's thrust axis of some tenths of a second ago
+    -e a                                a force proportional to the vehicle's acceleration
+    p                                   a constant push, for instance from a frame that is not quite level
     d                                   turbulence: a Markov process of first order in x and y
 
 Massless, taut cable; the load is a point. World frame z up; SI units. The state is the tuple
@@ -26,15 +26,15 @@ from typing import NamedTuple
 from autopilot.geometry.kernel import kernel
 
 LoadState = tuple[float, float, float, float, float, float]
-# acceleration (3) and velocity (3) of the vehicle, and the vehicle's place from where its wash comes down (2)
+# acceleration (3) and velocity (3) of the vehicle, and its position relative to where its wash comes down (2)
 Drive = tuple[float, float, float, float, float, float, float, float]
 
-_LEAST_DOWN = 1e-3  # of -q_z: the equations are of a cable that points down
+_LEAST_DOWN = 1e-3  # of -q_z: the equations are for a cable that points down
 _STEPS = 2  # of integration from row to row
 
 
 class LoadModel(NamedTuple):
-    """Numbers of the load's motion; the last nine are those of its estimation."""
+    """Parameters of the load's motion; the last nine are those of its estimation."""
 
     length_m: float  # from the attachment at the vehicle to the load
     gravity_m_s2: float
@@ -48,14 +48,14 @@ class LoadModel(NamedTuple):
     push_y_m_s2: float
     mass_ratio: float  # load / vehicle
     vehicle_drag_per_s: float  # of the vehicle: force per mass and velocity
-    tilt_share: float  # of the vehicle's horizontal acceleration that its attitude shows
+    tilt_share: float  # share of the vehicle's horizontal acceleration that its attitude shows
     turbulence_m_s2: float  # standard deviation of d
     turbulence_s: float  # its correlation time
     force_density: float  # white noise of the load's acceleration, m/s^2 / sqrt(Hz)
     seen_m: float  # standard deviation of the load's position
-    seen_s: float  # and of the time of it
+    seen_s: float  # standard deviation of its time
     tilt_noise: float  # standard deviation of the thrust's direction
-    tilt_per_accel: float  # and how much its variance grows with the horizontal acceleration, squared
+    tilt_per_accel: float  # relative growth of its variance with the squared horizontal acceleration
     tilt_walk: float  # random walk of its bias, 1/sqrt(s)
 
 
@@ -122,7 +122,7 @@ def _between(a: Drive, b: Drive, part: float) -> Drive:
 
 @kernel
 def step_load(s: LoadState, h: float, before: Drive, after: Drive, m: LoadModel) -> LoadState:
-    """The state a time h later, while the drive goes evenly from `before` to `after` (Runge-Kutta 4)."""
+    """The state a time h later, while the drive changes linearly from `before` to `after` (Runge-Kutta 4)."""
     part = 1.0 / _STEPS
     e = h * part
     for i in range(_STEPS):
@@ -139,10 +139,10 @@ def step_load(s: LoadState, h: float, before: Drive, after: Drive, m: LoadModel)
 
 @kernel
 def thrust_tilt(s: LoadState, u: Drive, m: LoadModel) -> tuple[float, float]:
-    """Direction of the thrust, (b_x / b_z, b_y / b_z), that moves vehicle and load as they move.
+    """Direction of the thrust, (b_x / b_z, b_y / b_z), that the motion of vehicle and load requires.
 
-    b is along m_Q (a + g e_3) + D v - T q with the cable's tension T; the drive should be as slow as the
-    attitude that is compared with it.
+    b is along m_Q (a + g e_3) + D v - T q with the cable's tension T; the drive should be smoothed as
+    strongly as the attitude that is compared with it.
     """
     qx, qy, wx, wy = s[0], s[1], s[2], s[3]
     qz = down(qx, qy)

@@ -1,4 +1,4 @@
-"""What the kernels of the load need of a recording, row by row."""
+"""The data of a recording that the kernels of the load need, row by row."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ _AXIS_DENSITY = 50.0
 SLOW_DENSITY = 20.0  # the course to which the attitude is compared
 SLOW_NOISE_M = 1.5e-3
 _SLOW_AXIS_NOISE = 1e-2
-_SLOW_AXIS_DENSITY = 890.0  # as fast as the course
+_SLOW_AXIS_DENSITY = 890.0  # smoothed as strongly as the course
 
 
 class Motion(NamedTuple):
-    """A vehicle's motion as arrays of rows, and what was seen of the load."""
+    """A vehicle's motion as arrays of rows, and the measured load."""
 
     time_s: Floats  # (n,)
     attachment: Course  # of the cable at the vehicle
     thrust: Floats  # (n, 3) direction of the thrust
-    slow: Course  # of the vehicle, as slow as the attitude that is compared with it
+    slow: Course  # of the vehicle, smoothed as strongly as the attitude that is compared with it
     tilt: Floats  # (n, 2) of the thrust's axis, x / z and y / z
-    load: Floats  # (n, 3) position of the load; nan where it is not seen
-    times: RowTimes  # and what is known of them
+    load: Floats  # (n, 3) position of the load; nan where it was not measured
+    times: RowTimes  # and what they were inferred from
 
 
 def motion_of(recording: Recording, columns: ColumnMap) -> Motion:
-    """The motion of a recorded vehicle, whose rows get their times here if they have none."""
+    """The motion of a recorded vehicle; the times of rows without times are inferred."""
     tracking, attachment = columns.tracking, columns.attachment
     position = recording.position
     if recording.time_s is not None:
@@ -67,7 +67,7 @@ def distances(motion: Motion) -> Floats:
 
 
 def drive_rows(motion: Motion, model: LoadModel) -> Floats:
-    """(n, 8): acceleration, velocity, and the attachment's place from where the wash comes down now."""
+    """(n, 8): acceleration, velocity, position of the attachment relative to the wash that comes down now."""
     then = motion.time_s - model.wash_delay_s
     place = motion.attachment.position[:, :2]
     from_there = place - model.length_m * motion.thrust[:, :2]
@@ -76,12 +76,12 @@ def drive_rows(motion: Motion, model: LoadModel) -> Floats:
 
 
 def slow_rows(motion: Motion) -> Floats:
-    """(n, 8): the drive that the attitude is compared with."""
+    """(n, 8): the drive with which the attitude is compared."""
     still = np.zeros((len(motion.time_s), 2))
     return np.hstack([motion.slow.acceleration, motion.slow.velocity, still])
 
 
 def sight_rows(motion: Motion) -> Floats:
-    """(n, 6): load from attachment, direction of the thrust, weight of the row, 1 where it is broken."""
+    """(n, 6): load relative to attachment, direction of the thrust, weight of the row, 1 where broken."""
     seen = motion.load[:, :2] - motion.attachment.position[:, :2]
     return np.hstack([seen, motion.tilt, motion.times.sure[:, None], motion.times.broken[:, None]])

@@ -1,4 +1,4 @@
-"""Reading a recorded flight: rows of numbers, or a telemetry log of Plumbline's own."""
+"""Reading a recorded flight: rows of numbers, or a telemetry log of Plumbline."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEAST_ROWS = 200
 _MOST_BYTES = 2**30
 _LONGEST_ROW = 2**16  # bytes
 _STAMPS = range(10**15, 10**16)  # us since 1970, of any year from 2001 to 2286
-_FRAMES = (b"\xfd", b"\xfe")  # what a frame of MAVLink begins with
+_FRAMES = (b"\xfd", b"\xfe")  # first byte of a MAVLink frame
 _SHORTEST_S, _LONGEST_S = 1e-4, 0.5  # between rows
 _UNIT = 0.1  # by which the length of a quaternion may differ from 1
 _LIFTED_M = 0.05  # above the lowest place of the load: a log begins and ends on the ground
@@ -49,7 +49,7 @@ class Recording(NamedTuple):
 
 
 def read_recording(path: Path, columns: ColumnMap) -> Recording:
-    """The recording in a file; RecordingError if it is none."""
+    """The recording in a file; RecordingError if the file has none."""
     try:
         if not path.is_file():
             raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}; {READ}")
@@ -60,13 +60,13 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
 
 
 def name_of(path: Path) -> str:
-    """The file's name without what says its kind."""
+    """The file's name without its suffix, or `.gz` and the one before."""
     return path.name.removesuffix(".gz").rsplit(".", 1)[0]
 
 
 def is_log(path: Path) -> bool:
-    """Whether it is a telemetry log, of a simulated flight, and not rows of numbers: by its name, or because
-    it begins with a time of 8 bytes and a frame."""
+    """Whether it is a telemetry log, of a simulated flight, and not rows of numbers: judged by its name, or
+    by a time of 8 bytes and a frame at its beginning."""
     if path.suffix == ".tlog" or not path.is_file():  # a pipe may have no end
         return path.suffix == ".tlog"
     try:
@@ -78,7 +78,7 @@ def is_log(path: Path) -> bool:
 
 
 def is_table(path: Path) -> bool:
-    """Whether a file begins with rows of comma-separated numbers, behind one line of headings at most."""
+    """Whether a file begins with rows of comma-separated numbers, after one line of headings at most."""
     return any(_is_row(line) for line in _first_lines(path))
 
 
@@ -89,11 +89,11 @@ def _has_headings(path: Path) -> bool:
 
 
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
-    """Empty where they cannot be read."""
+    """The first two lines; empty if they cannot be read."""
     try:
         with _opened(path) as file:
             return file.readline(_LONGEST_ROW), file.readline(_LONGEST_ROW)
-    except (OSError, EOFError, zlib.error):  # the last two of a torn archive
+    except (OSError, EOFError, zlib.error):  # the last two: a truncated archive
         return b"", b""
 
 
@@ -115,7 +115,7 @@ def _is_number(cell: bytes) -> bool:
 
 
 def _no_number(path: Path, headings: int, missing: Collection[str]) -> str:
-    """Where the first cell stands that is neither a number nor one of the words for a `missing` one; empty if
+    """The place of the first cell that is neither a number nor one of the words for a `missing` one; empty if
     there is none."""
     with _opened(path) as file:
         for number, line in enumerate(file, start=1):
@@ -206,7 +206,7 @@ def _longest(true: NDArray[np.bool_]) -> slice:
 
 
 def _valid(found: Recording, path: Path) -> Recording:
-    """The rows whose pose is one."""
+    """The rows with a valid pose; RecordingError if they are too few or their times are wrong."""
     length = np.linalg.norm(found.quaternion_xyzw, axis=1)
     good = np.isfinite(found.position).all(axis=1) & (np.abs(length - 1.0) < _UNIT)
     if found.time_s is not None:

@@ -1,4 +1,4 @@
-"""What `gcs replay` leaves behind: a table of the load, row by row, and a picture."""
+"""The files that `gcs replay` writes: a table of the load, row by row, and a picture."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _HEAD = "time_s,load_x_m,load_y_m,load_z_m,sd_x_m,sd_y_m,measured_x_m,measured_y
 
 
 def write_table(path: Path, motion: Motion, load: Floats, sd: Floats) -> None:
-    """The load (n, 3) from the vehicle's pose alone, its standard deviations (n, 2), and as measured."""
+    """Write the load (n, 3) from the vehicle's pose alone, its deviations (n, 2), and the measured load."""
     table = np.column_stack([motion.time_s, load, sd, motion.load])
     np.savetxt(path, table, fmt="%.6f", delimiter=",", header=_HEAD, comments="")
 
 
 def write_picture(path: Path, motion: Motion, load: Floats, sd: Floats) -> None:
-    """Estimated and measured load from the vehicle, and the error with its 95 % bounds."""
+    """Plot estimated and measured load relative to the vehicle, and the error with its 95 % bounds."""
     from gcs.report.style import draw, key, rows, save, style
 
     time, vehicle = motion.time_s, motion.attachment.position

@@ -1,10 +1,10 @@
-"""When the rows of a recording were measured, if it does not say so.
+"""The times at which the rows of a recording were measured, if it does not contain them.
 
 The recorder ran evenly, but each row holds the latest pose that the tracker had sent: the times of the poses
-are jittered about an even grid, and the jitter does not accumulate. A moving vehicle betrays it: a pose that
-is 5 ms late lies 5 mm further along a course of 1 m/s. Course and times are found in turn, the times by one
-step of Gauss and Newton with the even grid as prior. While the vehicle stands still nothing is learnt, and
-nothing depends on it. Where rows are missing (`gaps`), the grid leaves room for them.
+scatter about an even grid, and the scatter does not accumulate. The motion of the vehicle reveals it: a pose
+that is 5 ms late lies 5 mm further along a course of 1 m/s. Course and times are estimated in turn, the times
+by one step of Gauss-Newton with the even grid as prior. While the vehicle stands still the times cannot be
+inferred, and nothing depends on them. Where rows are missing (`gaps`), the grid leaves room for them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from gcs.recorded.gaps import gaps
 from gcs.recorded.smoothing import Course, Floats, smooth
 
 _ROUNDS = 30
-_COARSE_ROUNDS = 9  # in which the poses are taken as less precise, so that far times can be reached
+_COARSE_ROUNDS = 9  # in which the poses are assumed less precise, so that times far off can be reached
 _OUTLIER = 5.0  # standard deviations beyond which a row is weighted down
 _STALE = 1e-6  # weight of a row that repeats the one before
 _SILENCE_S = 1.0
@@ -67,7 +67,7 @@ def infer_times(
 
 
 def known_times(time_s: Floats, position: Floats, noise_m: float, jerk_density: float) -> RowTimes:
-    """The same for rows that say their time; broken where a second or more is missing."""
+    """The same for rows with given times; broken where more than a second is missing."""
     n = len(time_s)
     broken = np.append(False, np.diff(time_s) > _SILENCE_S)
     course = smooth(time_s, position, noise_m**2, jerk_density)

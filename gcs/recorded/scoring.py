@@ -1,4 +1,4 @@
-"""How well a recorded load is predicted, and how well it is known from the vehicle's pose alone."""
+"""How well a recorded load is predicted, and how well it is estimated from the vehicle's pose alone."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from gcs.recorded.motion import Motion
 from gcs.recorded.smoothing import Floats
 
 HORIZONS_S = (2.0, 5.0)
-EVERY_ROWS = 15  # a prediction begins
-SETTLED_ROWS = 90  # the filter has seen the load so long before the first prediction
+EVERY_ROWS = 15  # between the beginnings of predictions
+SETTLED_ROWS = 90  # with a measured load that the filter uses before the first prediction
 BOUND_95 = 5.991  # chi-square of two degrees of freedom
 
 
 class Score(NamedTuple):
     """Errors (k,) in metres, and their normalised squares (k,) by the stated covariance of the direction."""
 
-    rows: NDArray[np.intp]  # at which
+    rows: NDArray[np.intp]  # of the errors
     error_m: Floats
     square: Floats
 
@@ -39,10 +39,10 @@ class Score(NamedTuple):
 
 
 def score_ahead(motion: Motion, rows: Rows, model: LoadModel) -> tuple[Score, ...]:
-    """Predictions from every half second on, for each horizon, against the measured load.
+    """Predictions that begin every `EVERY_ROWS` rows, for each horizon, compared with the measured load.
 
-    Each begins with what the rows said so far of load and vehicle, and goes on by the vehicle's motion
-    alone. Left out are those across a break, of which nobody knows how long it was.
+    Each begins with the estimate from load and vehicle up to this row, and continues with the vehicle's
+    motion and attitude alone. Predictions across a break, whose duration is unknown, are left out.
     """
     estimates = filtered(rows, model, load=True, tilt=True)
     begins = np.arange(SETTLED_ROWS, len(rows.time_s), EVERY_ROWS)
@@ -59,7 +59,7 @@ def score_ahead(motion: Motion, rows: Rows, model: LoadModel) -> tuple[Score, ..
 
 
 def score_pose_alone(motion: Motion, rows: Rows, model: LoadModel) -> Score:
-    """Smoothed estimates of the whole flight, without a look at the load, against the measured load."""
+    """Smoothed estimates of the whole flight from the pose alone, compared with the measured load."""
     found = filtered(rows, model, load=False, tilt=True, smoothed=True)
     at = np.arange(len(rows.time_s))
     covariance = found.covariances[:, [0, 0, 1], [0, 1, 1]]

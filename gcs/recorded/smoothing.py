@@ -1,8 +1,8 @@
-"""Position, velocity and acceleration of something that is measured row by row.
+"""Position, velocity and acceleration of a point that is measured row by row.
 
 The motion is a triple integrator driven by white noise (a Wiener process of jerk). Its most probable course
 is a linear least squares problem with 3 x 3 blocks on three diagonals (Särkkä, *Bayesian Filtering and
-Smoothing*, 2013, section 8.2, gives the recursive form); solved here at once as a banded system.
+Smoothing*, 2013, section 8.2, gives the recursive form); solved here in one pass as a banded system.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from scipy.linalg import solveh_banded
 Floats = NDArray[np.float64]
 
 _HALF_BAND = 5  # entries beside the diagonal that neighbouring blocks of three reach
-_SHORTEST_S = 1e-4  # a step between rows; the motion is smooth over anything shorter
+_SHORTEST_S = 1e-4  # least step between rows; the motion is smooth over anything shorter
 
 
 class Course(NamedTuple):
-    """A smoothed motion, one row an instant; shapes (n, d)."""
+    """A smoothed motion, one row per instant; shapes (n, d)."""
 
     position: Floats
     velocity: Floats
@@ -30,7 +30,7 @@ class Course(NamedTuple):
 def smooth(time_s: Floats, measured: Floats, variance: Floats | float, jerk_density: float) -> Course:
     """The most probable course of `measured` (n, d) at increasing `time_s` (n,).
 
-    `variance` is that of the measurement, a number or one a row; infinite where a row says nothing.
+    `variance` is that of the measurement, a number or one per row; infinite for a row without information.
     `jerk_density` is the spectral density of the jerk's noise, in units of `measured`^2 / s^5.
     """
     n, d = measured.shape
@@ -56,7 +56,7 @@ def smooth(time_s: Floats, measured: Floats, variance: Floats | float, jerk_dens
 
 
 def _transitions(step: Floats, density: float) -> tuple[Floats, Floats]:
-    """Transition matrices over steps (k,) and the inverse covariances of what the noise adds, (k, 3, 3)."""
+    """Transition matrices over steps (k,) and the inverses of the noise's covariances, (k, 3, 3)."""
     one, zero = np.ones_like(step), np.zeros_like(step)
     moves = np.stack([one, step, 0.5 * step**2, zero, one, step, zero, zero, one], axis=1).reshape(-1, 3, 3)
     # inverse of the covariance [[h^5/20, h^4/8, h^3/6], [h^4/8, h^3/3, h^2/2], [h^3/6, h^2/2, h]]

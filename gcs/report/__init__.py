@@ -1,1 +1,1 @@
-"""The report of a flight: pictures, a page, a table, and the files they are kept in."""
+"""The report of a flight: pictures, a page, a table, and the files that contain them."""

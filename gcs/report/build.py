@@ -1,4 +1,4 @@
-"""A report from a captured flight: a .tlog goes in, a directory of files and the record come out."""
+"""Builds the report of a flight from its .tlog: a directory of files, and the record."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ META_FILE = "meta.json"
 PARQUET_FILE = "flight.parquet"
 MCAP_FILE, COMMON_FILE = "flight.mcap", "flight.common.tlog"
 
-# steps done, steps in all, what is done next
+# steps done, steps in total, name of the next step
 Progress = Callable[[int, int, str], None]
 
 
 class ReportError(ValueError):
-    """The user's files do not allow a report; one line says which, why, and what to do."""
+    """No report can be made from the user's files; one line says which file, why, and what to do."""
 
 
 def load_meta(path: Path) -> FlightMeta:
-    """What a meta.json says; nothing known if there is no such file."""
+    """The contents of a meta.json; if there is no such file, a FlightMeta in which nothing is known."""
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -48,10 +48,10 @@ def build_report(
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
 
-    `figures` is given the record as soon as it stands, before what takes longer. `meta` is that of a new
-    flight, and the report of another one in the directory is deleted; without it, meta.json beside the log is
-    read. A log that is cut short, empty or of a lost flight gives a record all the same, with None for what
-    cannot be known. With `all_pictures` those that no page needs are drawn too.
+    `figures` is called with the record as soon as it is complete, before the steps that take longer. `meta`,
+    if given, is that of a new flight, and an earlier report in the directory is deleted; otherwise meta.json
+    beside the log is read. A log that is truncated, empty or of a lost flight gives a record too, with None
+    for what cannot be known. With `all_pictures`, the pictures that the page does not need are drawn too.
     """
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View
@@ -91,7 +91,7 @@ def build_report(
         from gcs.report.replay import replay_of
         from gcs.report.settings import changed_settings
 
-        # where the directory lies is no property of the flight
+        # the path of the directory is not a property of the flight
         about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
         write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
         done(PARQUET_FILE)
@@ -104,7 +104,7 @@ def build_report(
 
 
 def forget_report(directory: Path) -> None:
-    """Delete the report of an earlier flight, with what was made on demand."""
+    """Delete the report of an earlier flight, including files that were made on demand."""
     from gcs.report.plots import PICTURES
 
     made = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)

@@ -1,4 +1,4 @@
-"""Several flights beside each other: what differed, figures with the best marked, tracks over each other."""
+"""Comparison of several flights: what differed, figures with the best marked, tracks drawn in one scene."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ _WAYS = (
     "sensors",
     "vehicle",
     "seed",
-)  # keys of the record that say how it was flown
-_CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
+)  # keys of the record that state how it was flown
+_CLOCK = {"wall_s", "real_time_factor"}  # depend on the machine, not on the flight: no best
 STAR = "*: the best of the completed flights, and what is within 1 % of it."
-DEFAULT = "default"  # of a parameter that was not changed, where its number is not known, as of an own law
-_LAW_PARAMETER = "CTL_LAW"  # what the law is in the table of parameters
-_AS_GOOD = 0.01  # as a share of the best value: a difference that is none
-_PARTS = 3  # of a label; what differs beyond is in the table
+DEFAULT = "default"  # shown for an unchanged parameter whose default is not known, as with a custom law
+_LAW_PARAMETER = "CTL_LAW"  # the parameter that holds the law
+_AS_GOOD = 0.01  # as a share of the best value: a smaller difference counts as none
+_PARTS = 3  # of a label; further differences are in the table
 STEPS = "mission steps"
-_UNTOLD = {STEPS}  # in labels
+_UNTOLD = {STEPS}  # differences that labels do not mention
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
-_LABELS = 32  # before the columns of the flights
+_LABELS = 32  # characters before the columns of the flights
 _DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
 SCRIPTS = (
     *PLOT_SCRIPTS,
@@ -71,7 +71,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Difference:
-    """Something that was not the same: a value for each run, and whether it is what is usual there."""
+    """Something that differs between the runs: its value in each run, and whether that is unchanged there."""
 
     name: str
     values: tuple[str, ...]
@@ -80,7 +80,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of each run as people read it, and which runs have the best; none if all are equal."""
+    """A figure as displayed for each run, and which runs have the best value; none if all are equal."""
 
     metric: Metric
     values: tuple[str, ...]
@@ -95,8 +95,8 @@ def load_run(name: str, tlog: Path, meta: FlightMeta) -> Run:
 
 
 def differences(runs: Sequence[Run]) -> list[Difference]:
-    """What is known of how they were flown and is not the same in all: what was asked for first, then the
-    parameters that followed from it."""
+    """What differs in how the runs were flown, as far as it is known: first the given settings, then the
+    parameters that followed from them."""
     rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
     asked = {name for run in runs for name in run.meta.settings}
@@ -116,8 +116,8 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
 
 
 def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
-    """What those of the parameters that were not changed are as people read it. A vehicle that told its
-    parameters has none but these."""
+    """The displayed values of these parameters in a run that did not change them. A vehicle that reported its
+    parameters has no others: the value of any other is unknown."""
     if not (run.meta.command or run.telemetry.parameters):
         return dict.fromkeys(names, UNKNOWN)
     otherwise = UNKNOWN if run.telemetry.parameters else DEFAULT
@@ -125,7 +125,7 @@ def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
 
 
 def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
-    """The figures group by group; those of which nothing is known, or that say how it was flown, left out."""
+    """The figures by group, without those that are unknown or 0 in all runs or state how it was flown."""
     found = []
     for group, metrics in GROUPS:
         rows = [
@@ -139,8 +139,8 @@ def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
 
 
 def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
-    """Which runs have the best value, and those that are as good (`_AS_GOOD`), of flights that were completed
-    if there are any. None where all are as good."""
+    """The runs with the best value or one that counts as equal (`_AS_GOOD` or the same when displayed), among
+    the completed flights if there are any. Empty if all of these are equal."""
     completed = [i for i, run in enumerate(runs) if run.record["outcome"] == "completed"]
     rated = {
         i: value for i in completed or range(len(runs)) if (value := runs[i].record[metric.name]) is not None
@@ -158,11 +158,12 @@ def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
-    """What each flight is called on the page: by what differs, `thesis, SIM_ACT_DELAY_MS=72`; where that is
-    the same of several, or nothing, with the flight's name, which is its folder's."""
+    """The label of each flight on the page, from what differs: `thesis, SIM_ACT_DELAY_MS=72`. If several
+    flights have the same label, or none, the flight's name is added, which is that of its folder."""
     asked = {*_WAYS, *(name for run in runs for name in run.meta.settings)}
     known = [one for one in differences(runs) if one.name not in _UNTOLD]
-    # what was asked for, without the parameters that follow; of captured flights what the vehicle said
+    # the given settings, without the parameters that follow from them; if none differ, as with captured
+    # flights, what the vehicle reported
     different = [one for one in known if one.name in asked] or known
     found = []
     for i in range(len(runs)):
@@ -177,16 +178,16 @@ def labels(runs: Sequence[Run]) -> list[str]:
 
 
 def _part(name: str, value: str, usual: bool) -> str:
-    """A difference in a label; empty where it is what is usual."""
+    """A difference as part of a label; empty if the value is unchanged or unknown."""
     if usual or value == UNKNOWN:
         return ""
     if name in _WAYS and name != "seed":
-        return value.rsplit("/", 1)[-1]  # a file goes by its name
+        return value.rsplit("/", 1)[-1]  # of a file, its name without the folder
     return f"{name} {value}" if name in ("seed", "version") else f"{name}={value}"
 
 
 def comparison(runs: Sequence[Run]) -> Json:
-    """As `gcs compare --json` prints it; `best` has the places of the best runs, from 0."""
+    """As `gcs compare --json` prints it; `best` contains the indices of the best runs, from 0."""
     return {
         "runs": [
             {"name": run.name, "label": label, **{k: v for k, v in run.record.items() if k != "report_dir"}}
@@ -198,12 +199,12 @@ def comparison(runs: Sequence[Run]) -> Json:
 
 
 def in_columns(runs: Sequence[Run], width: int) -> bool:
-    """Whether a terminal of so many characters has place for a column for each flight."""
+    """Whether a terminal of this width, in characters, has room for a column for each flight."""
     return _LABELS + len(runs) * (_HEADING + 2) <= width
 
 
 def comparison_table(runs: Sequence[Run]) -> Table:
-    """For the terminal: differences first, then the figures, a star at the best (`STAR` says so)."""
+    """For the terminal: differences first, then the figures, with a star at the best (see `STAR`)."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -225,7 +226,7 @@ def comparison_table(runs: Sequence[Run]) -> Table:
 
 
 def _heading(name: str) -> str:
-    """A name in lines of up to `_HEADING` characters that end where its parts do, if these are shorter."""
+    """A name broken between its parts into lines of up to `_HEADING` characters; longer parts stay whole."""
     lines = [""]
     for part in re.findall(r"[^-_/. ]*[-_/. ]?", name):
         if lines[-1] and len(lines[-1] + part) > _HEADING:
@@ -242,7 +243,7 @@ def cell(value: str, best: bool) -> Any:
 
 
 def comparison_page(runs: Sequence[Run]) -> str:
-    """The page: tables, tracks over each other, errors over each other."""
+    """The page: tables, all tracks in one scene, all errors in one plot."""
     what, times = begins(runs)
     called = labels(runs)
     return render(
@@ -266,13 +267,13 @@ def _told(run: Run) -> dict[str, str]:
 
 
 def _embedded(run: Run, begin_s: float, label: str) -> Json:
-    """The flight, and its time at which the flights are laid over each other."""
+    """The flight, and the time in it that is aligned with that of the other flights."""
     replay = replay_of(run.telemetry, run.samples, run.meta, _DRAWN)
     return {**replay, "name": run.name, "label": label, "begin": begin_s}
 
 
 def begins(runs: Sequence[Run]) -> tuple[str, list[float]]:
-    """Of what all have begun last (the mission, the flight, the log) its name, and when each began it."""
+    """The latest stage that all have begun (mission, flight or log), and the time when each began it."""
     for name, phases in (("mission", (MISSION,)), ("flight", AIRBORNE)):
         found = [_first(run, phases) for run in runs]
         if all(time is not None for time in found):
@@ -287,7 +288,7 @@ def _first(run: Run, phases: tuple[int, ...]) -> float | None:
 
 
 def _different_steps(runs: Sequence[Run]) -> list[str]:
-    """The steps of each mission without those at its beginning and at its end that all have."""
+    """The steps of each mission without those at its beginning and end that are the same in all."""
     missions = [[step.text for step in step_texts(run.telemetry.mission, run.telemetry.home)] for run in runs]
     first = _common(missions)
     last = _common([list(reversed(steps[first:])) for steps in missions])
@@ -298,7 +299,7 @@ def _different_steps(runs: Sequence[Run]) -> list[str]:
 
 
 def _common(lists: Sequence[Sequence[str]]) -> int:
-    """How many entries all begin with."""
+    """The number of entries at the beginning that are the same in all lists."""
     return sum(1 for _ in takewhile(lambda entries: len(set(entries)) == 1, zip(*lists, strict=False)))
 
 

@@ -1,6 +1,7 @@
-"""The pictures of a report, drawn by a process beside ours where there are two cores.
+"""The pictures of a report, drawn by a second process if there are two cores.
 
-What pictures are drawn with takes half a second to load: the other process does that while we read the log.
+The libraries for drawing take half a second to load: the second process loads them while this one reads the
+log.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from gcs.report.warm import load_drawing
 
 
 class Drawing:
-    """The pictures in the making: the other process loads at once, and draws from `begin` on."""
+    """Draws the pictures: the other process loads its libraries immediately, and draws from `begin` on."""
 
     def __init__(self, directory: Path, pictures: Sequence[Picture]) -> None:
         self._directory = directory
@@ -31,7 +32,7 @@ class Drawing:
         self._taken: Synchronized[int]
         if (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods():
             return
-        context = multiprocessing.get_context("fork")  # with what is loaded here
+        context = multiprocessing.get_context("fork")  # the child has everything that is loaded here
         self._taken = context.Value("i", 0)
         self._pipe, theirs = context.Pipe()
         self._helper = context.Process(target=self._help, args=(theirs,), daemon=True)
@@ -39,14 +40,14 @@ class Drawing:
         theirs.close()
 
     def begin(self, view: View) -> None:
-        """What is drawn; waits until the other process has loaded."""
+        """Give the process what is to be drawn; waits until it has loaded its libraries."""
         self._view = view
         if self._helper is not None:
             with suppress(OSError):  # it was killed
                 self._pipe.send(view)
 
     def finish(self, done: Callable[[Picture], None]) -> None:
-        """Wait until all are drawn, of which `done` is told. Of several we draw some, too."""
+        """Wait until all are drawn, and call `done` for each. Of several, this process draws some too."""
         if self._helper is not None and len(self._pictures) > 1:
             self._draw_here(self._next(), done)
         while self._helper is not None:
@@ -55,7 +56,7 @@ class Drawing:
             self._draw_here(list(self._missing.values()), done)
 
     def _draw_here(self, pictures: Iterable[Picture], done: Callable[[Picture], None]) -> None:
-        """Draw these ourselves, and tell meanwhile what the helper has drawn."""
+        """Draw these in this process, and meanwhile report what the helper has drawn."""
         with style():
             for picture in pictures:
                 self._draw(picture)
@@ -64,7 +65,7 @@ class Drawing:
                     self._receive(done)
 
     def _next(self) -> Iterator[Picture]:
-        """Those that the other process has not taken."""
+        """The pictures that no process has taken yet; taking one marks it as taken."""
         while True:
             with self._taken.get_lock():
                 index = self._taken.value
@@ -80,7 +81,7 @@ class Drawing:
         done(self._missing.pop(file))
 
     def _receive(self, done: Callable[[Picture], None]) -> None:
-        """Take one word of the helper, or note that it has ended."""
+        """Receive the name of one picture that the helper has drawn, or note that the helper has ended."""
         try:
             self._tell(self._pipe.recv(), done)
         except (EOFError, OSError):
@@ -88,8 +89,8 @@ class Drawing:
             self._helper = None
 
     def _help(self, parent: Connection) -> None:
-        self._pipe.close()  # our parent's end, which we would not see closed
-        with suppress(KeyboardInterrupt, OSError, EOFError):  # our parent is gone, or draws what is left
+        self._pipe.close()  # our copy of the parent's end: with it open, we would not notice its closing
+        with suppress(KeyboardInterrupt, OSError, EOFError):  # the parent has ended, or draws what is left
             load_drawing()
             self._view = parent.recv()
             with style():

@@ -1,4 +1,4 @@
-"""report.html: a flight as replay, plots, figures and texts; one file that asks for nothing elsewhere."""
+"""report.html: a flight as replay, plots, figures and texts, in one file that loads no other."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STYLES = (*PLOT_STYLES, "page.css", "charts.css", "transport.css", "stage.css")
 def render_page(
     record: Record, meta: FlightMeta, replay: Json, settings: list[Setting], directory: Path
 ) -> str:
-    """The page of a flight; its still picture, for print, lies in `directory`."""
+    """The page of a flight; the picture that replaces the scene in print is read from `directory`."""
     outcome = str(record["outcome"])
     return render(
         "gcs.report",
@@ -68,7 +68,7 @@ def _subtitle(record: Record) -> str:
 
 
 def _figures(record: Record, replay: Json) -> list[Json]:
-    """The main figures; `time` is when the one that has a moment was measured."""
+    """The main figures; `time` is that of the greatest load error, None for the other figures."""
     worst = replay["worst"]
     return [
         {
@@ -82,7 +82,7 @@ def _figures(record: Record, replay: Json) -> list[Json]:
 
 
 def _groups(record: Record) -> list[dict[str, Any]]:
-    """The groups of figures, each with what is known."""
+    """The groups of figures, each with the figures that are known."""
     return [
         {"title": group.title, "window": group.window, "rows": [_row(metric, record) for metric in metrics]}
         for group, metrics in told(record)

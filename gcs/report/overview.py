@@ -1,4 +1,4 @@
-"""Many flights in a terminal that is too narrow for a column each: a row a flight, with the main figures."""
+"""Many flights in a terminal too narrow for a column for each: a row for each, with the main figures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gcs.report.compare import Run, cell, differences, figures
 if TYPE_CHECKING:
     from rich.table import Table
 
-# by the names of metrics, the most important first; what they are called over a narrow column
+# titles of narrow columns by the names of metrics, the most important first
 _MAIN = {
     "outcome": "outcome",
     "load_error_rms_m": "error RMS",
@@ -23,13 +23,13 @@ _MORE = {
     "mission_s": "mission",
     "estimator_error_max_m": "estimate max",
 }
-_LONGEST = 14  # characters of a value that is shown
-_LEAST_NAME, _NAME = 12, 36  # of a flight, in a line
+_LONGEST = 14  # characters of a value; a difference with a longer one has no column
+_LEAST_NAME, _NAME = 12, 36  # characters of a flight's name in a line, least and most
 _BETWEEN = 3
 
 
 class _Column(NamedTuple):
-    """What it is called, and a value for each flight; `best` are the places of the best ones."""
+    """Title, and a value for each flight; `best` are the indices of the best ones."""
 
     title: str
     values: tuple[str, ...]
@@ -42,7 +42,7 @@ class _Column(NamedTuple):
 
 
 def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
-    """The table, as many columns as find place in `width` characters, and what differs and found none."""
+    """The table, with as many columns as fit into `width` characters, and the differences that do not fit."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -65,7 +65,7 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
 
 
 def _columns(runs: Sequence[Run]) -> Iterator[_Column]:
-    """The main figures, what differs and is short, and more figures."""
+    """The main figures, then differences with short values, then further figures."""
     known = {figure.metric.name: figure for _, rows in figures(runs) for figure in rows}
 
     def chosen(names: Mapping[str, str]) -> list[_Column]:

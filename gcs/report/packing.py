@@ -1,6 +1,6 @@
-"""Columns of numbers as short text for a page: whole steps, differences of differences, deflate, base64.
+"""Columns of numbers as short text for a page: whole steps, second differences, deflate, base64.
 
-`gcs/web/flight_data.js` is the other end. A flight at 125 Hz takes about a byte a number.
+`gcs/web/flight_data.js` decodes it. A flight at 125 Hz takes about a byte a number.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from gcs.analysis.axes import Floats
 
 _MOST = float(2**30)  # steps from zero: whole numbers of 32 bits
-_BEYOND = 1e6  # such numbers are of a flight that is lost: none
+_BEYOND = 1e6  # numbers from here on belong to a lost flight and count as missing
 _LEVEL = 6
 
 
 class Column(NamedTuple):
-    """n numbers, NaN where there is none, and the step to whose multiples they are rounded."""
+    """n numbers, NaN where one is missing, and the step to whose multiples they are rounded."""
 
     name: str
     values: Floats
@@ -30,7 +30,7 @@ class Column(NamedTuple):
 
 def pack(columns: list[Column], count: int) -> dict[str, Any]:
     """JSON values: `count`, of each column its `name`, `step` and `gaps` ([first, last + 1] of each stretch
-    of NaN), and `data`. Columns of NaN alone are left out."""
+    of NaN), and `data`. Columns that contain only NaN are omitted."""
     meant = [column._replace(values=_meant(column.values)) for column in columns]
     known = [column for column in meant if np.isfinite(column.values).any()]
     described, planes = [], []
@@ -40,7 +40,7 @@ def pack(columns: list[Column], count: int) -> dict[str, Any]:
         described.append({"name": name, "step": step, "gaps": _gaps(finite)})
         whole = np.rint(_filled(values, finite) / step).astype(np.int32)
         twice = np.diff(np.diff(whole, prepend=np.int32(0)), prepend=np.int32(0))
-        # bytes of one weight lie together: most of the upper ones are equal
+        # bytes of the same significance are stored together: most of the upper ones are equal
         planes.append(twice.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
     squeezed = zlib.compress(b"".join(planes), _LEVEL, wbits=-zlib.MAX_WBITS)
     return {"count": count, "columns": described, "data": base64.b64encode(squeezed).decode("ascii")}
@@ -51,7 +51,7 @@ def _meant(values: Floats) -> Floats:
 
 
 def _step(finite: Floats, least: float) -> float:
-    """`least`, or so much more that the greatest number fits."""
+    """`least`, or the power of ten with which the greatest number fits into 32 bits."""
     greatest = float(np.abs(finite).max())
     if greatest <= least * _MOST:
         return least
@@ -59,7 +59,7 @@ def _step(finite: Floats, least: float) -> float:
 
 
 def _filled(values: Floats, finite: NDArray[np.bool_]) -> Floats:
-    """The last number that is known in place of each that is not: no jumps to be stored."""
+    """Each missing number replaced by the last known one, so that no jumps have to be stored."""
     index = np.maximum.accumulate(np.where(finite, np.arange(len(values)), int(np.argmax(finite))))
     return values[index]
 

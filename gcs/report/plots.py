@@ -1,4 +1,4 @@
-"""The pictures of a report: what the thesis shows of a flight in 4-4, from telemetry."""
+"""The pictures of a report: those that the thesis shows of a flight in 4-4, drawn from telemetry."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from gcs.report.style import (
 )
 from gcs.report.track import draw_track
 
-_SEEN = 0.004  # of the width: a mark for one sample
+_SEEN = 0.004  # of the width of the axes: the least width of a mark, so that a single sample is visible
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class View:
         inside = self.samples.time_s[self.samples.in_mission]
         if len(inside) < 2:
             return self.whole
-        # some of the hold on both sides, but nothing of lifting and lowering, which would set the scale
+        # with some of the hold on both sides, but without lifting and lowering, which would set the scale
         margin = max(0.5, 0.03 * float(inside[-1] - inside[0]))
         time_s = self.samples.time_s
         near = (time_s >= inside[0] - margin) & (time_s <= inside[-1] + margin)
@@ -70,12 +70,12 @@ class View:
         return float(calm[0]), float(calm[-1])
 
     def shade(self, axes: Any, limits: tuple[float, float] | None = None) -> None:
-        """Phases and limits of the time axis for axes that stand above each other."""
+        """Draw the phases and set the limits of the time axis, for axes above each other."""
         spans = phase_spans(self.telemetry.setpoint.time_s, self.telemetry.setpoint.phase)
         bands(list(axes), spans, limits or self.window)
 
     def visible(self, time_s: Floats) -> slice:
-        """The samples inside the window, so that axes scale to what is seen."""
+        """The samples inside the window, so that axes scale to what is visible."""
         begin, end = self.window
         return slice(int(np.searchsorted(time_s, begin)), int(np.searchsorted(time_s, end, side="right")))
 
@@ -130,7 +130,7 @@ def error(view: View, path: Target) -> None:
     seen = view.visible(s.time_s)
     scale, unit = length_scale(s.error_m[seen])
     believed, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
-    beside = bool(np.isfinite(filtered).any())  # an estimator of somebody's own flies
+    beside = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
     columns = (
         ("position error", unit, scale * s.error_m),
         ("velocity error", f"{unit}/s", scale * s.error_m_s),
@@ -206,7 +206,7 @@ def psi(view: View, path: Target) -> None:
 
 
 def rotors(view: View, path: Target) -> None:
-    """Force of each rotor, command and truth, with its limits and where they cut a command."""
+    """Commanded and true force of each rotor, its limits, and where a limit cut the command."""
     count = view.telemetry.rotors_truth.force_n.shape[1]
     lines = -(-count // 2)
     figure, axes = rows(11.0, 2.9 * lines, lines, 2, share_y=True)
@@ -258,7 +258,7 @@ def _rotor(view: View, ax: Any, i: int) -> None:
 
 
 def _limits(view: View, ax: Any) -> None:
-    """The limits of a rotor, where there are any."""
+    """Draw the limits of a rotor, if there are any."""
     track = view.telemetry.rotors_commanded
     if not len(track.time_s):
         track = view.telemetry.rotors_truth
@@ -307,7 +307,7 @@ def tension(view: View, path: Target) -> None:
 
 
 def overview(view: View, path: Target) -> None:
-    """Track, error and rotors in one picture, for a reader in a hurry."""
+    """Track, error and rotors in one picture, as a summary."""
     figure = new_figure(13.0, 6.2)
     draw_track(figure, view.samples, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
     s = view.samples
@@ -365,7 +365,7 @@ def summary_line(record: Record) -> str:
 
 
 def _letters(name: str) -> str:
-    """A letter with its subscript set as such: Ψ_R."""
+    """A letter with its subscript, Ψ_R, in the notation of matplotlib."""
     letters = {"Ψ": r"\Psi", "φ": r"\varphi", "θ": r"\theta"}
     symbol, _, rest = name.partition(" ")
     letter, _, index = symbol.partition("_")
@@ -373,7 +373,7 @@ def _letters(name: str) -> str:
 
 
 def _least_range(ax: Any, least: float) -> None:
-    """Keeps rounding noise from filling a picture: an axis spans at least `least`."""
+    """Make an axis span at least `least`, so that rounding noise does not fill the picture."""
     low, high = ax.get_ylim()
     if high - low < least:
         middle = 0.5 * (low + high)
@@ -381,7 +381,7 @@ def _least_range(ax: Any, least: float) -> None:
 
 
 class Picture:
-    """A picture's name and file name, its caption, and what draws it."""
+    """A picture's name, file name and caption, and the function that draws it."""
 
     def __init__(self, name: str, caption: str, draw_it: Callable[[View, Target], None]) -> None:
         self.name = name

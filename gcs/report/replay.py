@@ -1,7 +1,7 @@
 """What the page replays: the flight's samples and events as JSON values, for `flight_data.js`.
 
-World ENU from home, SI units; attitudes as the scene takes them, FRD in NED. Where the log is silent for
-longer than a report interpolates, a row without numbers stands in the gap, so that nothing is drawn across.
+World ENU from home, SI units; attitudes as the scene takes them, FRD in NED. Where the log has a gap longer
+than a report interpolates, a row without numbers is inserted, so that nothing is drawn across the gap.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ KINDS = {  # of phases: what the band behind a plot looks like
     mavlink.PLUMBLINE_PHASE_GUIDED: "busy",
 }
 MOST_ROWS = 30_000  # four minutes at 125 Hz
-_USUAL = "bebop"  # drawn where nobody says which vehicle flew
+_USUAL = "bebop"  # drawn if it is not known which vehicle flew
 # steps to which numbers are rounded
 _PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
 
@@ -49,9 +49,9 @@ Json = dict[str, Any]
 def replay_of(
     telemetry: Telemetry, samples: Samples, meta: FlightMeta, columns: Collection[str] | None = None
 ) -> Json:
-    """Everything that a page draws; without the truth, as the vehicle believed it to be.
+    """Everything that a page draws; if the log has no truth, the vehicle's estimate.
 
-    `columns` names those that are wanted by the word before the underscore; None: all.
+    `columns` are the wanted columns, by the part of their name before the first underscore; None: all.
     """
     true = bool(len(samples.time_s))
     if not true:
@@ -99,8 +99,8 @@ def _phase(phase: int) -> str:
 
 
 def layout_of(vehicle: str | None) -> Json:
-    """Where the rotors are (body FRD, m), which way they turn (about the body's z axis) and sizes; of a
-    vehicle whose file is gone, those of the usual one."""
+    """Positions of the rotors (body FRD, m), their directions of rotation (about the body's z axis) and
+    sizes; those of `_USUAL` if the vehicle's file no longer exists."""
     try:
         flown: Vehicle = load_vehicle(vehicle or _USUAL)
     except (VehicleFileError, OSError):
@@ -119,7 +119,7 @@ def layout_of(vehicle: str | None) -> Json:
 
 
 def worst_moment(samples: Samples) -> Json | None:
-    """When the load was farthest from where it was asked to be, of what `load_error_max_m` counts over."""
+    """Time and size of the greatest load position error, over the samples of `load_error_max_m`."""
     distance = np.where(samples.position_tracked, np.linalg.norm(samples.error_m, axis=1), np.nan)
     known = np.isfinite(distance)
     if not known.any():
@@ -145,7 +145,7 @@ def _limits(telemetry: Telemetry) -> list[float] | None:
 
 
 def _steps(telemetry: Telemetry) -> list[Json]:
-    """The steps of the mission; `time` is when the first of its items was flown first, None if never."""
+    """The steps of the mission; `time` is when one of the step's items was first flown, None if never."""
     setpoint = telemetry.setpoint
     flown = np.isin(setpoint.phase, list(KINDS))
     items, at = setpoint.item[flown], setpoint.time_s[flown]
@@ -157,7 +157,7 @@ def _steps(telemetry: Telemetry) -> list[Json]:
 
 
 def _wind(telemetry: Telemetry) -> list[list[float]]:
-    """[time, east, north, up] from when on the wind, mean and gust, was another."""
+    """[time, east, north, up] at each change of the wind (mean plus gust); empty if there was none."""
     wind = telemetry.wind
     total = wind.wind_m_s + wind.gust_m_s
     if not len(wind.time_s) or not total.any():
@@ -169,7 +169,7 @@ def _wind(telemetry: Telemetry) -> list[list[float]]:
 def _columns(
     telemetry: Telemetry, samples: Samples, wanted: Collection[str] | None
 ) -> tuple[list[Column], int]:
-    """The columns, a row without numbers within each gap, and how many rows there are."""
+    """The columns, with a row without numbers within each gap, and the number of rows."""
     t, truth = samples.time_s, telemetry.load_truth
     rotors, commanded, cascade = telemetry.rotors_truth, telemetry.rotors_commanded, telemetry.cascade
     found = [
@@ -211,8 +211,8 @@ def _ends(time_s: Floats) -> NDArray[np.bool_]:
 
 
 def _kept(telemetry: Telemetry, samples: Samples) -> NDArray[np.intp]:
-    """The samples that the page carries: all; of a long flight every so many, with each peak of error and
-    tension, both sides of a gap, and where the load leaves the cable."""
+    """The samples that the page carries: all; of a long flight every `stride`-th, and besides the peaks of
+    error and tension, both sides of each gap, and the moments at which the load leaves the cable."""
     n = len(samples.time_s)
     stride = -(-n // MOST_ROWS)
     kept = np.zeros(n, dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Parameters of a flight that differ from what the vehicle is delivered with."""
+"""Parameters of a flight that differ from their defaults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _USUAL = "bebop"
 
 
 class Setting(NamedTuple):
-    """A parameter as people read it; `default` is None where it is not known."""
+    """A parameter as displayed; `default` is None if it is not known."""
 
     name: str
     value: str
@@ -22,7 +22,7 @@ class Setting(NamedTuple):
 
 
 def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
-    """What was set on the command line, and what the vehicle said that is not the default."""
+    """Parameters set on the command line, and those that the vehicle reported as not the default."""
     told = {**telemetry.parameters, **meta.settings}
     tables = _tables(meta.vehicle or _USUAL) if told else ()
     found = []
@@ -35,7 +35,7 @@ def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
 
 
 def unchanged_settings(names: Iterable[str], telemetry: Telemetry, meta: FlightMeta) -> dict[str, str]:
-    """What the vehicle said of these parameters, else their defaults, where one is known."""
+    """The values of these parameters that the vehicle reported, else their defaults if known."""
     tables = _tables(meta.vehicle or _USUAL)
     known = {name: telemetry.parameters.get(name, _default(name, tables)) for name in names}
     return {name: _number(value) for name, value in known.items() if value is not None}
@@ -58,7 +58,7 @@ def _tables(vehicle: str) -> tuple[ParameterTable, ...]:
 
 
 def _same(value: float | str, default: float) -> bool:
-    """Equal but for the rounding of a single-precision number on the wire."""
+    """Whether they are equal except for the rounding to single precision on the wire; true for a text."""
     return isinstance(value, str) or abs(value - default) <= 1e-6 * max(abs(default), 1e-6)
 
 

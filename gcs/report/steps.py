@@ -1,4 +1,4 @@
-"""What a mission asks, in words: a line for each step, from the items that were uploaded."""
+"""A mission in words: a line for each step, from the uploaded items."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from missions.model import (
     Winch,
 )
 
-_MOST_TERMS = 3  # of a signal that are written out
+_MOST_TERMS = 3  # of a signal: further terms are only counted
 
 
 class StepText(NamedTuple):
-    """A step in words, and the items that it was made of, both included."""
+    """A step in words, and the first and last item from which it was made, both included."""
 
     first: int
     last: int
@@ -36,7 +36,7 @@ class StepText(NamedTuple):
 
 
 def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
-    """The steps in the order in which they are flown; items that cannot be flown by their command's name."""
+    """The steps in the order in which they are flown; if they cannot be flown, each item's command name."""
     try:
         found = located_steps(items, home)
     except MissionItemError:
@@ -49,7 +49,7 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
 
 
 def describe(step: Step, alone: bool) -> str:
-    """One step as a sentence without a full stop; `alone`: the vehicle has let the load go."""
+    """One step as a sentence without a full stop; `alone`: the vehicle has released the load."""
     match step:
         case Takeoff():
             return f"Take off{'' if alone else ', lift the load'} to {_m(step.altitude_m)}"

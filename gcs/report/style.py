@@ -1,4 +1,4 @@
-"""One look for all pictures: colours that the colour-blind tell apart, phases as bands, thinned lines."""
+"""One look for all pictures: colours for the colour-blind too, phases as bands, thinned lines."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ROTORS = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#B8A800", "#7A5230", INK)
 
 
 def rotor_colour(i: int) -> str:
-    """Of the rotor with this index; those beyond eight have colours again."""
+    """Colour of the rotor with this index; beyond eight rotors the colours repeat."""
     return _ROTORS[i % len(_ROTORS)]
 
 
@@ -92,7 +92,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width_in: float, height_in: float) -> Any:
-    """A figure of its own, apart from pyplot and its global state."""
+    """A new figure, independent of pyplot and its global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -105,7 +105,7 @@ Target = Path | BinaryIO  # of a picture
 
 
 def save(figure: Any, path: Target) -> None:
-    """PNG without date or version inside, so that the same flight gives the same bytes."""
+    """Write a PNG without date or version in it, so that the same flight gives the same bytes."""
     figure.savefig(path, dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
 
 
@@ -127,14 +127,14 @@ def rows(width_in: float, height_in: float, count: int, columns: int = 1, *, sha
 
 
 def draw(ax: Any, time_s: Floats, values: Floats, **how: Any) -> None:
-    """A line of the finite values, thinned; no line if there are none."""
+    """Draw a thinned line of the finite values; no line if there are none."""
     t, v = thinned(time_s, np.where(np.isfinite(values), values, np.nan))
     if np.isfinite(v).any():
         ax.plot(t, v, **how)
 
 
 def thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest value of each of many short spans: the picture of the line, with fewer points."""
+    """Least and greatest value of each of many short spans: the line looks the same, with fewer points."""
     n = len(time_s)
     width = -(-2 * n // _MAX_POINTS)
     if width <= 2:
@@ -150,25 +150,25 @@ def thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def length_scale(values_m: Floats) -> tuple[float, str]:
-    """What to multiply lengths by, and the unit: millimetres, but metres where a flight was lost."""
+    """The factor for lengths, and the unit: mm, or m if a length reaches a metre (a lost flight)."""
     finite = values_m[np.isfinite(values_m)]
     return (1.0, "m") if finite.size and np.abs(finite).max() >= 1.0 else (1e3, "mm")
 
 
 def note_if_empty(ax: Any, text: str = "not in the log") -> None:
-    """Says so where nothing was drawn."""
+    """Write `text` into axes in which nothing was drawn."""
     if not ax.lines and not ax.collections:
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
 def key(ax: Any, columns: int = 4) -> None:
-    """The legend above the right end of the axes, out of the way of the data."""
+    """Draw the legend above the right end of the axes, where it hides no data."""
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.25)
 
 
 def phase_spans(time_s: Floats, phase: Ints) -> list[tuple[float, float, int]]:
-    """(begin, end, phase) of each stretch of one phase; a stretch ends where the next begins."""
+    """(begin, end, phase) of each stretch of one phase; a stretch ends where the next one begins."""
     if len(time_s) == 0:
         return []
     begins = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
@@ -177,7 +177,7 @@ def phase_spans(time_s: Floats, phase: Ints) -> list[tuple[float, float, int]]:
 
 
 def bands(axes: list[Any], spans: list[tuple[float, float, int]], limits: tuple[float, float]) -> None:
-    """Phases as shaded bands behind all axes, named in the first where the name fits, above the data."""
+    """Draw phases as shaded bands behind all axes; the first show their names above the data, if they fit."""
     low, high = axes[0].get_ylim()
     axes[0].set_ylim(low, high + _HEADROOM * (high - low))
     for ax in axes:
@@ -205,7 +205,7 @@ def bands(axes: list[Any], spans: list[tuple[float, float, int]], limits: tuple[
 
 
 def true_spans(time_s: Floats, flags: NDArray[np.bool_], least_s: float) -> list[tuple[float, float]]:
-    """(begin, width) of each stretch of set flags, at least `least_s` wide so that one sample is seen."""
+    """(begin, width) of each stretch of set flags, at least `least_s` wide so that one sample is visible."""
     if not flags.any():
         return []
     edges = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))

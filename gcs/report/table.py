@@ -14,7 +14,7 @@ _OUTCOME_STYLES = {"completed": "bold green", "diverged": "bold red", "lost": "b
 
 
 def record_table(record: Record) -> Table:
-    """What is known of a flight, a section per group."""
+    """What is known of a flight, with a section for each group."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -25,7 +25,7 @@ def record_table(record: Record) -> Table:
     table.add_column(justify="right")
     for group, known in told(record):
         for i, metric in enumerate(known):
-            # values are data, not markup: a mission path may hold brackets
+            # values are data, not markup: a mission path may contain brackets
             value = Text(metric.read(record))
             if metric.name == "outcome":
                 value.stylize(_OUTCOME_STYLES.get(str(record[metric.name]), "bold yellow"))

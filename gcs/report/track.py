@@ -1,4 +1,4 @@
-"""The load track in three dimensions, with what hangs on it."""
+"""The load track in three dimensions, with cable and vehicle at some instants."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from gcs.report.style import GREY, INK, PALE, SHADOW, length_scale
 
 _SNAPSHOTS = 7
 _APART = 0.1  # of the diagonal of the box: least distance between two snapshots
-_ARM = 0.05  # of the longest side of the box: arms are drawn longer than they are
-_POINTS = 1500  # of a line in space: each segment is projected and coloured on its own
-_LONGEST = 3.5  # the longest side of the box over the shortest; beyond, the axes are not to scale
-_LEAST_M = 1.2  # of a side of the box
-_NEAR_GROUND = 0.25  # of the height of the box: nearer than that, the box stands on the ground
-_FAR_M = 1e3  # a flight that was lost may end anywhere; the picture keeps to what is near
-_BESIDE, _ABOVE, _BELOW = 0.07, 0.03, 0.12  # of a room: what is left around the box, for ticks and labels
+_ARM = 0.05  # of the longest side of the box: length of the arms as drawn, longer than they are
+_POINTS = 1500  # of a line in space: each segment is projected and coloured separately
+_LONGEST = 3.5  # greatest ratio of the longest to the shortest side of the box; beyond, axes are not to scale
+_LEAST_M = 1.2  # least side of the box
+_NEAR_GROUND = 0.25  # of the height of the box: a box that is closer to the ground extends to it
+_FAR_M = 1e3  # a flight that was lost may end anywhere; points farther away are not drawn
+_BESIDE, _ABOVE, _BELOW = 0.07, 0.03, 0.12  # of a room: the space around the box, for ticks and labels
 
 Indices = NDArray[np.intp]
 Room = tuple[float, float, float, float]  # left, bottom, width, height, as parts of the figure
 
 
 def snapshots(position: Floats, apart: float) -> list[int]:
-    """Indices of positions (n, 3) more than `apart` from each other: each the farthest from all before."""
+    """Indices of positions (n, 3) more than `apart` from each other: each the farthest from all before it."""
     if len(position) == 0:
         return []
     chosen = [0]
@@ -56,7 +56,7 @@ def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> Non
     _fit(figure, ax, room, low, high)
 
     whole = _thin(np.flatnonzero(known))
-    # lines in space are not cut at the box
+    # matplotlib does not cut lines in space at the box
     quiet = samples.actual_m[whole]
     beyond = np.any((quiet < low) | (quiet > high), axis=1, keepdims=True)
     ax.plot(*np.where(beyond, np.nan, quiet).T, color=GREY, linewidth=0.9, alpha=0.7)
@@ -83,7 +83,7 @@ def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> Non
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=8, length=0)
     _hang(ax, samples, np.flatnonzero(mission if mission.any() else known), low, high)
-    # the box is turned: its corners may lie beyond the axes' rectangle, at which Matplotlib would cut
+    # the box is turned: its corners may be outside the rectangle of the axes, at which Matplotlib would cut
     for artist in (*ax.lines, *ax.collections):
         artist.set_clip_on(False)
 
@@ -93,7 +93,8 @@ def _thin(index: Indices) -> Indices:
 
 
 def _frame(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
-    """Limits around load and vehicle, to scale unless the scene is very long; least and greatest corner."""
+    """Set the limits around load and vehicle, to scale unless the scene is very long; return the least and
+    the greatest corner."""
     points = np.concatenate((samples.actual_m[shown], samples.vehicle_m[shown]))
     points = points[(np.abs(points) < _FAR_M).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
@@ -126,13 +127,13 @@ def _ticks() -> Any:
 
 
 def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
-    """Zooms and moves the axes so that the box, of whatever shape, fills its room but for the labels."""
+    """Zoom and move the axes so that the box, whatever its shape, fills its room except for the labels."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)]).T
 
     def extent() -> tuple[Floats, Floats]:
-        """Least and greatest corner of the box in the figure, as parts of it."""
+        """Least and greatest corner of the box, as fractions of the figure."""
         ax.apply_aspect()
         flat = np.stack(proj_transform(*corners, ax.get_proj())[:2], axis=-1)
         placed = figure.transFigure.inverted().transform(ax.transData.transform(flat))
@@ -141,7 +142,7 @@ def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
     least, greatest = extent()
     wanted = np.array(room[2:]) * (1.0 - 2.0 * _BESIDE, 1.0 - _ABOVE - _BELOW)
     ax.set_box_aspect(ax._box_aspect, zoom=float((wanted / (greatest - least)).min()))
-    # set_box_aspect normalises again: the shape stays, the size is new
+    # set_box_aspect normalises again: the shape stays the same, the size changes
     least, greatest = extent()
     middle = np.array(room[:2]) + 0.5 * np.array(room[2:]) * (1.0, 1.0 + _BELOW - _ABOVE)
     x, y = middle - 0.5 * (least + greatest)
@@ -149,7 +150,7 @@ def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
 
 
 def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
-    """Vehicle, cable and load at some instants; once the load is released, the vehicle and its path."""
+    """Draw vehicle, cable and load at some instants; after a release, the vehicle and its path."""
     box = _box(high - low)
     stretch = (high - low) / box
     mission = mission[np.isfinite(samples.vehicle_m[mission]).all(axis=1)]
@@ -162,7 +163,7 @@ def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats
         ax.plot(*load[:, None], marker="o", markersize=5, color=INK, zorder=6)
     ax.plot(*samples.vehicle_m[_thin(alone)].T, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
     chosen = np.concatenate((hanging, alone[snapshots(samples.vehicle_m[alone] / stretch, apart)]))
-    # arms keep their shape in the picture where the axes are not to scale
+    # arms keep their shape in the picture if the axes are not to scale
     reach = _ARM * float(box.max()) * stretch
     forward, left = body_axes(samples.quat_wxyz[chosen])
     for index, *axes in zip(chosen, forward, left, strict=True):

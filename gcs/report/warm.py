@@ -1,6 +1,6 @@
-"""Loads what reports are drawn with, once: python -m gcs.report.warm.
+"""Loads once what reports are made with: python -m gcs.report.warm.
 
-The first time matplotlib looks through the machine's fonts, and Python compiles what is imported.
+The first time, matplotlib searches the machine's fonts, and Python compiles the imported modules.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _DRAWN_WITH = ("matplotlib.backends.backend_agg", "mpl_toolkits.mplot3d")
 
 
 def load(enough: Callable[[], bool] = lambda: False) -> None:
-    """Import what a report is made with, until it is `enough`: the rest comes when it is needed."""
+    """Import what a report is made with, until `enough` is true: the rest is imported when it is needed."""
     for name in _NEEDED:
         if enough():
             return
@@ -37,7 +37,7 @@ def load_drawing() -> None:
 
 
 def main() -> None:
-    """Draw a picture of nothing."""
+    """Import everything and draw an empty picture."""
     print("matplotlib", flush=True)
     load()
     load_drawing()

@@ -1,4 +1,4 @@
-"""Progress on stderr: bars on a terminal, a plain line now and then elsewhere."""
+"""Progress on stderr: bars on a terminal, otherwise a plain line now and then."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 _REFRESH_S = 0.1
 _PLAIN_S = 10.0  # between two plain lines of the same stage
-_WONDERS_S = 2.0  # of silence
+_WONDERS_S = 2.0  # of silence, after which a user is told what is being done
 _OPENS_AFTER_S = 0.5  # a short step needs no bar
 
 Row = Mapping[str, Any]  # description, completed, total and the fields of one bar
 
 
 def say(line: str) -> None:
-    """One line of trouble or news on stderr. Whoever has closed it (`2>&1 | head`) stops nothing."""
+    """Print one line of trouble or news to stderr. If stderr was closed (`2>&1 | head`), nothing stops."""
     try:
         print(f"gcs: {line}", file=sys.stderr, flush=True)
     except BrokenPipeError:
@@ -36,7 +36,7 @@ def say(line: str) -> None:
 
 @contextmanager
 def told_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
-    """Say what is being done, if it takes longer than a person waits without wondering."""
+    """Print what is being done if it takes longer than `_WONDERS_S`."""
     timer = Timer(_WONDERS_S, say, (line,))
     timer.daemon = True
     if not quiet:
@@ -51,22 +51,22 @@ _aside: list[TextIO] = []  # stdout, while `sys.stdout` is stderr
 
 
 def keep_stdout_for_results() -> None:
-    """From here on stdout is for what `to_results` and `to_reader` write: whatever else is printed in this
-    process, as by a law that somebody has brought, goes to stderr."""
+    """From here on, only `to_results` and `to_reader` write to stdout. Anything else that is printed in this
+    process, for example by a custom law, goes to stderr."""
     if not _aside:
         _aside.append(sys.stdout)
         sys.stdout = sys.stderr
 
 
 def give_stdout_back() -> None:
-    """Whoever prints writes to stdout again."""
+    """From here on, all that is printed goes to stdout again."""
     if _aside:
         sys.stdout = _aside.pop()
 
 
 @contextmanager
 def to_results() -> Iterator[None]:
-    """Meanwhile `sys.stdout` is stdout, also where that is kept for results."""
+    """Within the block, `sys.stdout` is stdout, even if stdout is kept for results."""
     if not _aside:
         yield
         return
@@ -78,12 +78,12 @@ def to_results() -> Iterator[None]:
 
 
 def to_reader(write: Callable[[], None]) -> None:
-    """Write to stdout by `write`. Whoever has closed it (`| head`) has read enough, and the work goes on."""
+    """Write to stdout by `write`. If its reader has closed it (`| head`), the work continues silently."""
     with to_results():
         try:
             write()
             sys.stdout.flush()
-        except (BrokenPipeError, SystemExit):  # the latter of rich
+        except (BrokenPipeError, SystemExit):  # rich raises the latter
             sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115 - it is stdout from here on
 
 
@@ -95,11 +95,11 @@ def is_live() -> bool:
 class LiveBars:
     """The life cycle of all progress displays: opened by the first `_show`, closed with the `with` block.
 
-    On a terminal `_show` draws bars, at most ten times a second; elsewhere it prints a plain line when the
+    On a terminal `_show` draws bars, at most ten times a second; otherwise it prints a plain line when the
     stage changes, and every ten seconds. A quiet display does neither.
     """
 
-    _transient = False  # whether the bars vanish when they are closed
+    _transient = False  # whether the bars disappear when they are closed
 
     def __init__(self, quiet: bool, delay_s: float = 0.0) -> None:
         self._quiet = quiet
@@ -115,7 +115,7 @@ class LiveBars:
 
     @property
     def due(self) -> bool:
-        """Whether it is time to show anything."""
+        """Whether the next refresh is due; never if quiet."""
         return not self._quiet and time.monotonic() >= self._next_s
 
     def _show(
@@ -125,7 +125,8 @@ class LiveBars:
         stage: str = "",
         at_once: bool = False,
     ) -> None:
-        """Show progress if it is time to, or `at_once`; `rows` are the bars by name, `plain` the line."""
+        """Show progress if it is due, or immediately with `at_once`; `rows` gives the bars by name, `plain`
+        the line."""
         now_s = time.monotonic()
         if self._quiet or (now_s < self._next_s and not at_once):
             return
@@ -137,7 +138,7 @@ class LiveBars:
             say(plain())
 
     def _line_said(self) -> None:
-        """A plain line was said: the next one has time."""
+        """Note that a plain line was printed, so that the next one is not due soon."""
         self._plain_s = time.monotonic()
 
     def _draw(self, rows: Mapping[str, Row]) -> None:
@@ -180,7 +181,7 @@ class FlightDisplay(LiveBars):
         self._began: tuple[float, float] | None = None  # wall clock and vehicle clock, first message
 
     def update(self, progress: Progress) -> None:
-        """Show `progress`, if it is time to."""
+        """Show `progress` if it is due."""
         now_s = time.monotonic()
         if self._began is None and progress.sim_time_s > 0.0:
             self._began = (now_s, progress.sim_time_s)
@@ -222,7 +223,7 @@ class FlightDisplay(LiveBars):
         if self._began is None or now_s - self._began[0] < 2.0 * _REFRESH_S:
             return ""
         pace = f"x{(progress.sim_time_s - self._began[1]) / (now_s - self._began[0]):.1f}"
-        return "" if pace == "x0.0" else pace  # the vehicle has barely begun
+        return "" if pace == "x0.0" else pace  # too little simulated time has passed
 
     def _line(self, fields: dict[str, str]) -> str:
         words = [fields["clock"], fields["phase"], fields["item"]]
@@ -234,13 +235,13 @@ class FlightDisplay(LiveBars):
 
 
 class CompileDisplay(LiveBars):
-    """What is being compiled, kernel by kernel, how many parts remain, and how long it took so far."""
+    """What is being compiled, kernel by kernel, how many parts remain, and the time taken so far."""
 
     _transient = True
 
     def update(self, running: Mapping[str, str], remain: int, total: int, left: str) -> None:
-        """Show the kernel of each running part by the part's title, that `remain` of `total` parts are not
-        done, and in words what is left."""
+        """Show the kernel of each running part (`running`: kernels by the parts' titles), that `remain` of
+        `total` parts are not done, and the text `left` on the remaining time."""
         self._show(
             lambda: {
                 "all": {
@@ -258,7 +259,7 @@ class CompileDisplay(LiveBars):
         )
 
     def done(self, title: str, seconds: float, left: str) -> None:
-        """Elsewhere than on a terminal say that a part is done, how long it took, and what is left."""
+        """If stderr is no terminal, print that a part is done, how long it took, and what is left."""
         if not self._quiet and not is_live():
             say(f"compiled {title} in {seconds:.0f} s; {left}")
             self._line_said()
@@ -270,7 +271,8 @@ class CompileDisplay(LiveBars):
 
 
 class StepDisplay(LiveBars):
-    """A bar for any other step that takes more than half a second; of a `long` one plain lines elsewhere."""
+    """A bar for any other step that takes more than half a second; without a terminal, plain lines for a
+    `long` one."""
 
     _transient = True
 
@@ -280,7 +282,7 @@ class StepDisplay(LiveBars):
         self._long = long
 
     def update(self, done: int, total: int, title: str | None = None) -> None:
-        """Show that `done` of `total` are done; a `total` of 0 means that it is not known."""
+        """Show that `done` of `total` are done; a `total` of 0 means that it is unknown."""
         named = title or self._title
         row = {"description": named, "completed": done, "total": total or None}
         far = f": {done} of {total}" if total else ""
@@ -293,7 +295,7 @@ class StepDisplay(LiveBars):
 
 
 def _parts(running: Mapping[str, str]) -> str:
-    """Titles, each with the kernel that is being compiled, if that is known."""
+    """Titles, each with the kernel that is being compiled, if it is known."""
     return ", ".join(f"{title} ({kernel})" if kernel else title for title, kernel in running.items())
 
 

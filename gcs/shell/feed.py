@@ -1,7 +1,7 @@
 """The pipe between `gcs fly` and the process that serves its page.
 
-The flight tells what it hears, by messages that are dropped where the page falls behind: nothing ever waits
-for a page. The page tells how many readers it has and what they ask of the vehicle.
+The flight sends the datagrams that it receives, in messages that are dropped if the page falls behind:
+nothing ever waits for a page. The page sends how many readers it has and what they request of the vehicle.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ import sys
 from typing import Any, NamedTuple
 
 VEHICLE, TRUTH, EVENT, COMMAND = b"V", b"T", b"E", b"C"
-_BUFFER = 8 * 1024 * 1024  # as much of it as the system grants
-_LONGEST = 70_000  # of one message
+_BUFFER = 8 * 1024 * 1024  # bytes; the system may grant less
+_LONGEST = 70_000  # bytes of one message
 _LARGEST = 60_000  # bytes of datagrams in one message
 _HEAD = struct.Struct("<cq")
-# messages keep their borders; where the system has such pipes, their end is seen too
+# both kinds preserve message boundaries; SOCK_SEQPACKET, where available, also shows that the pipe was closed
 _KIND = socket.SOCK_SEQPACKET if sys.platform == "linux" else socket.SOCK_DGRAM
 
 
 class Piece(NamedTuple):
-    """One message: what kind, at which time of the vehicle (us), and what."""
+    """One message: its kind, its time on the vehicle's clock (us), and its contents."""
 
     kind: bytes
     time_us: int
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
 
     @property
     def event(self) -> dict[str, Any]:
-        """The record of an EVENT."""
+        """The record that an EVENT contains."""
         record: dict[str, Any] = json.loads(self.body)
         return record
 
@@ -49,7 +49,7 @@ class FeedEnd:
         return self._socket.fileno()
 
     def tell(self, kind: bytes, time_us: int, datagrams: list[bytes]) -> None:
-        """Datagrams one behind the other, in as few messages as they fit."""
+        """Send datagrams: joined in one message if they fit, otherwise one message each."""
         body = b"".join(datagrams)
         if len(body) <= _LARGEST:
             self._send(kind, time_us, body)
@@ -58,7 +58,7 @@ class FeedEnd:
             self._send(kind, time_us, datagram)
 
     def tell_event(self, record: dict[str, Any]) -> None:
-        """A record; in order with the datagrams, and as little waited for."""
+        """Send a record, in order with the datagrams and likewise without waiting."""
         self._send(EVENT, 0, json.dumps(record).encode())
 
     def _send(self, kind: bytes, time_us: int, body: bytes) -> None:
@@ -72,7 +72,7 @@ class FeedEnd:
             self.closed = True
 
     def read(self, most: int = 256) -> list[Piece]:
-        """What is there, without waiting; no more than `most` messages."""
+        """The messages that have arrived, without waiting, but at most `most`."""
         pieces: list[Piece] = []
         while len(pieces) < most and not self.closed:
             try:
@@ -93,11 +93,11 @@ class FeedEnd:
 
 
 def pipe() -> tuple[FeedEnd, socket.socket]:
-    """Our end, and the one for a child process."""
+    """The end for this process, and the one for a child process."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, _KIND)
     return FeedEnd(ours), theirs
 
 
 def inherited(descriptor: int) -> FeedEnd:
-    """The end that our parent has left us."""
+    """The end that was inherited from the parent process."""
     return FeedEnd(socket.socket(fileno=descriptor))

@@ -1,4 +1,4 @@
-"""UDP: the sockets of the ground station. Here bytes leave and enter; what they say is said elsewhere."""
+"""UDP sockets of the ground station. They send and receive bytes, which other modules interpret."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ API_PORT = 14540
 PAGE_PORT = 8090  # TCP, of the live page
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
-_BUFFER = 4 * 1024 * 1024  # the fast streams of a second, and a report being written meanwhile
+_BUFFER = 4 * 1024 * 1024  # bytes: a second of the fast streams, in case a report is being written meanwhile
 
 
 class AddressError(GcsError):
-    """An address that cannot be read."""
+    """A text that is not a valid address."""
 
 
 @dataclass(frozen=True)
 class Address:
-    """Where to meet a vehicle: `listen` waits for it to speak there, else we speak first."""
+    """Where to meet a vehicle: with `listen` we wait there for its messages, otherwise we send first."""
 
     host: str
     port: int
     listen: bool = True
-    signing_key: bytes | None = field(default=None, repr=False)  # messages are signed with it
+    signing_key: bytes | None = field(default=None, repr=False)  # key with which messages are signed
 
     def __str__(self) -> str:
         return f"{'' if self.listen else 'udpout:'}{self.host}:{self.port}"
 
 
-SITL_TRUTH = Address(LOOPBACK, 14560)  # where sitl tells what is true, unless it is told otherwise
+SITL_TRUTH = Address(LOOPBACK, 14560)  # where sitl sends the truth by default
 
 
 def parse_address(text: str) -> Address:
-    """`14550`, `HOST:PORT`, `udpin:HOST:PORT` (wait there) or `udpout:HOST:PORT` (speak first)."""
+    """`14550`, `HOST:PORT`, `udpin:HOST:PORT` (wait there) or `udpout:HOST:PORT` (send first)."""
     rest = text.removeprefix("udpin:").removeprefix("udpout:")
     host, _, port = rest.rpartition(":")
     if not port.isdigit() or not 0 < int(port) < 65536 or (":" in rest and not host) or ":" in host:
@@ -52,14 +52,14 @@ def parse_address(text: str) -> Address:
 
 
 def free_port() -> int:
-    """A UDP port on the loopback that nobody uses now."""
+    """A UDP port on the loopback interface that is not in use now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])
 
 
 class UdpSocket:
-    """One socket; answers go to whoever spoke last."""
+    """One socket; answers go to the sender of the last datagram."""
 
     def __init__(self, host: str = LOOPBACK, port: int = 0, peer: tuple[str, int] | None = None) -> None:
         self._peer = peer
@@ -70,11 +70,11 @@ class UdpSocket:
             self._socket.close()
             raise GcsError(_bind_problem(host, port, error)) from None
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-        self._waits_s = 0.0  # a receive that waits
+        self._waits_s = 0.0  # receive timeout of the socket
 
     @property
     def address(self) -> str:
-        """HOST:PORT, as the option of another program takes it."""
+        """HOST:PORT, as options of other programs take it."""
         host, port = self._socket.getsockname()[:2]
         return f"{host}:{port}"
 
@@ -83,18 +83,18 @@ class UdpSocket:
 
     @property
     def waiting(self) -> bool:
-        """Whether a datagram is there."""
+        """Whether a datagram has arrived and was not read yet."""
         return bool(select.select([self], [], [], 0.0)[0])
 
     def drain(self) -> list[bytes]:
-        """All datagrams that are there, without waiting."""
+        """All datagrams that have arrived, without waiting."""
         found = self.drain_with_senders()
         if found:
             self._peer = found[-1][1]
         return [datagram for datagram, _ in found]
 
     def drain_with_senders(self) -> list[tuple[bytes, tuple[str, int]]]:
-        """As `drain`, each datagram with the address from which it came."""
+        """As `drain`, each datagram with the address of its sender, and without changing the peer."""
         found: list[tuple[bytes, tuple[str, int]]] = []
         while True:
             try:
@@ -105,7 +105,7 @@ class UdpSocket:
                 return found
 
     def wait(self, timeout_s: float) -> list[bytes]:
-        """The next datagram, if one comes within the time; by one system call where `select` needs three."""
+        """The next datagram, if one arrives within the time; takes one system call, with `select` three."""
         if timeout_s != self._waits_s:
             self._waits_s = timeout_s
             whole = int(timeout_s)
@@ -118,20 +118,20 @@ class UdpSocket:
         return [datagram]
 
     def answer_to(self, peer: tuple[str, int]) -> None:
-        """Send there from now on."""
+        """Send to this address from now on."""
         self._peer = peer
 
     def send(self, datagram: bytes) -> None:
-        """Send to the peer; nothing if there is none yet or it does not listen."""
+        """Send to the peer; does nothing if there is none yet or it does not listen."""
         if self._peer is not None:
             self.send_to(datagram, self._peer)
 
     def send_to(self, datagram: bytes, peer: tuple[str, int]) -> None:
-        """Send to that address; nothing if nobody listens there."""
+        """Send to that address; does nothing if no program listens there."""
         try:
             self._socket.sendto(datagram, socket.MSG_DONTWAIT, peer)
         except (ConnectionError, BlockingIOError):
-            return  # UDP: the protocols above ask again
+            return  # UDP: the protocols above repeat what was lost
         except OSError as error:
             raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
 
@@ -140,7 +140,7 @@ class UdpSocket:
 
 
 def open_address(address: Address) -> UdpSocket:
-    """The socket at which the vehicle is met."""
+    """The socket for this address of a vehicle."""
     if address.listen:
         return UdpSocket(address.host, address.port)
     try:
@@ -151,19 +151,19 @@ def open_address(address: Address) -> UdpSocket:
 
 
 class Readable(Protocol):
-    """A socket, or what holds one."""
+    """A socket, or an object that has one."""
 
     def fileno(self) -> int:
         """Its file descriptor."""
 
 
 def wait(sockets: Sequence[Readable], timeout_s: float) -> None:
-    """Until one of them has a datagram, or the time is over."""
+    """Wait until one of them has a datagram, or the time has passed."""
     select.select(sockets, [], [], max(timeout_s, 0.0))
 
 
 def monotonic_us() -> int:
-    """The wall clock of everything that is not in lockstep."""
+    """The wall clock (monotonic) of everything that does not run in lockstep."""
     return time.monotonic_ns() // 1000
 
 

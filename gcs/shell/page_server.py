@@ -1,8 +1,8 @@
-"""Serves one page and its web socket to browsers of this machine, or of others where that is asked for.
+"""Serves one page and its web socket to browsers on this machine, or on others if so configured.
 
-Whoever knows the address may use the page: its first part is a token that nobody can guess. A request must
-name us as its host (else a page from elsewhere could have its own name lead here), and a web socket must come
-from our own page. Nothing is taken from disk but what `Site` lists.
+The address is the permission to use the page: it begins with a token that cannot be guessed. A request must
+name this server as its host (otherwise a foreign page could let its own host name point here), and a web
+socket must be opened by our own page. Only what `Site` lists is read from disk.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from gcs.errors import GcsError
 from gcs.shell.link import PAGE_PORT
 
 _WHOLE_ADDRESS = ": open the whole address that gcs has printed, which holds a key"
-SOCKET = "socket"  # the web socket's place beside the page
-REPORT = "report"  # and that of the folder with the report
+SOCKET = "socket"  # path of the web socket beside the page
+REPORT = "report"  # path of the folder with the report
 _MOST_BYTES = 4096  # of one request of a page
 _TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -46,7 +46,7 @@ _OURS = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self' {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# a report carries its scripts and pictures within itself, and may ask for nothing
+# a report contains its scripts and pictures, and may load nothing else
 _OF_REPORTS = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -63,7 +63,7 @@ class Site:
 
 @dataclass
 class Pages:
-    """What happens to open pages: `opened` gives the records with which one is greeted."""
+    """Callbacks for open pages: `opened` returns the records that a page receives when it opens."""
 
     opened: Callable[[], Sequence[dict[str, Any]]]
     asked: Callable[[Any, Any], None]  # a page, and the record that it sent
@@ -71,7 +71,7 @@ class Pages:
 
 
 class PageServer:
-    """`async with` opens and closes it."""
+    """The server; `async with` opens and closes it."""
 
     def __init__(self, site: Site, pages: Pages, host: str, port: int | None) -> None:
         self.site = site
@@ -84,7 +84,7 @@ class PageServer:
 
     @property
     def address(self) -> str:
-        """The page's, token included."""
+        """The address of the page, including the token."""
         shown = f"[{self._host}]" if ":" in self._host else self._host
         return f"http://{shown}:{self._port}/{self._token}/"
 
@@ -109,7 +109,7 @@ class PageServer:
         except OSError as error:
             if self._port is not None or error.errno != errno.EADDRINUSE:
                 raise GcsError(_trouble(self._host, self._port or PAGE_PORT, error)) from None
-            self._server = await self._serve(0)  # any that is free
+            self._server = await self._serve(0)  # any free port
         self._port = next(iter(self._server.sockets)).getsockname()[1]
         return self
 
@@ -153,7 +153,7 @@ class PageServer:
     # ---- requests
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """The answer to a request; None lets the web socket open."""
+        """The answer to a request; None permits the web socket to open."""
         hosts = request.headers.get_all("Host")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return _refused(http.HTTPStatus.MISDIRECTED_REQUEST)
@@ -184,7 +184,7 @@ class PageServer:
             return _refused(http.HTTPStatus.NOT_FOUND)
 
     def _is_ours(self, host: str) -> bool:
-        """Whether a Host header names us: the loopback, or the address at which we are."""
+        """Whether a Host header names this server: the loopback interface, or the address that is served."""
         name, _, port = host.rpartition(":")
         if port != str(self._port):
             return False
@@ -192,7 +192,7 @@ class PageServer:
             return True
         if self._host not in ("0.0.0.0", "::"):
             return False
-        with suppress(ValueError):  # bound to all addresses: a number cannot be a name that leads elsewhere
+        with suppress(ValueError):  # bound to all addresses: only numeric ones, which no foreign name can be
             ipaddress.ip_address(name.strip("[]"))
             return True
         return False

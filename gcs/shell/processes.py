@@ -1,8 +1,8 @@
 """The simulator and the autopilot as child processes that cannot outlive us.
 
-Each gets a process group of its own (Ctrl-C reaches us alone, we stop them in order), is killed by the kernel
-if we die (Linux), and writes its stderr to a file from which the reason of an early end is taken. A program
-of ours can be loaded before it is known with what it is to start.
+Each has its own process group (Ctrl-C reaches only this process, which stops the children in order), is
+killed by the kernel if this process dies (Linux), and writes its stderr to a file, from which the reason of
+an early end is taken. A program of Plumbline can be loaded before its arguments are known.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from gcs.shell.display import say
 
 STOP_S = 3.0  # from SIGTERM to SIGKILL
 STOPPED_LIMIT_S = (
-    15.0  # of a child that was stopped (SIGSTOP): before its silence is taken for that of another
+    15.0  # that a child may be stopped (SIGSTOP), before its silence is taken for that of another program
 )
-_WORKING_SHARE = 0.05  # of a processor: one that waits, and asks again now and then, takes less
+_WORKING_SHARE = 0.05  # of a processor: a child that waits, and asks again now and then, uses less
 LOOK_S = 1.0  # between two looks at the states of the children
 _PR_SET_PDEATHSIG = 1
-_LAST_LINE = 4096  # bytes of the log in which the last line is looked for
+_LAST_LINE = 4096  # bytes at the end of the log in which the last line is searched
 
 
 class Child:
@@ -46,7 +46,7 @@ class Child:
         environment: Mapping[str, str] | None = None,
         waits: bool = False,
     ) -> None:
-        """With `waits` it is one of our programs, which waits for its arguments (`take`)."""
+        """With `waits` it is a program of Plumbline, which waits for its arguments (`take`)."""
         self.name = name
         self.log = log
         self.exit_code: int | None = None
@@ -64,7 +64,7 @@ class Child:
             )
 
     def take(self, arguments: Sequence[str], log: Path) -> bool:
-        """Start with these arguments and write to this file; False if it has ended while it waited."""
+        """Let it start with these arguments and write to this file; False if it ended while it waited."""
         pipe = self._process.stdin
         if pipe is None or not self.running:
             return False
@@ -88,7 +88,7 @@ class Child:
 
     @property
     def stopped(self) -> bool:
-        """Whether somebody has stopped it by a signal (state T); False where the system does not say."""
+        """Whether it was stopped by a signal (state T); False if the system does not report it."""
         try:
             state = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()[0]
         except (OSError, IndexError):
@@ -96,7 +96,7 @@ class Child:
         return state in ("T", "t")
 
     def used_s(self) -> float:
-        """Processor time that it has used so far; 0 where the system does not say."""
+        """Processor time that it has used so far; 0 if the system does not report it."""
         try:
             fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
             return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -104,7 +104,7 @@ class Child:
             return 0.0
 
     def last_line(self) -> str:
-        """The last line it wrote, empty if none."""
+        """The last line that it wrote; empty if none."""
         try:
             text = self.log.read_bytes()[-_LAST_LINE:].decode("utf-8", "replace")
         except OSError:
@@ -113,7 +113,7 @@ class Child:
         return lines[-1] if lines else ""
 
     def obituary(self) -> str:
-        """One line on why it ended, once it has."""
+        """One line on why it has ended."""
         line = self.last_line().removeprefix(f"{self.name}: ")
         code = self.exit_code if self.exit_code is not None else 0
         how = f"ended with exit code {code}"
@@ -127,7 +127,7 @@ class Child:
             self._process.terminate()
 
     def wait(self, limit_s: float) -> bool:
-        """Wait for its end, no longer than this; True if it has ended."""
+        """Wait for its end, at most this long; True if it has ended."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(limit_s)
         return not self.running
@@ -145,23 +145,23 @@ class Processes:
 
     def __init__(self) -> None:
         self._children: list[Child] = []
-        self._loaded: dict[str, Child] = {}  # by name, those that wait to be started
+        self._loaded: dict[str, Child] = {}  # by name, loaded programs that wait to be started
         self._cpus_before: set[int] | None = None
         self._looked_s = 0.0
-        self._used = 0.0, 0.0  # time of the last look, and processor time that they had used
+        self._used = 0.0, 0.0  # time of the last look, and processor time that the children had used then
         self._works = False
-        self._stopped_s: dict[int, float] = {}  # since when a child is seen to be stopped, by its id
+        self._stopped_s: dict[int, float] = {}  # time since which a child is stopped, by its process id
 
     def load(self, name: str) -> Child:
-        """Have a program of ours load what it needs, which takes it a second, before it is started."""
+        """Let a program of Plumbline load what it needs, which takes a second, before it is started."""
         with _told(name):
             command = [sys.executable, "-m", name, ARGUMENTS_FOLLOW]
             child = self._loaded[name] = Child(name, command, Path(os.devnull), waits=True)
         return child
 
     def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
-        """Start `python -m NAME ARGUMENTS` with its output in `log`: the one that is loaded, or else a new
-        one, which inherits these open descriptors."""
+        """Start `python -m NAME ARGUMENTS` with its output in `log`: the loaded process if there is one, else
+        a new one, which inherits these open descriptors."""
         with _told(name):
             child = self._loaded.pop(name, None)
             if child is None or not child.take(arguments, log):
@@ -172,22 +172,22 @@ class Processes:
     def start_program(
         self, name: str, command: Sequence[str], log: Path, folder: Path, environment: Mapping[str, str]
     ) -> Child:
-        """Start a program of others, called `name`, in a folder, with its output in `log` and these variables
-        beside ours."""
+        """Start a third-party program, called `name`, in a folder, with its output in `log` and these
+        environment variables beside ours."""
         with _told(name):
             child = Child(name, command, log, (), folder, environment)
         self._children.append(child)
         return child
 
     def ended(self) -> str:
-        """Why a child has ended, or that it has been stopped for long; empty while all run."""
+        """Why a child has ended, or that it has been stopped for too long; empty while all run."""
         for child in self._children:
             if not child.running:
                 return child.obituary()
         return self._stopped(time.monotonic())
 
     def works(self) -> bool:
-        """Whether one of them has used the processor since the last look, as while it prepares paths."""
+        """Whether the children have used the processor since the last look, as when preparing paths."""
         now_s, used_s = time.monotonic(), sum(child.used_s() for child in self._children)
         before_s, before_used_s = self._used
         if now_s - before_s < LOOK_S:
@@ -197,7 +197,7 @@ class Processes:
         return self._works
 
     def stopped(self) -> str:
-        """Who is stopped by a signal at this moment; empty where nobody is."""
+        """The children that are stopped by a signal at this moment; empty if none is."""
         names = [f"{child.name} (process {child.pid})" for child in self._children if child.stopped]
         return f"{' and '.join(names)} stopped by a signal" if names else ""
 
@@ -223,9 +223,9 @@ class Processes:
     def share_one_core(self) -> None:
         """Keep the children on one core: in lockstep only one of them has work at a time.
 
-        Handing over on one core is a mere switch, between two it wakes a sleeping one. We ourselves, for whom
-        they seldom wait, keep to the other cores, if there are any. Nothing is done where the system has no
-        such call.
+        A hand-over on one core is only a switch of processes; between two cores it must wake a sleeping one.
+        This process, for which the children seldom wait, keeps to the other cores, if there are any. Without
+        the system call, nothing is done.
         """
         if not hasattr(os, "sched_setaffinity"):
             return
@@ -235,11 +235,11 @@ class Processes:
         for pid, cores in (*moved, (0, self._cpus_before - core or core)):
             try:
                 os.sched_setaffinity(pid, cores)
-            except OSError:  # it has just ended, or may not be moved
+            except OSError:  # the process has just ended, or may not be moved
                 continue
 
     def stop(self) -> None:
-        """End all, the last started first."""
+        """End all children, the last started first."""
         if self._cpus_before is not None:
             os.sched_setaffinity(0, self._cpus_before)
             self._cpus_before = None
@@ -262,7 +262,7 @@ class Processes:
 
 @contextmanager
 def _told(name: str) -> Iterator[None]:
-    """GcsError where a program cannot be started."""
+    """Raise GcsError if a program cannot be started."""
     try:
         yield
     except OSError as error:
@@ -270,7 +270,7 @@ def _told(name: str) -> Iterator[None]:
 
 
 def _current_core(allowed: set[int]) -> int:
-    """The core we run on, as the scheduler chose it: an idle one, if there was any."""
+    """The core on which this process runs, as the scheduler chose it: an idle one, if there was any."""
     try:
         core = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[36])
     except (OSError, ValueError, IndexError):
@@ -279,7 +279,7 @@ def _current_core(allowed: set[int]) -> int:
 
 
 def _die_with_parent() -> Callable[[], None] | None:
-    """What the child runs before it becomes the program: ask the kernel to kill it when we die."""
+    """A function that the child runs before the program: it asks the kernel to kill the child when we die."""
     if not sys.platform.startswith("linux"):
         return None
     libc = ctypes.CDLL(None)

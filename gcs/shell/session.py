@@ -1,4 +1,4 @@
-"""A link to a running vehicle for one exchange after another, on the wall clock."""
+"""A link to a running vehicle, for one exchange after the other, on the wall clock."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from gcs.shell.truth import TruthLink
 from gcs.shell.vehicle_socket import VehicleSocket
 
 FIND_S = 5.0
-TRUTH_S = 2.0  # it says five times a second of its clock whose it is
-REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
+TRUTH_S = 2.0  # the truth states five times a second of its clock to which run it belongs
+REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may arrive a little later
 _TICK_S = 0.02
 _STANDS_STILL = "it or its simulator is stopped (SIGSTOP, a debugger), or the link loses messages: try again"
 
-Seen = Callable[[bytes, int], None]  # a datagram of the vehicle and the time
+Seen = Callable[[bytes, int], None]  # called with a datagram and its time
 
 
 class Session:
-    """One vehicle; `view` is what it has told."""
+    """One vehicle; `view` is what it has reported."""
 
     def __init__(
         self, address: Address, find_s: float | None = None, link_timeout_us: int = LINK_TIMEOUT_US
@@ -39,7 +39,7 @@ class Session:
         self.on_received: Seen | None = None
         self.on_sent: Seen | None = None
         self.on_truth: Seen | None = None
-        self.deaf = ""  # why the vehicle has not answered, where that is for want of its key
+        self.deaf = ""  # why the vehicle has not answered, if that is because its key is missing
         self._truth: TruthLink | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection(link_timeout_us)
@@ -56,19 +56,19 @@ class Session:
 
     @property
     def lost(self) -> bool:
-        """True when the vehicle was there and has been silent for too long. What has come and was not read
-        yet counts as heard: on a busy machine it may be we who were late."""
+        """True if the vehicle was connected and has been silent for too long. A datagram that has arrived but
+        was not read yet counts as received: on a busy machine this process may be late."""
         return self._connection.lost(monotonic_us()) and not self._socket.waiting
 
     def find_with_truth(self, truth: TruthLink) -> Target:
-        """As `find`; from then on the world that the vehicle flies in is heard too, and awaited for a moment.
+        """As `find`; from then on the truth of the vehicle's world is received too, and is awaited briefly.
 
-        `truth` remains the caller's, who closes it.
+        The caller keeps `truth` and closes it.
         """
         target = self.find()
         try:
             truth.of_vehicle(int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id))
-        except RefusedError:  # another firmware, or a vehicle that flies in no simulator
+        except RefusedError:  # another firmware, or a vehicle without a simulator
             truth.of_vehicle(None)
         except GcsError:
             truth.of_vehicle(None, silent=self.deaf or _STANDS_STILL)
@@ -103,7 +103,7 @@ class Session:
         label: str = "",
         operation: Operation | None = None,
     ) -> bool:
-        """Listen until `done` or the time (None: any time) is over; True if done."""
+        """Listen until `done` or until the time has passed (None: no limit); True if done."""
         until_us = None if seconds is None else monotonic_us() + round(seconds * 1e6)
         with StepDisplay(label) as display:
             while not done():
@@ -123,7 +123,7 @@ class Session:
         return True
 
     def run(self, operation: Operation, label: str = "") -> Result:
-        """Bring one operation to its end: NoVehicleError if nobody answers, RefusedError if it is a no."""
+        """Carry out one operation; NoVehicleError if the vehicle is silent, RefusedError if it refuses."""
         texts_before = len(self.view.texts)
         self.watch(
             lambda: operation.result is not None or self.lost,
@@ -144,11 +144,11 @@ class Session:
 
     @property
     def signing_trouble(self) -> str:
-        """Why nothing that is asked is answered, where that is for want of the key that signs messages."""
+        """Why no request is answered, if that is because the key that signs messages is missing."""
         return self._connection.signatures.trouble
 
     def request(self, message_id: int) -> Any:
-        """The newest message of that id, asked for if the vehicle has not sent it by itself."""
+        """The newest message of that id, requested if the vehicle has not sent one by itself."""
         name = mavlink.mavlink_map[message_id].msgname
         if name not in self.view.latest:
             self.run(command.request_message(self.target, message_id))

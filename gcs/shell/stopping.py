@@ -1,6 +1,7 @@
-"""Ctrl-C: the first asks to stop in order, the second abandons what is still being done.
+"""Ctrl-C: the first requests an orderly stop, the second abandons what is still being done.
 
-A terminal that is closed asks to stop, too, however often that is said: shell and system both say it.
+Closing the terminal requests an orderly stop too, and repeating it has no effect: both the shell and the
+system send the signal.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from gcs.shell.display import say
 
 
 class StopRequest:
-    """True once somebody asked to stop, who is told the `hint` then. In force within its `with` block."""
+    """True after a stop was requested; the `hint` is printed then. In force within its `with` block."""
 
     def __init__(self, hint: str) -> None:
         self.hint = hint
@@ -27,7 +28,7 @@ class StopRequest:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._process:
-            return  # a process that was forked from ours: a terminal asks both, and we decide
+            return  # a forked process: the terminal signals both, and the parent decides
         if self._asked:
             if number != signal.SIGHUP:
                 raise KeyboardInterrupt

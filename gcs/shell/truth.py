@@ -1,4 +1,4 @@
-"""Where simulators that run by themselves tell what is true."""
+"""The socket on which simulators that were started separately send the truth."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from gcs.shell.link import SITL_TRUTH, Address, UdpSocket
 
 
 class TruthLink:
-    """The truth of the world that one vehicle flies in; without any where the port is another program's."""
+    """The truth of the world in which one vehicle flies; there is none if another program uses the port."""
 
     def __init__(self, address: Address | None) -> None:
-        """`address`: where it is told; None: where `sitl` tells it by default.
+        """`address`: where the truth is sent; None: where `sitl` sends it by default.
 
-        GcsError if a port that was named is in use.
+        GcsError if the given port is in use.
         """
         named = address or SITL_TRUTH
         self._where = str(named)
@@ -29,24 +29,24 @@ class TruthLink:
                 raise GcsError(f"--truth: UDP {named} {trouble}") from None
 
     def of_vehicle(self, run: int | None, silent: str = "") -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say, or has not answered
-        and `silent` says why."""
+        """Set the run of the world in which the vehicle reports to fly; None: it does not report one, or has
+        not answered, and `silent` states why."""
         self._truth.of_vehicle(run, silent)
 
     def drain(self) -> list[bytes]:
-        """All datagrams of the vehicle's own world that are there."""
+        """All datagrams of the vehicle's own world that have arrived."""
         return [] if self._socket is None else self._truth.take(self._socket.drain_with_senders())
 
     @property
     def missing(self) -> str:
-        """Why there is no truth so far, and what to do; empty where there is."""
+        """Why there is no truth so far, and what to do; empty if there is truth."""
         if self._socket is None:
             return f"UDP {self._where} is in use by another program; --truth PORT names another port"
         return self._truth.missing
 
     @property
     def heard(self) -> bool:
-        """Whether the truth of the vehicle's own world has come."""
+        """Whether the truth of the vehicle's own world has arrived."""
         return self._truth.heard
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The socket at which one vehicle is met: others that speak there are not taken for it."""
+"""The socket for one vehicle: other vehicles that send to it are not mistaken for this one."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from gcs.clients.datagrams import messages
 from gcs.shell.display import say
 from gcs.shell.link import Address, UdpSocket, monotonic_us, open_address
 
-GONE_US = 2_000_000  # after such a silence who else speaks is the vehicle, started again
+GONE_US = 2_000_000  # after this silence another vehicle that sends is assumed to be this one, started again
 
 Sender = tuple[str, int]
 
 
 class VehicleSocket:
-    """Hears the vehicle whose heartbeat comes first, and whoever is no vehicle; answers go to the vehicle."""
+    """Receives from the vehicle whose heartbeat arrives first, and from senders that are no vehicles; sends
+    to the vehicle."""
 
     def __init__(self, address: Address) -> None:
         self._address = address
         self._socket: UdpSocket = open_address(address)
         self._vehicle: Sender | None = None
         self._heard_us = 0
-        self._autopilots: dict[Sender, int] = {}  # that spoke before there was a vehicle, and their systems
-        self._others: dict[Sender, int] = {}  # vehicles that are not heard, and their systems
+        self._autopilots: dict[Sender, int] = {}  # senders before there was a vehicle, with their system ids
+        self._others: dict[Sender, int] = {}  # vehicles that are ignored, with their system ids
         self._told: set[Sender] = set()
 
     def fileno(self) -> int:
@@ -30,15 +31,15 @@ class VehicleSocket:
 
     @property
     def waiting(self) -> bool:
-        """Whether a datagram is there."""
+        """Whether a datagram has arrived and was not read yet."""
         return self._socket.waiting
 
     def send(self, datagram: bytes) -> None:
-        """Send to the vehicle, or to whoever spoke last before there was one."""
+        """Send to the vehicle; before there is one, to the last sender."""
         self._socket.send(datagram)
 
     def drain(self) -> list[bytes]:
-        """All datagrams that are there, without waiting."""
+        """All datagrams that have arrived from the accepted senders, without waiting."""
         now_us = monotonic_us()
         heard = self._socket.drain_with_senders()
         return [datagram for datagram, sender in heard if self._takes(datagram, sender, now_us)]
@@ -65,7 +66,7 @@ class VehicleSocket:
         return True
 
     def _tell_of_others(self) -> None:
-        """The vehicle speaks on, so that these are not it: said once of each."""
+        """Print once for each that it is another vehicle, now that the first one is still sending."""
         for sender, system in self._others.items():
             if sender not in self._told:
                 self._told.add(sender)
@@ -81,7 +82,8 @@ class VehicleSocket:
 
 
 def _speaks_in(datagram: bytes) -> tuple[int | None, int | None]:
-    """The systems of the vehicle whose heartbeat it holds, and of the autopilot whose message."""
+    """System ids: of the vehicle whose heartbeat the datagram contains, and of the autopilot that sent any
+    message in it."""
     vehicle = autopilot = None
     for one in messages(datagram)[0]:
         if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):

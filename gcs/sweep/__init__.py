@@ -1,1 +1,1 @@
-"""Thousands of flights without the wire: the same cores fused into one kernel, and what becomes of them."""
+"""Thousands of flights without the wire: both ticks in one kernel, and the results of the flights."""

@@ -1,4 +1,4 @@
-"""What the flights of a cell of a sweep share: those of one law under the same settings, of any seed."""
+"""What the flights of a cell of a sweep share: flights with one law and the same settings, and any seed."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from sitl.vehicles.truth import truth_of
 
 @dataclass(frozen=True)
 class Cell:
-    """All of a flight but its seed."""
+    """Everything about a flight except its seed."""
 
     mission: Mission
     setup: Setup
     plan: MissionPlan
-    items: int  # of the mission
-    limit_us: int  # that the flight may last
+    items: int  # number of mission items
+    limit_us: int  # longest time that the flight may last
     truth: Truth
     layout: Layout
     profile: Profile
@@ -51,9 +51,9 @@ class Cell:
 
 
 def cell_of(mission: Mission, conditions: Conditions) -> Cell:
-    """The cell to which a flight under these conditions belongs. ValueError where it cannot be flown."""
+    """The cell to which a flight under these conditions belongs. ValueError if it cannot be flown."""
     settings, own = tuple(conditions.settings.items()), conditions.own
-    # what somebody brings may change under its name
+    # custom code may change under the same name: its digests are part of the cache's key
     return _cell(mission, conditions.vehicle, conditions.sensors, settings, own, own.digests)
 
 
@@ -99,11 +99,11 @@ def _profile(name: str) -> Profile:
 
 
 def _own_plan(items: tuple[WireItem, ...], setup: Setup) -> MissionPlan:
-    """By a planner that somebody has brought."""
+    """The plan of a mission by a custom planner."""
     return plan_of(StoredMission(items), Home(), setup.settings.limits, planner=setup.planner)
 
 
 @lru_cache(maxsize=64)
 def _plan(items: tuple[WireItem, ...], limits: Limits) -> MissionPlan:
-    """Shaping paths takes seconds; it depends on nothing else."""
+    """The plan of a mission; cached, as shaping its paths takes seconds and depends on nothing else."""
     return plan_of(StoredMission(items), Home(), limits)

@@ -1,8 +1,8 @@
 """One whole flight without the wire: the flight that `gcs.closed_loop` flies, many times as fast.
 
 The tick of the world and the tick of the autopilot run in turn in machine code (`gcs.sweep.kernel`), until
-the supervisor may have something to decide; then `FlightCore.decide` lets it, as in the process. The ground
-station's part is known beforehand: the two instants at which it arms and starts the mission.
+the supervisor may have something to decide; then `FlightCore.decide` runs it, as in the process. The actions
+of the ground station are known beforehand: the two instants at which it arms and starts the mission.
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ from sitl.plant.chain.records import new_chain
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
-GROUND_WINDOW_US = 20_000  # between two turns of the ground station
+GROUND_WINDOW_US = 20_000  # between two turns of the ground station in lockstep
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
 _TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
 _SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
-# machine code of `fly_stretch` and of what it calls, by the type of the cable's rows
+# machine code of `fly_stretch` and of the ticks that it calls, by the type of the cable's rows
 _ENTRIES: dict[type, tuple[Callable[..., bool], Code]] = {}
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
 @dataclass(frozen=True)
 class Boarding:
-    """When the ground station, in lockstep, arms the vehicle and starts the mission."""
+    """The times at which the ground station, in lockstep, arms the vehicle and starts the mission."""
 
     arm_us: int
     start_us: int
@@ -62,7 +62,7 @@ class Boarding:
 
 @dataclass
 class Flown:
-    """What became of a flight; NaN for a figure that nothing was measured of. Figures are of the mission."""
+    """The result of a flight; NaN for a figure that was not measured. Figures are those of the mission."""
 
     outcome: str = ""  # as `gcs fly` names it
     reason: str = ""
@@ -85,14 +85,14 @@ class Flown:
 
 
 class _NoLog:
-    """Takes the frames of a flight of which only the beginning is of interest."""
+    """Discards the frames of a flight of which only the beginning is of interest."""
 
     def write(self, *_: object) -> None:
-        """Forget them."""
+        """Discard a frame."""
 
 
 def boarding(mission: Mission, conditions: Conditions) -> Boarding:
-    """When the real ground station would arm and start: from the real dialogue, flown until then."""
+    """The times at which the real ground station arms and starts: from a flight over the wire to then."""
     times: dict[Phase, int] = {}
 
     def watch(onboard: Onboard, _: HilSimulator) -> bool:
@@ -110,13 +110,13 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
 
 
 class SweptFlight:
-    """A flight on its way."""
+    """A flight in progress."""
 
     def __init__(self, cell: Cell, seed: int, boarding: Boarding, trace: Floats | None = None) -> None:
         self.cell = cell
         self.tick_us = cell.settings.tick_us
         self.core = FlightCore(cell.setup, LAID_OUT_WAITING)
-        self.item = 0  # of the mission, last flown
+        self.item = 0  # mission item that was flown last
         self.core.change(with_plan(self.core.flight, cell.plan))
         self.world = new_world(cell.truth, cell.profile, cell.settings, seed, cell.layout)
         self.chain = new_chain(cell.truth, unpack(World, self.world.world, 0).plant)
@@ -126,10 +126,10 @@ class SweptFlight:
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
         self.arm_us, self.start_us = boarding.arm_us, boarding.start_us
         self.flown = Flown()
-        self._warned: list[str] = []  # by the vehicle as it left the mission, and since
+        self._warned: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
         self.airborne_us = -1
         self.mission_us = 0
-        self.begun = False  # the first tick is over
+        self.begun = False  # the first tick has been flown
 
     # ---- the loop
 
@@ -140,7 +140,7 @@ class SweptFlight:
         return self.conclude()
 
     def turn(self, last_tick: int) -> None:
-        """Fly until something is decided, or this tick is over."""
+        """Fly until the supervisor or the ground station acts, at most to the end of this tick."""
         before_us, slack_before = self.now_us, self.slack_events
         self.core.move_cable(before_us + (self.tick_us if self.begun else 0))
         flight = self.core.flight
@@ -158,7 +158,7 @@ class SweptFlight:
         self._judge(now_us)
 
     def flown_in_lanes(self, ticks: int, slack_before: int) -> None:
-        """What follows from so many ticks that were flown together with others."""
+        """Account for ticks that were flown in lanes: times and slack events, the ground station, the end."""
         self._note(self.core.flight.phase, ticks * self.tick_us, self.slack_events - slack_before)
         self._ground_turn(self.now_us)
         self._judge(self.now_us)
@@ -182,7 +182,7 @@ class SweptFlight:
         return _ENTRIES[kind]
 
     def compile(self) -> None:
-        """Have that machine code ready that is the same with all laws."""
+        """Compile or load the machine code that is the same for all laws."""
         self._entry()
 
     @property
@@ -197,18 +197,18 @@ class SweptFlight:
 
     @property
     def slack_events(self) -> int:
-        """How often the cable went slack so far."""
+        """How often the cable has gone slack so far."""
         return int(self.world.world[_SLACK_EVENTS])
 
     def stop_tick(self, now_us: int) -> int:
-        """The tick after which the ground station has something to do, or the time is over."""
+        """The tick after which the ground station has something to do, or the time limit has passed."""
         due = [time for time in (self.arm_us, self.start_us) if time > now_us]
         if self.airborne_us >= 0:
             due.append(self.airborne_us + self.cell.limit_us + self.tick_us)
         return -(-min(due, default=now_us + self.cell.limit_us) // self.tick_us)
 
     def _note(self, phase: Phase, passed_us: int, slack_events: int) -> None:
-        """What passed in a stretch that was flown in this phase."""
+        """Add time and slack events of a stretch that was flown in this phase."""
         if phase in _LOAD_CARRIED:
             self.flown.slack_events += slack_events
         if phase == Phase.MISSION:
@@ -217,7 +217,7 @@ class SweptFlight:
             self.item = mission.plan.sequence[mission.step]
 
     def _decide(self, now_us: int) -> None:
-        """The supervisor's part of a tick; and where the mission asks the load to be."""
+        """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
         phase = self.core.flight.phase
         self._hear(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
@@ -234,7 +234,7 @@ class SweptFlight:
     # ---- what the ground station does
 
     def _ground_turn(self, now_us: int) -> None:
-        """Arm and start at their instants; as long as the vehicle has complaints both are put off."""
+        """Arm and start at their instants; as long as the vehicle is not ready to be armed, postpone both."""
         phase = self.core.flight.phase
         if now_us == self.arm_us and phase == Phase.DISARMED:
             complaints = arming_complaints(self.core.flight, self.core.view(now_us), self.core.settings)
@@ -255,7 +255,7 @@ class SweptFlight:
     # ---- how it ends
 
     def _end(self, outcome: str, reason: str, lost_phase: str = "") -> None:
-        """The flight is over, for a reason that is told in the mission's terms."""
+        """End the flight; the reason is stated with the item numbers of the mission file."""
         flown = self.flown
         flown.outcome, flown.reason = outcome, of_mission(reason, self.cell.mission)
         flown.lost_phase = lost_phase
@@ -282,7 +282,7 @@ class SweptFlight:
             self._end("timeout", f"not landed after {limit_s:.0f} s of flight: still in phase {where}", where)
 
     def _landed(self) -> None:
-        """The vehicle is disarmed; said as `gcs fly` says it."""
+        """End the flight of a vehicle that was disarmed, with outcome and reason as in `gcs fly`."""
         if self.core.flight.mission.done:
             self._end("completed", "")
             return
@@ -291,7 +291,7 @@ class SweptFlight:
         self._end("interrupted", "; ".join([*dict.fromkeys(self._warned), ended]))
 
     def conclude(self) -> Flown:
-        """What became of the flight."""
+        """Compute the figures of the flight and return its result."""
         flown, f = self.flown, unpack(Figures, self.figures, 0)
         if self.airborne_us >= 0:
             flown.flight_s = (self.now_us - self.airborne_us) * 1e-6

@@ -1,9 +1,9 @@
-"""Up to eight flights of one cell of a sweep, flown at once where they go the same way.
+"""Up to eight flights of one cell of a sweep, flown at once while they take the same branches.
 
-A block of ticks is flown in lanes (`gcs.sweep.lane_kernel`). A flight whose course parts from that of the
-others, or that is to be decided upon, is flown alone for some ticks, while the others go on; what was flown
-in vain is flown again from its own memory, which is still as it was when the block began. So every flight is
-the same to the bit as if it were flown alone.
+A block of ticks is flown in lanes (`gcs.sweep.lane_kernel`). A flight that takes another branch than the
+others, or for which the supervisor must decide, is flown alone for some ticks, while the others continue.
+Ticks of a block that are not valid for a flight are flown again from its own memory, which is still as it was
+when the block began. Every flight is therefore the same to the bit as if it were flown alone.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from gcs.sweep.lane_kernel import fly_lanes
 from gcs.sweep.lane_memory import LaneMemory
 from sitl.world import JITTER, LOSS, OUTAGE_CHANCE, WorldModel
 
-FEWEST = 3  # flights for which lanes pay
+FEWEST = 3  # least number of flights for which lanes are faster
 _LONGEST, _SHORTEST = 2000, 8  # ticks of a block
-_ASIDE = 16  # ticks that one flies alone which is to be decided upon
-_ALONE, _MOST_ALONE = 4, 128  # ticks that are flown alone after courses have parted: longer each time
+_ASIDE = 16  # ticks that a flight is flown alone when the supervisor must decide for it
+_ALONE, _MOST_ALONE = 4, 128  # ticks that a flight is flown alone after another branch: more each time
 
 _ENTRIES: dict[type, Callable[..., tuple[int, int]]] = {}  # machine code, by the type of the law's rows
 
 
 def suits(flight: SweptFlight) -> bool:
-    """Whether a flight can be flown in lanes: no reading is lost by chance, or late by a time of its own,
-    and the cable has no links."""
+    """Whether a flight can be flown in lanes: no reading is lost or late at random, and the cable has no
+    links."""
     gnss = unpack(WorldModel, flight.world.model, 0).gnss
     by_chance = flight.world.fate[:, [LOSS, OUTAGE_CHANCE, JITTER]]
     alike = not by_chance.any() and gnss.float_chance == 0.0 and gnss.lost_chance == 0.0
@@ -36,21 +36,21 @@ def suits(flight: SweptFlight) -> bool:
 
 
 class Group:
-    """Flights of one cell on their way."""
+    """Flights of one cell in progress."""
 
     def __init__(self, flights: Sequence[SweptFlight]) -> None:
         self._flights = flights
         self._memory = LaneMemory(flights)
         self._block = _SHORTEST
         self._alone = [_ALONE] * len(flights)
-        self.in_lanes = 0  # ticks, of all flights
+        self.in_lanes = 0  # ticks that were flown in lanes, of all flights
 
     def compile(self) -> None:
-        """Have the machine code ready."""
+        """Compile or load the machine code."""
         self._fly_lanes(range(len(self._flights)), 0)
 
     def run(self) -> None:
-        """Fly all to their ends."""
+        """Fly all flights to their ends."""
         flying = list(range(len(self._flights)))
         for i in flying:
             self._fly_alone(i, 1)
@@ -63,7 +63,7 @@ class Group:
             flight.conclude()
 
     def _go_on(self, flying: Sequence[int]) -> None:
-        """Let those fly that are behind, at most until they meet those that are ahead."""
+        """Fly the flights that are behind, at most until they reach those that are ahead."""
         ticks = [self._flights[i].tick for i in flying]
         tick = min(ticks)
         behind = [i for i, own in zip(flying, ticks, strict=True) if own == tick]
@@ -94,7 +94,7 @@ class Group:
         courses: dict[object, list[int]] = {}
         for i in members:
             core = flights[i].core
-            if not core.reels:  # else its growth would be told twice
+            if not core.reels:  # otherwise the growth of the cable would be passed on twice
                 core.move_cable(flights[i].now_us + flights[i].tick_us)
                 courses.setdefault(self._memory.course(i), []).append(i)
         most = max(courses.values(), key=len, default=[])
@@ -105,7 +105,7 @@ class Group:
         return [] if winch.released or reels else most
 
     def _undecided(self, i: int) -> int:
-        """Ticks that a flight can fly before it is to be decided upon, or the ground station has a turn."""
+        """Ticks that a flight can fly before the supervisor must decide, or the ground station has a turn."""
         flight = self._flights[i]
         to_decide = -(-(self._memory.stop_us(i) - flight.now_us) // flight.tick_us) - 1
         return max(min(to_decide, flight.stop_tick(flight.now_us) - flight.tick), 0)
@@ -113,12 +113,12 @@ class Group:
     # ---- in lanes
 
     def _fly_block(self, members: Sequence[int], ticks: int) -> None:
-        """Fly so many ticks in lanes, or as far as all go the same way."""
+        """Fly these ticks in lanes, or as many as all flights fly alike."""
         memory = self._memory
         tick = self._flights[members[0]].tick
         flown, parted = self._fly_lanes(members, ticks)
         if not memory.remembers():
-            # begun anew: what lies in the ring is not all of it
+            # the estimator was reset or needs a longer memory: the lanes do not hold all of the ring for it
             for i in members:
                 self._fly_alone(i, tick + min(flown + 1, ticks))
             return
@@ -127,7 +127,7 @@ class Group:
         if faithful:
             self._take_back(faithful, flown + 1 if astray else flown)
         if astray:
-            # a few are flown again as fast alone
+            # fewer than `FEWEST` are flown again alone, which is as fast
             if flown > 0 and len(astray) >= FEWEST:
                 self._fly_lanes(astray, flown)
                 self._take_back(astray, flown)
@@ -140,7 +140,7 @@ class Group:
                 self._alone[i] = _ALONE
 
     def _fly_lanes(self, members: Sequence[int], ticks: int) -> tuple[int, int]:
-        """Of members in lanes: see `fly_lanes`."""
+        """Take the members into lanes and call `fly_lanes`, with its result."""
         memory = self._memory
         memory.take(members)
         law = type(memory.law_rows)
@@ -167,7 +167,7 @@ class Group:
     # ---- alone
 
     def _longer(self, i: int) -> int:
-        """For how many ticks a flight flies alone that has parted from the others: longer each time."""
+        """The number of ticks to fly a flight alone after it took another branch: more each time."""
         ticks = self._alone[i]
         self._alone[i] = min(2 * ticks, _MOST_ALONE)
         return ticks

@@ -2,7 +2,7 @@
 turn.
 
 Both are the functions that fly in the processes (`sitl.world.world_tick`, `autopilot.core.tick.fly_tick`),
-and their very machine code; what is added is the rounding of the wire between them, and the figures of the
+with the same machine code. Added are only the rounding of the wire between them, and the figures of the
 flight.
 """
 
@@ -27,12 +27,12 @@ from sitl.world import Floats, World, WorldModel, WorldRows, world_tick
 
 
 class Figures(NamedTuple):
-    """Of the mission, tick by tick, from the true state."""
+    """Figures of the mission, accumulated at each tick from the true state."""
 
-    error_max: float  # m, from where the mission asks the load to be
+    error_max: float  # m, distance from the requested path
     error_square: float  # m^2, summed
     samples: float
-    tracking_max: float  # m, from the path that is flown
+    tracking_max: float  # m, distance from the shaped path
     psi_R_max: float
     psi_q_max: float
     saturated: float  # ticks
@@ -51,8 +51,8 @@ NO_FIGURES = Figures(
 
 @kernel
 def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: Vec3) -> None:
-    """The figures with those of this tick; `asked` is where the mission asks the load to be, `target` where
-    the autopilot does."""
+    """Add this tick to the figures; `asked` is the load's position on the requested path, `target` that on
+    the shaped path, which the autopilot flies."""
     f = unpack(Figures, figures, 0)
     plant, pilot = unpack(World, world.world, 0).plant, unpack(Pilot, core.pilot, 0)
     believed = unpack(Seen, core.seen, 0).state
@@ -80,21 +80,21 @@ def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: V
 
 
 class Code(NamedTuple):
-    """Where the machine code of the two ticks is; 0 where nothing is compiled."""
+    """Addresses of the machine code of the two ticks; 0 if nothing is compiled."""
 
     world: int
     fly: int
 
 
 def code_of_world(world: WorldRows, chain: ChainRows | None = None) -> int:
-    """The address of the world's tick for such rows, compiled or loaded where need be."""
+    """The address of the world's tick for such rows, which is compiled or loaded if necessary."""
     if not hasattr(world_tick, "overloads"):
         return 0
     return native_address_of(world_tick, world, world.rotors[ASKED], False, 0.0, chain)
 
 
 def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
-    """The address of the autopilot's tick for such rows, of any law, compiled or loaded where need be."""
+    """The address of the autopilot's tick for such rows and any law, compiled or loaded if necessary."""
     if not hasattr(fly_tick, "overloads"):
         return 0
     return native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False)
@@ -103,7 +103,7 @@ def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
 def move_world(
     code: Code, world: WorldRows, gripper_open: bool, reel_rate: float, chain: ChainRows | None
 ) -> None:
-    """`world_tick` by its address."""
+    """Call `world_tick` by its address."""
     world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
 
 
@@ -125,7 +125,7 @@ def fly_autopilot(
     dt: float,
     decided: bool,
 ) -> int:
-    """`fly_tick` by its address."""
+    """Call `fly_tick` by its address."""
     return fly_tick(core, law_rows, readings, now_us, tick, dt, decided)
 
 
@@ -171,12 +171,12 @@ def fly_stretch(
     stop_tick: int,
     chain: ChainRows | None,
 ) -> bool:
-    """Fly until the supervisor is to be asked (True) or the tick `stop_tick` is over (False).
+    """Fly until the supervisor must decide (True) or the tick `stop_tick` has been flown (False).
 
-    `begun`: the present tick is over; `decided`: but for the law's part, as the supervisor was to be asked.
-    `asked` (ticks, 21) is where the mission asks the load to be, from the
-    first tick of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the
-    true state, as long as it lasts. `chain` is the memory of a cable of links, if it is one.
+    `begun`: the present tick has been flown; `decided`: except for the law's part, which had to wait for the
+    supervisor's decision. `asked` (ticks, 21) is the load's requested path, from the first tick of the core's
+    stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the true state, up to its
+    length. `chain` is the memory of a cable of links, None for other cables.
     """
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us

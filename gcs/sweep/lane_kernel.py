@@ -19,7 +19,7 @@ from sitl.world import World, WorldModel, WorldRows, world_tick
 
 @kernel
 def world_in_lanes(rows: WorldRows) -> WorldRows:
-    """The world's rows, of which each flight has its own where they have an axis of lanes."""
+    """The rows of the world, in lanes where each flight has its own; the others are shared."""
     return WorldRows(
         in_lanes(rows.world),
         rows.model,
@@ -37,7 +37,7 @@ def world_in_lanes(rows: WorldRows) -> WorldRows:
 
 @kernel
 def core_in_lanes(rows: CoreRows) -> CoreRows:
-    """The same of the autopilot's."""
+    """The same for the rows of the autopilot."""
     h = rows.history
     history = History(
         in_lanes(h.ring),
@@ -76,11 +76,11 @@ def fly_lanes(
     asked: Any,
     ticks: int,
 ) -> tuple[int, int]:
-    """Fly so many ticks: how many of them all lanes flew alike, and which did not fly the one after like
-    lane 0, a bit each.
+    """Fly `ticks` ticks; return how many of them all lanes flew alike, and one bit for each lane that took
+    another branch than lane 0 in the tick after these.
 
-    The memory of these is not valid then, that of the others is of that tick. Where lane 0 is to be decided
-    upon that is all of them.
+    The memory of the lanes with a bit is then invalid; that of the others is the state after that tick. If
+    the supervisor must decide for lane 0, all bits are set.
     """
     world, core = world_in_lanes(world_rows), core_in_lanes(core_rows)
     law_rows = with_field(own_law_rows, "memory", in_lanes(own_law_rows.memory))

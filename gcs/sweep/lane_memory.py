@@ -1,8 +1,8 @@
-"""The memory of eight flights: of each its own, and once more with the flights side by side, in lanes.
+"""The memory of eight flights: separately for each flight, and a second time side by side, in lanes.
 
-What a flight carries from tick to tick is moved into one block of numbers for each flight, of which its rows
-are views, so that a copy into lanes or back is the transpose of a matrix. Of the ring of past states, which
-is longer than all the rest, only what is recent enough to be asked for is copied.
+All numbers that a flight keeps from tick to tick are moved into one block for each flight, and its rows
+become views of the block, so that a copy into lanes or back is the transpose of a matrix. Of the ring of past
+states, which is longer than all the rest, only the part that is recent enough to be needed is copied.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.flight import SweptFlight
 from sitl.world import Floats, WorldRows
 
-# of each flight; `inbox` last, of which only the first row is told on
+# arrays of each flight; `core.inbox` comes behind these, and only its first row is copied
 _WORLD = ("world", "seed", "errors", "queue", "commands", "rotors")
 _CORE = ("estimator", "pilot", "seen", "commands", "stretch", "rotors")
 _HISTORY = ("covariance", "consistency")
 _SCRATCH = ("error", "shares", "gain", "scalars")
-_SHARED = ("clock", "command_ring")  # of the world: whole numbers, the same for all
+_SHARED = ("clock", "command_ring")  # of the world: integers, the same for all flights
 _SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
-# of the covariance in lanes: with 32, rows of 2 KiB, what lies in one column would share few places of the
-# processor's cache
+# columns of the covariance in lanes: with 32, a row would take 2 KiB, and the numbers of one column would
+# compete for few places of the processor's cache
 _COLUMNS = ROOM + 8
 _ALIGNED = 64  # bytes
 _MEMORY, _HEAD, _RESETS = (place_of(EstimatorState, name) for name in ("memory_s", "head", "resets"))
@@ -44,14 +44,14 @@ Indices = NDArray[np.intp]
 
 
 def _aligned(rows: int) -> Floats:
-    """(rows, LANES) zeros that begin at a whole cache line."""
+    """(rows, LANES) zeros that begin at the start of a cache line."""
     block = np.zeros(rows * LANES + _ALIGNED // 8)
     first = -block.ctypes.data // 8 % (_ALIGNED // 8)
     return block[first : first + rows * LANES].reshape(rows, LANES)
 
 
 def _rows_of(flight: SweptFlight) -> dict[str, NDArray[Any]]:
-    """All arrays of a flight, in the order in which they lie in its block."""
+    """All arrays of a flight, in the order of its block."""
     core, world = flight.core.rows, flight.world
     found = {f"world.{name}": getattr(world, name) for name in _WORLD}
     found |= {f"core.{name}": getattr(core, name) for name in _CORE}
@@ -66,9 +66,9 @@ def _named(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[An
 
 
 class LaneMemory:
-    """The memory of up to eight flights of one cell of a sweep; their rows are views of it from now on.
+    """The memory of up to eight flights of one cell of a sweep; from now on, their rows are views of it.
 
-    `world`, `core`, `law_rows`, `figures` and `asked` are what `fly_lanes` takes, once flights were taken.
+    `world`, `core`, `law_rows`, `figures` and `asked` are the arguments of `fly_lanes`, after `take`.
     """
 
     def __init__(self, flights: Sequence[SweptFlight]) -> None:
@@ -119,13 +119,13 @@ class LaneMemory:
         self.law_rows = first.core.law_rows._replace(memory=made["law"])
         self.figures = made["figures"]
         self.asked: tuple[Floats, ...] = ()
-        self.lanes: Indices = np.zeros(LANES, np.intp)  # which flight lies in each
+        self.lanes: Indices = np.zeros(LANES, np.intp)  # the flight in each lane
 
     def take(self, members: Sequence[int]) -> None:
-        """Copy these flights into lanes; where they are fewer than eight the last one lies there again."""
+        """Copy these flights into lanes; if they are fewer than eight, the last one fills the other lanes."""
         self.lanes[:] = [*members, *[members[-1]] * (LANES - len(members))]
         self._common[:] = self._own[members[0], self._shared]
-        # the estimator's own first: they say what of the ring is recent
+        # the estimator's numbers first: they determine which part of the ring is recent
         self._estimator[:] = self._own_estimator[self.lanes].T
         there = self._lanes, self._square, self._lane_ring
         _copy_in(self._own, self.lanes, self._places, *there, self._recent())
@@ -140,7 +140,7 @@ class LaneMemory:
         self.asked = tuple(flight.asked for flight in flights)
 
     def give(self, members: Sequence[int], ticks: int) -> None:
-        """Copy some of those that were taken back after so many ticks."""
+        """Copy some of the flights that were taken back from their lanes, after this number of ticks."""
         lanes = [self.lanes.tolist().index(member) for member in members]
         there = self._lanes, self._square, self._lane_ring
         which = np.asarray(members, np.intp), np.asarray(lanes, np.intp)
@@ -148,12 +148,13 @@ class LaneMemory:
         self._own[members, self._shared] = self._common
 
     def remembers(self) -> bool:
-        """Whether the ring goes back as far as when the flights were taken, and nobody began anew."""
+        """Whether the estimator needs the ring only as far back as when the flights were taken, and was not
+        reset; judged by the first lane."""
         before, now = self._own_estimator[self.lanes[0]], self._estimator[:, 0]
         return bool(before[_MEMORY] == now[_MEMORY] and before[_RESETS] == now[_RESETS])
 
     def course(self, member: int) -> tuple[Any, ...]:
-        """What must be the same for flights that are flown together."""
+        """What must be equal for flights that are flown together."""
         flight = self.flights[member]
         return (
             self._own_stretch[member, _MODE],
@@ -166,22 +167,22 @@ class LaneMemory:
         )
 
     def stop_us(self, member: int) -> int:
-        """When a flight is to be decided upon, at the latest."""
+        """The time at which the supervisor must decide for a flight, at the latest."""
         return int(self._own_stretch[member, _STOP_US])
 
     def _recent(self, ticks: int = 0) -> Indices:
-        """Rows of the ring that may be asked for, and those of the last ticks."""
+        """Rows of the ring that may be needed, and those of the last ticks."""
         memory_s, head = self._estimator[_MEMORY, 0], int(self._estimator[_HEAD, 0])
         back = ceil(memory_s / (self.flights[0].tick_us * 1e-6)) + _SPARE_ROWS + ticks
         return np.arange(head - min(back, RING_LENGTH - 1), head + 1) % RING_LENGTH
 
 
 class _Places(NamedTuple):
-    """Where the parts of a flight's block begin and end."""
+    """Indices at which the parts of a flight's block begin and end."""
 
     covariance: int
-    behind: int  # the covariance
-    end: int  # of what is copied number by number
+    behind: int  # behind the covariance
+    end: int  # of the numbers that are copied one by one
     ring: int
 
 
@@ -195,7 +196,7 @@ def _copy_in(
     ring: Floats,
     rows: Indices,
 ) -> None:
-    """Copy flights into lanes, number by number: of the ring these rows."""
+    """Copy flights into lanes, number by number; of the ring only `rows`."""
     for i in range(at.covariance):
         for lane in range(LANES):
             lanes[i, lane] = own[members[lane], i]
@@ -223,7 +224,7 @@ def _copy_out(
     ring: Floats,
     rows: Indices,
 ) -> None:
-    """Copy these lanes back into the blocks of the flights that lie there."""
+    """Copy the lanes `taken_from` back into the blocks of the flights `members`."""
     count = members.shape[0]
     for i in range(at.covariance):
         for k in range(count):
@@ -246,7 +247,7 @@ def _view(block: Floats, array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _move(flight: SweptFlight, moved: dict[str, NDArray[Any]]) -> None:
-    """Let the flight's rows be these, with the numbers that they held."""
+    """Replace the flight's rows by `moved`, with the same numbers."""
     for name, array in _rows_of(flight).items():
         moved[name][...] = array
     core = flight.core

@@ -1,9 +1,9 @@
-"""How far a parameter may go by linear theory: until an eigenvalue of hovering leaves the unit circle.
+"""The range of a parameter by linear theory: until an eigenvalue of hovering leaves the unit circle.
 
 The loop is that of load position: the vehicle of (2-30)-(2-35) about hover with first-order rotors and a
-transport delay, sampled with a zero-order hold, and the law that flies, linearised by central differences of
-its own tick. The state is taken as known: what estimator and sensors do to it is what the flights show beyond
-this. Mass and wind are not observed meanwhile.
+transport delay, sampled with a zero-order hold, and the flown law, linearised by central differences of its
+own tick. The state is assumed to be known: the effects of estimator and sensors are seen only in flights.
+Mass and wind are not estimated meanwhile.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
 STEP = 1e-5  # central differences: truncation and rounding both below 1e-9
-LOST = 1.0 + 1e-7  # spectral radius; what the law carries but does not use has eigenvalue 1
-STRIDES = 12  # on the way from the value delivered to the end of the search
+LOST = 1.0 + 1e-7  # spectral radius; numbers that the law stores but does not use have eigenvalue 1
+STRIDES = 12  # steps of the search from the default value to the end of the range
 HALVINGS = 6
-SETTLE_TICKS = 500  # in which the memory of a law comes to rest while hovering
+SETTLE_TICKS = 500  # in which the memory of a law settles while hovering
 
 
 def sampled_plant(
@@ -44,8 +44,8 @@ def sampled_plant(
 ) -> tuple[Floats, Floats, Floats]:
     """(A, B, C) from one tick to the next of x' = A x + B u with held commands u = (f, M): exact.
 
-    States are x (n), the rotors if their lag `tau` is not zero, and the commands on their way, oldest first;
-    C gives x. A command of tick k works from t_k + `delay` until that of tick k + 1 does. Times in seconds.
+    States are x (n), the rotors if their lag `tau` is not zero, and the delayed commands, oldest first; C
+    gives x. A command of tick k acts from t_k + `delay` until that of tick k + 1 acts. Times in seconds.
     """
     n = len(A)
     if tau > 0.0:
@@ -78,7 +78,7 @@ def sampled_plant(
 
 
 def state_at(motion: Floats, vehicle: Vehicle) -> State:
-    """The state near hover with these LOAD_STATES, on its manifolds to second order."""
+    """The state near hover with these LOAD_STATES, on the manifolds of q and R to second order."""
     q_x, q_y = float(motion[6]), float(motion[7])
     q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
     q = np.array([q_x, q_y, q_z])
@@ -124,7 +124,7 @@ def _like(record: Any, numbers: Iterator[float]) -> Any:
 
 
 def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
-    """(A, B, C, D) of the law at hover: memory and motion in, memory and (f, M) out."""
+    """(A, B, C, D) of the law at hover: states are its memory, inputs the motion, outputs (f, M)."""
     vehicle, law = setup.vehicle, setup.law
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
     observed = aloft(vehicle)
@@ -182,16 +182,17 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     A, B, C = sampled_plant(*load_state_space(really), true.rotor_tau, delay, period)
     world = control.ss(A, B, C, np.zeros((LOAD_STATES, 4)), period)
     law = control.ss(*linearised_law(setup), period)
-    # the law's own sign closes the loop
+    # feedback is already negative in the law itself
     return sorted(np.abs(control.feedback(world, law, sign=1).poles()).tolist())
 
 
 def linear_range(
     plan: SweepPlan, law: str, name: str, nominal_value: float, limits: tuple[float, float]
 ) -> str:
-    """How far the parameter may go from its value as delivered, at most to `limits`; empty if the linear loop
-    does not know it, or the law is somebody's own. Everything else is as delivered or set for all flights."""
-    # of an estimator or a planner of somebody's own
+    """The range of the parameter, within `limits`, in which the linear loop is stable; empty if the parameter
+    is not part of the loop, or the law is a custom one. All other parameters have their defaults, or the
+    values set for all flights."""
+    # parameters of a custom estimator or planner
     brought = {parameter.name for one in plan.own(law).loaded() for parameter in one.parameters}
     if law not in LAWS or name in brought:
         return ""
@@ -212,7 +213,8 @@ def linear_range(
 
 
 def _boundary(holds: Callable[[float], bool], inside: float, outside: float) -> tuple[float, bool]:
-    """Where on the way it first ceases to hold, and whether it held all the way (to no natural end)."""
+    """The last value on the way from `inside` to `outside` before it ceases to hold, and whether it held all
+    the way (False if `outside` is zero, which is a natural end)."""
     if outside == inside:
         return inside, False
     low = inside

@@ -1,6 +1,6 @@
-"""What a sweep flies: laws, seeds and settings, every flight with a number of its own.
+"""What a sweep flies: laws, seeds and settings. Every flight has its own number.
 
-The flights follow from the plan alone, so that a sweep that was stopped goes on, and any flight of it can be
+The flights follow from the plan alone, so that a stopped sweep can be continued, and any flight of it can be
 flown again by its number.
 """
 
@@ -34,24 +34,24 @@ from sitl.vehicles.truth import load_truth
 
 MOST_FLIGHTS = 10_000_000
 _MOST_VALUES = 10_000
-_DRAW_SEED = 1  # of the settings of `--sample`: part of the plan's meaning
+_DRAW_SEED = 1  # for drawing the settings of `--sample`: another one would change the meaning of a plan
 
 
 def simulated(settings: Mapping[str, float]) -> dict[str, float]:
-    """Of settings by name those that the simulator takes."""
+    """Those of the settings, by name, that the simulator takes."""
     return {n: v for n, v in settings.items() if n.startswith("SIM_") and n != "SIM_LOSS_PCT"}
 
 
 class PlanError(GcsError):
-    """A sweep that cannot be."""
+    """A sweep that cannot be flown as specified."""
 
     exit_code = EXIT_USAGE
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A parameter and what it takes on: on a grid each of `values`; drawn, if `continuous`, any number
-    between the least and the greatest."""
+    """A parameter and its values: on a grid, each of `values`; if drawn and `continuous`, any number between
+    the least and the greatest of them."""
 
     name: str
     values: tuple[float, ...]
@@ -80,21 +80,21 @@ class SweepPlan:
     varied: tuple[Varied, ...]
     settings: tuple[tuple[str, float], ...]  # the same for all flights
     sample: int = 0
-    estimator: str = ""  # that somebody has brought, of all flights
+    estimator: str = ""  # custom estimator of all flights; empty: the built-in one
     planner: str = ""
 
     def own(self, law: str) -> Own:
-        """What of a flight with this law somebody has brought."""
+        """The custom parts (law, estimator, planner) of a flight with this law."""
         return Own(own_law(law), self.estimator, self.planner)
 
     @property
     def points(self) -> int:
-        """How many different settings are flown."""
+        """The number of different settings that are flown."""
         return self.sample or math.prod(len(v.values) for v in self.varied)
 
     @property
     def flights(self) -> int:
-        """How many flights there are."""
+        """The number of flights."""
         return len(self.laws) * self.points * len(self.seeds)
 
     def cases(self) -> Iterator[Case]:
@@ -116,14 +116,14 @@ class SweepPlan:
         ]
 
     def conditions(self, case: Case) -> Conditions:
-        """What the flight is flown under."""
+        """The conditions under which the flight is flown."""
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
         law = {"CTL_LAW": float(law_number(case.law))}
         settings = {**dict(self.settings), **varied, **law}
         return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law))
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The plan as plain JSON values."""
         return json.loads(json.dumps(asdict(self)))  # type: ignore[no-any-return]
 
 
@@ -181,7 +181,7 @@ def read_varied(text: str, sampled: bool) -> Varied:
     if count != int(count) or not 2 <= count <= _MOST_VALUES:
         raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MOST_VALUES}")
     n = int(count)
-    # twelve digits: 0.1 and not 0.30000000000000004
+    # rounded to twelve digits: 0.1 and not 0.30000000000000004
     return Varied(name, tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n)), True)
 
 
@@ -206,7 +206,7 @@ def make_plan(
     sample: int,
     own: Own = NOTHING_OWN,
 ) -> SweepPlan:
-    """The plan, or PlanError with what is wrong with it. Of `own` estimator and planner are those of all
+    """The plan; PlanError states what is wrong with it. The estimator and planner of `own` are those of all
     flights."""
     names = [v.name for v in varied]
     for name in names:
@@ -246,7 +246,7 @@ def make_plan(
 
 
 def _check_laws(laws: Sequence[str]) -> None:
-    """PlanError if two laws could not be told apart in a table."""
+    """PlanError if two laws have the same name and could not be distinguished in a table."""
     try:
         names = {law: name_of(law) for law in laws}
     except OwnError as error:
@@ -257,7 +257,7 @@ def _check_laws(laws: Sequence[str]) -> None:
 
 
 def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
-    """PlanError if what somebody has brought fails before it flies."""
+    """PlanError if custom code fails in the trial before the flights."""
     table = parameters_for(load_belief(vehicle), own)
     apply_settings(table, settings.items())
     try:
@@ -268,14 +268,14 @@ def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
 
 
 def _lines(error: ValueError) -> tuple[str, ...]:
-    """One for each mistake in a file."""
+    """The lines of an error: one for each mistake in a file."""
     return error.problems if isinstance(error, FileError) else (str(error),)
 
 
 def _check_values(
     vehicle: str, own: Own, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
 ) -> None:
-    """PlanError unless all these values, of which `settings` do not vary, can be set."""
+    """PlanError unless all these values can be set; those of `settings` do not vary."""
     try:
         world = sim_parameters(load_truth(vehicle))
         table = parameters_for(load_belief(vehicle), own)
@@ -302,7 +302,7 @@ def _check_values(
 
 
 def _check_rates(world: ParameterTable, table: ParameterTable, values: Sequence[tuple[str, float]]) -> None:
-    """PlanError if the law cannot run at one of its rates with one of the sensors'."""
+    """PlanError if the law cannot run at one of its rates with one of the simulator's tick rates."""
     ticks, jobs = ([value for name, value in values if name == one] for one in ("SIM_RATE_HZ", "CTL_RATE_HZ"))
     for tick_hz, job_hz in product(ticks or [world["SIM_RATE_HZ"]], jobs or [table["CTL_RATE_HZ"]]):
         table.set("CTL_RATE_HZ", job_hz)

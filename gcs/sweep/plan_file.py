@@ -1,4 +1,4 @@
-"""plan.json of a sweep's directory: what is flown into it, and from which settings, version and code."""
+"""plan.json of a sweep's directory: what is flown there, and with which settings, version and code."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
 _NAMED = {"mission": "mission", "laws": "--law", "varied": "--vary", "settings": "--set"}
-ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
+ENTRIES = ("gcs.sweep.work",)  # modules whose imports are all the code that flies a sweep
 
 
 def sweep_origin(plan: SweepPlan) -> Origin:
-    """What the flights of a plan follow from when they are flown now."""
+    """The origin of the flights of a plan if they are flown now: settings, files, version and code."""
     files = file_digests((plan.mission, plan.vehicle, plan.sensors))
     for law in plan.laws:
         files |= {one.reference: one.digest for one in plan.own(law).loaded()}
@@ -24,8 +24,8 @@ def sweep_origin(plan: SweepPlan) -> Origin:
 
 
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:
-    """Write plan.json; PlanError if the directory holds flights of another origin, GcsError if nothing can be
-    written into it."""
+    """Write plan.json; PlanError if the directory contains flights of another origin, GcsError if it cannot
+    be written."""
     make_folder(directory)
     path = directory / PLAN_FILE
     if path.exists():
@@ -50,17 +50,27 @@ def default_folder(plan: SweepPlan) -> Path:
 
 
 def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
-    """sweeps/MISSION, or the first of sweeps/MISSION-2, -3 ... that holds this sweep, or nothing.
+    """The first of sweeps/MISSION, sweeps/MISSION-2, -3 ... that contains this sweep, or nothing, or does not
+    exist.
 
-    `fresh`: also one that other code has flown, whose flights are discarded.
+    `fresh`: also one with flights by other code, which are discarded.
     """
     first = default_folder(plan)
     ordinal = 1
     while True:
         directory = first if ordinal == 1 else first.with_name(f"{first.name}-{ordinal}")
-        if not directory.exists() or _is_of(directory, origin, fresh):
+        if _is_free(directory) or _is_of(directory, origin, fresh):
             return directory
         ordinal += 1
+
+
+def _is_free(directory: Path) -> bool:
+    try:
+        return not any(directory.iterdir())
+    except FileNotFoundError:
+        return True
+    except OSError:  # a file, or a directory that cannot be read
+        return False
 
 
 def _is_of(directory: Path, origin: Origin, fresh: bool) -> bool:
@@ -72,8 +82,7 @@ def _is_of(directory: Path, origin: Origin, fresh: bool) -> bool:
 
 
 def _differing(origin: Origin, found: Mapping[str, Any]) -> list[str]:
-    """What of the settings differs, as the command line names it, with the value that is stored if it is
-    short."""
+    """The settings that differ, by their names on the command line, with the stored value if it is short."""
     try:
         stored, asked = found["origin"]["settings"], origin.to_json()["settings"]
         pairs = [(name, stored["plan"].get(name), value) for name, value in asked["plan"].items()]

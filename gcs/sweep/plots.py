@@ -13,14 +13,14 @@ from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Cells, Flights, cells
 
 LAW_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
-_MOST_NUMBERS = 144  # cells of a map up to which each has its number written in
-_ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colours
+_MOST_NUMBERS = 144  # cells of a map; with more, the values are not written into the cells
+_ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colour scale
 
 
 def draw_map(
     path: Path, flights: Flights, plan: SweepPlan, names: tuple[str, str], units: dict[str, str]
 ) -> None:
-    """Share of success, median and worst error of one law over two parameters."""
+    """Draw the share of success, and the median and worst error, of one law over two parameters."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
     found = cells(flights, plan, names)
@@ -81,7 +81,7 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
 
 
 def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, units: dict[str, str]) -> None:
-    """Share of success and error over one parameter, all laws."""
+    """Draw the share of success and the error over one parameter, for all laws."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     with style():

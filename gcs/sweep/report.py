@@ -1,4 +1,4 @@
-"""report.html of a sweep: what was flown, maps and curves, and how far each parameter may go."""
+"""report.html of a sweep: what was flown, maps and curves, and the limits of each parameter."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _STYLES = ("page.css", "sweep.css")
 
 
 def write_report(directory: Path, plan: SweepPlan) -> Path:
-    """Pictures and page from the flights that are stored; the page's path."""
+    """Write pictures and page from the stored flights; return the page's path."""
     laws = [flights for flights in flights_of(Store(directory, plan).read(), plan) if flights.outcome]
     tables = _tables(plan)
     units = {v.name: _parameter(tables, v.name).unit for v in plan.varied}
@@ -73,7 +73,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
 
 
 def _shown(plan: SweepPlan, flight: Standout, directory: Path) -> dict[str, Any]:
-    """A row of the page; `page` leads to the report, where it was flown again."""
+    """A row of the page; `page` is the path of the report, None unless the flight was flown again."""
     page = f"{FOLDER}/{flight.name}/report.html"
     return {
         "flight": flight,
@@ -115,7 +115,7 @@ def _plain(values: Floats) -> list[float | None]:
 
 
 def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, ...]) -> list[dict[str, str]]:
-    """For each law and varied parameter: from where to where all is well, and what linear theory says."""
+    """For each law and varied parameter: the ranges in which flights complete, and that of linear theory."""
     rows = []
     for flights in laws:
         planned = plan.flights // len(plan.laws)
@@ -163,7 +163,7 @@ def _law(flights: Flights) -> dict[str, Any]:
 
 
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
-    """Of the simulator, and of the autopilot with each law."""
+    """Parameter tables of the simulator, and of the autopilot with each law."""
     belief = load_belief(plan.vehicle)
     tables = (parameters_for(belief, own) for own in dict.fromkeys(map(plan.own, plan.laws)))
     return (sim_parameters(load_truth(plan.vehicle)), *tables)

@@ -1,4 +1,4 @@
-"""What a sweep found: shares of success and errors over the settings, and how far each setting goes."""
+"""Results of a sweep: shares of success and errors over the settings, and the limits of each parameter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gcs.sweep.plan import SweepPlan
 if TYPE_CHECKING:
     import pyarrow
 
-BINS = 8  # of a parameter whose values were drawn
+BINS = 8  # for a parameter whose values were drawn
 COMPLETED = "completed"
 
 
@@ -31,10 +31,10 @@ class Flights:
     error_m: Floats  # (n,) greatest load error of the mission
     outcome: tuple[str, ...]
     lost_phase: tuple[str, ...]
-    index: NDArray[np.int64]  # (n,) of the sweep
+    index: NDArray[np.int64]  # (n,) numbers of the flights in the sweep
     seed: NDArray[np.int64]  # (n,)
-    reference: str  # of the law, as it was named
-    reason: tuple[str, ...] = ()  # of those that were not completed
+    reference: str  # of the law, as the user named it
+    reason: tuple[str, ...] = ()  # why a flight was not completed
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,15 @@ class Cells:
     success: Floats  # share
     error_median_m: Floats  # of the flights that completed
     error_worst_m: Floats
-    shown: NDArray[np.intp]  # row of the flight that shows most: a lost one, else the worst; -1: none
+    shown: NDArray[np.intp]  # row of the flight to show for a cell: a lost one, else the worst; -1: none
 
 
 @dataclass(frozen=True)
 class Reach:
-    """From where to where, around the value that the vehicle is delivered with, a parameter may go.
+    """The ranges of a parameter, around its default value, in which flights complete.
 
     `all_from`, `all_to`: every flight completes, whatever else is varied. `some_from`, `some_to`: there is a
-    setting of everything else at which all seeds complete. NaN: not even at that value.
+    setting of all other parameters at which all seeds complete. NaN: not even at the default value.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Reach:
 
 
 def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
-    """The table law by law, in the order of the plan."""
+    """The flights of the table by law, in the order of the plan."""
 
     def values(column: str, kind: type) -> NDArray[Any]:
         return np.array(table.column(column).to_pylist(), dtype=kind)
@@ -98,7 +98,7 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
 
 
 def levels(plan: SweepPlan, name: str) -> Floats:
-    """The values that a parameter takes on, or the centres of the bins that its drawn values fall into."""
+    """The values of a parameter, or the centres of the bins of its drawn values."""
     varied = next(v for v in plan.varied if v.name == name)
     if plan.sample and varied.continuous:
         edges = np.linspace(min(varied.values), max(varied.values), BINS + 1)
@@ -111,7 +111,7 @@ def _nearest(values: Floats, centres: Floats) -> NDArray[np.intp]:
 
 
 def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
-    """The figures over the parameters named, over all other settings and seeds."""
+    """The figures over the named parameters, taken over all other settings and seeds."""
     axes = tuple(levels(plan, name) for name in names)
     shape = tuple(len(axis) for axis in axes)
     at = np.ravel_multi_index(
@@ -143,10 +143,10 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
 
 
 def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach:
-    """How far a parameter may go from `nominal` (or the value flown that is nearest to it).
+    """The ranges of a parameter around `nominal` (or the nearest flown value) in which flights complete.
 
-    What has not been flown yet holds nowhere: a value counts when all its flights were flown, a setting when
-    all its seeds were.
+    A flight that has not been flown yet counts as not completed: a value counts when all its flights have
+    completed, a setting when all its seeds have.
     """
     centres = levels(plan, name)
     names = [varied.name for varied in plan.varied]
@@ -160,8 +160,8 @@ def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach
 
 
 def _settings(values: Floats, column: int, centres: Floats) -> list[Counter[tuple[float, ...]]]:
-    """For each of the values `centres` of the parameter in `column`: the settings of all other parameters in
-    the rows of `values` that are next to it, and how often each occurs."""
+    """For each value in `centres` of the parameter in `column`: the settings of all other parameters in those
+    rows of `values` that are nearest to it, and how often each occurs."""
     found: list[Counter[tuple[float, ...]]] = [Counter() for _ in centres]
     rest = np.delete(values, column, axis=1)
     for level, setting in zip(_nearest(values[:, column], centres), rest.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""A sweep from its plan to its table: what is flown already stays, the rest is flown."""
+"""A sweep from its plan to its table: stored flights are kept, the rest is flown."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
 
-_KEEP_S = 5.0  # a flight is on disk so long after its end, at the latest
+_KEEP_S = 5.0  # longest time between the end of a flight and its storage on disk
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,15 @@ class Swept:
     """What `gcs sweep` did."""
 
     flights: int  # in the table
-    flown: int  # of them in this run
+    flown: int  # of these, in this run
     completed: int
-    load_error_max_m: float | None  # of those that were completed; None: there is none
+    load_error_max_m: float | None  # of the completed flights; None: there is none
     wall_s: float
     whole: bool  # False: stopped before the end
 
     @property
     def flights_per_s(self) -> float:
-        """Pace of this run."""
+        """Flights per second of this run."""
         return self.flown / self.wall_s if self.wall_s > 0.0 else 0.0
 
 
@@ -50,10 +50,10 @@ def sweep(
     fresh: bool,
     warm: Callable[[Iterable[Part]], None] = lambda _: None,
 ) -> Swept:
-    """Fly what is missing of the plan and store all of it.
+    """Fly the flights of the plan that are missing, and store them.
 
-    `stopped` says whether somebody asked to stop; `warm` compiles parts of the flight software beforehand,
-    which are otherwise compiled where they are first needed.
+    `stopped` returns whether a stop was requested; `warm` compiles parts of the flight software beforehand,
+    which are otherwise compiled when they are first needed.
     """
     store = Store(directory, plan)
     keep_others(directory, PLAN_FILE, (PAGE_FILE,))
@@ -91,5 +91,5 @@ def _fly_missing(
     outcomes = table.column("outcome").to_pylist()
     errors = table.column("load_error_max_m").to_pylist()
     completed = [error for error, outcome in zip(errors, outcomes, strict=True) if outcome == COMPLETED]
-    whole = whole or len(outcomes) == plan.flights  # a request to stop may come while the last ones fly
+    whole = whole or len(outcomes) == plan.flights  # a stop may be requested while the last flights fly
     return Swept(len(outcomes), flown, len(completed), max(completed, default=None), wall_s, whole)

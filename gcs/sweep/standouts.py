@@ -1,4 +1,4 @@
-"""The flights of a sweep that stand out, and how each of its flights is flown again, with a report."""
+"""The flights of a sweep that stand out, and the command that flies a flight again, with a report."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ from gcs.sweep.results import Flights, flights_of
 from gcs.sweep.store import Store
 from gcs.workflows.flight_options import own_words
 
-FOLDER = "flights"  # of a sweep's directory: flown again, each with a report
+FOLDER = "flights"  # in a sweep's directory: flights that were flown again, each with a report
 
 
 @dataclass(frozen=True)
 class Standout:
-    """A flight that somebody wants to see."""
+    """A flight of interest."""
 
     law: str
-    reference: str  # of the law, as it was named
+    reference: str  # of the law, as the user named it
     kind: str  # worst, median or lost
-    index: int  # of the sweep
+    index: int  # number of the flight in the sweep
     seed: int
     varied: dict[str, float]
     outcome: str
-    error_m: float  # NaN where there is none
-    reason: str = ""  # of one that was not completed
+    error_m: float  # NaN if there is none
+    reason: str = ""  # why it was not completed
 
     @property
     def name(self) -> str:
-        """Of its directory."""
+        """The name of its directory."""
         return f"{self.law}-{self.kind}"
 
     @property
     def told(self) -> str:
-        """What is seen there, in a few words."""
+        """What happened in it, in a few words."""
         if self.kind == "lost":
             return f"{self.outcome}: {self.reason}" if self.reason else self.outcome
         return f"load error {1e3 * self.error_m:.1f} mm"
 
 
 def standouts(flights: Flights) -> list[Standout]:
-    """Of one law, of the flights that completed the worst and the median by their load error, and of the
-    others the first."""
+    """The flights of one law that stand out: of the completed ones, the worst and the median by load error;
+    of the others, the first."""
     rated = np.flatnonzero(flights.completed & np.isfinite(flights.error_m))
     ranked = rated[np.argsort(flights.error_m[rated], kind="stable")]
     found = []
@@ -61,7 +61,7 @@ def standouts(flights: Flights) -> list[Standout]:
 
 
 def stored_standouts(directory: Path, plan: SweepPlan) -> list[Standout]:
-    """Those of all laws, of the flights that lie in the directory of a sweep."""
+    """The flights of all laws that stand out, from those stored in the directory of a sweep."""
     laws = flights_of(Store(directory, plan).read(), plan)
     return [one for flights in laws for one in standouts(flights)]
 
@@ -81,14 +81,14 @@ def _standout(flights: Flights, kind: str, row: int) -> Standout:
 
 
 def flight_settings(plan: SweepPlan, varied: Mapping[str, float]) -> tuple[str, ...]:
-    """NAME=VALUE of all that is set for a flight, with the digits that give the same numbers."""
+    """NAME=VALUE for each setting of a flight, with the digits that give exactly the same numbers."""
     return tuple(f"{name}={value!r}" for name, value in {**dict(plan.settings), **varied}.items())
 
 
 def base_command(plan: SweepPlan) -> str:
-    """What the commands of all flights begin with; law, seed and what is varied follow.
+    """The beginning of the commands of all flights; law, seed and varied settings follow.
 
-    A sweep does not check whether the vehicle can do it, hence --force.
+    A sweep does not check whether the vehicle can fly the mission, hence --force.
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_words(plan.estimator, plan.planner)
@@ -98,7 +98,7 @@ def base_command(plan: SweepPlan) -> str:
 
 
 def command_of(plan: SweepPlan, flight: Standout, directory: Path) -> str:
-    """The command that flies it again into the directory of the sweep, whatever of it lies there already."""
+    """The command that flies it again into the directory of the sweep, and overwrites an earlier repeat."""
     words = ["--law", flight.reference, "--seed", str(flight.seed)]
     for name, value in flight.varied.items():
         words += ["--set", f"{name}={value!r}"]

@@ -1,7 +1,7 @@
-"""flights.parquet: a row for each flight of a sweep, written in parts so that nothing flown is lost.
+"""flights.parquet: a row for each flight of a sweep, written in parts so that no flight is lost.
 
-A part is whole or not there: it is written under another name and renamed. When all is flown the parts become
-one table in the order of the flights.
+A part is either complete or absent: it is written under another name and renamed. When the sweep ends, the
+parts are merged into one table in the order of the flights.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _WHOLE = ("index", "seed", "slack_events")
 
 
 def columns(plan: SweepPlan) -> tuple[str, ...]:
-    """The columns of the table: which flight it is, what was varied, what became of it."""
+    """The columns of the table: number, law and seed of the flight, varied values, results."""
     figures = tuple(f.name for f in fields(Flown) if f.name != "texts")
     return ("index", "law", "seed", *(v.name for v in plan.varied), *figures, "wall_s")
 
@@ -94,7 +94,7 @@ class Store:
         return self._directory / TABLE_FILE
 
     def parts(self) -> list[Path]:
-        """The parts that are whole."""
+        """The complete parts."""
         return sorted((self._directory / PARTS).glob("*.parquet"))
 
     def done(self) -> set[int]:
@@ -107,7 +107,7 @@ class Store:
         return found
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Store rows as a part of its own."""
+        """Store rows as a new part."""
         if not rows:
             return
         folder = self._directory / PARTS
@@ -116,7 +116,8 @@ class Store:
         self._write(folder / f"{first:09d}-{len(rows)}.parquet", table_of(rows, self._schema))
 
     def merge(self) -> pyarrow.Table:
-        """One table of all that is stored, in the order of the flights; the parts go when it is on disk."""
+        """Merge all that is stored into one table, in the order of the flights; delete the parts when the
+        table is on disk."""
         table = self.read()
         self._write(self.path, table)
         for path in self.parts():
@@ -127,11 +128,11 @@ class Store:
         return table
 
     def read(self) -> pyarrow.Table:
-        """All that is stored; a flight that was stored twice (killed while merging) counts once."""
+        """All that is stored; a flight that was stored twice (by a merge that was killed) counts once."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        # `read_table` and `to_numpy` import pandas too
+        # `read_table` and `to_numpy` would import pandas too
         tables = [pq.ParquetFile(path).read().cast(self._schema) for path in self._files()]
         if not tables:
             return self._schema.empty_table()
@@ -140,7 +141,7 @@ class Store:
         return table.take(array_of(first)).replace_schema_metadata(self._schema.metadata)
 
     def clear(self) -> None:
-        """Forget all flights."""
+        """Delete all flights."""
         for path in self._files():
             path.unlink()
 

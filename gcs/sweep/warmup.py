@@ -1,4 +1,4 @@
-"""Compiles what only sweeps fly with: python -m gcs.sweep.warmup alone|lanes LAW."""
+"""Compiles what only sweeps need: python -m gcs.sweep.warmup alone|lanes LAW."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def lanes_part(law: str) -> Part:
 
 
 def main(part: str, law: str) -> None:
-    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    """Compile the part unless it is compiled already; prints the names of the kernels that it compiles."""
     name_what_is_compiled()
-    # only now: the import itself compiles the first ones
+    # imported only now, because the import itself compiles the first kernels
     from autopilot.own.chosen import Own
     from autopilot.own.law import law_number, own_law
     from autopilot.own.rehearsal import REFERENCE

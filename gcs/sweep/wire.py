@@ -1,7 +1,7 @@
-"""What the simulator link makes of readings and commands: the rounding of its messages, without the messages.
+"""What the simulator link does to readings and commands: the rounding of its messages, without the messages.
 
-Readings pass through single precision in NED and FRD, fixes through 1e-7 degrees, so that a flight without a
-wire is the same flight. Nothing else is done here: which readings are believed is the autopilot's affair.
+Readings are rounded to single precision in NED and FRD, fixes to 1e-7 degrees, so that a flight without a
+wire is the same flight. Nothing else is done here: the autopilot decides which readings it accepts.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from sitl.world import BARO, CABLE, GNSS, IMU, LOAD, MAG, MOCAP, READING, SHOWS,
 
 
 class Wire(NamedTuple):
-    """The deviations that the trackers state, as they arrive (negative: not measured), and the home place."""
+    """The standard deviations that the trackers state, as they arrive (negative: not measured), and home."""
 
     pose_position_std: float
     pose_attitude_std: float
@@ -50,7 +50,7 @@ class Wire(NamedTuple):
     fix_horizontal_std: float
     fix_vertical_std: float
     fix_float_std: float
-    rtk: float  # GnssReading.rtk of a fix that does not float
+    rtk: float  # GnssReading.rtk of a fix that is not RTK_FLOAT
     home: Vec3  # degrees north and east, m
     metres_per_degree: float
     east_metres_per_degree: float
@@ -64,15 +64,15 @@ def _single3(row: Row, first: int) -> Vec3:
 
 @kernel
 def put_forces(rotors: Array, table: Array, world: WorldRows) -> None:
-    """Put the forces of the rotors (N) where the world takes them, as HIL_ACTUATOR_CONTROLS carries them;
-    `rotors` and `table` are the mixer's."""
+    """Pass the commanded rotor forces (N) to the world, rounded as in HIL_ACTUATOR_CONTROLS; `rotors` and
+    `table` are the mixer's."""
     asked = world.rotors
     for i in range(min(table.shape[0] - 1, world.rotor_table.shape[0])):
         asked[ASKED, i] = single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
 
 
 def wire_rate(rate: float) -> float:
-    """The winch's rate (m/s) as HIL_ACTUATOR_CONTROLS carries it."""
+    """The winch's rate (m/s), rounded as in HIL_ACTUATOR_CONTROLS."""
     return float(single(rate / REEL_MAX) * REEL_MAX)
 
 
@@ -100,7 +100,7 @@ def _load(row: Row, wire: Wire) -> LoadReading:
 
 @kernel
 def _fix(row: Row, wire: Wire) -> GnssReading:
-    """A fix as HIL_GPS carries it: position in 1e-7 degrees and millimetres, velocity in centimetres."""
+    """A fix, rounded as in HIL_GPS: position in 1e-7 degrees and millimetres, velocity in centimetres."""
     home, scale_north, scale_east = wire.home, wire.metres_per_degree, wire.east_metres_per_degree
     east_deg = row[READING] / scale_east
     north_deg = row[READING + 1] / scale_north
@@ -126,7 +126,7 @@ def _fix(row: Row, wire: Wire) -> GnssReading:
 
 @kernel
 def _newest(sensor: int, now_us: int, rows: WorldRows) -> int:
-    """Row of the sensor's newest reading of this tick, those before it taken out; or -1."""
+    """Row of the sensor's newest reading that arrives at this tick, or -1; removes the older ones."""
     newest = -1
     at = arrived(sensor, now_us, rows)
     while at >= 0:
@@ -137,9 +137,9 @@ def _newest(sensor: int, now_us: int, rows: WorldRows) -> int:
 
 @kernel
 def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
-    """Put what has left the sensors by now into the autopilot's inbox; how many readings that is.
+    """Put the readings that arrive at this tick into the autopilot's inbox; return their number.
 
-    Row 0 is the inertial unit's: HIL_SENSOR says its newest sample, or again the last one.
+    Row 0 is the inertial unit's: HIL_SENSOR contains its newest sample, or repeats the last one.
     """
     newest = _newest(IMU, now_us, rows)
     inbox[0, box.KIND] = box.IMU
@@ -165,7 +165,7 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
     at = arrived(CABLE, now_us, rows)
     while at >= 0:
         row = rows.queue[CABLE, at]
-        if row[READING + 3] > 0.0:  # seen
+        if row[READING + 3] > 0.0:  # the cable is seen
             sight = DirectionReading(0.0, _single3(row, READING), wire.direction_std)
             inbox[count, box.KIND], inbox[count, box.SHOWS] = box.DIRECTION, row[SHOWS]
             pack(sight, inbox[count], box.READING)
@@ -199,17 +199,17 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
 
 
 def most_readings(rows: WorldRows) -> int:
-    """Readings that can arrive at one tick."""
+    """The greatest number of readings that can arrive at one tick."""
     return int(rows.queue.shape[0] * rows.queue.shape[1]) + len(rows.rotor_table)
 
 
 def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
-    """What the trackers of a profile state, rounded as their messages round it."""
+    """What the trackers of a profile state, rounded as in their messages."""
     stated = stated_of(profile, noise_scale)
     mocap, load = profile.mocap, profile.load_tracker
 
     def root(std: float) -> float:
-        """Of a variance that was sent."""
+        """The deviation as the receiver computes it from a variance that was sent."""
         variance = float(np.float32(std * std))
         return sqrt(variance) if variance >= 0.0 else nan
 

@@ -1,4 +1,4 @@
-"""A sweep as work for a crew: what every worker must know, and the function that flies some flights of it."""
+"""A sweep as work for workers: the data that each of them needs, and the function that flies some flights."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from missions.fileformat import load_mission
 from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
-LANES_PAY = 1000  # flights with a law, for which its lanes are compiled
-_MOST_AT_A_TIME = 2 * LANES  # flights that one worker is given
+LANES_PAY = 1000  # least number of flights with a law for which its lanes are compiled
+_MOST_AT_A_TIME = 2 * LANES  # flights that one worker is given at a time
 
 _NOT_FLOWN = (ValueError, ArithmeticError)
 
 
 @dataclass(frozen=True)
 class Work:
-    """All that a worker must know, wherever it runs."""
+    """All data that a worker needs, wherever it runs."""
 
     plan: SweepPlan
     mission: Mission
     boardings: dict[str, Boarding]  # by law
-    in_lanes: frozenset[str] = frozenset()  # laws of which eight flights are flown at once
+    in_lanes: frozenset[str] = frozenset()  # laws with which eight flights are flown at once
 
 
 def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool = True) -> Work:
     """The work of a plan; flies the beginning of one flight for each law.
 
-    `warm` compiles what is not compiled yet of some parts of the flight software. The instants of arming and
-    starting are those of the settings that all flights share. A vehicle that is not ready at them, under what
-    is varied, is asked again.
+    `warm` compiles the given parts of the flight software that are not compiled yet. The instants of arming
+    and starting are those of a flight with only the settings that all flights share. A vehicle that is not
+    ready then because of a varied parameter is asked again.
     """
     warm(sweep_parts(plan.laws))
     mission = load_mission(plan.mission)
@@ -65,8 +65,8 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool
 
 
 def _lanes_pay(plan: SweepPlan, law: str) -> bool:
-    """Whether there are flights that differ by their seeds alone, and enough of them to compile for, if that
-    is not done yet."""
+    """Whether there are flights that differ only in their seeds, and the lanes are compiled already or the
+    flights are enough to compile them."""
     compiled = hasattr(lane_kernel.fly_lanes, "overloads") and not any(plan.own(law))
     enough = plan.points * len(plan.seeds) >= LANES_PAY
     return compiled and len(plan.seeds) >= FEWEST and (enough or lanes_part(law).ready)
@@ -75,8 +75,8 @@ def _lanes_pay(plan: SweepPlan, law: str) -> bool:
 def fly_cases(
     work: Work, cases: Sequence[Case], clock: Clock, stopped: Callable[[], bool] = lambda: False
 ) -> list[Row]:
-    """Fly some of the flights, up to eight of a cell at once where that is prepared; when it is `stopped`,
-    those in the air."""
+    """Fly these flights, up to eight of a cell at once if that is prepared; if `stopped`, only those that
+    have begun."""
     rows: list[Row] = []
     for (law, _), cell in groupby(cases, key=lambda case: (case.law, case.varied)):
         members = list(cell)
@@ -97,7 +97,7 @@ def fly_cases(
 
 
 def fly_one(work: Work, case: Case, clock: Clock) -> Row:
-    """Fly one of the flights. One that cannot be flown at all has the outcome `refused`."""
+    """Fly one flight. If it cannot be flown at all, its outcome is `refused`."""
     began_s = clock()
     try:
         flown = fly(work.mission, work.plan.conditions(case), work.boardings[case.law])
@@ -124,8 +124,8 @@ def _fly_at_once(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] |
 
 
 def batches(plan: SweepPlan, cases: Sequence[Case], workers: int) -> list[tuple[Case, ...]]:
-    """The cases in groups to be handed to so many workers, each of one law, so that a worker need not change
-    its kernels."""
+    """The cases in groups for this number of workers, each group of one law, so that a worker need not change
+    kernels within it."""
     size = batch_size(len(cases), workers)
     groups: list[tuple[Case, ...]] = []
     for law, members in groupby(cases, key=lambda case: case.law):
@@ -136,8 +136,8 @@ def batches(plan: SweepPlan, cases: Sequence[Case], workers: int) -> list[tuple[
 
 
 def batch_size(flights: int, workers: int) -> int:
-    """How many flights a worker is given at a time: what is left is divided among all of them, and where
-    there is plenty, a group takes a second or two."""
+    """The number of flights that a worker is given at a time: few flights are divided among all workers; of
+    many, a group takes a second or two."""
     share = max(1, -(-flights // workers))
     if share <= LANES:
         return share

@@ -1,9 +1,10 @@
-"""An estimator of your own, in plain Python; docs/estimators.md tells all that it may do.
+"""A custom state estimator in plain Python; docs/estimators.md describes everything that it can do.
 
 Fly it: gcs fly hover --estimator my_name.py:MyName
 
-For rooms where trackers see vehicle and load (--sensors lab). World: x east, y north, z up. Body: x forward,
-y left, z up. Metres, seconds, newtons, radians. Vectors are tuples of three floats, which numpy takes.
+For rooms in which trackers measure vehicle and load (--sensors lab). World axes: x east, y north, z up. Body
+axes: x forward, y left, z up. Units: metres, seconds, newtons, radians. Vectors in `now` are tuples of three
+floats, which numpy functions accept as they are.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class Memory(NamedTuple):
-    """What is remembered: the vehicle (x, v, R), errors of the inertial unit, the load (x_L, v_L)."""
+    """What is kept from tick to tick: vehicle (x, v, R), biases of the inertial unit, load (x_L, v_L)."""
 
     x: np.ndarray
     v: np.ndarray
@@ -26,18 +27,19 @@ class Memory(NamedTuple):
     gyro_bias: np.ndarray
     x_L: np.ndarray
     v_L: np.ndarray
-    pose_s: float  # when the trackers' last readings were
-    load_s: float
+    pose_s: float  # time of the vehicle tracker's last reading
+    load_s: float  # time of the load tracker's last reading
 
 
 class MyName:
-    """A model, driven by the inertial unit, that is pulled to what the trackers see."""
+    """Predicts vehicle and load from the inertial unit, and corrects the prediction by the trackers."""
 
-    # shown in the report; without it the name of the class
+    # the name in the report; if omitted, the name of the class
     name = "my_name"
 
-    # become parameters of the autopilot: gcs fly ... --set MINE_W=20, gcs sweep ... --vary MINE_W=5:30:6,
-    # or from any ground station while it flies. Default, least, greatest, unit, text.
+    # These become parameters of the autopilot. Set them with gcs fly ... --set MINE_W=20, vary them with
+    # gcs sweep ... --vary MINE_W=5:30:6, or change them in flight from any ground station.
+    # Parameter(default, minimum, maximum, unit, description)
     parameters = {
         "MINE_W": Parameter(15.0, 1.0, 60.0, "rad/s", "How fast the vehicle's place follows the tracker"),
         "MINE_W_TURN": Parameter(30.0, 1.0, 100.0, "rad/s", "How fast its attitude does"),
@@ -45,16 +47,16 @@ class MyName:
     }
 
     def __init__(self, parameters):
-        """Made anew when a parameter changes; `parameters` has all of the autopilot's, by name."""
+        """Called again when a parameter changes. `parameters` contains all of the autopilot's, by name."""
         self.w, self.w_turn, self.w_load = (parameters[n] for n in ("MINE_W", "MINE_W_TURN", "MINE_W_LOAD"))
         self.gravity = parameters["VEH_GRAVITY"]
 
     def start(self, now):
-        """What the estimator remembers at its first tick: nothing yet."""
+        """Return the memory with which the first tick begins: None, because nothing is known yet."""
         return
 
     def estimate(self, memory, now):
-        """At each tick, 250 times a second: what is remembered from now on, and the estimate."""
+        """Called at each tick, 250 times a second: return the new memory and the estimate."""
         pose, load, dt, zero = now.pose, now.load, now.period_s, np.zeros(3)
         if memory is None:
             if pose.new and load.new:
@@ -64,7 +66,8 @@ class MyName:
             return memory, no_estimate()
         x, v, R, accel_bias, gyro_bias, x_L, v_L, pose_s, load_s = memory
 
-        # the model: the inertial unit moves the vehicle, and the load swings below it
+        # Predict: the inertial unit measures the vehicle's body rate and specific force (`felt`, turned into
+        # world axes); the load swings below the vehicle while the cable is taut, else it keeps its velocity.
         omega = now.inertial.gyro - gyro_bias
         R = R * Rotation.from_rotvec(omega * dt)
         felt = R.apply(now.inertial.accel - accel_bias)
@@ -78,7 +81,8 @@ class MyName:
             a_L = a - (felt - q.dot(felt) * q) - length * q_dot.dot(q_dot) * q
         x, v, x_L, v_L = x + v * dt, v + a * dt, x_L + v_L * dt, v_L + a_L * dt
 
-        # what the trackers saw some milliseconds ago, held against where the model was then
+        # Correct: a tracker's reading is some milliseconds old when it arrives. It is therefore compared
+        # with the prediction for the time of the reading.
         if pose.new:
             age, T, w = now.time_s - pose.time_s, pose.time_s - pose_s, self.w
             e = pose.x_quad - (x - v * age)

@@ -1,9 +1,9 @@
-"""A control law of your own, in plain Python; docs/laws.md tells all that it may do.
+"""A custom control law in plain Python; docs/laws.md describes everything that it can do.
 
 Fly it: gcs fly hover --law my_name.py:MyName
 
-World: x east, y north, z up. Body: x forward, y left, z up. Metres, seconds, newtons, radians. Vectors are
-tuples of three floats, which numpy takes.
+World axes: x east, y north, z up. Body axes: x forward, y left, z up. Units: metres, seconds, newtons,
+radians. Vectors in `now` are tuples of three floats, which numpy functions accept as they are.
 """
 
 import numpy as np
@@ -12,13 +12,14 @@ from plumbline.laws import Parameter, force
 
 
 class MyName:
-    """Steers the load as a weight on a string: a position loop above a loop for the cable."""
+    """A position loop for the load commands the cable's direction; an inner loop tracks that direction."""
 
-    # shown by --law and in tables; without it the name of the class
+    # the name in reports and tables; if omitted, the name of the class
     name = "my_name"
 
-    # become parameters of the autopilot: gcs fly ... --set MINE_KP=5, gcs sweep ... --vary MINE_KP=3:8:6,
-    # or from any ground station while it flies. Default, least, greatest, unit, text.
+    # These become parameters of the autopilot. Set them with gcs fly ... --set MINE_KP=5, vary them with
+    # gcs sweep ... --vary MINE_KP=3:8:6, or change them in flight from any ground station.
+    # Parameter(default, minimum, maximum, unit, description)
     parameters = {
         "MINE_KP": Parameter(6.0, 0.0, 50.0, "1/s^2", "Gain of the load's position error"),
         "MINE_KI": Parameter(2.0, 0.0, 50.0, "1/s^3", "Gain of the integral of this error"),
@@ -28,31 +29,33 @@ class MyName:
     }
 
     def __init__(self, parameters):
-        """Made anew when a parameter changes; `parameters` has all of the autopilot's, by name."""
+        """Called again when a parameter changes. `parameters` contains all of the autopilot's, by name."""
         self.k_p, self.k_i, self.k_d = (parameters[name] for name in ("MINE_KP", "MINE_KI", "MINE_KD"))
         self.k_q, self.k_w = parameters["MINE_KQ"], parameters["MINE_KW"]
 
     def start(self, now):
-        """What the law remembers when it begins, on take-off and after each change of mode."""
+        """Return the memory with which the law begins, at take-off and after each change of mode."""
         return np.zeros(3)  # the integral
 
     def load_position(self, memory, now):
-        """At each tick, 250 times a second: what is remembered from now on, and what is asked for."""
+        """Called at each tick, 250 times a second: return the new memory and the command."""
         state, believed = now.state, now.believed
 
-        # where the load is to be, with the derivatives of that
+        # desired position of the load with its first three derivatives, and the errors; `believed` is what
+        # the autopilot assumes of the vehicle; while the load lies on the ground, the integral is held
         x_d, v_d, a_d, jerk_d = map(np.array, now.reference.jet[:4])
         e_x, e_v = state.x_load - x_d, state.v_load - v_d
         integral = memory if believed.load_lies else memory + now.period_s * e_x
         a = a_d - self.k_p * e_x - self.k_i * integral - self.k_d * e_v
 
-        # the cable pulls the load along its own direction: q_d gives the acceleration that is asked for
+        # The cable can pull the load only along its own direction. q_d, the unit vector from vehicle to load,
+        # is the direction in which its pull gives the load the acceleration a.
         pull = a + np.array([0.0, 0.0, believed.gravity])
         size = np.linalg.norm(pull)
         q_d = -pull / size
         q_d_dot = -(jerk_d - jerk_d.dot(q_d) * q_d) / size
         swing = self.k_q * (state.q_cable - q_d) + self.k_w * (state.q_cable_dot - q_d_dot)
 
-        # the force of the rotors; the built-in attitude loop turns the vehicle to it
+        # the force of all rotors together, N, world; the built-in attitude loop turns the vehicle to it
         F = (believed.quad_mass + believed.load_mass) * pull + believed.quad_mass * now.cable.length * swing
         return integral, force(F)

@@ -1,9 +1,9 @@
-"""A path planner of your own; docs/planners.md tells all that it may do.
+"""A custom path planner; docs/planners.md describes everything that it can do.
 
 Fly it: gcs fly square --planner my_name.py:MyName
 
-World: x east, y north, z up from home, in metres. A planner is asked for the load's path through waypoints,
-from rest to rest, before the flight.
+World axes: x east, y north, z up, in metres from home. When a mission is uploaded, the autopilot calls the
+planner for each path of the load through waypoints, from rest to rest.
 """
 
 from itertools import pairwise
@@ -14,25 +14,26 @@ from plumbline.planners import Parameter, samples, slower, use
 
 
 class MyName:
-    """Straight lines from waypoint to waypoint, at rest in each: sampled, and slow enough for the vehicle."""
+    """Straight lines from waypoint to waypoint with a stop at each, slow enough for the vehicle."""
 
-    # shown in the report; without it the name of the class
+    # the name in the report; if omitted, the name of the class
     name = "my_name"
 
-    # become parameters of the autopilot: gcs fly ... --set MINE_SLOW=2. Default, least, greatest, unit, text.
+    # These become parameters of the autopilot: gcs fly ... --set MINE_SLOW=2.
+    # Parameter(default, minimum, maximum, unit, description)
     parameters = {"MINE_SLOW": Parameter(1.0, 1.0, 5.0, "", "How many times as long the paths take")}
 
     def __init__(self, parameters):
-        """`parameters` has all of the autopilot's, by name."""
+        """`parameters` contains all parameters of the autopilot, by name."""
         self.longer = parameters["MINE_SLOW"]
 
     def plan(self, route):
-        """The path from the first point of the route to the last, past each in between."""
+        """Return the path from the first point of the route to the last, through each point in between."""
         points = np.array(route.points)
         times, positions, passes = [0.0], [points[0]], [0.0]
         for start, end in pairwise(points):
             duration = 2.0 * np.linalg.norm(end - start) / route.speed_m_s + 0.5
-            # from 0 to 1 with all derivatives up to the fourth 0 at both ends
+            # `share` of the line that is covered: from 0 to 1, derivatives up to the fourth 0 at both ends
             s = np.linspace(0.0, 1.0, 41)[1:]
             share = s**5 * (126.0 - 420.0 * s + 540.0 * s**2 - 315.0 * s**3 + 70.0 * s**4)
             positions += [start + one * (end - start) for one in share]
@@ -40,8 +41,8 @@ class MyName:
             passes.append(passes[-1] + duration)
         path = samples(times, positions, passes)
 
-        # `use` tells how many times as long it should take, to keep speed, acceleration, rotors and cable
-        # within what is allowed
+        # `use` estimates by which factor the path must be slowed down to keep the limits of speed,
+        # acceleration, rotors and cable; at 1 or less the path keeps them
         for _ in range(20):
             longer = use(path, route)
             if longer <= 1.0:

@@ -1,4 +1,4 @@
-"""The live page: what running vehicles say, as JSON for a browser, and what a browser asks of them.
+"""The live page: what running vehicles report, as JSON for a browser, and what a browser requests of them.
 
-Neither sockets nor clocks: datagrams and times come in, records and datagrams go out.
+Without sockets and clocks: datagrams and times come in, records and datagrams go out.
 """

@@ -1,6 +1,6 @@
-"""What the page can ask of a vehicle: each a few MAVLink exchanges that any other ground station could make.
+"""Actions that the page can request: each is a few MAVLink exchanges, as of any other ground station.
 
-What a page says is not trusted: an unknown action, a number out of range or of another kind is an
+Requests of a page are not trusted: an unknown action, a number out of range or a value of another type is an
 ActionError.
 """
 
@@ -32,7 +32,7 @@ _MOTOR, _OK, _OFF = 101.0, 0.0, 1.0  # of INJECT_FAILURE
 
 
 class ActionError(ValueError):
-    """What was asked is no action, or not with these arguments; the text says why."""
+    """The requested action does not exist, or not with these arguments; the text says why."""
 
 
 def operations_of(vehicle: WatchedVehicle, name: Any, arguments: Any) -> list[Operation]:
@@ -75,7 +75,7 @@ def _return(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
 
 
 def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
-    """Take the load to `place`, [north, east, down] in m."""
+    """Carry the load to `place`, [north, east, down] in m."""
     place = arguments.get("place")
     if not isinstance(place, list) or len(place) != 3:
         raise ActionError("place: must be [north, east, down]")
@@ -83,7 +83,7 @@ def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     north, east, down = (_number(named, name, -_FARTHEST_M, _FARTHEST_M) for name in named)
     places = zip(
         (north, east, down), vehicle.offset, strict=True
-    )  # in the picture, and of the vehicle's home
+    )  # the place in the picture, and that of the vehicle's home
     north, east, down = (place - home for place, home in places)
     # the change of axes is its own inverse
     latitude, longitude, _ = geodetic_from_enu(ned_from_enu((north, east, down)), vehicle.home)
@@ -91,7 +91,7 @@ def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
 
 
 def _set(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
-    """Set one of the sliders."""
+    """Set the parameter of one of the sliders."""
     name = arguments.get("name")
     if not isinstance(name, str) or name not in NAMES:
         raise ActionError("name: must be that of a slider")

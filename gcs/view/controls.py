@@ -1,4 +1,4 @@
-"""The sliders of the page: parameters that may be turned while the vehicle flies."""
+"""The sliders of the page: parameters that may be changed while the vehicle flies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Slider:
-    """A parameter with what a page shows of it."""
+    """A parameter, and how a page shows it."""
 
     name: str
     label: str
@@ -16,7 +16,7 @@ class Slider:
     low: float
     high: float
     step: float
-    default: float | None = None  # None: what the vehicle tells, and the ends are shares of it
+    default: float | None = None  # None: the value that the vehicle reports; the ends are shares of it
 
     def record(self) -> dict[str, Any]:
         """For the page."""
@@ -33,5 +33,5 @@ SLIDERS = (
     Slider("SIM_LOSS_PCT", "Losses of the ground link", "%", 0.0, 60.0, 5.0, 0.0),
 )
 NAMES = {slider.name for slider in SLIDERS}
-# what the page shows or draws besides
+# further parameters that the page shows or draws
 READ = ("VEH_ARM_LEN", "VEH_CABLE_LEN", "SIM_ENGINE_FAIL", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")

@@ -1,11 +1,11 @@
-"""What a page that opens later must know of the flight so far: a sample now and then, of each vehicle."""
+"""The flight so far, for pages that open later: a sample now and then of each vehicle."""
 
 from __future__ import annotations
 
 from typing import Any
 
 SAMPLE_S = 0.05  # of the vehicle's clock
-MOST = 12_000  # samples; beyond, every other one of the older half goes
+MOST = 12_000  # samples; beyond this, every other one of the older half is deleted
 FIELDS = (
     *("time", "load", "position", "asked", "error", "tension"),
     *("swing", "velocity", "use", "estimator_error", "pace"),
@@ -19,9 +19,9 @@ class History:
         self.samples: list[list[Any]] = []
 
     def due(self, time_s: float | None) -> bool:
-        """Whether it is time for a sample.
+        """Whether the next sample is due.
 
-        A clock that runs backward is that of a vehicle that began anew: what was before is forgotten.
+        If the clock jumps back, the vehicle was restarted, and the samples so far are deleted.
         """
         if time_s is None:
             return False
@@ -30,7 +30,7 @@ class History:
         return not self.samples or time_s >= self.samples[-1][0] + SAMPLE_S - 1e-6
 
     def take(self, state: dict[str, Any]) -> list[Any]:
-        """The sample that was taken of a vehicle's state, in the order of FIELDS."""
+        """Store a sample of a vehicle's state and return it, in the order of FIELDS."""
         load, rotors = state["load"], state["rotors"]
         sample = [
             round(state["time"], 3),

@@ -1,4 +1,4 @@
-"""How good a link is, by what came over it: age, losses, rate, and how fast the vehicle's clock runs."""
+"""Quality of a link, judged by its messages: age, losses, rate, and the speed of the vehicle's clock."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 from autopilot.wire.codec import Received
 
 LOST_US = 3_000_000  # of silence
-_SPAN_US = 2_000_000  # over which rate and pace are taken
-_GAP = 128  # of sequence numbers: a larger one is a restart
+_SPAN_US = 2_000_000  # over which rate and pace are measured
+_GAP = 128  # of sequence numbers: a gap of this size or more is a restart
 
 
 class LinkQuality:
-    """Kept up by `heard`; `record` says it in numbers."""
+    """Updated by `heard` and `clock`; `record` gives the figures."""
 
     def __init__(self) -> None:
         self.heard_us: int | None = None
@@ -40,7 +40,7 @@ class LinkQuality:
             self._window_us, self._came, self._missed = now_us, 0, 0
 
     def clock(self, vehicle_us: int, now_us: int) -> None:
-        """Note what the vehicle's clock says."""
+        """Note the time of the vehicle's clock."""
         if self._clocks and (vehicle_us < self._clocks[-1][1] or now_us < self._clocks[-1][0]):
             self._clocks.clear()
         if not self._clocks or now_us - self._clocks[-1][0] >= 10_000:
@@ -50,7 +50,7 @@ class LinkQuality:
 
     @property
     def pace(self) -> float | None:
-        """Seconds of the vehicle's clock in a second of ours."""
+        """Seconds of the vehicle's clock per second of ours."""
         if len(self._clocks) < 2:
             return None
         (began_us, first_us), (now_us, last_us) = self._clocks[0], self._clocks[-1]
@@ -59,7 +59,7 @@ class LinkQuality:
         return (last_us - first_us) / (now_us - began_us)
 
     def record(self, now_us: int) -> dict[str, Any]:
-        """age (s), loss (0 ... 1), rate (messages a second), pace, lost (whether silent too long)."""
+        """age (s), loss (0 ... 1), rate (messages per second), pace, lost (whether silent for too long)."""
         age_us = 0 if self.heard_us is None else max(0, now_us - self.heard_us)
         pace = self.pace
         return {

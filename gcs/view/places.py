@@ -21,7 +21,7 @@ _PLACED = {
     mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
     mavlink.MAV_CMD_NAV_LAND,
 }
-_HEIGHTS = {  # by frame: whether they are above home
+_HEIGHTS = {  # by frame: whether its heights are above home
     mavlink.MAV_FRAME_GLOBAL: False,
     mavlink.MAV_FRAME_GLOBAL_INT: False,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
@@ -36,7 +36,7 @@ _CIRCLES = {
 def fence_record(
     items: Sequence[WireItem], home: Home, parameters: Mapping[str, float]
 ) -> dict[str, Any] | None:
-    """Zones, greatest distance and greatest height (m); None if there is no fence."""
+    """Zones, maximum distance and maximum height (m); None if there is no fence."""
     zones: list[dict[str, Any]] = []
     corners: list[list[float]] = []
     for item in items:
@@ -60,12 +60,12 @@ def fence_record(
 
 
 def rally_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
-    """Places on the ground: heights of rally points are not used."""
+    """Positions of the rally points on the ground: their heights are not used."""
     return [[*_spot(item, home), 0.0] for item in items if item.command == mavlink.MAV_CMD_NAV_RALLY_POINT]
 
 
 def waypoints_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
-    """The places that a mission names, one after the other; how it flies between them is not said here."""
+    """The positions that a mission specifies, in order, beginning with home; not the path between them."""
     places: list[list[float]] = [[0.0, 0.0, 0.0]]
     for item in items:
         if item.command not in _PLACED or item.frame not in _HEIGHTS or not -inf < item.z < inf:

@@ -1,10 +1,10 @@
-"""The ground station behind the page: hears vehicles, carries out what the page asks, and tells what is new.
+"""The ground station behind the page: receives from vehicles, carries out requests of pages, reports news.
 
     datagrams of vehicles and of the world  ->  Station  ->  records for pages
                           requests of pages  ->          ->  datagrams for vehicles
 
-A station that only looks on (`speaks` False) is fed by another ground station: it has no heartbeat, asks for
-nothing by itself, and says a word to a vehicle only where a person asked for it.
+A passive station (`speaks` False) gets its datagrams from another ground station: it sends no heartbeat,
+requests nothing by itself, and sends to a vehicle only what a user requested on the page.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ FAST_MESSAGES = (
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
 )
-MOST_REQUESTS = 32  # that wait; a page that asks for more is told no
-_REASON_US = 300_000  # a refusal is explained by a STATUSTEXT that may come a little later
+MOST_REQUESTS = 32  # that wait for one vehicle; further ones are refused
+_REASON_US = 300_000  # a refusal is explained by a STATUSTEXT that may arrive a little later
 _ASK_AGAIN_US = 2_000_000
 _TEXTS = 60  # kept for pages that open later
 
@@ -51,7 +51,8 @@ class Outgoing(NamedTuple):
 
 
 class _Task:
-    """Exchanges with one vehicle, one after the other; `request` is who asked, None for ourselves."""
+    """Exchanges with one vehicle, one after the other; `request` is (page, request number), None if the
+    station itself began them."""
 
     def __init__(self, request: tuple[Any, Any] | None, name: str, operations: list[Operation]) -> None:
         self.request = request
@@ -63,26 +64,26 @@ class _Task:
 
 
 class Station:
-    """All vehicles that are heard."""
+    """All vehicles from which something was received."""
 
     def __init__(self, speaks: bool = True, signing: Signing | None = None) -> None:
         self.vehicles: dict[int, WatchedVehicle] = {}
-        self.known_parameters: dict[str, float] = {}  # of vehicles that must not be asked
+        self.known_parameters: dict[str, float] = {}  # of vehicles that a passive station does not ask
         self.known_waypoints: list[list[float]] = []
         self._histories: dict[int, History] = {}
-        self._fresh: dict[str, list[list[Any]]] = {}  # samples that pages have not been told of
+        self._fresh: dict[str, list[list[Any]]] = {}  # samples that were not sent to pages yet
         self._speaks = speaks
         self._signing = signing
         self._tasks: dict[int, deque[_Task]] = {}
         self._news: list[dict[str, Any]] = []
         self._texts: deque[dict[str, Any]] = deque(maxlen=_TEXTS)
-        self._unknown_run = False  # a world was heard in which no vehicle says it flies
+        self._unknown_run = False  # truth was received of a world in which no vehicle reports to fly
         self._next_ask_us = 0
 
     # ---- what comes in
 
     def receive(self, datagram: bytes, now_us: int) -> list[int]:
-        """Take a datagram of a vehicle in; the systems that were heard in it."""
+        """Process a datagram of a vehicle; return the system ids of the vehicles that sent messages in it."""
         for one in messages(datagram)[0]:
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles:
                 self._meet(one, datagram, now_us)
@@ -100,9 +101,10 @@ class Station:
         return heard
 
     def receive_truth(self, datagram: bytes, run: int | None = None, alone: bool = True) -> None:
-        """Take a datagram of a simulated world in: that of the vehicle that says it flies in this run of it.
+        """Process a datagram of a simulated world, for the vehicle that reports to fly in this run of it.
 
-        `alone`: no other world tells its truth; then it is that of the only vehicle, if this does not say.
+        `alone`: no other world sends its truth; then a single vehicle that reports no run is assumed to fly
+        in it.
         """
         for vehicle in self.vehicles.values():
             boot = vehicle.view.latest.get("SIM_BOOT")
@@ -114,7 +116,7 @@ class Station:
         self._unknown_run = True
 
     def ask(self, page: Any, request: Any) -> None:
-        """Begin what a page asks for; what becomes of it is told by `news`."""
+        """Begin what a page requests; its result is reported by `news`."""
         if not isinstance(request, dict):
             return
         number = request.get("request")
@@ -141,7 +143,7 @@ class Station:
     def poll(self, now_us: int) -> Iterator[Outgoing]:
         """The datagrams to send now."""
         if self._unknown_run and self._speaks and now_us >= self._next_ask_us:
-            # one of them may have begun anew with its simulator
+            # one of the vehicles may have been restarted with its simulator
             self._unknown_run, self._next_ask_us = False, now_us + _ASK_AGAIN_US
             for system, vehicle in self.vehicles.items():
                 self._tasks[system].append(_Task(None, "", [_which_run(vehicle)]))
@@ -160,7 +162,7 @@ class Station:
         """Take a sample of each vehicle for which one is due."""
         origin = next((vehicle.home for vehicle in self.vehicles.values()), None)
         for system, vehicle in self.vehicles.items():
-            vehicle.origin = origin  # all are shown in one picture
+            vehicle.origin = origin  # all vehicles are shown in one picture
             time_us = vehicle.time_us
             history = self._histories[system]
             if time_us is not None and history.due(time_us * 1e-6):
@@ -168,18 +170,18 @@ class Station:
                 self._fresh.setdefault(str(system), []).append(sample)
 
     def state(self, now_us: int) -> dict[str, Any]:
-        """What is known now of all vehicles, and the samples that were taken since the last time."""
+        """What is known now of all vehicles, and the samples that were taken since the last call."""
         self.sample(now_us)
         fresh, self._fresh = self._fresh, {}
         states = [vehicle.state(now_us) for vehicle in self.vehicles.values()]
         return {"type": "state", "vehicles": states, "samples": fresh}
 
     def forget_samples(self) -> None:
-        """No page is there to be told of what is new: one that opens is given all."""
+        """Discard samples that were not sent, while no page is open: a page that opens later receives all."""
         self._fresh.clear()
 
     def news(self) -> list[dict[str, Any]]:
-        """What is new since the last time; a record with "page" is for that page alone."""
+        """What is new since the last call; a record with "page" is for that page only."""
         news = self._news
         self._news = []
         for vehicle in self.vehicles.values():
@@ -196,7 +198,7 @@ class Station:
         return news
 
     def greeting(self) -> list[dict[str, Any]]:
-        """What a page that has just opened must know."""
+        """The records that a page receives when it opens."""
         vehicles = [self._vehicle_record(vehicle) for vehicle in self.vehicles.values()]
         histories = [
             {"type": "history", "vehicle": system, "samples": history.samples}
@@ -205,7 +207,7 @@ class Station:
         return [*vehicles, *histories, *self._texts]
 
     def samples(self, system: int) -> list[list[Any]]:
-        """Those taken of a vehicle so far."""
+        """The samples taken of a vehicle so far."""
         return self._histories[system].samples
 
     # ---- vehicles
@@ -232,7 +234,7 @@ class Station:
             )
 
     def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int, int]) -> None:
-        """Fetch what has changed of mission, fence and rally points."""
+        """Download mission, fence and rally points, each only if it has changed."""
         before = vehicle.plan_ids or (None, None, None)
         vehicle.plan_ids = ids
         for kind, now, then in zip(_PLANS, ids, before, strict=True):
@@ -255,7 +257,7 @@ class Station:
     # ---- exchanges
 
     def _present(self, vehicle: WatchedVehicle, now_us: int) -> _Task | None:
-        """What is being asked of the vehicle; what people ask goes before what we ask by ourselves."""
+        """The present task of the vehicle; requests of pages take precedence over those of the station."""
         tasks = self._tasks[vehicle.target.system]
         if not tasks:
             return None
@@ -306,7 +308,7 @@ class Station:
         self._news.append({**record, "ok": done, "text": text})
 
     def _take(self, vehicle: WatchedVehicle, operation: Operation) -> None:
-        """What an exchange of ours has brought."""
+        """Use the result of an exchange: a downloaded mission, fence or list of rally points."""
         if (
             not isinstance(operation, MissionDownload)
             or operation.result is None
@@ -328,7 +330,7 @@ def _begun(task: _Task) -> bool:
 
 
 def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
-    """What we must know of a vehicle that was met."""
+    """The exchanges with which the station begins for a new vehicle."""
     target = vehicle.target
     streams = [command.message_interval(target, message, INTERVAL_US) for message in FAST_MESSAGES]
     home = command.request_message(target, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -338,7 +340,7 @@ def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
 
 
 def _which_run(vehicle: WatchedVehicle) -> Operation:
-    """The question in which run of the simulated world it flies."""
+    """The request for the run of the simulated world in which the vehicle flies."""
     return command.request_message(vehicle.target, mavlink.MAVLINK_MSG_ID_SIM_BOOT)
 
 

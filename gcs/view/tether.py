@@ -7,15 +7,15 @@ from typing import Any
 
 
 class Tether:
-    """The cable as far as it is known by now; `gcs.analysis.release` tells the same of a whole flight."""
+    """The cable as far as it is known by now; `gcs.analysis.release` does the same for a whole flight."""
 
     def __init__(self, beyond_m: float) -> None:
-        self._beyond_m = beyond_m  # by which a load that is held is never farther away than when last taut
-        self.length_m: float | None = None  # when it was taut last
-        self.attached = True  # until the load is seen farther away, and again once the cable is taut
+        self._beyond_m = beyond_m  # an attached load is at most this farther away than when last taut
+        self.length_m: float | None = None  # when it was last taut
+        self.attached = True  # False from a reading with the load farther away until the cable is taut again
 
     def see(self, load: Any) -> None:
-        """Take a LOAD_STATE in."""
+        """Process a LOAD_STATE."""
         if load.taut:
             self.attached = True
             if math.isfinite(load.distance):

@@ -1,4 +1,4 @@
-"""What is true of a simulated vehicle, at the times of which the autopilot speaks."""
+"""The true state of a simulated vehicle, at the times to which the autopilot's messages apply."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KEPT = 80  # positions of the load: half a second of the fastest truth
 
 
 class Truth:
-    """The newest of each kind, and where the load was a little while ago."""
+    """The newest message of each kind, and the recent positions of the load."""
 
     def __init__(self) -> None:
         self.newest: dict[int, Received] = {}
@@ -28,12 +28,12 @@ class Truth:
         self._places: deque[Place] = deque(maxlen=_KEPT)
 
     def put(self, one: Received) -> None:
-        """Take one message of the simulated world in."""
+        """Process one message of the simulated world."""
         self.newest[one.id] = one
         if one.id != mavlink.MAVLINK_MSG_ID_LOAD_STATE:
             return
         message = one.message
-        if self._times_us and message.time_usec <= self._times_us[-1]:  # the world began anew
+        if self._times_us and message.time_usec <= self._times_us[-1]:  # the simulator was restarted
             self._times_us.clear()
             self._places.clear()
             self.tether = Tether(BEYOND_M)
@@ -42,12 +42,12 @@ class Truth:
         self._places.append((message.x, message.y, message.z))
 
     def message(self, message_id: int) -> Any:
-        """The newest of that id, or None."""
+        """The newest message of that id, or None."""
         received = self.newest.get(message_id)
         return None if received is None else received.message
 
     def load_at(self, time_us: int) -> Place | None:
-        """Where the load was at that time, between two messages; None outside of what is known."""
+        """Position of the load at that time, interpolated between two messages; None if it is not known."""
         if not self._times_us or not self._times_us[0] <= time_us <= self._times_us[-1]:
             return None
         after = bisect_left(self._times_us, time_us)
@@ -62,7 +62,7 @@ class Truth:
 
     @property
     def wind(self) -> Place | None:
-        """Mean wind and gust pulse, m/s, NED."""
+        """Mean wind plus gust, m/s, NED."""
         message = self.message(mavlink.MAVLINK_MSG_ID_WIND_STATE)
         if message is None:
             return None

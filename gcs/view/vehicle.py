@@ -1,4 +1,4 @@
-"""One vehicle as the page shows it: all that is known now, in one record of plain numbers."""
+"""One vehicle as the page shows it: everything that is known now, in one record of plain numbers."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from gcs.view.link_quality import LinkQuality
 from gcs.view.tether import Tether
 from gcs.view.truth import Place, Truth
 
-_LONGEST_SHOWN = 1.25  # of its cable: a load that is further from its vehicle has left it
-_BEYOND_M = 0.2  # the same of an estimate, which need not see a load that has left
-_ESTIMATES = 8  # that wait for the truth of their time
+_LONGEST_SHOWN = 1.25  # of the cable's length: a load that is farther away is no longer attached
+_BEYOND_M = 0.2  # the same for an estimate, beyond the cable; the estimator may not notice a release
+_ESTIMATES = 8  # estimates that are kept until the truth of their time arrives
 _NOT_CARRIED = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 
 
 class WatchedVehicle:
-    """What one vehicle has told, and its link."""
+    """What one vehicle has reported, and its link."""
 
     def __init__(self, target: Target, connection: Connection) -> None:
         self.target = target
         self.connection = connection
         self.origin: Home | None = None  # of the picture
         self._home: Home | None = None
-        self._tether = Tether(_BEYOND_M)  # as the vehicle believes
+        self._tether = Tether(_BEYOND_M)  # as the vehicle estimates it
         self.view = VehicleView()
         self.truth = Truth()
         self.link = LinkQuality()
         self.parameters: dict[str, float] = {}
-        self.changed_parameters: dict[str, float] = {}  # since the page was told
+        self.changed_parameters: dict[str, float] = {}  # that were not sent to the page yet
         self.fence: dict[str, Any] | None = None
         self.rally: list[list[float]] = []
         self.waypoints: list[list[float]] = []
-        self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # places of the load by time
+        self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # load positions as estimated
         self.plan_ids: tuple[int, int, int] | None = None  # versions of mission, fence and rally points
-        self.told_texts = 0  # of view.texts
+        self.told_texts = 0  # number of view.texts that were sent to the page
 
     def receive(self, one: Received, now_us: int) -> None:
-        """Take one message of the vehicle in."""
+        """Process one message of the vehicle."""
         if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.component != self.target.component:
             return
         self.link.heard(one, now_us)
@@ -72,7 +72,7 @@ class WatchedVehicle:
             self.link.clock(time_us, now_us)
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Note what a parameter is."""
+        """Note the value of a parameter."""
         if math.isfinite(value):
             self.parameters[name] = self.changed_parameters[name] = value
 
@@ -83,26 +83,26 @@ class WatchedVehicle:
 
     @property
     def home(self) -> Home:
-        """Where its places are counted from; a home that is set later does not move them."""
+        """The origin of the vehicle's positions; a home that is set later does not move them."""
         return self._home or Home()
 
     @property
     def offset(self) -> Place:
-        """Where that is in the picture, whose origin is `origin`, NED."""
+        """Position of `home` in the picture, whose origin is `origin`, NED."""
         if self.origin is None or self.home == self.origin:
             return 0.0, 0.0, 0.0
         spot = round(self.home.latitude_deg * 1e7), round(self.home.longitude_deg * 1e7)
         return ned_from_enu(enu_from_geodetic(*spot, round(self.home.altitude_m * 1e3), self.origin))
 
     def layout(self) -> dict[str, float]:
-        """Sizes in m: what the picture needs of the vehicle."""
+        """Sizes of the vehicle that the picture needs, in m."""
         return {
             "arm": self.parameters.get("VEH_ARM_LEN", 0.126),
             "cable": self.parameters.get("VEH_CABLE_LEN", 0.7),
         }
 
     def state(self, now_us: int) -> dict[str, Any]:
-        """All that is known at this moment; what is not known is None. Places are NED in m, angles deg."""
+        """Everything that is known at this moment; None for unknown values. Positions NED, m; angles deg."""
         view = self.view
         offset = self.offset
         load, taut = self._load(offset)
@@ -140,7 +140,7 @@ class WatchedVehicle:
         return None if found is None else getattr(found, field)
 
     def _load_message(self) -> Any:
-        """LOAD_STATE: the truth if it is known, else the estimate."""
+        """LOAD_STATE: the true one if it is known, else the estimate."""
         true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
         return true if true is not None else self.view.latest.get("LOAD_STATE")
 
@@ -155,12 +155,12 @@ class WatchedVehicle:
 
     @property
     def cable(self) -> float:
-        """How long the cable was when it was taut last; a winch may have changed it since take-off."""
+        """Length of the cable when it was last taut (a winch may change it); at first, that of `layout`."""
         return self._known_tether.length_m or self.layout()["cable"]
 
     @property
     def _known_tether(self) -> Tether:
-        """In truth, where that is known."""
+        """The true one if the truth is known, else the estimated one."""
         true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
         return self._tether if true is None else self.truth.tether
 
@@ -197,14 +197,15 @@ class WatchedVehicle:
         return None if message is None else _rounded(message.tension, 3)
 
     def _swing(self) -> float | None:
-        """Off the plumb line."""
+        """Angle between cable and vertical in deg; None if the cable is not taut."""
         message = self._load_message()
         if message is None or not message.taut or not math.isfinite(message.qz):
             return None
         return _rounded(math.degrees(math.acos(max(-1.0, min(1.0, message.qz)))), 2)
 
     def _rotors(self) -> tuple[list[float] | None, float | None]:
-        """Share of the greatest force of each, and that force; without limits the shares of the thrust."""
+        """Force of each rotor as a share of the maximum force, and that force; without limits, as a share of
+        the thrust, and None."""
         message = self.view.latest.get("ROTOR_STATE")
         if message is None:
             return None, None
@@ -215,7 +216,7 @@ class WatchedVehicle:
         return shares, (_rounded(message.force_max, 3) if limited else None)
 
     def _estimator_error(self) -> float | None:
-        """Between where the load is believed to be and where it was at that time."""
+        """Distance between an estimated position of the load and the true one at the same time."""
         for time_us, believed in reversed(self._believed):  # the newest may be ahead of the truth
             true = self.truth.load_at(time_us)
             if true is not None:

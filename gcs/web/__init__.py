@@ -1,7 +1,7 @@
-"""What the pages of Plumbline are made of: scripts and styles, ours and (in `vendor/`) those of others.
+"""Scripts and styles of Plumbline's pages, our own and (in `vendor/`) third-party ones.
 
-All scripts are plain: a page may load them from a server or carry their text. Ours make one global,
-`Plumbline`.
+All are plain scripts, not modules: a page may load them from a server or contain their text. Ours define one
+global, `Plumbline`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SCENE_SCRIPTS = (  # in the order in which they are loaded
     "scene.js",
 )
 LIVE_PAGE = "live.html"
-LIVE_FILES = (  # what the live page asks its server for
+LIVE_FILES = (  # that the live page loads from its server
     *PLOT_STYLES,
     "live.css",
     *PLOT_SCRIPTS,

@@ -1,4 +1,4 @@
-"""Pages in one file: scripts and styles within, nothing asked for from anywhere, no other script runs."""
+"""Pages in one file: they contain their scripts and styles, load nothing, and run no other script."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def embedded(values: Any) -> str:
 def render(
     package: str, template: str, scripts: Sequence[str], styles: Sequence[str], data: Any, **values: Any
 ) -> str:
-    """The page of a template of `package`, which places `policy`, `styles`, `data` and `scripts` (names of
-    files of `gcs.web`) in its text. Every other value is escaped."""
+    """The page from a template of `package`, in which `policy`, `styles`, `data` and `scripts` are inserted.
+    `scripts` and `styles` are names of files of `gcs.web`. Every other value is escaped."""
     from jinja2 import Environment
     from markupsafe import Markup
 
     texts = [asset(name) for name in scripts]
     hashes = " ".join(f"'sha256-{_digest(text)}'" for text in texts)
     source = files(package).joinpath(template).read_text(encoding="utf-8")
-    # the template is ours, every value is not: escape them all
+    # the template is ours, but not every value is: escape them all
     return (
         Environment(autoescape=True)
         .from_string(source)

@@ -1,4 +1,4 @@
-"""What is looked at before a flight, however it is flown: the options, and whether the vehicle can fly it."""
+"""Checks before any kind of flight: the options, and whether the vehicle can fly the mission."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ CHECKING = "checking whether the vehicle can fly it; paths that are hard to shap
 
 
 def check_options(options: FlightOptions) -> list[str]:
-    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, or if what
-    somebody brings cannot fly; else a line for each option that may not be meant so."""
+    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, or if
+    custom code cannot fly; else a line for each option that may be unintended."""
     if _as_shipped(options):
         return []
     from gcs.workflows.flight_inputs import check_flight_inputs, doubts
@@ -30,20 +30,20 @@ def check_options(options: FlightOptions) -> list[str]:
 
 
 def planner_doubts(planner: str, mission: Mission) -> list[str]:
-    """A line if the mission gives a planner of somebody's own nothing to plan."""
+    """A line if the mission contains nothing for a custom planner to plan."""
     unused = without_planning(mission) if planner else ""
     return [f"--planner {planner}: {unused}"] if unused else []
 
 
 def without_planning(mission: Mission) -> str:
-    """What is to be said of a planner for this mission if it has nothing to plan in it; else empty."""
+    """The text for a planner that has nothing to plan in this mission; else empty."""
     if any(isinstance(step, Waypoint) for step in mission.steps):
         return ""
     return f"is not used: mission {mission.name} has no waypoints"
 
 
 def _as_shipped(options: FlightOptions) -> bool:
-    """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
+    """Whether there is no option that could be refused; to check others, most of the simulator is loaded."""
     return (
         not any(options.own)
         and options.vehicle in VEHICLES.names()
@@ -53,7 +53,7 @@ def _as_shipped(options: FlightOptions) -> bool:
 
 
 def check_mission(mission: Mission, options: FlightOptions) -> None:
-    """GcsError unless the vehicle can fly it, or need not."""
+    """GcsError unless the vehicle can fly the mission, or the options waive this check."""
     if options.force or options.tries_anyway:
         return
     shaped = options.law == "plumbline"

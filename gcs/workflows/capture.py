@@ -1,4 +1,4 @@
-"""Telemetry of a running vehicle into a file."""
+"""Recording the telemetry of a running vehicle in a file."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def capture_to(
     truth_at: Address | None = None,
     overwrite: bool = False,
 ) -> tuple[Path, int]:
-    """Record telemetry until `duration_s` is over or somebody asks to stop; the log and its messages' number.
+    """Record telemetry for `duration_s` or until the user stops; return the log and its number of messages.
 
     Without `out` the log goes to flights/capture-TIME/flight.tlog. Parameters come first.
-    `truth_at`: where the simulator tells what is true; None: where `sitl` does by default.
-    InputError if `out` is an earlier log, unless `overwrite` gives it up.
+    `truth_at`: where the simulator sends the truth; None: where `sitl` does by default.
+    InputError if `out` is an earlier log, unless `overwrite` permits to replace it.
     """
     if out is not None and not overwrite:
         _keep_earlier(out)
@@ -77,7 +77,7 @@ def capture_to(
 
 
 def _ask_for_all(session: Session, target: Target) -> None:
-    """Parameters, and the fast messages that a report needs."""
+    """Request all parameters, and the fast messages that a report needs."""
     try:
         session.run(ParameterList(target), "parameters")
     except NoVehicleError as error:
@@ -90,6 +90,6 @@ def _ask_for_all(session: Session, target: Target) -> None:
 
 
 def _keep_earlier(out: Path) -> None:
-    """InputError if there is a file that holds something; a pipe or a device has nothing to lose."""
+    """InputError if `out` is a file with contents; a pipe or a device has none to lose."""
     if out.is_file() and out.stat().st_size:
         raise InputError(f"--out {out}: holds a log already; name another, or add --overwrite")

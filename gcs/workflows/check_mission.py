@@ -1,4 +1,4 @@
-"""Missions as the commands take them: loaded, and checked against the vehicle that is to fly them."""
+"""Missions for the commands: loaded, and checked against the vehicle that is to fly them."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import AttitudeRun, Mission, Release, Signals, Winch
 
-# Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
-# battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
-# 15 %, and brings it home with 35 %; with 40 % also from wind of 5 m/s with gusts of 1 m/s (docs/realism.md).
+# Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
+# one: slower rotors, a sagging battery and a cable off the centre take a part of it, wind another.
+# `heavy-real` loses Case C with 15 % and completes it with 35 %; with 40 % also in wind of 5 m/s with gusts
+# of 1 m/s (docs/realism.md).
 ROOM_FOR_TRUTH = 0.25
 MORE_ROOM = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
 def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
-    """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked.
+    """What the vehicle cannot fly of the mission, with paths `shaped` by the autopilot or as requested.
 
-    InputError if a vehicle would not even accept it.
+    InputError if no vehicle would accept its items.
     """
     items_of(mission, Home())
     found = check(mission, load_limits(vehicle), shaped)
@@ -42,7 +43,8 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
 
 
 def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
-    """Where it asks for a cable that the winch, as the vehicle comes, does not make; refused at its start."""
+    """Winch items that request a cable length beyond the default limits of the vehicle's winch; the vehicle
+    would refuse the mission at its start."""
     table = autopilot_parameters(load_belief(vehicle))
     least_m, most_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
     for entry, _, length_m in _reelings(mission, table):
@@ -54,7 +56,7 @@ def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
 
 
 def _reelings(mission: Mission, table: AutopilotParameters) -> Iterator[tuple[TimelineEntry, Winch, float]]:
-    """Each winch item, and how long the cable is then."""
+    """Each winch item, and the length of the cable after it."""
     for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
         if isinstance(entry.step, Winch) and entry.after.cable_m is not None:
             yield entry, entry.step, entry.after.cable_m
@@ -63,8 +65,8 @@ def _reelings(mission: Mission, table: AutopilotParameters) -> Iterator[tuple[Ti
 def path_reports(
     mission: Mission, vehicle: str, planner: Planner | None = None, shaped: bool = True
 ) -> list[PathReport]:
-    """How the vehicle flies it, its paths `shaped` by the autopilot or as asked, and with `planner` those
-    through waypoints made by that; GcsError says what is wrong with one of these."""
+    """How the vehicle flies the mission, with paths `shaped` by the autopilot or as requested; a `planner`
+    makes those through waypoints. GcsError says what is wrong with a planned path."""
     try:
         return paths(mission, load_limits(vehicle), planner, shaped)
     except PlanError as error:
@@ -72,7 +74,7 @@ def path_reports(
 
 
 def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
-    """A line for each path that leaves a vehicle which is not as it is believed little for control."""
+    """A line for each path that leaves little for control, if the true vehicle is not the assumed one."""
     believed = belief_of(vehicle)
     if believed == vehicle:
         return
@@ -90,7 +92,7 @@ def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
 
 
 def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
-    """A line about each cable that is reeled while the load is carried, which no path report tells of."""
+    """A line about each winch item while the load is carried, which path reports do not include."""
     table = autopilot_parameters(load_belief(vehicle))
     for entry, step, length_m in _reelings(mission, table):
         if not entry.before.released:
@@ -103,7 +105,7 @@ def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
 
 
 def flown_alone(mission: Mission) -> Iterator[str]:
-    """A line about what comes behind a release, which no path report tells of."""
+    """A line about the items after a release, which path reports do not include."""
     released = [i for i, step in enumerate(mission.steps) if isinstance(step, Release)]
     if released and released[0] + 1 < len(mission.steps):
         rest = [f"items[{i}]" for i in (released[0] + 1, len(mission.steps) - 1)]
@@ -113,8 +115,7 @@ def flown_alone(mission: Mission) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Check:
-    """What `gcs check` found: what the vehicle cannot do, or else how it flies each path, with what is to be
-    feared of that."""
+    """What `gcs check` found: what the vehicle cannot fly, or else how it flies each path, with warnings."""
 
     mission: str
     vehicle: str
@@ -123,7 +124,7 @@ class Check:
     warnings: tuple[str, ...] = ()
 
     def lines(self) -> tuple[str, ...]:
-        """For people."""
+        """The result as text."""
         if self.violations:
             return tuple(map(str, self.violations))
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
@@ -132,7 +133,7 @@ class Check:
 def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None) -> Check:
     """Check a mission against a vehicle; `as_asked`: without shaping.
 
-    GcsError if somebody's own `planner` does not plan it.
+    GcsError if a custom `planner` fails to plan it.
     """
     mission = load(name_or_path)
     found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
@@ -150,7 +151,7 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
 
 
 def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
-    """The mission, which the vehicle can fly unless `force` says that it need not."""
+    """The mission; GcsError unless the vehicle can fly it, which is not checked with `force`."""
     mission = load(name_or_path)
     if force:
         return mission
@@ -159,7 +160,7 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
 
 
 def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
-    """GcsError unless the vehicle can fly what the items stand for."""
+    """GcsError unless the vehicle can fly the mission of these items."""
     steps = decode_items(items, home)
     refuse_unflyable(Mission(name, name, "", (), steps), vehicle, True)
 

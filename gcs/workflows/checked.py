@@ -1,7 +1,7 @@
-"""Which missions were found flyable before: to find that takes longer than all else before a flight.
+"""Missions that were found flyable before: this check takes longer than everything else before a flight.
 
-It follows from the sources, the mission and the vehicle alone. A mark of it is kept beside those of what is
-compiled; nothing heavy is imported here.
+Its result depends only on the sources, the mission and the vehicle. A mark of it is stored beside the marks
+of what is compiled. Nothing heavy is imported here.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from autopilot.vehicle.shipped import VEHICLES
 from missions.model import Mission
 from missions.toml_files import FileError
 
-_CHECK = ROOT / "gcs" / "workflows" / "check_mission.py"  # which imports all that decides
+_CHECK = ROOT / "gcs" / "workflows" / "check_mission.py"  # imports all code that determines the result
 
 
 def known_flyable(mission: Mission, vehicle: str, shaped: bool) -> bool:
-    """True if a check of this mission by this vehicle, its paths shaped or not, has found nothing."""
+    """True if a check of this mission for this vehicle, with paths shaped or not, has found no problem."""
     try:
         return is_marked(_CHECK, _part(mission, vehicle, shaped))
-    except FileError:  # of the vehicle, which the check will tell
+    except FileError:  # of the vehicle's file, which the check will report
         return False
 
 
 def note_flyable(mission: Mission, vehicle: str, shaped: bool) -> None:
-    """Let later flights know."""
+    """Store for later flights that the check has found no problem."""
     mark_ready(_CHECK, (_part(mission, vehicle, shaped),))
 
 

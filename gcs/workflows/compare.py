@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from gcs.report.compare import Run
 
 LONGEST_NAME = 100  # of a page, in characters
-MOST_RUNS = 12  # whose lines can be told apart, on a page of some megabytes
+MOST_RUNS = 12  # so that lines remain distinguishable, on a page of some megabytes
 FOLDER = Path("comparisons")
 
 
 class CompareError(GcsError):
-    """What was named cannot be compared."""
+    """The given flights cannot be compared."""
 
     exit_code = EXIT_USAGE
 
 
 def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]:
-    """The flights that were named, and the page that was made of them."""
+    """Compare the given flights and write the page; return the flights and the page's path."""
     if not 2 <= len(sources) <= MOST_RUNS:
         named = "one flight was named" if len(sources) == 1 else f"{len(sources)} flights were named"
         raise CompareError(f"{named}; name 2 to {MOST_RUNS} that are to be compared")
@@ -53,8 +53,8 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
 
 
 def _page_name(names: Sequence[str], logs: Sequence[Path]) -> str:
-    """RUN-RUN as far as that is a name of a file; of more flights the first, and a mark that these logs alone
-    have."""
+    """RUN-RUN... if that is short enough for the name of a file; else the first, the number of the others,
+    and a hash of the logs' paths."""
     whole = "-".join(names).replace("/", "_")
     if len(whole) <= LONGEST_NAME:
         return whole
@@ -63,7 +63,7 @@ def _page_name(names: Sequence[str], logs: Sequence[Path]) -> str:
 
 
 def _meta(log: Path) -> FlightMeta:
-    """What lies beside a log that was made by gcs fly; any other log is on its own."""
+    """The meta.json beside a log that `gcs fly` made; for any other log, nothing is known."""
     from gcs.analysis.record import FlightMeta
     from gcs.report.build import META_FILE, ReportError, load_meta
 
@@ -76,6 +76,6 @@ def _meta(log: Path) -> FlightMeta:
 
 
 def _names(sources: Sequence[Path]) -> list[str]:
-    """The last part of each path, or all of it where two are the same."""
+    """The last part of each path; the whole paths if two of these are the same."""
     short = [source.resolve().name.removesuffix(".tlog") for source in sources]
     return short if len(set(short)) == len(short) else [str(source) for source in sources]

@@ -25,10 +25,11 @@ from gcs.workflows.sweep import STOPPING
 def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quiet: bool) -> Report:
     """Fly what is missing in `out`, `jobs` flights at a time, and write everything else there.
 
-    StoppedError if somebody stopped it; what is flown stays. `docs` is a page of the documentation to renew.
+    StoppedError if the user stopped it; completed flights are kept. `docs` is a page of the documentation to
+    renew.
     """
     if docs is not None:
-        around_tables(docs)  # it is told before the flights what would be told behind them
+        around_tables(docs)  # raises before the flights what would otherwise be raised after them
     make_directory(out)
     plan, flights = experiments(), out / FLIGHTS
     with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:
@@ -58,11 +59,11 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
 
 
 def print_tables(records: Sequence[Record]) -> None:
-    """All tables on stdout, as wide as they need to be."""
+    """Print all tables to stdout, as wide as they need to be."""
     from rich.console import Console
 
     shown = [table.rich() for table in tables(records)]
-    # on a narrow terminal lines wrap: better than numbers cut short
+    # on a narrow terminal the lines wrap, which is better than truncated numbers
     wide = max(Console(width=1000).measure(table).maximum for table in shown)
     console = Console(width=max(wide, Console().width))
     for table in shown:

@@ -1,4 +1,4 @@
-"""A flight without processes and sockets: simulator, autopilot and ground station in this one."""
+"""A flight without sockets: simulator, autopilot and ground station in this process."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def fly_here(
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `doubt` is given a line for each option that may not be meant so.
+    `doubt` is called with a line for each option that may be unintended.
     """
     for line in (*check_options(options), *planner_doubts(options.planner, mission)):
         doubt(line)

@@ -1,7 +1,7 @@
-"""What a flight of its own is started with, checked before anything starts: vehicle, sensors and settings.
+"""Checks vehicle, sensors and settings of a flight before its programs are started.
 
-The programs would refuse the same, each in its own log; here it is told at once. This module alone of the
-ground station knows both tables of parameters.
+The programs would refuse the same errors, each in its own log; here they are reported immediately. No other
+module of the ground station knows both tables of parameters.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from sitl.vehicles.truth import truth_of
 def check_flight_inputs(
     vehicle: str, sensors: str, settings: Iterable[tuple[str, float]], given_own: Own = NOTHING_OWN
 ) -> None:
-    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, if a rate does
-    not divide the rate that it must divide, or if what somebody brings cannot fly."""
+    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, if a rate
+    does not divide the rate that it must divide, or if custom code cannot fly."""
     try:
         found, believed = load_vehicle(vehicle), load_belief(vehicle)
         load_profile(sensors)
@@ -52,8 +52,8 @@ def check_flight_inputs(
 
 
 def doubts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
-    """A line for each setting that can be flown, but hardly as it was meant: a time of less than a
-    millisecond that is told in milliseconds, as by somebody who thinks in seconds."""
+    """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
+    in milliseconds, which was probably meant in seconds."""
     found = load_vehicle(vehicle)
     tables = sim_parameters(truth_of(found)), parameters_for(load_belief(vehicle), NOTHING_OWN)
     units = {name: table.describe(name).unit for table in tables for name in table.names}
@@ -67,7 +67,8 @@ def doubts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
 def split_settings(
     vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-    """The settings of the simulator, and those left to a third-party autopilot; GcsError as above."""
+    """The settings for the simulator, and the rest for a third-party autopilot; GcsError if there is no such
+    vehicle or sensor profile, or if a parameter of the simulator cannot have its value."""
     try:
         found = load_vehicle(vehicle)
         load_profile(sensors)
@@ -89,7 +90,7 @@ def _table(vehicle: Vehicle, own: Own) -> ParameterTable:
 
 
 def _try(own: Own, table: ParameterTable, settings: list[tuple[str, float]]) -> None:
-    from autopilot.own.trial import try_all  # and with it all that flies
+    from autopilot.own.trial import try_all  # imports all flight software
     from autopilot.shell.watched_calls import watched_calls
 
     apply_settings(table, settings)

@@ -19,32 +19,32 @@ if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
 
 _WAIT_S = 0.2
-_TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
-START_LIMIT_S = 60.0  # some seconds on an idle machine; all kernels are compiled before
-WORKING_S = 3.0  # of silence, after which it is looked whether the autopilot works
-SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that was there before
-STANDING_LIMIT_S = 60.0  # of the clock of a vehicle that speaks; no busy machine holds it up for so long
+_TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to punctual processes
+START_LIMIT_S = 60.0  # a start takes some seconds on an idle machine; all kernels are compiled before
+WORKING_S = 3.0  # of silence, after which it is checked whether the autopilot is computing
+SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that has sent before
+STANDING_LIMIT_S = 60.0  # without progress of the clock of a vehicle that sends; no load delays it so long
 
-Ended = Callable[[], str]  # why a process of ours has ended, or empty
+Ended = Callable[[], str]  # why one of the child processes has ended; empty if none has
 
 
 class Drained(Protocol):
-    """Where datagrams come from: a socket, or the part of it that concerns the vehicle."""
+    """A source of datagrams: a socket, or those of its datagrams that concern the vehicle."""
 
     def drain(self) -> list[bytes]:
-        """All that are there, without waiting."""
+        """All datagrams that have arrived, without waiting."""
 
 
 class Clock:
-    """Notices that the vehicle's clock stands while the vehicle still speaks: its simulator is silent."""
+    """Notices that the vehicle's clock stands while the vehicle still sends: its simulator is silent."""
 
     def __init__(self, now_s: float) -> None:
         self._time_us: int | None = None
         self._looked_s = now_s
-        self._stood_s = 0.0  # while we ourselves ran
+        self._stood_s = 0.0  # counted only while this process ran
 
     def standing(self, time_us: int | None, now_s: float) -> str:
-        """What is wrong with a clock that is at `time_us` now (None: not known), empty where nothing is."""
+        """What is wrong with a clock that is at `time_us` now (None: not known); empty if nothing is."""
         passed_s, self._looked_s = min(now_s - self._looked_s, 1.0), now_s
         if time_us is None or time_us != self._time_us:
             self._time_us, self._stood_s = time_us, 0.0
@@ -68,16 +68,16 @@ def run_lockstep(
     page: FlightPage | None = None,
     works: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Fly until the client has its outcome. `first_word` is called when the vehicle is heard at first.
+    """Fly until the client has its outcome. `first_word` is called at the vehicle's first question.
 
-    A process that ends before that raises NoVehicleError; one that ends later is an outcome. An autopilot
-    that is silent while it `works` prepares what it is asked for, and is waited for.
+    If a process ends before that, NoVehicleError is raised; if one ends later, that is an outcome. An
+    autopilot that is silent while it `works` is computing what was requested; the loop waits for it.
     """
     turns = LockstepTurns()
     truth_queue = TruthQueue()
     pending: list[bytes] = []
     started = False
-    promised_us = 0  # how far the vehicle may go by itself
+    promised_us = 0  # time until which the vehicle continues without waiting for answers
     asked_us: int | None = None  # the time of the vehicle's last question
     clock = Clock(time.monotonic())
     heard_s = worked_s = time.monotonic()
@@ -131,7 +131,7 @@ def run_lockstep(
                     vehicle.send(sent)
             pending.clear()
             answer = turns.answer(question_ns, client.silent_until_us)
-            if now_us >= promised_us:  # before, the vehicle waits for none
+            if now_us >= promised_us:  # earlier, the vehicle does not wait for an answer
                 vehicle.send(answer)
             promised_us = max(promised_us, client.silent_until_us)
             capture.flush(now_us)
@@ -142,7 +142,7 @@ def run_lockstep(
 
 
 def _let_stand(vehicle: UdpSocket, turns: LockstepTurns, promised_us: int) -> None:
-    """Wait until the vehicle waits for us, so that its own log of the flight ends at the same tick always."""
+    """Wait until the vehicle waits for an answer, so that its own log always ends at the same tick."""
     while datagrams := vehicle.wait(_WAIT_S):
         for datagram in datagrams:
             question_ns = turns.question(datagram)
@@ -166,7 +166,7 @@ def run_wall_clock(
     first_word: Callable[[], None],
     page: FlightPage | None = None,
 ) -> None:
-    """Fly until the client has its outcome. Log records bear the vehicle's clock once it is known."""
+    """Fly until the client has its outcome. Log records have the time of the vehicle's clock once known."""
     started, clock = False, Clock(time.monotonic())
     while client.outcome is None:
         time.sleep(_TICK_S)

@@ -1,4 +1,4 @@
-"""What is kept of a flight beside its telemetry, and decides nothing in it."""
+"""The record of a flight beside its telemetry, which has no influence on the flight."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _law(options: FlightOptions) -> str:
 def meta_of(
     mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float, truth_missing: str = ""
 ) -> FlightMeta:
-    """What is kept of a flight beside its telemetry."""
+    """The contents of meta.json: what is stored about a flight beside its telemetry."""
     from gcs.analysis.record import FlightMeta
 
     own = options.connect is None

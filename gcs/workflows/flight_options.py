@@ -1,4 +1,4 @@
-"""What a flight is asked for on the command line, and the same words again for its record."""
+"""The options of a flight on the command line, and the command line again for its record."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from autopilot.own.chosen import Own
 from autopilot.own.law import own_law
 from gcs.shell.link import Address
 
-WORLD = "SIM_"  # begins the names of the simulator's parameters
+WORLD = "SIM_"  # beginning of the names of the simulator's parameters
 _REFUSED = 2.0  # MIS_INFEASIBLE
 
 
 class FirmwareProgram(NamedTuple):
-    """A third-party autopilot that is started for the flight: which one, and its program."""
+    """A third-party autopilot that is started for the flight: its kind, and its program."""
 
     kind: str
     path: Path
@@ -31,7 +31,7 @@ class FlightOptions:
     vehicle: str
     seed: int
     speed: float | None  # None: lockstep
-    real_time: bool  # the simulator waits for nobody
+    real_time: bool  # the simulator does not wait for the autopilot
     out: Path | None
     settings: tuple[str, ...]  # NAME=VALUE
     connect: Address | None
@@ -39,15 +39,15 @@ class FlightOptions:
     force: bool
     overwrite: bool
     limit_s: float | None
-    firmware: FirmwareProgram | None = None  # that flies instead of our autopilot
-    estimator: str = ""  # that somebody has brought; empty: the built-in one
+    firmware: FirmwareProgram | None = None  # flies instead of Plumbline's autopilot
+    estimator: str = ""  # a custom one; empty: the built-in one
     planner: str = ""
-    truth_at: Address | None = None  # where the world of `connect` tells what is true
-    pictures: bool = False  # all of the report, not only that of its page
+    truth_at: Address | None = None  # where the simulator of `connect` sends the truth
+    pictures: bool = False  # all pictures of the report, not only that of its page
 
     @property
     def own(self) -> Own:
-        """What of the flight somebody has brought."""
+        """The custom parts (law, estimator, planner) of the flight."""
         return Own(own_law(self.law), self.estimator, self.planner)
 
     def command_line(self) -> str:
@@ -71,19 +71,19 @@ class FlightOptions:
 
     @property
     def tries_anyway(self) -> bool:
-        """Whether the autopilot is told to fly, or to slow down, what it cannot fly as asked."""
+        """Whether the settings let the autopilot fly, or slow down, what it cannot fly as requested."""
         name = "MIS_INFEASIBLE="
         given = [float(s.removeprefix(name)) for s in self.settings if s.startswith(name)]
         return any(value < _REFUSED for value in given)
 
 
 def own_words(estimator: str, planner: str) -> list[str]:
-    """Estimator and planner on a command line, where somebody has brought any."""
+    """The words of a command line for a custom estimator and planner, if there are any."""
     words = ["--estimator", estimator] if estimator else []
     return [*words, "--planner", planner] if planner else words
 
 
 def setting_of(text: str) -> tuple[str, float]:
-    """NAME=VALUE as the command line has checked it."""
+    """Name and value of NAME=VALUE, which the command line has already checked."""
     name, _, value = text.partition("=")
     return name, float(value)

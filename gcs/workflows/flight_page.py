@@ -1,7 +1,7 @@
-"""The live page of one `gcs fly`: a process of its own that is told what the ground station hears.
+"""The live page of one `gcs fly`: a separate process, to which the ground station passes what it receives.
 
-The flight never waits for it. What a person asks on the page comes back as frames, and is said to the vehicle
-as a word of the ground station's own, in lockstep at its turn.
+The flight never waits for the page. Requests of the user on the page come back as frames, which the ground
+station sends to the vehicle as its own, in lockstep at its turn.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.view import open_browser, tell_if_open
 from missions.model import Mission
 
-_BEGIN_S = 20.0  # for the page's process to say its address
-_READER_S = 15.0  # for the browser that we have opened
-_RELOAD_S = 3.0  # between a page that is closed and the same one opened again
+_BEGIN_S = 20.0  # until the page's process must have sent its address
+_READER_S = 15.0  # until the opened browser must show the page
+_RELOAD_S = 3.0  # within which a closed page may be opened again, as by a reload
 _WAIT_S = 0.1
 
 
@@ -41,11 +41,11 @@ class PageOptions:
     """Where the page of a flight is served."""
 
     host: str
-    port: int | None  # None: any that is free
+    port: int | None  # None: any free port
 
 
 class FlightPage:
-    """Our end of it."""
+    """The end of the flight's process."""
 
     def __init__(self, feed: FeedEnd, host: str) -> None:
         self.address = ""
@@ -67,9 +67,9 @@ class FlightPage:
         now_us: int,
         may_speak: bool,
     ) -> list[bytes]:
-        """Tell the page what was heard; the datagrams for the vehicle that somebody asked for there.
+        """Pass what was received to the page; return the datagrams for the vehicle that the page requested.
 
-        They wait for a turn at which we may speak.
+        These wait for a turn at which the ground station may send (`may_speak`).
         """
         self._feed.tell(TRUTH, now_us, truth)
         self._feed.tell(VEHICLE, now_us, vehicle)
@@ -87,7 +87,7 @@ class FlightPage:
         return sent
 
     def tell(self, **record: Any) -> None:
-        """News of the flight as a whole."""
+        """Send the page news about the flight as a whole."""
         self._feed.tell_event(record)
 
     # ---- before and after it
@@ -99,14 +99,14 @@ class FlightPage:
             raise GcsError("the process of the live page does not start")
 
     def await_reader(self, stop: StopRequest) -> None:
-        """Open a browser and wait until it shows the page; without a screen nobody is waited for."""
+        """Open a browser and wait until it shows the page; without a screen, do not wait."""
         say(f"live page: {self.address}")
         tell_if_open(self._host)
         if open_browser(self.address):
             self._wait(_READER_S, lambda: bool(self._readers or stop))
 
     def stay(self, stop: StopRequest) -> None:
-        """Let people look until the last page is closed, or until Ctrl-C."""
+        """Keep the page until the last browser closes it, or until Ctrl-C."""
         if stop:
             return
         say("the page stays until it is closed or Ctrl-C ends it")
@@ -138,7 +138,7 @@ class FlightPage:
 
 @contextmanager
 def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> Iterator[FlightPage]:
-    """The page of a flight; afterwards it is gone."""
+    """Start the page of a flight, and end it afterwards."""
     ours, theirs = pipe()
     with closing(ours), Processes() as processes:
         with closing(theirs):

@@ -1,4 +1,4 @@
-"""One `gcs fly` from the mission file to the report: starts what is needed, flies, and always cleans up."""
+"""One `gcs fly` from the mission file to the report: starts the programs, flies, and always cleans up."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ _EXIT = {
     "lost": EXIT_ERROR,
 }
 
-UNFLOWN_FILE = "unflown.tlog"  # what a vehicle said with which nothing was flown
+UNFLOWN_FILE = "unflown.tlog"  # telemetry of a vehicle that did not fly
 
 Told = Callable[["Record", "Outcome"], None]
 
 
 @dataclass(frozen=True)
 class Flight:
-    """What came of it."""
+    """The result of a flight."""
 
     outcome: Outcome
     record: Record
     out: Path
-    stopped: bool  # by Ctrl-C, before the mission was over
+    stopped: bool  # by Ctrl-C, before the mission ended
 
     @property
     def exit_code(self) -> int:
@@ -72,9 +72,9 @@ class Flight:
 def fly(
     options: FlightOptions, told: Told, view: PageOptions | None = None, processes: Processes | None = None
 ) -> Flight:
-    """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
-    the report are drawn. With `view` a page shows it, and stays. Simulator and autopilot may be loaded in
-    `processes`."""
+    """The whole flight; GcsError if there was none. `told` is called when the flight has ended, before the
+    pictures of the report are drawn. With `view`, a page shows the flight and stays afterwards. Simulator and
+    autopilot may already be loaded in `processes`."""
     doubts = []
     if options.connect is None and options.firmware is None:
         doubts = check_options(options)
@@ -117,7 +117,7 @@ def fly(
             flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
             if page is not None:
                 page.tell(report=str(out.resolve()))
-                stop.hint = "the page is closed"  # there is no report left to be abandoned
+                stop.hint = "the page is closed"  # the report is complete and can no longer be abandoned
                 page.stay(stop)
             return flight
 
@@ -126,7 +126,7 @@ def fly(
 def _page(
     mission: Mission, options: FlightOptions, view: PageOptions | None, stop: StopRequest
 ) -> Iterator[FlightPage | None]:
-    """The live page, with somebody before it where there is a screen; None if it is not asked for."""
+    """The live page, opened in a browser if there is a screen; None if it was not requested."""
     if view is None:
         yield None
         return
@@ -148,13 +148,13 @@ def _fly_own(
     processes: Processes | None,
 ) -> FlightClient:
     with own_vehicle(options, out, processes) as own:
-        from gcs.workflows.own_flight import fly_own  # while they load
+        from gcs.workflows.own_flight import fly_own  # imported while the programs load
 
         check_mission(mission, options)
         if options.speed is None:
             from gcs.report.warm import load as load_report
 
-            load_report(lambda: own.vehicle.waiting)  # there is a core to spare until the vehicle speaks
+            load_report(lambda: own.vehicle.waiting)  # a core is idle until the vehicle sends
         return fly_own(mission, options, log, own, stop, watch, page)
 
 
@@ -203,7 +203,7 @@ def _end(
     from gcs.clients.flight import Outcome
 
     outcome = client.outcome or Outcome("interrupted")
-    if options.firmware is None:  # which has its own way to count
+    if options.firmware is None:  # a firmware counts items in its own way
         outcome = outcome.of_mission(mission)
     tlog = out / TLOG_FILE
     if tlog.stat().st_size == 0:
@@ -234,8 +234,8 @@ def _tell_abandoned(tlog: Path) -> None:
 
 
 class FlightFolder:
-    """The output directory, without the flight that is overwritten; if the new one came to nothing, what we
-    put there is taken away again."""
+    """The output directory, from which a flight that is overwritten is deleted; if the new flight fails, our
+    files are deleted again."""
 
     _OURS = (TLOG_FILE, *LOGS)
 
@@ -248,7 +248,7 @@ class FlightFolder:
         self._kept = True
 
     def set_aside(self) -> Path:
-        """Keep what was captured under a name that is not a flight's: the next flight may have the folder."""
+        """Keep what was captured under a name that is not a flight's; the next flight may use the folder."""
         self._kept = True
         return (self._path / TLOG_FILE).rename(self._path / UNFLOWN_FILE)
 
@@ -273,7 +273,7 @@ class FlightFolder:
         if trouble:
             size = tlog.stat().st_size if tlog.exists() else 0
             if not size:
-                with suppress(OSError):  # the disk may be at fault, too
+                with suppress(OSError):  # the faulty disk may prevent this too
                     self._clear()
                 raise GcsError(f"{self._path}: {trouble}; no telemetry could be kept") from None
             raise GcsError(

@@ -1,4 +1,4 @@
-"""Missions by name or file, with the errors of a command. It is light: `gcs fly` begins with it."""
+"""Missions by name or file, with errors for the command line. Imports little: `gcs fly` begins with it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from missions.model import Mission
 
 
 def load(name_or_path: str) -> Mission:
-    """The mission; GcsError says what is wrong with it."""
+    """The mission; GcsError states what is wrong with it."""
     try:
         return load_mission(name_or_path)
     except MissionFileError as error:
@@ -24,6 +24,6 @@ def load(name_or_path: str) -> Mission:
 
 
 def _is_of_others(path: Path) -> bool:
-    from gcs.formats.missions import is_foreign  # which loads much, and is asked in case of need alone
+    from gcs.formats.missions import is_foreign  # loads much, and is therefore imported only when needed
 
     return is_foreign(path)

@@ -1,8 +1,8 @@
-"""A new file of your own, from a template that flies as it is.
+"""A new file for the user, from a template that flies as it is.
 
 The kinds are the files in `gcs/templates`: `vehicle.toml` is the template of a vehicle. A template is itself
-such a file, with the name `my_name` (and `MyName`, where a class is named), which is replaced; a comment line
-in it that begins with `Fly it:` holds the command that flies it.
+a valid file of its kind with the name `my_name` (and `MyName` for a class), which is replaced. A comment line
+in it that begins with `Fly it:` contains the command that flies it.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ class NewFile:
 
 
 def _is_taken(module: str) -> bool:
-    """Whether scripts beside the file would import it in place of what they mean: a module of Python, of a
-    library that is installed, or of ours."""
+    """Whether scripts beside the file would import it instead of another module: of Python, of an installed
+    library, or of Plumbline."""
     if module in sys.stdlib_module_names:
         return True
     return PathFinder.find_spec(module, [*map(get_path, ("purelib", "platlib")), str(ROOT)]) is not None
 
 
 def kinds() -> tuple[str, ...]:
-    """What there are templates of, sorted."""
+    """The kinds of files for which there are templates, sorted."""
     return tuple(sorted(_suffixes()))
 
 
 def new_file(kind: str, name: str) -> NewFile:
-    """Write the template of `kind` as `name`, which may lead into another folder and may have its ending.
+    """Write the template of `kind` as `name`, which may be a path and may include the ending.
 
-    InputError for a name that cannot be one or is taken, or where no file can be written; GcsError if the
+    InputError if the name is not allowed or is taken, or if the file cannot be written there; GcsError if the
     disk is full.
     """
     suffix = _suffixes()[kind]
@@ -57,7 +57,7 @@ def new_file(kind: str, name: str) -> NewFile:
         raise InputError(
             f"{name!r} cannot be the name of a {kind}: letters, digits, - and _, beginning with a letter"
         )
-    # a module's name is an identifier
+    # the name of a module must be an identifier
     stem = word.replace("-", "_") if suffix == ".py" else word
     if suffix == ".py" and _is_taken(stem):
         raise InputError(f"{name!r}: {stem} is a module of Python or of a library; choose another name")

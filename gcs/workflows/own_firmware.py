@@ -1,4 +1,4 @@
-"""A flight by a third-party autopilot, started for it on Plumbline's world, and stopped after it."""
+"""A flight by a third-party autopilot in Plumbline's simulator: both are started, and stopped afterwards."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from missions.nearest import nearest
 if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
 
-FOLDER = "firmware"  # in the directory of the flight: where the firmware keeps what it keeps
-_PX4_PHYSICS = 4560  # TCP; its startup script knows no other
+FOLDER = "firmware"  # in the directory of the flight: the firmware's own files
+_PX4_PHYSICS = 4560  # TCP; PX4's startup script supports no other
 
 
 def firmware_program(text: str) -> FirmwareProgram:
-    """KIND=PATH; InputError says what is wrong with it."""
+    """The program of KIND=PATH; InputError says what is wrong with the text."""
     kind, _, path = text.partition("=")
     program = Path(path).expanduser()
     if kind not in FIRMWARES or not path:
@@ -74,13 +74,13 @@ def firmware_client(
 
 @contextmanager
 def own_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) -> Iterator[OwnVehicle]:
-    """Start simulator and firmware; afterwards they are gone. What the firmware wrote is left in `out`."""
+    """Start simulator and firmware, and end them afterwards. The files of the firmware stay in `out`."""
     ours, theirs = split_settings(options.vehicle, options.sensors, map(setting_of, options.settings))
     folder = (out / FOLDER).resolve()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     begin = _BEGINNINGS[program.kind]
-    port = DEFAULT_PORT if program.kind == "px4" else 0  # where it says to the ground what it has to say
+    port = DEFAULT_PORT if program.kind == "px4" else 0  # to which the firmware sends for the ground station
     with (
         Processes() as processes,
         closing(UdpSocket(LOOPBACK, port)) as vehicle,
@@ -99,7 +99,7 @@ def own_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) ->
 def _ardupilot(
     program: Path, folder: Path, parameters: str, physics: int, vehicle: UdpSocket
 ) -> tuple[list[str], dict[str, str]]:
-    """Its command line, and what it needs in its environment: it speaks to us, and listens to nobody."""
+    """ArduPilot's command line, and its environment variables: it sends to us, and listens on no port."""
     file = folder / "plumbline.parm"
     file.write_text(parameters, encoding="ascii")
     home = Home()
@@ -115,7 +115,7 @@ def _ardupilot(
 def _px4(
     program: Path, folder: Path, parameters: str, physics: int, vehicle: UdpSocket
 ) -> tuple[list[str], dict[str, str]]:
-    """The same of PX4, whose startup looks for px4-rc.params in PATH; `etc` is where its build has it."""
+    """The same for PX4, whose startup searches PATH for px4-rc.params; `etc` is a folder of its build."""
     etc = program.parent.parent / "etc"
     if not etc.is_dir():
         raise InputError(f"--autopilot px4={program}: no folder {etc}; name bin/px4 of a build of px4_sitl")
@@ -127,7 +127,7 @@ def _px4(
 
 
 _BEGINNINGS = {"ardupilot": _ardupilot, "px4": _px4}
-_IN_TURN = ("ardupilot",)  # whose flight is done by one thread, which waits while the simulator works
+_IN_TURN = ("ardupilot",)  # these fly in one thread, which waits while the simulator works
 
 
 def fly_firmware(
@@ -175,6 +175,6 @@ def _start_simulator(
 
 
 def _parameters(kind: str, settings: list[tuple[str, float]]) -> str:
-    """The firmware's parameters: those that are shipped, then what the user sets."""
+    """The firmware's parameters: the shipped ones, then those that the user sets."""
     shipped = (files("sitl.interfaces") / f"{kind}.parm").read_text(encoding="ascii")
     return shipped + "".join(f"{name} {value:.9g}\n" for name, value in settings)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def flight_client(
     mission: Mission, options: FlightOptions, home: Home, silence_us: int = LINK_TIMEOUT_US
 ) -> FlightClient:
-    """The ground station's side of the flight of a vehicle with this home, which may be silent so long."""
+    """The ground station's side of a flight; `home` is the vehicle's, `silence_us` its longest silence."""
     slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     return FlightClient(
         items_of(mission, home),
@@ -47,7 +47,7 @@ def fly_own(
     page: FlightPage | None = None,
 ) -> FlightClient:
     """Fly with the simulator and the autopilot that were started for it."""
-    # one of our programs that is stopped for long is named before the vehicle is taken for lost
+    # this long, so that a program that was stopped (SIGSTOP) is reported before the vehicle counts as lost
     silence_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
     client = flight_client(mission, options, Home(), silence_us)
 

@@ -1,4 +1,4 @@
-"""A planner that somebody has brought, as `gcs check` has it plan."""
+"""A custom planner, as `gcs check` uses it."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from gcs.errors import InputError, input_error
 
 @contextmanager
 def own_planner(reference: str, vehicle: str) -> Iterator[Planner]:
-    """The planner with the parameters that it has by default for a vehicle, its calls watched. GcsError if
-    there is no such vehicle, or if the planner cannot be loaded."""
+    """The planner with its default parameters for a vehicle, and with its calls watched. GcsError if there is
+    no such vehicle, or if the planner cannot be loaded."""
     try:
         values = parameters_for(load_belief(vehicle), Own(planner=reference)).values()
         planner = planner_of(load_planner(reference), values)

@@ -1,8 +1,8 @@
 """A simulator and an autopilot started for one flight, and stopped after it.
 
-They load for a second before they speak: they are started first, and what the ground station itself has to
-load, and to check, comes meanwhile. Therefore nothing heavy is imported here. A command has them loaded
-before it has looked at what it was given.
+They load for a second before they send anything. They are therefore started first, and the ground station
+loads and checks its own part meanwhile; for this reason nothing heavy is imported here. A command starts to
+load them before it has examined its arguments.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 
 @dataclass(frozen=True)
 class OwnVehicle:
-    """The running programs, and the sockets to which they speak."""
+    """The running programs, and the sockets to which they send."""
 
     processes: Processes
     vehicle: UdpSocket
@@ -37,9 +37,9 @@ class OwnVehicle:
 def own_vehicle(
     options: FlightOptions, out: Path, processes: Processes | None = None
 ) -> Iterator[OwnVehicle]:
-    """Start both programs, among `processes`, in which they may be loaded; afterwards they are gone.
+    """Start both programs in `processes`, which may have loaded them already, and end them afterwards.
 
-    Their logs, and the autopilot's own log of the flight, are left in `out`.
+    Their logs, and the autopilot's own log of the flight, stay in `out`.
     """
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
@@ -54,7 +54,7 @@ def own_vehicle(
 
 @contextmanager
 def _log_kept(storage: Path, out: Path) -> Iterator[None]:
-    """Afterwards the autopilot's own log of the flight is in `out`, if it has made one."""
+    """Afterwards, copy the autopilot's own log of the flight to `out`, if it has written one."""
     try:
         yield
     finally:
@@ -74,7 +74,7 @@ def _start(
     told = ["--set", "MIS_INFEASIBLE=0"] if options.force else []
     told += [
         word for words in given for word in words
-    ]  # those of the world, too: what is measured is believed
+    ]  # those of the simulator too: the autopilot assumes them as if they had been measured
     world = [
         "--sensors",
         options.sensors,

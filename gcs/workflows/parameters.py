@@ -1,4 +1,4 @@
-"""Parameters of a running vehicle: read, written, and kept in files."""
+"""Parameters of a running vehicle: reading, setting, and storing them in files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ANY = "bebop"  # parameters have the same units with all vehicles
 
 
 def list_parameters(pattern: str, address: Address) -> dict[str, float]:
-    """Values by name of those that match a shell pattern; GcsError if none does."""
+    """Values by name of the parameters that match a shell pattern; GcsError if none does."""
     with Session(address) as session:
         values = _listed(session, session.find())
     found = {n: v for n, v in values.items() if fnmatch.fnmatchcase(n, pattern.upper())}
@@ -43,7 +43,8 @@ def get_parameters(names: Sequence[str], address: Address) -> dict[str, float | 
 
 
 def set_parameter(name: str, value: float, address: Address) -> str:
-    """Set one parameter and read it back; a line that says so. A value that may not be meant so is told."""
+    """Set one parameter and read it back; return a line on the result. If the value may be unintended, a line
+    says so."""
     with Session(address) as session:
         operation = ParameterSet(session.find(), name.upper(), value)
         done = exchange(session, operation, name).text
@@ -61,9 +62,9 @@ def exchange(
     label: str = "",
     names: list[str] | None = None,
 ) -> Result:
-    """Bring a get or a set to its end; RefusedError names the nearest parameters where there is no such.
+    """Carry out a get or a set; if the parameter does not exist, RefusedError names the most similar ones.
 
-    `names`: where the names of the vehicle's parameters are kept between one exchange and the next.
+    `names`: a list in which the names of the vehicle's parameters are kept between exchanges.
     """
     try:
         return session.run(operation, label)
@@ -77,7 +78,7 @@ def exchange(
 
 
 def save_parameters(file: Path, address: Address) -> int:
-    """Write all parameters to a file, in the form that its ending says; their number."""
+    """Write all parameters to a file, in the format of its ending; return their number."""
     with Session(address) as session:
         target = session.find()
         values = _listed(session, target)
@@ -93,7 +94,8 @@ def save_parameters(file: Path, address: Address) -> int:
 
 
 def load_parameters(file: Path, address: Address) -> tuple[int, int]:
-    """Set all parameters of a file; how many were set, and how many it holds. Each refusal is told."""
+    """Set all parameters of a file; return how many were set, and how many it contains. Each refusal is
+    printed."""
     try:
         values = parse_text(text_of(file))
     except (TextFileError, ParameterError) as error:

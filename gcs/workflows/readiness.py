@@ -1,4 +1,4 @@
-"""Waiting until a running vehicle says that it may be armed."""
+"""Waiting until a running vehicle reports that it may be armed."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from gcs.errors import NoVehicleError, RefusedError
 from gcs.shell.display import say
 from gcs.shell.session import Session
 
-HEALTH_S = 2.0  # in which a vehicle tells its health
-READY_S = 10.0  # an estimator settles in a few, by a clock that may be slow
+HEALTH_S = 2.0  # in which a vehicle reports its health
+READY_S = 10.0  # an estimator settles in a few seconds of the vehicle's clock, which may run slowly
 
 
 def wait_until_ready(session: Session) -> bool:
-    """Wait a while for a vehicle that is not ready yet, and say for what; True if it may be armed, or does
-    not tell."""
+    """Wait for a while if the vehicle is not ready, and print for what; True if it may be armed, or does not
+    report whether it may."""
     view = session.view
     session.watch(lambda: view.ready_to_arm is not None, HEALTH_S)
     if view.armed or view.ready_to_arm is not False:
@@ -21,10 +21,10 @@ def wait_until_ready(session: Session) -> bool:
     before = len(view.texts)
     try:
         session.run(command.run_prearm_checks(session.target))
-        # the reasons come with the answer, or a moment later
+        # the reasons arrive with the answer, or a moment later
         session.watch(lambda: bool(view.complaints_since(before)), READY_S)
     except (RefusedError, NoVehicleError):
-        pass  # its reasons come with the refusal to arm
+        pass  # its reasons will arrive with the refusal to arm
     reasons = "; ".join(view.complaints_since(before))
     say("waiting for the vehicle to be ready" + (f": {reasons}" if reasons else ""))
     return session.watch(lambda: view.ready_to_arm is True, READY_S, "waiting for the vehicle to be ready")

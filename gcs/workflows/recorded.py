@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from gcs.recorded.motion import Motion
 
 FOLDER = Path("replays")
-_FARTHEST_M = 200.0  # a load from its vehicle: nobody flies a cable so long
-OWN_MAP = "telemetry"  # of Plumbline's own logs
+_FARTHEST_M = 200.0  # of a load from its vehicle: cables are shorter
+OWN_MAP = "telemetry"  # column map of Plumbline's own logs
 
 
 def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, Any]:
-    """What the recording says of cable, load and vehicle, with half the widths of the 95 % intervals, and of
-    what it says nothing."""
+    """The properties of cable, load and vehicle that the recording determines, with half the widths of their
+    95 % intervals, and those that it does not determine."""
     from gcs.recorded.identification import (
         LEAST_S,
         NoLoadError,
@@ -70,7 +70,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
 def replay(
     path: Path, columns: str | None, out: Path | None, quiet: bool = False
 ) -> tuple[dict[str, Any], Path]:
-    """The scores of the estimates, and the folder in which their table and picture are."""
+    """Estimate the load in a recording; return the scores, and the folder with table and picture."""
     from gcs.recorded.estimates import filtered, load_position, rows_of
     from gcs.recorded.identification import LEAST_S, TooLittleMotionError, identify_vehicle, map_doubt
     from gcs.recorded.replay_files import write_picture, write_table
@@ -116,7 +116,7 @@ def replay(
 
 
 def find_recording(source: Path) -> Path:
-    """The recording that is named; of a flight's folder its telemetry log."""
+    """The given recording; for the folder of a flight, its telemetry log."""
     from gcs.recorded.recording import READ
 
     if not source.is_dir():
@@ -127,7 +127,7 @@ def find_recording(source: Path) -> Path:
 
 
 def name_of(path: Path) -> str:
-    """The name of a recording; a flight goes by its folder, as the log in each is called flight.tlog."""
+    """The name of a recording; for a flight, that of its folder, since every log is called flight.tlog."""
     from gcs.recorded.recording import name_of as stem
 
     return (path.resolve().parent.name if path.name == TLOG_FILE else "") or stem(path)
@@ -177,7 +177,7 @@ def _rows_record(path: Path, motion: Motion) -> dict[str, Any]:
     times = motion.times
     return {
         "file": str(path),
-        "true_states": is_log(path),  # of a simulated flight, not what somebody has measured
+        "true_states": is_log(path),  # the true states of a simulated flight, not measurements
         "rows": len(motion.time_s),
         "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
         "row_jitter_s": float(np.std(times.offset_s)),

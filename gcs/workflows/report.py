@@ -1,4 +1,4 @@
-"""The report, as the commands make and show it."""
+"""Making and showing the report, for the commands."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def make_report(
     figures: Callable[[Record], None] | None = None,
     all_pictures: bool = False,
 ) -> Record:
-    """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken. `figures` is given
+    """Make the report in `out`; without `meta`, meta.json beside the log is used. `figures` is called with
     the record before anything is drawn. `all_pictures`: also those that the page does not contain."""
     from gcs.report.build import ReportError, build_report
 
@@ -39,7 +39,8 @@ def make_report(
 
 
 def _not_made(error: OSError, tlog: Path, out: Path) -> GcsError:
-    """That the report cannot be written; with a full disk what is kept, and how to make it later."""
+    """The error that the report cannot be written; if the disk is full, also what is kept, and how to make
+    the report later."""
     if not disk_trouble(error):
         return not_written(error, error.filename or out)
     kept = [str(tlog)] if tlog.is_file() else []
@@ -60,7 +61,7 @@ def _is_whole(summary: Path) -> bool:
 
 
 def find_log(source: Path) -> Path:
-    """The log that is named, or that lies in the directory that is named."""
+    """The given log, or the log in the given directory."""
     tlog = source / TLOG_FILE if source.is_dir() else source
     allowed = f"must be a .tlog, or a directory that holds {TLOG_FILE}"
     if not tlog.is_file():
@@ -71,7 +72,7 @@ def find_log(source: Path) -> Path:
 
 
 def meta_beside(tlog: Path) -> FlightMeta:
-    """What meta.json beside the log says of the flight; nothing known if there is none."""
+    """The contents of meta.json beside the log; without such a file, nothing is known."""
     from gcs.report.build import META_FILE, ReportError, load_meta
 
     try:
@@ -83,7 +84,8 @@ def meta_beside(tlog: Path) -> FlightMeta:
 def report_again(
     source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
 ) -> tuple[Record, Path]:
-    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+    """Make the report of a log, or of the directory that contains it, again; return the record and the
+    report's directory."""
     tlog = find_log(source)
     beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
@@ -94,7 +96,7 @@ def report_again(
 
 
 def make_mcap(source: Path, folder: Path) -> Path:
-    """flight.mcap of a log, in the directory of its report."""
+    """Write flight.mcap of a log into the directory of its report."""
     from gcs.report.build import ReportError, build_mcap
 
     try:
@@ -106,7 +108,7 @@ def make_mcap(source: Path, folder: Path) -> Path:
 
 
 def make_common(source: Path, folder: Path) -> Path:
-    """flight.common.tlog of a log: without the private dialect."""
+    """Write flight.common.tlog of a log: the log without the private dialect."""
     from gcs.report.build import COMMON_FILE
 
     path = folder / COMMON_FILE
@@ -118,7 +120,7 @@ def make_common(source: Path, folder: Path) -> Path:
 
 
 def print_record(record: Record) -> None:
-    """The record as a table on stdout."""
+    """Print the record as a table to stdout."""
     from rich.console import Console
 
     from gcs.report.table import record_table

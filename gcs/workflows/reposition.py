@@ -1,4 +1,4 @@
-"""Sending the load of a running vehicle to a place in metres."""
+"""Sending the load of a running vehicle to a position in metres."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from gcs.clients.operation import Operation
 from gcs.errors import GcsError
 from gcs.shell.session import Session
 
-LOAD_S = 2.0  # in which a vehicle tells where its load is
+LOAD_S = 2.0  # in which a vehicle reports the position of its load
 
 
 @dataclass(frozen=True)
 class Move:
-    """A place that the load is sent to: what sends it, and how far it has to go."""
+    """The command that sends the load to a position, and the distance of that position from the load."""
 
     operation: Operation
-    distance_m: float  # of a load that a vehicle does not tell of: NaN
+    distance_m: float  # NaN if the vehicle does not report the position of its load
 
 
 def reposition(
     session: Session, offset: tuple[float, float, float | None], from_load: bool, speed_m_s: float | None
 ) -> Move:
-    """What takes the load to a place, `offset` (east, north, up in m; None: at its height) from the vehicle's
-    home or from where its load is."""
+    """The command that sends the load to the position at `offset` (east, north, up in m; up None: at the
+    load's height) from the vehicle's home or, with `from_load`, from the present position of the load."""
     message = session.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     origin = Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
     load = _load(session)
@@ -48,7 +48,7 @@ def reposition(
     operation = command.reposition(session.target, latitude, longitude, height_m, speed_m_s)
     if load is None:
         return Move(operation, math.nan)
-    there = (east, north, load[2] if offset[2] is None else up)  # without a height it keeps its own
+    there = (east, north, load[2] if offset[2] is None else up)  # without a height, the load keeps its own
     return Move(operation, norm(sub(there, load)))
 
 

@@ -1,4 +1,4 @@
-"""What a run must reach, by `--require`, and whether it did: for people, and as JUnit's XML for CI."""
+"""Requirements on a run (`--require`), and whether it met them: as text, and as JUnit XML for CI."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from gcs.shell.display import say
 from missions.nearest import nearest_few
 
 COMPLETED = "completed"
-WHOLE = "all flights flown"  # the test case of a sweep: of its flights some may be lost
-_COUNTS = ("completed", "completed_fraction", "failed")  # figures of a sweep that lost flights change
+WHOLE = "all flights flown"  # the test case of a sweep, in which some flights may be lost
+_COUNTS = ("completed", "completed_fraction", "failed")  # figures of a sweep that depend on lost flights
 _NO_FIGURE = "this run has no such figure, for example because nothing happened that it measures"
 Value = float | str
 _SIGNS: dict[str, Callable[[Any, Any], bool]] = {
@@ -44,7 +44,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found of it."""
+    """A requirement, the value that was found, and whether it is met."""
 
     requirement: Requirement
     found: Any  # None: not known
@@ -52,15 +52,15 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """For people."""
+        """The verdict as text."""
         found = "not known" if self.found is None else f"{self.found}"
         why = f"; {_NO_FIGURE}" if self.found is None else ""
         return f"required {self.requirement.text}; found {found}{why}"
 
 
 def read_requirements(texts: Iterable[str], keys: Sequence[str], listed: str) -> list[Requirement]:
-    """Requirements as they were typed, on the figures `keys`, which are `listed` there. InputError names what
-    is wrong with one."""
+    """Parse requirements on the figures `keys`; `listed` names the place that lists these. InputError states
+    what is wrong with one."""
     return [_read(text, keys, listed) for text in texts]
 
 
@@ -89,7 +89,7 @@ def _value(word: str) -> Value:
 
 
 def judge(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> list[Verdict]:
-    """What the record says to each; a figure that is not known meets nothing."""
+    """The verdict on each requirement; an unknown figure meets none."""
     found = []
     for requirement in requirements:
         value = record.get(requirement.key)
@@ -101,8 +101,8 @@ def judge(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> lis
 
 
 def unjudged(requirements: Sequence[Requirement], flights: int, completed: int) -> str:
-    """That no requirement on a sweep judges its flights that were not completed, and what to add; empty if
-    there are none, or if nothing is required."""
+    """A line that no requirement on the sweep considers its failed flights, and what to add; empty if all
+    flights completed, if one does, or if nothing is required."""
     if not requirements or completed == flights or any(one.key in _COUNTS for one in requirements):
         return ""
     return (
@@ -113,7 +113,8 @@ def unjudged(requirements: Sequence[Requirement], flights: int, completed: int) 
 
 @contextmanager
 def reporting(run: str, junit: Path | None, case: str = COMPLETED) -> Iterator[None]:
-    """A run that does not come about is in the test report as well, as the test case `case`."""
+    """If the run raises GcsError, write the test report with this error in the test case `case`, and raise
+    it again."""
     try:
         yield
     except GcsError as error:
@@ -133,9 +134,9 @@ def conclude(
     reason: str = "",
     case: str = COMPLETED,
 ) -> bool:
-    """Tell each requirement that was not met on stderr, and write the test report: whether the run was
-    completed, as the test case `case`, or else the `reason`, and each requirement. True if all requirements
-    were met."""
+    """Print each requirement that was not met to stderr, and write the test report: the test case `case`,
+    which fails with the `reason` if the run was not completed, and one for each requirement. True if all
+    requirements were met."""
     missed = [verdict for verdict in verdicts if not verdict.met]
     for verdict in missed:
         say(verdict.line)
@@ -161,7 +162,7 @@ def _case(suite: ET.Element, run: str, name: str) -> ET.Element:
 
 
 def _write(path: Path, suite: ET.Element) -> None:
-    for element in suite.iter():  # XML has no word for most control characters
+    for element in suite.iter():  # XML cannot represent most control characters
         for key, value in element.attrib.items():
             element.set(key, "".join(c if c.isprintable() else " " for c in value))
     suites = ET.Element("testsuites")

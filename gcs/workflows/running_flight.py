@@ -1,4 +1,4 @@
-"""A flight by a vehicle that somebody else has started, and that goes on afterwards."""
+"""A flight by a vehicle that was started separately and continues to run afterwards."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def fly_running(
     watch: Stopwatch,
     page: FlightPage | None = None,
 ) -> tuple[FlightClient, str]:
-    """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold, or to land
-    where it cannot hold yet.
+    """Fly with the vehicle at `address`; if the flight is stopped early, command it to hold, or to land if it
+    cannot hold yet.
 
-    Returns why there is no truth of the world that it flew in, too; empty where there is.
+    Also returns why there is no truth of the vehicle's world; empty if there is.
     """
     with TruthLink(options.truth_at) as truth:
         with Session(address) as session:
@@ -77,9 +77,9 @@ def _fly(
 
 
 def _left_in_the_air(address: Address) -> str:
-    """Have a vehicle that flies on hold, or land where it cannot hold yet; what is to be told of it.
+    """Command a vehicle that is still flying to hold, or to land if it cannot hold yet; return a line on it.
 
-    Nothing of this is an error: what was captured is to be reported.
+    A failure raises no error here: the report of what was captured must still be made.
     """
     try:
         with Session(address) as session:
@@ -95,6 +95,6 @@ def _left_in_the_air(address: Address) -> str:
 
 
 def vehicle_home(session: Session) -> Home:
-    """Where the vehicle says its home is."""
+    """The home position that the vehicle reports."""
     message = session.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
     return Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)

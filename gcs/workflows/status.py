@@ -1,4 +1,4 @@
-"""What a running vehicle says of itself, listened to for a moment, and what it has said before."""
+"""The status that a running vehicle sends, received for a moment, and its earlier status texts."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from gcs.shell.link import Address, monotonic_us
 from gcs.shell.session import Session
 from gcs.shell.truth import TruthLink
 
-LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
-RECALL_S = 1.0  # kept texts take a fifth of that; of a vehicle that has said nothing nothing comes
-SHOWN_TEXTS = 10  # of these that are warnings or worse
-# of what `status_record` reads: when all of it has come there is nothing left to listen for
+LISTEN_S = 2.5  # by then every stream has arrived; the slowest are sent once a second
+RECALL_S = 1.0  # stored texts arrive within a fifth of that; a vehicle without any sends nothing
+SHOWN_TEXTS = 10  # texts that are warnings or worse
+# messages that `status_record` reads: when all of them have arrived, listening ends
 _READ = {
     "SYS_STATUS",
     "EXTENDED_SYS_STATE",
@@ -35,9 +35,9 @@ _SEVERITIES = {
 
 
 def vehicle_status(address: Address, truth_at: Address | None = None, quiet: bool = False) -> dict[str, Any]:
-    """The record of the vehicle at `address`; `texts` are the last warnings, and what is worse.
+    """The record of the vehicle at `address`; `texts` are the last ones that are warnings or worse.
 
-    `truth_at`: where its simulator tells what is true; None: where `sitl` does by default.
+    `truth_at`: where its simulator sends the truth; None: where `sitl` does by default.
     """
     with (
         TruthLink(truth_at) as truth,
@@ -62,8 +62,8 @@ def vehicle_status(address: Address, truth_at: Address | None = None, quiet: boo
 
 
 def vehicle_texts(address: Address) -> list[dict[str, Any]]:
-    """What the vehicle at `address` has told the operators, the oldest first; of one that keeps no texts,
-    what it said meanwhile. NoVehicleError if it does not answer for want of its key."""
+    """The status texts of the vehicle at `address`, the oldest first; if it does not store texts, those sent
+    meanwhile. NoVehicleError if it does not answer because its key is missing."""
     with Session(address) as session:
         session.find()
         asked = _ask_for_texts(session)
@@ -74,7 +74,7 @@ def vehicle_texts(address: Address) -> list[dict[str, Any]]:
 
 
 class _Asked:
-    """Kept texts that a vehicle was asked for; `keeps` whether it said that it tells them."""
+    """A request for the texts that a vehicle has stored; `keeps`: it has accepted the request."""
 
     def __init__(self, view: VehicleView, keeps: bool) -> None:
         self._view = view
@@ -84,12 +84,12 @@ class _Asked:
 
     @property
     def answered(self) -> bool:
-        """Whether all has come that will come."""
+        """Whether all texts have arrived that will arrive."""
         return not self._keeps or self._view.recalled_all or monotonic_us() >= self._until_us
 
     @property
     def texts(self) -> list[Text]:
-        """The kept ones, and what was said since then."""
+        """The stored texts, and those sent since then."""
         kept = {(text.severity, text.text) for text in self._view.recalled}
         new = (text for text in self._view.texts[self._heard :] if text[1:] not in kept)
         return [*self._view.recalled, *new]
@@ -119,10 +119,10 @@ def text_records(texts: list[Text]) -> list[dict[str, Any]]:
 
 
 def status_record(view: VehicleView) -> dict[str, Any]:
-    """Keys of `gcs status --json` but for the texts; None for what the vehicle has not sent."""
+    """Keys of `gcs status --json` except the texts; None for what the vehicle has not sent."""
     load = view.latest.get("LOAD_STATE")
     if load is not None and not math.isfinite(load.tension):
-        load = None  # it is not seen
+        load = None  # the load is not measured
     current = view.latest.get("MISSION_CURRENT")
     battery = view.latest.get("SYS_STATUS")
     world = view.truth.get("SIM_STATUS")

@@ -6,7 +6,7 @@ import time
 
 
 class Stopwatch:
-    """The wall time from the vehicle's first word to the end of the flight."""
+    """The wall time from the vehicle's first message to the end of the flight."""
 
     def __init__(self) -> None:
         self._began_s: float | None = None
@@ -16,7 +16,7 @@ class Stopwatch:
         self._began_s = time.monotonic()
 
     def stop(self) -> float:
-        """Stop if it runs; the time measured."""
+        """Stop if it runs; return the measured time."""
         if self._wall_s is None:
             self._wall_s = 0.0 if self._began_s is None else time.monotonic() - self._began_s
         return self._wall_s

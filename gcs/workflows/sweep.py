@@ -33,7 +33,7 @@ _CONTINUED = "completed flights are stored, run the same command again to contin
 STOPPING = f"stopping; {_CONTINUED}"
 
 
-FIGURES = (  # of the record, that something can be required of
+FIGURES = (  # of the record, that `--require` accepts
     "flights",
     "completed",
     "failed",
@@ -63,21 +63,21 @@ class SweepOptions:
     fresh: bool
     quiet: bool
     command: str  # as it was typed
-    own: Own = NOTHING_OWN  # estimator and planner that somebody has brought, of all flights
-    reports: bool = False  # of the flights that stand out
+    own: Own = NOTHING_OWN  # custom estimator and planner of all flights
+    reports: bool = False  # also of the flights that stand out
     table_only: bool = False  # no page
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What came of it; `name` is the mission's."""
+    """The result of a sweep; `name` is the mission's."""
 
     name: str
     done: Swept
     planned: int
     directory: Path
     result: Path  # the page, else the table
-    flights: tuple[dict[str, object], ...]  # those that stand out
+    flights: tuple[dict[str, object], ...]  # the flights that stand out
 
     @property
     def exit_code(self) -> int:
@@ -102,7 +102,7 @@ class Sweep:
 
 
 def run_sweep(options: SweepOptions) -> Sweep:
-    """Plan the sweep, fly what is missing of it, and write its report; PlanError if it cannot be flown."""
+    """Plan the sweep, fly its missing flights, and write its report; PlanError if it cannot be flown."""
     if options.seeds > MOST_FLIGHTS:
         raise InputError(f"--seeds {options.seeds}: too many, {MOST_FLIGHTS} flights at most")
     plan = make_plan(
@@ -154,7 +154,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
 
 @contextmanager
 def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Executor, int]]]:
-    """Who flies. A cluster is met here, before anything is written or taken away: it may not answer."""
+    """The workers. A cluster is contacted here, before anything is written or deleted: it may not answer."""
     if options.scheduler:
         with dask_cluster(options.scheduler) as cluster:
             yield nullcontext(cluster)
@@ -163,7 +163,7 @@ def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Exe
 
 
 def _tell_doubts(plan: SweepPlan) -> None:
-    """Tell what can be flown and may not be meant; of the values of a parameter the first alone."""
+    """Print what can be flown but may be unintended; of several values of a parameter only the first."""
     own = [line for law in plan.laws for line in own_doubts(plan.own(law))]
     for line in dict.fromkeys([*own, *planner_doubts(plan.planner, load(plan.mission))]):
         say(line)
@@ -177,7 +177,7 @@ def _tell_doubts(plan: SweepPlan) -> None:
 
 
 def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quiet: bool) -> None:
-    """Each of the flights over the wire, with its report."""
+    """Fly each of the flights over the wire, with a report."""
     from gcs.workflows.fly import fly
 
     for one in found:

@@ -1,4 +1,4 @@
-"""Whether the machine was fast enough for a flight in real time, by what its simulator counted."""
+"""Whether the machine was fast enough for a flight in real time, judged by the simulator's counters."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from pathlib import Path
 
 from autopilot.wire.tlog import read_tlog
 
-MOST_MISSED = 1e-3  # share of the commands that may come too late before it is told of
+MOST_MISSED = 1e-3  # share of the commands that may come too late without being reported
 _MICRO = 1e-6
 
 
 def too_slow(tlog: Path) -> str:
-    """What the simulator counted of commands that came too late, where it is more than one of a thousand."""
+    """A line on the commands that came too late, if more than one of a thousand did; else empty."""
     from autopilot.wire.dialect import plumbline as mavlink
 
-    missed, flown_s, rate_hz = 0, 0.0, 0.0  # the rate by the vehicle's clock, of a second that was in time
+    missed, flown_s, rate_hz = 0, 0.0, 0.0  # the rate per second of the vehicle's clock, the highest reported
     for _, received in read_tlog(tlog):
         if received.id == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
             status = received.message

@@ -1,4 +1,4 @@
-"""Missions between files and a running vehicle, with fence and rally points where the file has them."""
+"""Transfer of missions between files and a running vehicle, with fence and rally points if there are any."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Tell = Callable[[str], None]
 
 
 def upload(mission: str, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
-    """Check a mission by name or path against `vehicle` and upload it; `tell` gets a line for each list."""
+    """Check a mission by name or path for `vehicle` and upload it; `tell` gets a line for each list."""
     send = checked_upload(mission, vehicle, force, skip, tell)
     with Session(address) as session:
         session.find()
@@ -38,8 +38,9 @@ def upload(mission: str, vehicle: str, force: bool, skip: bool, address: Address
 def checked_upload(
     mission: str, vehicle: str, force: bool, skip: bool, tell: Tell
 ) -> Callable[[Session], None]:
-    """Read a mission by name or path, and check it against `vehicle`; what uploads it to a vehicle that was
-    found. A file of other ground stations is checked then: its places are judged by the vehicle's home."""
+    """Read a mission by name or path, and check it for `vehicle`; return a function that uploads it in a
+    session. A file of another ground station is checked only in that function, since its positions must be
+    judged by the vehicle's home."""
     path = Path(mission)
     if is_foreign(path):
         plan = read_foreign(path)
@@ -61,7 +62,7 @@ def _upload_foreign(
     if not force:
         with told_if_slow(CHECKING):
             check_items(path.name, items, home, vehicle)
-    # the fence first: the vehicle judges the mission by it
+    # the fence first: the vehicle checks the mission against it
     for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
         if area is not None:
             text = session.run(MissionUpload(session.target, area, kind)).text
@@ -71,7 +72,8 @@ def _upload_foreign(
 
 
 def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
-    """The items to upload; what is not done is told, and what is left out is an error unless it may be."""
+    """The items to upload. Prints what cannot be flown as in the file; GcsError if something must be left out
+    without `skip`, or if nothing remains."""
     for line in (*judged.kept, *judged.left_out):
         say(f"{path}: {line}")
     if judged.left_out and not skip:
@@ -92,8 +94,8 @@ def download(address: Address) -> list[WireItem]:
 
 
 def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
-    """The vehicle's mission, written to a .plan, with fence and rally points, or a .waypoints file; with what
-    was written, in words."""
+    """Write the vehicle's mission to a .plan file, with fence and rally points, or to a .waypoints file;
+    return its items, and what was written in words."""
     with Session(address) as session:
         session.find()
         items = _fetched(session, _MISSION)

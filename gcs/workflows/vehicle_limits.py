@@ -1,4 +1,4 @@
-"""What a mission is checked against before take-off: the vehicle of a name or a file."""
+"""The limits against which a mission is checked before take-off: those of a vehicle by name or file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcs.errors import input_error
 
 
 def load_limits(name_or_path: str) -> VehicleLimits:
-    """The limits of a shipped vehicle or of a vehicle file; GcsError says what is wrong with it."""
+    """The limits of a shipped vehicle or of a vehicle file; GcsError states what is wrong with it."""
     try:
         belief = load_belief(name_or_path)
     except VehicleFileError as error:

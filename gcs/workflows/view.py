@@ -43,28 +43,28 @@ class ViewOptions:
 
     connect: tuple[Address, ...]
     host: str = LOOPBACK
-    port: int | None = None  # None: PAGE_PORT, or any that is free
-    opens: bool = True  # a browser, where there is one
-    truth: Address | None = SITL_TRUTH  # where the simulated world tells what is true; None: it is not heard
+    port: int | None = None  # None: PAGE_PORT, or any free port
+    opens: bool = True  # opens a browser, if there is one
+    truth: Address | None = SITL_TRUTH  # where the simulator sends the truth; None: it is not received
 
 
 class Links(Protocol):
-    """Where datagrams of vehicles come from and go to."""
+    """The links on which datagrams of vehicles are received and sent."""
 
     def poll(self, station: Station, now_us: int) -> None:
-        """Hand all that came to the station, and send what it says."""
+        """Pass all received datagrams to the station, and send what it returns."""
 
     def close(self) -> None:
-        """Let all go."""
+        """Close all links."""
 
 
 class UdpLinks:
-    """Vehicles that run by themselves, met at one address or several."""
+    """Vehicles that were started separately, at one address or several."""
 
     def __init__(self, addresses: tuple[Address, ...], truth: Address | None) -> None:
         self._sockets: list[UdpSocket] = []
-        self._ways: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # to a system
-        self._spoken: list[UdpSocket] = []  # of `udpout:`: the vehicle waits for our first word
+        self._ways: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # socket and peer by system id
+        self._spoken: list[UdpSocket] = []  # of `udpout:` addresses: the vehicle waits until we send first
         self._truth: UdpSocket | None = None
         self._worlds = Worlds()
         try:
@@ -102,7 +102,7 @@ class UdpLinks:
 
 
 def _truth_socket(address: Address) -> UdpSocket | None:
-    """Where the simulated world tells what is true; None if another program listens there."""
+    """The socket on which the simulator sends the truth; None if another program uses its port."""
     try:
         return UdpSocket(address.host, address.port)
     except GcsError:
@@ -113,7 +113,7 @@ def _truth_socket(address: Address) -> UdpSocket | None:
 
 
 class FedLinks:
-    """The vehicle of `gcs fly`, which tells us what it hears and sends what a person asks for."""
+    """The vehicle of `gcs fly`, which passes on what it receives, and sends what the page requests."""
 
     def __init__(self, feed: FeedEnd, told: Callable[[dict[str, Any]], None]) -> None:
         self._feed = feed
@@ -127,13 +127,13 @@ class FedLinks:
                 station.receive_truth(piece.body)
             else:
                 station.receive(piece.body, now_us)
-                station.sample(now_us)  # a flight in lockstep outruns the clock
+                station.sample(now_us)  # at each datagram, since a lockstep flight is faster than the clock
         for out in station.poll(now_us):
             self._feed.tell(COMMAND, 0, [out.datagram])
 
     @property
     def ended(self) -> bool:
-        """Whether `gcs fly` is gone."""
+        """Whether `gcs fly` has ended."""
         return self._feed.closed
 
     def close(self) -> None:
@@ -142,7 +142,7 @@ class FedLinks:
 
 @dataclass
 class _Session:
-    """What the page is told of the flight as a whole; of `gcs view` there is none."""
+    """The record about the flight as a whole for the page; in `gcs view` it contains nothing of a flight."""
 
     record: dict[str, Any] = field(default_factory=lambda: {"type": "session", "kind": "view"})
 
@@ -160,7 +160,7 @@ def view(options: ViewOptions) -> None:
 
 
 def serve_feed(descriptor: int, options: ViewOptions) -> None:
-    """Serve the page of a flight that our parent flies, until it ends us."""
+    """Serve the page of a flight that the parent process flies, until that ends this process."""
     feed = inherited(descriptor)
     station = Station(speaks=False)
     session, site = _Session(), Site(_texts())
@@ -244,7 +244,7 @@ async def _serve(
 
 
 def _known(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
-    """Parameters of a flight's own vehicle before anybody turns them."""
+    """Parameters of the vehicle that was started for the flight, before they are changed on the page."""
     if vehicle is None:
         return {}
     sizes = load_vehicle(vehicle)
@@ -261,13 +261,13 @@ def _announce(address: str, options: ViewOptions) -> None:
 
 
 def tell_if_open(host: str) -> None:
-    """Say so if others than this machine can reach the page."""
+    """Print a line if other machines than this one can reach the page."""
     if host not in (LOOPBACK, "localhost", "::1"):
         say("other machines can reach the page: anyone who knows its full address can command the vehicle")
 
 
 def open_browser(address: str) -> bool:
-    """Show the page where there is a screen to show it on; whether there is."""
+    """Open the page in a browser if there is a screen; return whether it was opened."""
     has_screen = sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )

@@ -1,4 +1,4 @@
-"""Compiles what checks missions before they are flown: python -m gcs.workflows.warm_check."""
+"""Compiles the check of missions before flights: python -m gcs.workflows.warm_check."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from autopilot.shell.compiling import name_what_is_compiled
 def main() -> None:
     """Check every shipped mission; prints the names of the kernels that this compiles."""
     name_what_is_compiled()
-    # only now: the import itself compiles the first ones
+    # imported only now, because the import itself compiles the first kernels
     from gcs.workflows.check_mission import check_mission
     from missions.fileformat import shipped
 

@@ -1,4 +1,4 @@
-"""Compiles what flights in one process fly with beside the rest: python -m gcs.workflows.warm_here."""
+"""Compiles what only flights in one process need: python -m gcs.workflows.warm_here."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from autopilot.shell.compiling import name_what_is_compiled
 
 
 def main() -> None:
-    """Compile it, or find it compiled; prints the names of the kernels that this compiles."""
+    """Compile it unless it is compiled already; prints the names of the kernels that this compiles."""
     name_what_is_compiled()
-    # only now: the import itself compiles the first ones
+    # imported only now, because the import itself compiles the first kernels
     from autopilot.wire.convert.geodesy import Home
     from gcs.closed_loop import Conditions, build_onboard, build_simulator
     from gcs.closed_ticks import ClosedTicks

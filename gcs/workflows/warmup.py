@@ -1,4 +1,4 @@
-"""The flight software compiled before it flies: its parts in as many processes as there are cores."""
+"""Compiles the flight software before it flies: its parts in as many processes as there are cores."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "s
 
 
 def flight_parts(laws: Sequence[str]) -> list[Part]:
-    """What `gcs fly` needs for flights with these laws; with none, by a third-party autopilot."""
+    """What `gcs fly` needs for flights with these laws; without any, for a third-party autopilot."""
     own = autopilot_parts(*laws) if laws else ()
     return [*own, SIMULATOR, _CHECK, _REPORT]
 
@@ -48,7 +48,7 @@ def parts_here(laws: Sequence[str]) -> list[Part]:
 
 
 def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
-    """What sweeps with these laws need beside that, and eight flights at once of each law of ours."""
+    """What sweeps with these laws need besides; for shipped laws also the lanes (eight flights at once)."""
     from gcs.sweep.warmup import lanes_part, sweep_parts
 
     shared = {part.mark for part in flight_parts(laws)}
@@ -57,7 +57,7 @@ def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
 
 
 def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
-    """Compile what is left to be compiled of these parts, the longest first."""
+    """Compile those of these parts that are not compiled yet, the longest first."""
     waiting = sorted((part for part in parts if not part.ready), key=lambda part: -part.cost_s)
     if not waiting:
         return

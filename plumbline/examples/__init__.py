@@ -1,1 +1,1 @@
-"""Custom control laws, as examples: docs/laws.md tells how they came about."""
+"""Examples of custom laws, an estimator and a planner: docs/laws.md, estimators.md and planners.md."""

@@ -5,16 +5,16 @@ Cable-Suspended Load. IEEE Conference on Decision and Control, 2013.
 
 | symbol     | code name    | frame | unit     | meaning                                           |
 |------------|--------------|-------|----------|---------------------------------------------------|
-| e_x, e_v   | e_x, e_v     | world | m, m/s   | errors of the load                                |
-| A          | A            | world | N        | force that load and vehicle together should get   |
+| e_x, e_v   | e_x, e_v     | world | m, m/s   | position and velocity error of the load           |
+| A          | A            | world | N        | desired force on load and vehicle together        |
 | q, q_c     | q, q_c       | world |          | direction of the cable, and the computed one      |
 | e_q, e_q'  | e_q, e_q_dot | world | , 1/s    | q x (q x q_c), and q' - (q_c x q_c') x q          |
-| F_n        | F_n          | world | N        | part of the force along the cable                 |
+| F_n        | F_n          | world | N        | component of the force along the cable            |
 | F_pd, F_ff | F_pd, F_ff   | world | N        | feedback and feed-forward across it               |
 
-F = F_n - F_pd - F_ff; the paper's attitude controller is the built-in one. Of q_c the direction is the
-computed one and the derivatives are those of the reference, which are the same where the load is where it
-should be.
+F = F_n - F_pd - F_ff; the built-in attitude controller replaces that of the paper. The direction q_c is the
+computed one, but its derivatives are those of the reference, which are the same while the load is at its
+desired position.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ PARAMETERS = {
 
 
 class Nothing(NamedTuple):
-    """The controller remembers nothing."""
+    """The memory of the controller, which is empty."""
 
 
 class Gains(NamedTuple):
-    """Of the two loops: the paper's by the mass of vehicle and load, and by m_Q L."""
+    """Gains of the two loops: those of the paper divided by the mass of vehicle and load, and by m_Q L."""
 
     k_x: float  # 1/s^2
     k_v: float  # 1/s
@@ -47,13 +47,13 @@ class Gains(NamedTuple):
 
 
 class Geometric(Gains):
-    """The controller: it is its gains."""
+    """The controller, which consists of its gains."""
 
     parameters = PARAMETERS
 
     @classmethod
     def build(cls, parameters: Mapping[str, float]) -> Geometric:
-        """The gains that the parameters say."""
+        """The controller with the gains given by the parameters."""
         return cls(parameters["GEO_KX"], parameters["GEO_KV"], parameters["GEO_KQ"], parameters["GEO_KW"])
 
     @kernel

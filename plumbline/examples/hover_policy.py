@@ -1,6 +1,6 @@
-"""A policy that PPO has learned in `plumbline/Hover-v0`, as a law: benchmarks/learn_to_hover.py made it.
+"""A policy trained with PPO in `plumbline/Hover-v0` by benchmarks/learn_to_hover.py, as a law.
 
-It hovers the load; it was never shown a path, and lags behind one.
+It hovers the load. It was not trained to follow a path, and lags behind one.
 """
 
 from __future__ import annotations
@@ -11,6 +11,6 @@ from plumbline.learning.law import PolicyLaw
 
 
 class HoverPolicy(PolicyLaw):
-    """Flies with the numbers in hover_policy.npz."""
+    """Flies with the weights in hover_policy.npz."""
 
     file = Path(__file__).with_name("hover_policy.npz")

@@ -1,13 +1,13 @@
 """A PID on the load's position, in plain Python.
 
-It asks for an acceleration of the load; from this follows the direction that the cable must have, and a
-second loop swings the cable there. Thrust and attitude are left to the built-in loop.
+It commands an acceleration of the load. From this follows the direction that the cable must have, and a
+second loop swings the cable to it. Thrust and attitude are left to the built-in loop.
 
 | symbol   | code name | frame | unit   | meaning                                  |
 |----------|-----------|-------|--------|------------------------------------------|
-| e_x, e_v | e_x, e_v  | world | m, m/s | of the load: where it is less where it should be |
-| a        | a         | world | m/s^2  | acceleration of the load that is asked for |
-| q, q_d   | q, q_d    | world |        | direction of the cable, and the wanted one |
+| e_x, e_v | e_x, e_v  | world | m, m/s | position and velocity error of the load   |
+| a        | a         | world | m/s^2  | commanded acceleration of the load        |
+| q, q_d   | q, q_d    | world |        | direction of the cable, and the desired one |
 | F        | F         | world | N      | force of the rotors                       |
 """
 
@@ -42,7 +42,7 @@ class LoadPid:
         self.k_q, self.k_w = parameters["PID_KQ"], parameters["PID_KW"]
 
     def start(self, now: Now) -> Vector:
-        """The integral of a flight that begins."""
+        """The integral when the mode begins."""
         return np.zeros(3)
 
     def load_position(self, integral: Vector, now: Now) -> tuple[Vector, Asked]:
@@ -54,7 +54,7 @@ class LoadPid:
             integral = integral + now.period_s * e_x
         a = a_d - self.k_p * e_x - self.k_i * integral - self.k_d * e_v
 
-        # the cable pulls the load along its own direction: against that of acceleration and gravity
+        # the cable pulls the load along -q, so q_d is opposite to a + g e3
         pull = a + np.array([0.0, 0.0, believed.gravity])
         size = np.linalg.norm(pull)
         q_d = -pull / size

@@ -1,22 +1,22 @@
-"""A Luenberger observer of vehicle and load, compiled: a model that is pulled to what the trackers see.
+"""A Luenberger observer of vehicle and load, compiled: a model corrected by the readings of the trackers.
 
-For rooms where trackers see vehicle and load (`lab`). The inertial unit drives the model; each reading of a
-tracker, which is some milliseconds old, is held against where the model was then.
+For rooms where trackers see vehicle and load (`lab`). The inertial unit drives the model. Each reading of a
+tracker, which is some milliseconds old, is compared with the state of the model at the time of the reading.
 
 | symbol   | code name | frame | unit  | meaning                                             |
 |----------|-----------|-------|-------|-----------------------------------------------------|
 | x, v     | x, v      | world | m, m/s | of the vehicle                                     |
 | R, omega | R, omega  | , body | , rad/s | attitude, body to world; body rate               |
-| b_a, b_g | b_a, b_g  | body  | m/s^2, rad/s | errors of accelerometer and gyro            |
+| b_a, b_g | b_a, b_g  | body  | m/s^2, rad/s | biases of accelerometer and gyro            |
 | x_L, v_L | x_L, v_L  | world | m, m/s | of the load                                        |
-| q, L     | q, length | world | , m   | direction from vehicle to load, and how far it is   |
+| q, L     | q, length | world | , m   | direction and distance from vehicle to load         |
 
 While the cable is taut the load is a pendulum below a vehicle of known acceleration a:
 
     x_L'' = a + L q'',   L q'' = -(I - q q^T) (a + g e_3) - L |q'|^2 q
 
-The gains follow from the bandwidths w: they put all poles of the errors to -w, of the vehicle's position
-three, of the others two.
+The gains follow from the bandwidths w: they place all poles of the error dynamics at -w, three for the
+position of the vehicle, and two each for attitude and load.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ class Memory(NamedTuple):
     b_g: Vec3
     x_L: Vec3
     v_L: Vec3
-    pose_s: float  # when the trackers' last readings were
+    pose_s: float  # time of the latest reading of each tracker
     load_s: float
 
 
 class Tuning(NamedTuple):
-    """Bandwidths, and what is believed."""
+    """Bandwidths, and the assumed gravity and load mass."""
 
     w_quad: float  # rad/s
     w_turn: float
@@ -78,24 +78,24 @@ class Tuning(NamedTuple):
 
 
 class Luenberger(Tuning):
-    """The observer: it is its tuning."""
+    """The observer, which consists of its tuning."""
 
     parameters = PARAMETERS
 
     @classmethod
     def build(cls, parameters: Mapping[str, float]) -> Luenberger:
-        """The tuning that the parameters say."""
+        """The observer with the tuning given by the parameters."""
         w_quad, w_turn, w_load = (parameters[name] for name in PARAMETERS)
         return cls(w_quad, w_turn, w_load, parameters["VEH_GRAVITY"], parameters["VEH_LOAD_MASS"])
 
     @kernel
     def start(self, now: Sensed) -> Memory:
-        """A model of which nothing is known."""
+        """A model whose state is still unknown."""
         return Memory(False, ZERO, ZERO, IDENTITY, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0)
 
     @kernel
     def estimate(self, m: Memory, now: Sensed) -> tuple[Memory, Estimate]:
-        """The model a tick later, pulled to what is new."""
+        """The model one tick later, corrected by new readings."""
         pose, load, dt = now.pose, now.load, now.period_s
         if not m.begun:
             if pose.new and load.new:
@@ -122,7 +122,7 @@ class Luenberger(Tuning):
         x_L, v_L = axpy(dt, m.v_L, m.x_L), axpy(dt, a_L, m.v_L)
         b_a, b_g, pose_s, load_s = m.b_a, m.b_g, m.pose_s, m.load_s
 
-        # what the trackers say of where it was
+        # corrections by the readings of the trackers, compared with the model at their time
         if pose.new:
             age, T, w = now.time_s - pose.time_s, pose.time_s - pose_s, self.w_quad
             e = sub(pose.x_quad, axpy(-age, v, x))

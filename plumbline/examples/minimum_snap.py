@@ -1,4 +1,4 @@
-"""Minimum snap through waypoints, as Mellinger and Kumar have it: a polynomial of degree 7 for each segment.
+"""Minimum snap through waypoints, after Mellinger and Kumar: a polynomial of degree 7 for each segment.
 
 D. Mellinger, V. Kumar: Minimum Snap Trajectory Generation and Control for Quadrotors. IEEE International
 Conference on Robotics and Automation, 2011.
@@ -6,14 +6,14 @@ Conference on Robotics and Automation, 2011.
 | symbol | code name | meaning                                                        |
 |--------|-----------|----------------------------------------------------------------|
 | T_k    | T         | duration of segment k, s                                       |
-| u      | u         | time in a segment by its duration, 0 ... 1                     |
+| u      | u         | time in a segment divided by its duration, 0 ... 1             |
 | c_ki   | c         | coefficient of u^i in segment k, m                             |
-| A, b   | A, b      | what holds: waypoints, rest at both ends, derivatives that meet |
+| A, b   | A, b      | conditions: waypoints, rest at both ends, equal derivatives    |
 
-Of all paths that pass the waypoints at given times, and rest up to the jerk at both ends, the one of least
-snap is the polynomial of degree 7 whose derivatives up to the sixth are the same where two segments meet: as
-many equations as coefficients. Segments take as long as they would at the mission's speed; then the whole is
-stretched until speed, acceleration and rotors allow it.
+Among all paths that pass the waypoints at given times, and are at rest up to the jerk at both ends, the path
+of least snap consists of polynomials of degree 7 whose derivatives up to the sixth are equal where two
+segments meet: as many equations as coefficients. A segment lasts as long as it would at the mission's speed,
+plus a time to accelerate; then the whole path is slowed down until speed, acceleration and rotors allow it.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from plumbline.planners import Parameter, Path, Route, polynomials, slower, use
 Array = NDArray[np.float64]
 
 N = 8  # coefficients of a segment
-REST = 4  # derivatives, from the position on, that are given at the ends
-MEET = 7  # that are the same where two segments meet
+REST = 4  # derivatives, including the position, that are given at the ends
+MEET = 7  # derivatives, including the position, that are equal where two segments meet
 TRIES = 40
 
 PARAMETERS = {"SNAP_SLOW": Parameter(1.0, 1.0, 5.0, "", "How many times as long as need be the paths take")}
@@ -45,7 +45,7 @@ class MinimumSnap:
         self.longer = parameters["SNAP_SLOW"]
 
     def plan(self, route: Route) -> Path:
-        """From rest to rest, past each point."""
+        """A path from rest to rest through each point."""
         points = np.array(route.points)
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         T = lengths / route.speed_m_s + sqrt(lengths.mean() / route.accel_m_s2)
@@ -60,13 +60,13 @@ class MinimumSnap:
 
 
 def coefficients(points: Array, T: Array) -> Array:
-    """(segments, N, 3) of the powers of time since the begin of each segment."""
+    """Coefficients (segments, N, 3) of the powers of time since the beginning of each segment."""
     n, mean = len(T), float(T.mean())
     A, b = np.zeros((n * N, n * N)), np.zeros((n * N, 3))
     row = 0
 
     def hold(value: Array | float, *terms: tuple[int, float, int, float]) -> None:
-        """Segments at u, in a derivative of this order, each by a factor, sum up to the value."""
+        """Add an equation: derivatives of this order of segments at u, each times a factor, sum to value."""
         nonlocal row
         for segment, u, order, factor in terms:
             columns = slice(segment * N, (segment + 1) * N)

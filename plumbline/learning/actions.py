@@ -1,13 +1,13 @@
-"""What an action asks of the rotors: numbers between -1 and 1 become thrust and moment.
+"""What an action commands: numbers between -1 and 1 become thrust and moment of the rotors.
 
 | action | numbers | what 0 and +-1 mean |
 |---|---|---|
 | rotors | force of each rotor | 0 hovers, 1 is the greatest force, -1 the least; linear in between |
-| ctbr | thrust, body rates about x, y, z | thrust as above; rates times the greatest |
-| acceleration | acceleration of the load, ENU | times the greatest; 0 holds the load as it moves |
+| ctbr | thrust, body rates about x, y, z | thrust as above; rates in units of the greatest |
+| acceleration | acceleration of the load, ENU | in units of the greatest; 0 keeps the load's velocity |
 
-Rates are followed by M = J k (Omega_d - Omega) + Omega x J Omega, an acceleration by the load attitude mode
-of the law `thesis`: q_d = -A/|A| with A = a + g e3, under a pull of (m_Q + m_L) |A . q|.
+Rates are tracked by M = J k (Omega_d - Omega) + Omega x J Omega, an acceleration by the load attitude mode
+of the law `thesis`: q_d = -A/|A| with A = a + g e3, with a pull of (m_Q + m_L) |A . q|.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ _LEAST_ACCEL = 1e-3  # m/s^2; a shorter A has no direction
 
 
 class Mixing(NamedTuple):
-    """The rotors that carry an action out."""
+    """The mixer and the rotors that carry out an action."""
 
     table: Floats  # (rotors + 1, 8) of the mixer
-    rotors: Floats  # its memory; forces (N) are in the row FORCE
+    rotors: Floats  # memory of the mixer; forces (N) are in the row FORCE
     hover: Floats  # (MOST,) N: force of each rotor that holds vehicle and load
 
 
 def size_of_action(kind: int, rotors: int) -> int:
-    """Numbers of an action."""
+    """How many numbers an action has."""
     return {ROTORS: rotors, RATES: 4, ACCELERATION: 3}[kind]
 
 
 @kernel
 def within(number: float) -> float:
-    """A number of an action, cut to -1 ... 1; one that is no number is -1."""
+    """A number of an action, clipped to -1 ... 1; NaN becomes -1."""
     return if_above(number, -1.0, min(number, 1.0), -1.0)
 
 
 @kernel
 def between(number: float, least: float, middle: float, most: float) -> float:
-    """What -1 ... 1 asks for: the least, the middle at 0, the most, linear in between."""
+    """The value that -1 ... 1 commands: `least`, `middle` at 0, `most`, linear in between."""
     if number > 0.0:
         return middle + number * (most - middle)
     return middle + number * (middle - least)
@@ -57,7 +57,7 @@ def between(number: float, least: float, middle: float, most: float) -> float:
 
 @kernel
 def number_of(value: float, least: float, middle: float, most: float) -> float:
-    """The number that asks for a value, -1 ... 1."""
+    """The number, -1 ... 1, that commands a value: the inverse of `between`."""
     if value > middle:
         return min((value - middle) / (most - middle), 1.0)
     return max((value - middle) / (middle - least), -1.0)
@@ -65,7 +65,7 @@ def number_of(value: float, least: float, middle: float, most: float) -> float:
 
 @kernel
 def rate_moment(wanted: Vec3, state: State, model: ActionModel) -> Vec3:
-    """Moment (N m, body) that follows body rates (rad/s)."""
+    """Moment (N m, body) that tracks body rates (rad/s)."""
     J, Omega = model.vehicle.inertia, state.omega_body
     turning = times(J, times(model.rate_gain, sub(wanted, Omega)))
     return add(turning, cross(Omega, times(J, Omega)))
@@ -75,8 +75,8 @@ def rate_moment(wanted: Vec3, state: State, model: ActionModel) -> Vec3:
 def carry_out(
     action: Any, state: State, memory: ThesisMemory, model: ActionModel, mixing: Mixing
 ) -> tuple[ThesisMemory, MixerResult]:
-    """Put the rotor forces for an action at this tick into `mixing.rotors`; the memory is that of the law
-    below an acceleration."""
+    """Write the rotor forces for an action at this tick into `mixing.rotors`; the memory is that of the law
+    that tracks an acceleration."""
     vehicle, table, rotors = model.vehicle, mixing.table, mixing.rotors
     if model.kind == ROTORS:
         for i in range(table.shape[0] - 1):
@@ -101,8 +101,8 @@ def carry_out(
 
 @kernel
 def numbers_for(mixed: MixerResult, state: State, model: ActionModel, mixing: Mixing, out: Any) -> None:
-    """Write the action that asks for what a law asks for at this tick: rotor forces, or thrust and body
-    rates."""
+    """Write the action that is equivalent to the command of a law at this tick: rotor forces, or thrust and
+    body rates."""
     if model.kind == ROTORS:
         table = mixing.table
         for i in range(table.shape[0] - 1):

@@ -1,4 +1,4 @@
-"""A control law as a policy: what a learner is measured against."""
+"""A control law as a policy: the baseline with which a learner is compared."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Array = NDArray[np.float32]
 
 
 class LawPolicy:
-    """What a law would do in environments whose actions are `rotors` or `ctbr`.
+    """The actions of a law in environments whose actions are `rotors` or `ctbr`.
 
-    A law flies at every tick of the autopilot; an action is held for a step. With `action="rotors"` and a
-    `rate_hz` of the autopilot's 250 both are the same.
+    In flight a law commands at every tick of the autopilot; here its action is held for a step. With
+    `action="rotors"` and a `rate_hz` of 250, the rate of the autopilot, both are the same.
     """
 
     def __init__(self, env: Any, law: str = DEFAULT_LAW) -> None:
@@ -43,7 +43,8 @@ class LawPolicy:
         self._pilots: list[_LawPilot | None] = [None] * self._episodes.count
 
     def predict(self, observation: Array, *_: Any, **__: Any) -> tuple[Array, None]:
-        """The actions for where the environments are now, and None, as Stable-Baselines3 returns them."""
+        """The actions for the present states of the environments, and None, as in Stable-Baselines3. The
+        observation is not used."""
         actions = np.zeros((self._episodes.count, self._scenario.task.sight.actions), np.float32)
         for i in range(self._episodes.count):
             if self._episodes.begins(i) or self._pilots[i] is None:
@@ -57,7 +58,7 @@ class LawPolicy:
 
 
 class _LawPilot:
-    """A law on one episode."""
+    """A law that flies one episode."""
 
     def __init__(self, setup: Any, mixing: Mixing) -> None:
         self._setup, self.mixing = setup, mixing
@@ -68,7 +69,7 @@ class _LawPilot:
         self._memory: Any = None
 
     def step(self, state: Any, episodes: Any, i: int, ticks: int) -> Any:
-        """What the law asks of the rotors now; it is believed to be held for a step."""
+        """The law's command to the rotors now; the law assumes that it is held for a step."""
         setup = self._setup
         law, vehicle, actuation = setup.law, setup.vehicle, self._actuation
         kernels = law_of(law).kernels

@@ -1,4 +1,4 @@
-"""Many episodes side by side: their memory, how they begin, and steps of all of them at once."""
+"""Many episodes in parallel: their memory, their beginnings, and steps of all of them in one call."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from sitl.plant.records import PlantState
 from sitl.world import Floats, World
 
 Numbers = NDArray[np.int64]
-_LEAST_SHARE = 2000  # ticks of one thread for which another one pays
+_LEAST_SHARE = 2000  # ticks per thread from which on another thread is worthwhile
 
 
 class Episodes:
@@ -65,7 +65,7 @@ class Episodes:
         self._actions = np.zeros((count, scenario.task.sight.actions), np.float32)
         self._nowhere = np.zeros((1, 3))
         self._batch = self._memory()
-        self._alike: Beginning | None = None  # of all episodes, where they differ by place and speed alone
+        self._alike: Beginning | None = None  # of all episodes, if they differ only in position and velocity
         if not depends_on_chance(scenario):
             self._alike = beginning_of(scenario, scenario.draw(np.random.default_rng(0)))
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -75,7 +75,7 @@ class Episodes:
         self._run = entry_of(run_some, *self._job(self._all[:0], False, self._nowhere, self._nowhere))
 
     def close(self) -> None:
-        """Give up the threads."""
+        """End the threads."""
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
@@ -83,7 +83,7 @@ class Episodes:
     # ---- steps
 
     def step(self, actions: Actions, chosen: Numbers | None = None) -> None:
-        """Let all, or those that are `chosen`, do their actions (count, size)."""
+        """Step all episodes, or those that are `chosen`, with their actions (count, size)."""
         self._actions[:] = actions
         shares = np.array_split(self._all if chosen is None else chosen, self._threads)
         self._share([self._job(share, False, self._nowhere, self._nowhere) for share in shares])
@@ -111,7 +111,7 @@ class Episodes:
     # ---- beginnings
 
     def begin(self, chosen: Sequence[int], draws: Sequence[Draw]) -> None:
-        """Begin an episode in each chosen place; its first observation is in `observations`."""
+        """Begin an episode in each chosen environment; its first observation is in `observations`."""
         jets = self.scenario.reference[[draw.begin for draw in draws]]
         velocities = np.ascontiguousarray(jets[:, 3:6])
         places = jets[:, :3] + np.array([draw.offset for draw in draws])
@@ -130,7 +130,7 @@ class Episodes:
     def _lay_out(
         self, chosen: Sequence[int], draws: Sequence[Draw], places: Floats, velocities: Floats
     ) -> None:
-        """The memory of episodes that begin alike: load and vehicle move together, the cable vertical."""
+        """Fill the memory of episodes that begin alike: load and vehicle move together, cable vertical."""
         made = self._alike or beginning_of(self.scenario, draws[0])
         batch, rows, waiting, at = self._batch, made.rows, len(made.commands), np.asarray(chosen)
         batch.world[at] = made.world
@@ -197,7 +197,7 @@ class Episodes:
         )
 
     def _senses(self, core: FlightCore, readings: int) -> Senses:
-        """The estimators, which know nothing yet, for an autopilot whose law has its turn every second
+        """The memory of the estimators before the first reading, for an autopilot whose law runs every second
         tick."""
         n = self.count
         pilot = core.pilot
@@ -229,7 +229,7 @@ class Episodes:
 
     @property
     def mixing(self) -> Mixing:
-        """The mixer of one vehicle, with a memory of its own."""
+        """The mixer of one vehicle, with its own memory."""
         return Mixing(self._batch.mixer, new_rotors(), self._batch.hover)
 
     # ---- what is true
@@ -239,17 +239,17 @@ class Episodes:
         return unpack(World, self._batch.world[i], 0).plant
 
     def state(self, i: int) -> State:
-        """The state that is observed."""
+        """The observed state of an episode: the true or the estimated one."""
         if self.scenario.estimated:
             return unpack(Seen, self._batch.senses.seen[i], 0).state
         return true_state(self.plant(i))
 
     def begins(self, i: int) -> bool:
-        """Whether no step of an episode has been done yet."""
+        """Whether an episode has not been stepped yet."""
         return unpack(Episode, self._batch.episode[i], 0).tick == 0
 
     def jet(self, i: int, ahead_s: float = 0.0) -> Jet:
-        """Where the load is to be, with six derivatives, so many seconds from now."""
+        """Desired position of the load, with six derivatives, `ahead_s` seconds from now."""
         episode = unpack(Episode, self._batch.episode[i], 0)
         later = round(ahead_s * 1e6 / self.scenario.tick_us)
         return jet_at(self.scenario.reference, episode.begin + episode.tick + later)

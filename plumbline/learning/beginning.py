@@ -1,4 +1,4 @@
-"""The world as an episode begins: the load hanging from the vehicle in the air."""
+"""The world at the beginning of an episode: the load hangs from the vehicle in the air."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ X_LOAD, V_LOAD, X_QUAD, V_QUAD = (_place(name) for name in ("x_load", "v_load", 
 
 @dataclass(frozen=True)
 class Beginning:
-    """All of a world but where it is and how fast it moves; the load rests at the origin."""
+    """A world except for its position and velocity: the load rests at the origin."""
 
     world: Row
     rows: WorldRows  # model, rotors, fate and errors of the sensors
     clock: Ints
-    commands: Floats  # (waiting, 1 + rotors) given before, and on their way yet
+    commands: Floats  # (waiting, 1 + rotors) given before, and still in transit
     cable_length: float  # m
 
 
 def beginning_of(scenario: Scenario, draw: Draw) -> Beginning:
-    """The world of an episode. The rotors carry the weight, and have been asked to for long."""
+    """The world of an episode. The rotors carry the weight, and have been commanded to for a long time."""
     rows, truth, settings = scenario.world(draw)
     hover = hover_forces(scenario, (truth.quad_mass + truth.load_mass) * truth.gravity)
     for row in (ASKED, COMMAND, TARGET, FORCE):
         rows.rotors[row] = hover
     world = unpack(World, rows.world, 0)._replace(plant=_hanging(truth))
     clock = rows.clock.copy()
-    clock[:, LENGTH] = 0  # what was measured on the ground is lost
+    clock[:, LENGTH] = 0  # readings taken on the ground are discarded
     if not scenario.estimated:
         clock[:, DUE] = _NEVER
     waiting = settings.actuator_delay_us // settings.tick_us
@@ -58,13 +58,13 @@ def beginning_of(scenario: Scenario, draw: Draw) -> Beginning:
 
 
 def depends_on_chance(scenario: Scenario) -> bool:
-    """Whether two episodes differ by more than place and speed."""
+    """Whether two episodes differ in more than position and velocity."""
     gusts = scenario.cell.settings.gust_std != 0.0
     return scenario.estimated or gusts or bool(scenario.options.randomise)
 
 
 def hover_forces(scenario: Scenario, weight: float) -> Floats:
-    """(MOST,) N: force of each rotor that holds a weight (N) level."""
+    """(MOST,) N: force of each rotor that carries a weight (N) with the vehicle level."""
     setup, rotors = scenario.cell.setup, new_rotors()
     mix(weight, ZERO, setup.vehicle, 0.0, allocate(setup.layout), rotors)
     forces: Floats = rotors[MIXED]

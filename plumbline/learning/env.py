@@ -39,18 +39,18 @@ class LoadEnv(gymnasium.Env[Array, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """The first observation of another episode; the same one after the same seed."""
+        """Begin a new episode and return its first observation; the same seed gives the same episode."""
         super().reset(seed=seed)
         self.episodes.begin([0], [self.scenario.draw(self.np_random)])
         return self.episodes.observations[0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Observation, reward, whether it crashed, whether the path is over; no information beside."""
+        """Observation, reward, whether it crashed, whether the path has ended, and an empty dictionary."""
         self.episodes.step(checked_actions("action", action, self._shape)[None])
         end = int(self.episodes.ends[0])
         reward = float(self.episodes.rewards[0])
         return self.episodes.observations[0].copy(), reward, end == CRASHED, end == ENDED, {}
 
     def close(self) -> None:
-        """Nothing is left behind."""
+        """Release what the environment holds."""
         self.episodes.close()

@@ -1,4 +1,4 @@
-"""A trained policy as a control law: what `--law FILE:CLASS` takes.
+"""A trained policy as a control law, for `--law FILE:CLASS`.
 
 from pathlib import Path
 from plumbline.learning.law import PolicyLaw
@@ -26,10 +26,10 @@ class PolicyLaw:
         self._pilot = PolicyPilot(load_policy(self.file))
 
     def start(self, now: Now) -> None:
-        """Begin as an episode begins."""
+        """Reset the policy, as at the beginning of an episode."""
         self._pilot.start()
 
     def load_position(self, memory: None, now: Now) -> tuple[None, Asked]:
-        """What the policy asks for; it remembers by itself what it has seen."""
+        """The policy's command; the policy itself keeps its earlier observations."""
         thrust, moment = self._pilot.tick(now.state, now.reference.jet)
         return None, wrench(thrust, moment)

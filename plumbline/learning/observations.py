@@ -1,8 +1,8 @@
-"""What a policy sees: the same numbers in an environment and in flight.
+"""What a policy observes: the same numbers in an environment and in flight.
 
-| place | numbers | unit |
+| index | numbers | unit |
 |---|---|---|
-| 0 | x_L - x_d: the load from where it is to be | m |
+| 0 | x_L - x_d: position of the load relative to its desired position | m |
 | 3 | x_L' - x_d' | m/s |
 | 6 | q: unit vector from the vehicle to the load | |
 | 9 | q' | 1/s |
@@ -10,10 +10,10 @@
 | 21 | Omega: body rate | rad/s, body |
 | 24 | the last action | |
 
-Behind them, for each earlier step that is shown, newest first, its 24 numbers and the action before it; then,
-for each instant ahead, where the reference goes until then and its velocity there (m, m/s), by the six
-derivatives of the reference now. World ENU, body FLU. Positions are relative, so that a policy can be flown
-anywhere.
+These are followed by the 24 numbers of each earlier step of `history`, and the action before it, newest
+first. Then each instant of `preview` adds the displacement of the reference until that instant and its
+velocity at that instant (m, m/s), extrapolated from the six derivatives of the reference now. World ENU, body
+FLU. Positions are relative, so that a policy can be flown anywhere.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MOST
 from plumbline.learning.records import FEATURES, ViewModel
 
-AHEAD = 6  # numbers of an instant ahead
+AHEAD = 6  # numbers of an instant of the preview
 
 
 def size_of(view: ViewModel) -> int:
-    """Numbers of an observation."""
+    """How many numbers an observation has."""
     return (FEATURES + view.actions) * (1 + view.past) + AHEAD * view.ahead
 
 
@@ -68,8 +68,8 @@ def _preview(jet: Jet, ahead: int, ahead_s: float, out: Any, at: int) -> None:
 
 @kernel
 def look(state: State, jet: Jet, action: Any, past: Any, view: ViewModel, out: Any) -> None:
-    """Write the observation after the step in which `action` was done into `out`, and note it in `past`
-    (steps, FEATURES + MOST), newest first, as the latest of the earlier steps."""
+    """Write the observation after a step with `action` into `out`, and insert it into `past` (steps,
+    FEATURES + MOST), which has the newest of the earlier steps first."""
     _features(state, jet, out)
     for i in range(view.actions):
         out[FEATURES + i] = action[i]

@@ -1,4 +1,4 @@
-"""What an environment is made with, checked once."""
+"""The options of an environment, checked once."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class EnvOptions:
     reach_m: float = 2.0
     max_rate_rad_s: tuple[float, float, float] = (6.0, 6.0, 2.0)
     max_accel_m_s2: tuple[float, float, float] = (4.0, 4.0, 4.0)
-    mission: str | Path | Mission | None = None  # None: hover where the load is
+    mission: str | Path | Mission | None = None  # None: hover at a fixed position
     start: str = "begin"
 
     @cached_property
@@ -89,7 +89,7 @@ class EnvOptions:
 
 
 def options_of(given: Mapping[str, Any]) -> EnvOptions:
-    """The options in keyword arguments. `Error` (plumbline.Error) that names what is wrong."""
+    """The options given as keyword arguments. `Error` (plumbline.Error) names what is wrong."""
     known = [each.name for each in fields(EnvOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:

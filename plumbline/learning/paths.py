@@ -1,4 +1,4 @@
-"""The path of a mission as one table: where the load is to be at each tick while it is carried."""
+"""The path of a mission as one table: the desired position of the load at each tick while it is carried."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from gcs.errors import GcsError
 from missions.model import AttitudeRun, Land, Release, Speed, Takeoff, Winch
 from sitl.world import Floats
 
-_LATER = (Land, Release, AttitudeRun, Winch)  # from such a step on there is no path of the load to follow
+_LATER = (Land, Release, AttitudeRun, Winch)  # the first of these steps ends the path of the load
 
 
 def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: float, name: str) -> Floats:
-    """(ticks, 21) position of the load and its six derivatives, from after the take-off on, each leg as the
-    autopilot flies it. `Error` where a mission has no such leg."""
+    """(ticks, 21) position of the load and its six derivatives, beginning after the take-off, each leg as the
+    autopilot flies it. `Error` if the mission has no such leg."""
     flight = with_plan(Flight(), plan)
     flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
     here: Vec3 = ZERO

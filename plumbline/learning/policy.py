@@ -1,7 +1,7 @@
-"""A trained policy as a file of numbers, and as what flies a vehicle tick by tick.
+"""A trained policy: its file, and flying a vehicle with it tick by tick.
 
-A file holds the weights of a network and the options of the environment that decide what it sees and does.
-It is read by numpy alone: what it was trained with is not needed to fly it.
+A file holds the weights of a network, and the options of the environment that determine its observations and
+actions. It is read by numpy alone: the libraries that trained the policy are not needed to fly it.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from plumbline.learning.records import FEATURES
 from plumbline.learning.scenario import Scenario
 
 Floats = NDArray[np.float32]
-Layers = Sequence[tuple[Floats, Floats]]  # (weights (outputs, inputs), biases) of each
+Layers = Sequence[tuple[Floats, Floats]]  # (weights (outputs, inputs), biases) of each layer
 
-SHOWN = (  # options that decide what a policy sees and does
+SHOWN = (  # options that determine the observations and actions of a policy
     "action",
     "rate_hz",
     "history",
@@ -47,8 +47,8 @@ _AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 
 
 class Policy:
-    """A network with tanh between its layers. `options` are those of its environment, as far as they
-    matter."""
+    """A network with tanh between its layers. Of the `options` of its environment, those in `SHOWN` are
+    kept."""
 
     def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
         self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
@@ -106,7 +106,7 @@ def policy_of_sb3(model: Any, options: Mapping[str, Any]) -> Policy:
 
 
 class PolicyPilot:
-    """A policy that flies one vehicle: it is asked at each tick of the autopilot."""
+    """A policy that flies one vehicle: it is called at each tick of the autopilot."""
 
     def __init__(self, policy: Policy) -> None:
         scenario = Scenario(options_of(policy.options))
@@ -121,19 +121,19 @@ class PolicyPilot:
         self._memory: ThesisMemory | None = None
         hover = hover_forces(scenario, task.action.weight)
         self._mixing = Mixing(allocate(scenario.cell.setup.layout), new_rotors(), hover)
-        # compiled now, and not in the air
+        # compile now, not in flight
         self.tick(_AT_REST, (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO))
         self.start()
 
     def start(self) -> None:
-        """Begin anew, as an episode begins."""
+        """Reset, as at the beginning of an episode."""
         self._past[:] = 0.0
         self._action[:] = 0.0
         self._tick, self._memory = 0, None
 
     def tick(self, state: State, reference: Jet) -> tuple[float, Vec3]:
-        """Thrust (N) and moment (N m, body) at this tick, for what is known of the motion and for where the
-        load is to be."""
+        """Thrust (N) and moment (N m, body) at this tick, for the known state and the reference of the
+        load."""
         if self._tick % self._ticks == 0:
             look(state, reference, self._action, self._past, self._sight, self.observation)
             for k, number in enumerate(self._policy(self.observation).tolist()):

@@ -1,4 +1,4 @@
-"""The step of an environment compiled before it is made, with what `gcs fly` says meanwhile."""
+"""Compiles the step of an environment before the environment is made, with the messages of `gcs fly`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _COST_S = {"truth": 9.0, "estimate": 17.0}
 
 
 def part_of(observation: str) -> Part:
-    """What environments need that observe the truth, or the estimate."""
+    """What must be compiled for environments that observe the truth, or the estimate."""
     title = f"environments that observe the {observation}"
     return Part(
         title, "plumbline.learning.ready", (observation,), _SOURCE, f"env-{observation}", _COST_S[observation]
@@ -23,12 +23,12 @@ def part_of(observation: str) -> Part:
 
 
 def make_ready(scenario: Scenario) -> None:
-    """Compile what is left to be compiled; it is told on stderr."""
+    """Compile what is not compiled yet, with messages on stderr."""
     warm_up([part_of(scenario.options.observation)])
 
 
 def main(observation: str) -> None:
-    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    """Compile it, unless it is compiled already; prints the names of the kernels that it compiles."""
     name_what_is_compiled()
     from plumbline.learning.batch import Episodes
 

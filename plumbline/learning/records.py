@@ -1,7 +1,7 @@
-"""What the compiled step of an environment reads and writes.
+"""The data that the compiled step of an environment reads and writes.
 
-Numbers of an episode are a row of `Batch`, a row for each environment; what all environments share stands
-once. SI, world ENU, body FLU.
+`Batch` has a row for each environment, with the numbers of its episode; data that all environments share is
+stored once. SI, world ENU, body FLU.
 """
 
 from __future__ import annotations
@@ -19,35 +19,35 @@ from autopilot.geometry.packed import Row
 from gcs.sweep.kernel import Code
 from sitl.world import Floats, Ints
 
-ROTORS, RATES, ACCELERATION = range(3)  # what an action means
+ROTORS, RATES, ACCELERATION = range(3)  # kinds of actions
 ACTIONS = {"rotors": ROTORS, "ctbr": RATES, "acceleration": ACCELERATION}
-FEATURES = 24  # of the observation, without past and preview
+FEATURES = 24  # numbers of an observation without actions, past and preview
 
 
 class ActionModel(NamedTuple):
-    """What numbers between -1 and 1 ask of the vehicle, as the autopilot believes it to be."""
+    """What numbers between -1 and 1 command, for the vehicle that the autopilot assumes."""
 
     kind: int  # ROTORS, RATES or ACCELERATION
     vehicle: Vehicle
     limited: float  # 1.0: the rotors have limits
     weight: float  # N, of vehicle and load
-    least: float  # N, that a rotor of strength 1 can be asked for
-    most: float  # N
+    least: float  # N, smallest force that can be commanded of a rotor of strength 1
+    most: float  # N, greatest
     strength: float  # of all rotors together
-    rates: Vec3  # rad/s, greatest that can be asked for, body
-    rate_gain: Vec3  # 1/s, of the loop that follows them
-    accel: Vec3  # m/s^2, greatest of the load
-    gains: ThesisGains  # of the cascade whose load attitude mode follows an acceleration
+    rates: Vec3  # rad/s, greatest that can be commanded, body
+    rate_gain: Vec3  # 1/s, of the loop that tracks them
+    accel: Vec3  # m/s^2, greatest of the load that can be commanded
+    gains: ThesisGains  # of the cascade whose load attitude mode tracks an acceleration
     filters: ThesisFilters
 
 
 class ViewModel(NamedTuple):
-    """What an observation is made of."""
+    """What an observation contains."""
 
     actions: int  # numbers of an action
-    past: int  # how many earlier steps are shown
-    ahead: int  # how many instants of the reference to come are shown
-    ahead_s: float  # time between these
+    past: int  # number of earlier steps
+    ahead: int  # number of future instants of the reference
+    ahead_s: float  # time between these instants
 
 
 class Reward(NamedTuple):
@@ -71,11 +71,11 @@ class TaskModel(NamedTuple):
     reward: Reward
     ticks: int  # of a step
     reach: float  # m, from the reference; further away is a crash
-    settle: int  # ticks for which the simulator flies before an episode, so that the estimate is found
+    settle: int  # ticks for which the simulator flies before an episode, so that the estimate converges
 
 
 class Episode(NamedTuple):
-    """Where an environment is in its episode."""
+    """How far an environment is in its episode."""
 
     begin: int  # row of the reference at its first tick
     tick: int
@@ -99,8 +99,8 @@ class Senses(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """The memory of all environments; the first axis counts them, but for what they share (`mixer`, `hover`,
-    `task`, `reference`). `world` to `rotor_table` are as in `WorldRows`."""
+    """The memory of all environments. The first axis is the environment, except in shared data (`mixer`,
+    `hover`, `task`, `reference`). `world` to `rotor_table` are as in `WorldRows`."""
 
     world: Floats
     model: Floats
@@ -121,7 +121,7 @@ class Batch(NamedTuple):
     law: Floats  # ThesisMemory
     past: Floats  # (n, past, FEATURES + MOST), newest first
     task: Row  # TaskModel
-    reference: Floats  # (ticks, 21) where the load is to be
+    reference: Floats  # (ticks, 21) desired position of the load and its derivatives
     senses: Any  # Senses; None: the truth is observed
     code: Code  # of the ticks of world and autopilot
 

@@ -1,4 +1,4 @@
-"""The numbers of an environment from its options: vehicle, sensors, path, and what differs by episode."""
+"""The data of an environment, from its options: vehicle, sensors, path, and the draws of each episode."""
 
 from __future__ import annotations
 
@@ -41,24 +41,24 @@ from sitl.vehicles.truth import load_truth
 from sitl.world import Floats, WorldRows, command_room, new_world
 
 HOVER_AT: Vec3 = (0.0, 0.0, 3.0)  # m, of the load
-SETTLE_S = 2.0  # that the simulator flies before an episode in which the estimate is observed
+SETTLE_S = 2.0  # for which the simulator flies before an episode, if the estimate is observed
 RATE_GAIN: Vec3 = (20.0, 20.0, 8.0)  # 1/s
-_LAW = "thesis"  # flies below an acceleration, and before an episode
+_LAW = "thesis"  # tracks an acceleration, and flies before an episode
 _FIXED = ("SIM_RATE_HZ", "SIM_LOSS_PCT")  # the same for all episodes
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What chance decides about an episode."""
+    """The random numbers of an episode."""
 
     seed: int
-    offset: Vec3  # m, of the load from where it is to be
+    offset: Vec3  # m, of the load from its desired position
     begin: int  # row of the path
-    values: tuple[float, ...]  # of what is randomised
+    values: tuple[float, ...]  # of the randomised parameters
 
 
 class Scenario:
-    """An environment's numbers. `Error` (plumbline.Error) where the options cannot be."""
+    """The data of an environment. `Error` (plumbline.Error) if the options are invalid."""
 
     def __init__(self, options: EnvOptions) -> None:
         self.options = options
@@ -74,10 +74,10 @@ class Scenario:
             self._conditions(values)
         self.reference, self.task = self._reference(), self._task()
 
-    # ---- what chance decides
+    # ---- what is random
 
     def draw(self, rng: np.random.Generator) -> Draw:
-        """Of the next episode: as many numbers for each, whatever they decide."""
+        """Draw the next episode; each draw takes the same number of random numbers, used or not."""
         one, two, three, where, seed, *rest = rng.random(5 + len(self._names)).tolist()
         width = 2.0 * self.options.start_m
         offset = (width * (one - 0.5), width * (two - 0.5), width * (three - 0.5))
@@ -97,7 +97,7 @@ class Scenario:
         return new_world(truth, self.cell.profile, settings, draw.seed, self.cell.layout), truth, settings
 
     def roomiest(self) -> tuple[int, int]:
-        """Commands, and readings of one sensor, that can be on their way in any episode."""
+        """How many commands, and readings of one sensor, can be in transit at most in any episode."""
         rooms, queues = [], []
         for share in (0.0, 1.0):
             values = tuple(a + share * b for a, b in zip(self._lows, self._spans, strict=True))
@@ -107,7 +107,7 @@ class Scenario:
         return max(rooms), max(queues)
 
     def _conditions(self, values: tuple[float, ...]) -> tuple[Truth, Settings]:
-        """What is true of the vehicle and the settings of the simulator in an episode."""
+        """The true vehicle, and the settings of the simulator, in an episode."""
         if not values:
             return self.cell.truth, self.cell.settings
         table = self._simulator
@@ -138,7 +138,7 @@ class Scenario:
     # ---- what is the same for all episodes
 
     def setup_of(self, law: str) -> Setup:
-        """What the autopilot is given to fly with a law. `Error` if there is none of that name."""
+        """The setup of the autopilot for flying with a law. `Error` if there is no law of that name."""
         if law not in LAWS:
             hint = did_you_mean(law, LAWS)
             raise GcsError(f"law {law!r}: there is none of that name; {hint}must be one of {', '.join(LAWS)}")
@@ -214,7 +214,7 @@ class Scenario:
 
     @property
     def size(self) -> int:
-        """Numbers of an observation."""
+        """How many numbers an observation has."""
         return size_of(self.task.sight)
 
     @property

@@ -13,7 +13,7 @@ from plumbline.arguments import shown
 from plumbline.learning.scenario import Scenario
 
 Array = NDArray[np.float32]
-_FURTHEST = 1e6  # beyond what the plant takes for a motion at all (m, m/s, rad/s)
+_FURTHEST = 1e6  # beyond every motion that the plant accepts (m, m/s, rad/s)
 
 
 def action_space(scenario: Scenario) -> Space[Array]:
@@ -27,8 +27,8 @@ def observation_space(scenario: Scenario) -> Space[Array]:
 
 
 def checked_actions(name: str, given: Any, shape: tuple[int, ...]) -> Array:
-    """The numbers of an action, or of one for each environment, of this shape; they need not lie in the space
-    and are cut to it. `Error` if they are of another shape, or no numbers."""
+    """The numbers of an action, or of one action for each environment. Numbers outside the space are allowed;
+    the step clips them. `Error` if the shape is another one, or if a number is not finite."""
     try:
         found = np.asarray(given, np.float32)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The environments for Stable-Baselines3, which has an interface of its own for many at once."""
+"""The environments for Stable-Baselines3, which has its own interface for many environments."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from plumbline.learning.vector import LoadVectorEnv
 
 
 class SB3VecEnv(VecEnv):  # type: ignore[misc]
-    """The environments of a `LoadVectorEnv` as Stable-Baselines3 takes them.
+    """The environments of a `LoadVectorEnv`, with the interface of Stable-Baselines3.
 
         SB3VecEnv(gymnasium.make_vec("plumbline/Hover-v0", 64, autoreset_mode="SameStep"))
 
-    Its autoreset mode must be SAME_STEP, for that is what Stable-Baselines3 expects.
+    Their autoreset mode must be SAME_STEP, because Stable-Baselines3 expects it.
     """
 
     def __init__(self, envs: Any) -> None:
@@ -37,11 +37,11 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc]
         return self.envs.reset(seed=seeds)[0]
 
     def step_async(self, actions: Any) -> None:
-        """Note the actions."""
+        """Store the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Do them: observations, rewards, who is done, and information on each."""
+        """Step with the stored actions: observations, rewards, which episodes have ended, and their infos."""
         seen, rewards, crashed, ended, infos = self.envs.step(self._actions)
         done = crashed | ended
         told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -51,23 +51,23 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc]
         return seen, rewards.astype(np.float32), done, told
 
     def close(self) -> None:
-        """Give up the threads."""
+        """End the threads."""
         self.envs.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, the same for all."""
+        """An attribute, which is the same for all environments."""
         return [getattr(self.envs, attr_name)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """None can be set."""
+        """No attribute can be set: always an `Error`."""
         raise GcsError(f"{attr_name}: the environments are made with their options, and keep them")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """A method of all."""
+        """Call a method of all environments together; its result is repeated for each."""
         return [getattr(self.envs, method_name)(*args, **kwargs)] * len(self._chosen(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """None is."""
+        """No environment is wrapped."""
         return [False] * len(self._chosen(indices))
 
     def _chosen(self, indices: int | Iterable[int] | None) -> Sequence[int]:

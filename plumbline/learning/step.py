@@ -1,8 +1,9 @@
-"""A step of many environments in one call of machine code: the tick of the world, and before each the action.
+"""A step of many environments in one call of machine code: ticks of the world, each preceded by the action.
 
-`sitl.world.world_tick` moves the world, rounding and sensors included, as in every flight. Where the estimate
-is observed the readings go through the autopilot's own estimator, in ticks of `autopilot.core.tick.fly_tick`
-in which the law has no turn. Both are the very machine code of a flight, so that there is little to compile.
+`sitl.world.world_tick` advances the world, including rounding and sensors, as in every flight. If the
+estimate is observed, the readings go through the autopilot's own estimator, in ticks of
+`autopilot.core.tick.fly_tick` in which the law does not run. Both are the same machine code as in a flight,
+so that there is little to compile.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from sitl.plant.records import PlantState
 from sitl.world import World, WorldModel, WorldRows
 
 FLYING, CRASHED, ENDED = 0, 1, 2
-LAW_EVERY = 2  # ticks; of these the estimator has the odd one
+LAW_EVERY = 2  # ticks; only the odd ones are flown, in which only the estimator runs
 _ODD = 1
 
 
@@ -89,7 +90,7 @@ def _mixing(batch: Batch, i: int) -> Mixing:
 
 @kernel
 def true_state(plant: PlantState) -> State:
-    """What a law would be told if it were told the truth."""
+    """The true state in the form in which a law receives it."""
     return State(
         plant.x_load,
         plant.v_load,
@@ -105,7 +106,7 @@ def true_state(plant: PlantState) -> State:
 
 @kernel
 def _known(senses: Any, plant: PlantState, i: int) -> State:
-    """The state that is observed."""
+    """The observed state: the true or the estimated one."""
     if senses is None:
         return true_state(plant)
     return unpack(Seen, senses.seen[i], 0).state
@@ -118,7 +119,7 @@ def _vector(reference: Any, row: int, first: int) -> Vec3:
 
 @kernel
 def jet_at(reference: Any, row: int) -> Jet:
-    """The reference at a row of its table, or its last one."""
+    """The reference at a row of its table, or at the last row if the table is shorter."""
     at = min(row, reference.shape[0] - 1)
     return (
         _vector(reference, at, 0),
@@ -133,7 +134,7 @@ def jet_at(reference: Any, row: int) -> Jet:
 
 @kernel
 def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
-    """What the autopilot believes of rotors and disturbances after a command."""
+    """Update what the autopilot assumes of rotors and disturbances after a command."""
     constants = unpack(CoreConstants, senses.constants, 0)
     pilot, seen = unpack(Pilot, senses.pilot[i], 0), unpack(Seen, senses.seen[i], 0)
     cable = unpack(Winch, senses.winch, 0).cable
@@ -156,7 +157,7 @@ def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
 
 @kernel
 def _tick(senses: Any, code: Code, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing) -> PlantState:
-    """The world at the next tick, and the estimate of it; the true state."""
+    """Advance the world, and the estimate of it, by one tick; returns the true state."""
     put_forces(mixing.rotors, mixing.table, rows)
     if senses is not None:
         _believe(senses, i, mixed)
@@ -226,7 +227,7 @@ def _step_one(
 
 @kernel
 def _settle(senses: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3) -> None:
-    """Let the simulator fly so that the load comes to `end` with `velocity` while the estimate is found."""
+    """Fly so that the load arrives at `end` with `velocity`, while the estimate converges."""
     if senses is None:
         return
     rows, model, mixing = _world(batch, i), task.action, _mixing(batch, i)
@@ -264,13 +265,13 @@ def run_some(
     rewards: Any,
     ends: Any,
 ) -> None:
-    """A step of the environments `chosen`, or the beginning of an episode in each, its world having been
+    """Step the environments `chosen`, or begin an episode in each of them, whose world has already been
     made.
 
-    Of a step `actions` (n, size) are done, and written are observations (n, size), rewards (n,) and how the
-    episodes end: FLYING, CRASHED, or ENDED where the path is over. Of a beginning the observations are
-    written; where the estimate is observed the simulator flies until the load comes to `places` (k, 3), one
-    for each that is chosen, with `velocities` (k, 3). One function does both, for it takes long to compile.
+    A step applies `actions` (n, size), and writes observations (n, size), rewards (n,) and `ends`: FLYING,
+    CRASHED, or ENDED at the end of the path. A beginning writes the observations; if the estimate is
+    observed, the simulator first flies until the load arrives at `places` (k, 3), one for each chosen
+    environment, with `velocities` (k, 3). One function does both because it takes long to compile.
     """
     task = unpack(TaskModel, batch.task, 0)
     for k in range(chosen.shape[0]):

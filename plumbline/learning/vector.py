@@ -1,4 +1,4 @@
-"""Many environments in one: `gymnasium.make_vec`. All of them step in one call of machine code."""
+"""Many environments in one: `gymnasium.make_vec`. One call of machine code steps all of them."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ Stepped = tuple[Array, NDArray[np.float64], Flags, Flags, dict[str, Any]]
 
 
 class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
-    """`num_envs` environments, each the same to the bit as one of `LoadEnv` with the same seed.
+    """`num_envs` environments, each bit-identical to a `LoadEnv` with the same seed.
 
-    `autoreset_mode` is one of `gymnasium.vector.AutoresetMode`, or its value. `threads`: how many share the
-    work; by default as many as there are cores, where there is enough of it. The other options are those of
+    `autoreset_mode` is one of `gymnasium.vector.AutoresetMode`, or its value. `threads`: how many threads
+    share the work; by default one per core, or fewer if there is little work. The other options are those of
     `plumbline.learning.options.EnvOptions`.
     """
 
@@ -60,7 +60,7 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self._shape = (num_envs, self.scenario.task.sight.actions)
         self._limit = max_episode_steps
         self._steps = np.zeros(num_envs, np.int64)
-        self._over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not begun anew
+        self._over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not reset yet
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
 
     def reset(
@@ -69,9 +69,10 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """The first observations of other episodes: of all, or of those that `options["reset_mask"]` marks.
+        """Begin new episodes, in all environments or in those that `options["reset_mask"]` marks; returns the
+        observations of all.
 
-        `seed`: of each, or of the first, from which those of the others count on.
+        `seed`: a seed for each environment, or that of the first; those of the others count up from it.
         """
         seeds = self._seeds(seed)
         chosen = np.arange(self.num_envs)
@@ -84,7 +85,8 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         return self.episodes.observations.copy(), {}
 
     def step(self, actions: Array) -> Stepped:
-        """Observations, rewards, who crashed, whose path or time is over, and what `autoreset_mode` adds."""
+        """Observations, rewards, which episodes crashed, which reached the end of their path or their time
+        limit, and what `autoreset_mode` adds."""
         episodes, next_step = self.episodes, self.autoreset_mode == AutoresetMode.NEXT_STEP
         if self.autoreset_mode == AutoresetMode.DISABLED and self._over.any():
             raise GcsError("an episode is over; reset it with options={'reset_mask': ...}")
@@ -110,7 +112,7 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         return episodes.observations.copy(), rewards, crashed, ended, infos
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Give up the threads."""
+        """End the threads."""
         self.episodes.close()
 
     def _begin(self, chosen: NDArray[np.intp]) -> None:

@@ -1,1 +1,1 @@
-"""How third-party autopilots fly the vehicle: one file an interface, bytes in and bytes out."""
+"""How third-party autopilots fly the vehicle: one file per interface, bytes in and bytes out."""

@@ -1,8 +1,8 @@
 """ArduPilot's JSON interface (`--model JSON`): servo packets in, lines of JSON out, no socket and no clock.
 
-The firmware sends a packet of PWM for each of its frames and waits for one line. What it does not hear it
-asks for again, with the same count, every 1.1 s. A line that it did not ask for would leave it one frame
-behind for ever, so a repeated packet is answered only long after the answer to the first.
+The firmware sends a packet of PWM for each of its frames and waits for one line. If none arrives, it repeats
+the packet, with the same count, every 1.1 s. An additional line would leave it one frame behind for ever, so
+a repeated packet is answered only long after the answer to the first.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from sitl.hil import HilSimulator
 
 MOTORS = 4
 PWM_OFF, PWM_FULL = 1000, 2000  # us, MOT_PWM_MIN and MOT_PWM_MAX
-RATE_HZ = 800  # of frames: the firmware's scheduler refuses to arm with fewer at its 400 Hz
+RATE_HZ = 800  # frame rate: with a lower one the firmware's scheduler, at 400 Hz, refuses to arm
 _KINDS = ((18458, Struct("<HHI16H")), (29569, Struct("<HHI32H")))
 _PACKETS = {layout.size: (magic, layout) for magic, layout in _KINDS}
-_LOST_S = 0.5  # after an answer, until a repeated packet means that the answer was lost
-# The firmware cuts the difference of two times to whole microseconds. With this the rounding of their
-# binary numbers, which is less for the first hours, never takes one away; it adds 1 us in 100 s.
+_LOST_S = 0.5  # time after an answer from which a repeated packet means that the answer was lost
+# The firmware truncates the difference of two times to whole microseconds. With this factor the rounding of
+# their binary numbers, which is smaller for the first hours, never loses one; the factor adds 1 us in 100 s.
 _STRETCH = 1.0 + 1e-8
 _LINE = (
     '\n{"timestamp":%.17g,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},'
@@ -32,7 +32,7 @@ _LINE = (
 
 
 class ServoPacket(NamedTuple):
-    """What the firmware asks of its motors in one frame."""
+    """The firmware's commands to its motors in one frame."""
 
     rate_hz: int
     number: int  # of the frame
@@ -40,15 +40,15 @@ class ServoPacket(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What becomes of a datagram."""
+    """The effect of a datagram."""
 
     answer: bytes = b""  # to be sent; empty: nothing
-    moved: bool = False  # the world, by a tick
-    news: str = ""  # for whoever watches
+    moved: bool = False  # the world was advanced by a tick
+    news: str = ""  # for the terminal
 
 
 def read_servo_packet(datagram: bytes) -> ServoPacket | None:
-    """The packet in a datagram, None if there is none: another size or another first number."""
+    """The packet in a datagram; None if its size or its first number is another."""
     known = _PACKETS.get(len(datagram))
     if known is None:
         return None
@@ -58,7 +58,7 @@ def read_servo_packet(datagram: bytes) -> ServoPacket | None:
 
 
 def throttles(pwm: tuple[int, ...]) -> tuple[float, ...]:
-    """Throttles of the motors, 0 ... 1, of their pulses."""
+    """Throttles of the motors, 0 ... 1, from their pulses."""
     return tuple(min(max((us - PWM_OFF) / (PWM_FULL - PWM_OFF), 0.0), 1.0) for us in pwm[:MOTORS])
 
 
@@ -66,7 +66,7 @@ def line(
     now_us: int, gyro_body: Vec3, accel_body: Vec3, position: Vec3, velocity: Vec3, quat_wxyz: Quat
 ) -> bytes:
     """The answer to a frame: rates (rad/s) and specific force (m/s^2) in FLU, position (m) and velocity
-    in ENU, attitude FLU to ENU. Compact, as the firmware's reader needs it."""
+    in ENU, attitude FLU to ENU. Without spaces, as the firmware's reader requires."""
     return (
         _LINE
         % (
@@ -81,20 +81,20 @@ def line(
 
 
 class Exchange:
-    """One firmware after the other on one world: each new frame is a tick."""
+    """The exchange with one firmware after another in one world: each new frame is a tick."""
 
     def __init__(self, simulator: HilSimulator) -> None:
-        """ValueError if the vehicle is none that the firmware flies."""
+        """ValueError if the firmware cannot fly the vehicle."""
         self._simulator = simulator
         self._frame = simulator.frame
-        self._newest = -1  # frame's number
-        self._answer = b""  # to it
+        self._newest = -1  # number of the newest frame
+        self._answer = b""  # to the newest frame
         self._answered_s = 0.0
 
     def receive(self, packet: ServoPacket, now_s: float) -> Reply:
-        """Take a packet that came at `now_s` of any steady clock.
+        """Process a packet that arrived at `now_s` of any steady clock.
 
-        A number that goes back is a firmware that began anew: so does the world.
+        A smaller number than before means that the firmware was restarted: the world restarts too.
         """
         if packet.number == self._newest:
             if now_s - self._answered_s < _LOST_S:

@@ -1,7 +1,7 @@
 """Betaflight's simulator interface (target SITL): motors in, the vehicle's state out, no socket and no clock.
 
-The firmware keeps the wall clock and waits for nobody: each state that it hears it answers with the motors of
-its next loop, on UDP 9002; it hears states on 9003 and channels of a remote control on 9004.
+The firmware runs on the wall clock and does not wait: it answers each state that it receives with the motors
+of its next loop, on UDP 9002; it receives states on 9003 and the channels of a remote control on 9004.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from sitl.hil import HilSimulator
 from sitl.messages import pressure_pa
 
 RATE_HZ = 1000
-_MOTORS = Struct("<4f")  # servo_packet: not in its own order, but in that of `sitl.interfaces.frame`
+_MOTORS = Struct("<4f")  # servo_packet: in the order of `sitl.interfaces.frame`, not in the firmware's own
 _STATE = Struct("<18d")  # fdm_packet; firmwares before 4.4 leave the last number, the pressure, unread
-# The firmware runs its clock at the rate at which it sees this time pass from packet to packet, so that any
-# unevenness of their arrival makes it run fast and slow. Where the time stands it keeps the wall clock.
+# The firmware runs its clock at the rate at which this time passes from packet to packet, so that any
+# unevenness of their arrival makes it run fast and slow. With a constant time it keeps the wall clock.
 _TIME_S = 0.0
 
 
 def read_motors(datagram: bytes) -> tuple[float, ...] | None:
-    """Throttles of motors 1 to 4 in a datagram, 0 ... 1 where they are any; None of another size."""
+    """Throttles of motors 1 to 4 in a datagram, 0 ... 1 if they are valid; None for another size."""
     return _MOTORS.unpack(datagram) if len(datagram) == _MOTORS.size else None
 
 
 def state_packet(
     gyro_body: Vec3, accel_body: Vec3, quat_wxyz: Quat, velocity: Vec3, position: Vec3, home: Home
 ) -> bytes:
-    """What the firmware hears: rates (rad/s) and specific force (m/s^2) in FLU, attitude FLU to ENU, velocity
-    (m/s) and position (m) in ENU.
+    """The packet for the firmware, from rates (rad/s) and specific force (m/s^2) in FLU, attitude FLU to ENU,
+    velocity (m/s) and position (m) in ENU.
 
     On the wire rates are FRD, the force has the other sign, the attitude is FRD to NED, the position a
     longitude, latitude and altitude, and the pressure that of the standard atmosphere.
@@ -51,15 +51,15 @@ def state_packet(
 
 
 class Exchange:
-    """One firmware after the other on one world."""
+    """The exchange with one firmware after another in one world."""
 
     def __init__(self, simulator: HilSimulator) -> None:
-        """ValueError if the vehicle is none that the firmware flies."""
+        """ValueError if the firmware cannot fly the vehicle."""
         self._simulator = simulator
         self._frame = simulator.frame
 
     def state(self) -> bytes:
-        """What is sent at this tick."""
+        """The packet that is sent at this tick."""
         simulator, frame = self._simulator, self._frame
         felt, state = simulator.inertial, simulator.core.state
         return state_packet(
@@ -72,5 +72,5 @@ class Exchange:
         )
 
     def receive(self, motors: tuple[float, ...]) -> None:
-        """Take throttles as the answer to the present tick; while it is armed a motor turns."""
+        """Take throttles as the answer to the present tick; the firmware is armed while any motor turns."""
         self._simulator.obey(self._frame.forces(motors), any(motors))

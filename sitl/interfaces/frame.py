@@ -1,9 +1,9 @@
-"""The quadrotor as the firmwares know it: which rotor each of their motors drives, how the flight controller
-is mounted, and what a rotor makes of the throttle of its motor.
+"""The quadrotor as third-party firmwares define it: which rotor each of their motors drives, how the flight
+controller is mounted, and which force a rotor gives at a throttle of its motor.
 
-ArduPilot and PX4 number the motors of an X alike: 1 front right, 2 rear left, both counterclockwise; 3 front
-left, 4 rear right, both clockwise. A vehicle whose arms make a plus is an X to a flight controller that is
-mounted turned by half a right angle.
+ArduPilot and PX4 number the motors of an X in the same way: 1 front right, 2 rear left, both
+counterclockwise; 3 front left, 4 rear right, both clockwise. A vehicle whose arms form a plus is an X for a
+flight controller that is mounted turned by half a right angle.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from autopilot.vehicle.layout import Layout
 # angle from forward to the left, and the sign of the moment about the upward axis, of motors 1 to 4
 _MOTORS = ((-0.25 * pi, -1.0), (0.75 * pi, -1.0), (0.25 * pi, 1.0), (-0.75 * pi, 1.0))
 _TURNS = (0.0, 0.25 * pi)  # of the flight controller to the left
-_WITHIN = 0.15 * pi  # a rotor stands in the direction of its motor
+_WITHIN = 0.15 * pi  # from the direction of a motor, within which a rotor is taken as its rotor
 _ALIKE = 0.1  # share of the arm by which the distances of the rotors may differ
-# share of the thrust that grows with the square of the throttle: propellers behind common speed controllers
+# share of the thrust that grows with the square of the throttle, for propellers with common speed controllers
 THRUST_EXPO = 0.65
 
 
 class Frame(NamedTuple):
-    """How a firmware's motors and flight controller sit on a vehicle."""
+    """How a firmware's motors and flight controller are placed on a vehicle."""
 
     rotor_of: tuple[int, ...]  # index of the rotor that each motor drives, in the order of the motors
     greatest_n: tuple[float, ...]  # force of that rotor at full throttle
@@ -58,7 +58,7 @@ class Frame(NamedTuple):
 
 
 def frame_of(layout: Layout, least_n: float, greatest_n: float) -> Frame:
-    """The X that a vehicle is, whose rotors give `least_n` to `greatest_n`; ValueError if it is none."""
+    """The frame of a vehicle whose rotors give `least_n` to `greatest_n`; ValueError if it is not an X."""
     if not 0.0 <= least_n < greatest_n < inf:
         raise ValueError(
             f"rotors of {least_n:g} to {greatest_n:g} N; a throttle needs rotors from 0 N or more to a "
@@ -76,7 +76,7 @@ def frame_of(layout: Layout, least_n: float, greatest_n: float) -> Frame:
 
 
 def _order(layout: Layout, turn: float) -> tuple[int, ...]:
-    """The rotor of each motor if the flight controller is turned so; empty if they do not fit."""
+    """The rotor of each motor if the flight controller is turned by `turn`; empty if they do not fit."""
     reach = [hypot(rotor.x, rotor.y) for rotor in layout]
     if len(layout) != len(_MOTORS) or max(reach) - min(reach) > _ALIKE * max(reach):
         return ()

@@ -1,8 +1,9 @@
 """PX4's simulator interface: MAVLink over TCP, on which the simulator is the server; no socket and no clock.
 
-Each tick the firmware is sent HIL_STATE_QUATERNION (the truth, which it logs), HIL_GPS when there is a fix,
-and HIL_SENSOR, whose time sets its clock. It answers with HIL_ACTUATOR_CONTROLS once all that runs by its
-clock is done. Until its first answer the world runs on; from then on it waits for each.
+At each tick the firmware receives HIL_STATE_QUATERNION (the truth, which it logs), HIL_GPS when there is a
+fix, and HIL_SENSOR, whose time sets its clock. It answers with HIL_ACTUATOR_CONTROLS once everything that is
+scheduled by its clock is done. Until its first answer the world runs on; from then on it waits for each
+answer.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ MOTORS = 4
 _HEAD, _TAIL = 10, 2  # bytes of a MAVLink 2 frame around its payload
 _FRAME_START = 0xFD
 _TRUTH_US = 20_000
-_LARGEST = 65_536  # bytes that are kept of a stream without a whole frame
+_LARGEST = 65_536  # most bytes that are kept of a stream without a whole frame
 _SENSOR, _GPS, _STATE = (
     mavlink.MAVLINK_MSG_ID_HIL_SENSOR,
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
@@ -31,7 +32,7 @@ _CONTROLS = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
 
 
 def frames(datagram: bytes) -> Iterator[tuple[int, bytes]]:
-    """(message id, frame) of whole frames that lie one behind the other, as we write them."""
+    """(message id, frame) of each of our own frames in a datagram."""
     at = 0
     while at + _HEAD <= len(datagram) and datagram[at] == _FRAME_START:
         end = at + _HEAD + datagram[at + 1] + _TAIL
@@ -40,13 +41,13 @@ def frames(datagram: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class Stream:
-    """Frames out of a stream of bytes that is cut anywhere."""
+    """Extracts the frames of a stream of bytes that may be cut anywhere."""
 
     def __init__(self) -> None:
         self._left = b""
 
     def feed(self, piece: bytes) -> list[bytes]:
-        """The whole frames that are there now; what is none is passed over."""
+        """The frames that are complete now; bytes that belong to no frame are skipped."""
         data = (self._left + piece)[-_LARGEST:]
         found = []
         while True:
@@ -66,10 +67,10 @@ class Stream:
 
 
 class Exchange:
-    """One firmware on one world."""
+    """The exchange with one firmware in one world."""
 
     def __init__(self, simulator: HilSimulator) -> None:
-        """ValueError if the vehicle or its sensors are none that the firmware flies with."""
+        """ValueError if the firmware cannot fly with the vehicle or its sensors."""
         if not simulator.navigates:
             raise ValueError(
                 "PX4 flies by GNSS, barometer and magnetometer; take a sensor profile that has them: "
@@ -79,10 +80,10 @@ class Exchange:
         self._frame: Frame = simulator.frame
         self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._stream = Stream()
-        self.in_step = False  # it has answered once
+        self.in_step = False  # whether the firmware has answered once
 
     def sensors(self) -> bytes:
-        """What is sent at this tick."""
+        """The frames that are sent at this tick."""
         simulator = self._simulator
         sensors = [pair for pair in frames(simulator.sensor_datagram()) if pair[0] in (_SENSOR, _GPS)]
         sent = [frame for kind, frame in sensors if kind == _GPS]
@@ -93,7 +94,7 @@ class Exchange:
         return b"".join(sent)
 
     def receive(self, piece: bytes) -> bool:
-        """Take bytes of the firmware; True if with them the present tick is answered."""
+        """Process bytes of the firmware; True if they answer the present tick."""
         for frame in self._stream.feed(piece):
             message = decode(frame)[0][0].message
             if message.get_msgId() != _CONTROLS:

@@ -1,13 +1,13 @@
-"""What moving air and the near ground do to the rotors: drag, flapping, ground effect.
+"""Effects of moving air and of the nearby ground on the rotors: drag, flapping, ground effect.
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
 | F_i | rows[stage, i] | N | thrust of a rotor far from the ground |
-| r_i | place | body, m | its hub, from the centre of mass |
+| r_i | hub | body, m | its hub, from the centre of mass |
 | u_i | u | body, m/s | velocity of the hub relative to the air, R^T (x_Q' - w) + Omega x r_i |
 | k | rotor_drag | 1/s | induced drag |
 | a | rotor_flap | rad/(m/s) | backward tilt of the disc |
-| K | blade_stiffness | N m/rad | moment at the hub by tilt |
+| K | blade_stiffness | N m/rad | moment at the hub per tilt |
 | R_r, z | rotor_radius | m | radius, height of the hub over the ground along the rotor's axis |
 | A | | m^2 | pi R_r^2 |
 
@@ -16,12 +16,12 @@ In the disc's plane, with u' the part of u_i there:
     H_i = -(k/g + a) F_i u'              at the hub
     M_i = K a (e3 x -u')
 
-the lumped drag of Mahony, Kumar and Corke (2012), equation (13): linear in the velocity, proportional to the
-thrust. A disc that tilts by a |u'| turns its thrust back by a F |u'|; stiff blades hand the tilt to the hub
-as a moment. A vehicle that hovers has k + a g of drag in 1/s, for each kilogram that its rotors carry.
+This is the lumped drag of Mahony, Kumar and Corke (2012), equation (13): linear in the velocity, proportional
+to the thrust. A disc that tilts by a |u'| has a backward thrust component of a F |u'|; stiff blades transmit
+the tilt to the hub as a moment. In hover the drag is k + a g in 1/s, for each kilogram that the rotors carry.
 
-Near the ground a rotor gives more at the same power (Cheeseman and Bennett 1955; the second form with the
-wash that is blown away by forward speed):
+Near the ground a rotor gives more thrust at the same power (Cheeseman and Bennett 1955, in the second form,
+in which forward speed blows the wash away):
 
     F_i' = F_i (1 + c b / (1 - b)),   b = (R_r / 4 z)^2 / (1 + (|u'| / v_i)^2),   v_i^2 = F_i / (2 rho A)
 
@@ -40,7 +40,7 @@ from sitl.plant.records import Air, Truth
 from sitl.plant.rotors import PITCH, ROLL, RotorRows
 
 _LEAST_HEIGHT = 0.5  # rotor radii, above which the formula holds
-_NO_WASH = 1e-9  # N, of the air that is blown away: keeps 0 / 0 out
+_NO_WASH = 1e-9  # N, added to a denominator to avoid 0 / 0
 
 
 class Felt(NamedTuple):
@@ -52,14 +52,14 @@ class Felt(NamedTuple):
 
 @kernel
 def blows(truth: Truth) -> bool:
-    """Whether air or ground change what the rotors do."""
+    """Whether drag, flapping or ground effect act on the rotors."""
     air = truth.air
     return air.rotor_drag > 0.0 or air.rotor_flap > 0.0 or air.ground_effect > 0.0
 
 
 @kernel
 def hub_of(rotors: RotorRows, i: int, truth: Truth) -> Vec3:
-    """r_i."""
+    """r_i, the hub of rotor i."""
     table = rotors.table
     return (-truth.arm * table[i, PITCH], truth.arm * table[i, ROLL], truth.rotor_height)
 
@@ -79,12 +79,12 @@ def ground_gain(thrust: float, height: float, across: float, air: Air) -> float:
 def felt_by_rotors(
     rotors: RotorRows, stage: int, x_quad: Vec3, v_quad: Vec3, R: Mat3, omega: Vec3, wind: Vec3, truth: Truth
 ) -> Felt:
-    """What acts beside the rotors' thrust and torque; their forces are in the row `stage`."""
+    """Force and moment in addition to the rotors' thrust and torque; the rotor forces are in row `stage`."""
     air = truth.air
     through = apply_transposed(R, (v_quad[0] - wind[0], v_quad[1] - wind[1], v_quad[2] - wind[2]))
     lag = air.rotor_drag / truth.gravity + air.rotor_flap
     stiff = air.blade_stiffness * air.rotor_flap
-    # a rotor whose axis lies level has no ground below it
+    # a rotor with a horizontal axis has no ground below it
     upright = if_above(R[2][2], 0.0, R[2][2], 0.0)
     force, moment = ZERO, ZERO
     for i in range(rotors.table.shape[0]):

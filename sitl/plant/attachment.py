@@ -1,17 +1,17 @@
-"""Where the cable is attached to the vehicle, away from its centre of mass.
+"""A cable that is attached to the vehicle away from its centre of mass.
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
 | rho | attachment | body, m | from the centre of mass |
 | x_A | | world, m | x_Q + R rho |
 | q_b | q_body | body | R^T q, from x_A to the load |
-| n | | body, m | rho x q_b, so that the pull T q turns the vehicle by T n |
+| n | | body, m | rho x q_b, so that the pull T q exerts the moment T n on the vehicle |
 | mu | effective_mass | kg | 1 / mu = 1/m_L + 1/m_Q + n . J^-1 n |
 
     x_A'  = x_Q' + R (Omega x rho)
     x_A'' = x_Q'' + R (Omega' x rho + Omega x (Omega x rho))
 
-With rho = 0 nothing here is called: the equations are those of a cable at the centre of mass, to the bit.
+With rho = 0 nothing here is added: the equations are, to the bit, those of a cable at the centre of mass.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def accel_beside(R: Mat3, omega: Vec3, omega_dot: Vec3, truth: Truth) -> Vec3:
 
 @kernel
 def turning_arm(q_cable: Vec3, R: Mat3, truth: Truth) -> Vec3:
-    """n: the torque on the vehicle for each newton of the pull."""
+    """n: the torque on the vehicle per newton of pull."""
     return cross(truth.attachment, apply_transposed(R, q_cable))
 
 
@@ -63,7 +63,7 @@ def by_inertia(torque: Vec3, truth: Truth) -> Vec3:
 
 @kernel
 def effective_mass(q_cable: Vec3, R: Mat3, truth: Truth) -> float:
-    """mu, the mass of the pair as the cable feels it along q."""
+    """mu, the effective mass of vehicle and load along q."""
     if not off_centre(truth):
         return truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
     n = turning_arm(q_cable, R, truth)

@@ -1,4 +1,4 @@
-"""The plant with the forces of its rotors in its state: state in, state out, as proofs want it."""
+"""The plant with the forces of its rotors as part of its state: state in, state out, for the tests."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sitl.plant.records import PlantState, Truth
 from sitl.plant.rotors import COMMAND, FORCE, RotorRows, rotor_table, rotors_at_rest
 
 Forces = tuple[float, ...]
-Flown: TypeAlias = Any  # a PlantState and `rotor_force` (N), one of each rotor
+Flown: TypeAlias = Any  # the fields of a PlantState, and `rotor_force` (N), one per rotor
 _record: Any = namedtuple
 _FLOWN = _record("_FLOWN", [*PlantState._fields, "rotor_force"])
 
 
 def initial_state(truth: Truth, rotors: int = 4) -> Flown:
-    """At rest on the ground."""
+    """The state at rest on the ground."""
     return _FLOWN(*step.initial_state(truth), rotor_force=(0.0,) * rotors)
 
 

@@ -1,11 +1,11 @@
 """Drag of a straight cable across its length, in wind and wake.
 
-A piece of the cable feels the air across itself: -1/2 rho C_D D |u_n| u_n for each metre, with u_n the part
-of its velocity through the air that is normal to the cable (the cross-flow principle; Hoerner, Fluid-Dynamic
-Drag, 1965, 3-2 and 3-11: C_D = 1.2 of a round cylinder between 300 and 3e5 of Reynolds number). A taut cable
-without mass hands it to its ends as a lever does: the piece at the share s of its length gives the share s to
-the load and 1 - s to the vehicle. The integral is Gauss's of three points. A slack cable has no shape and
-feels nothing.
+Only the flow across the cable causes drag: -1/2 rho C_D D |u_n| u_n per metre, with u_n the component normal
+to the cable of its velocity through the air (the cross-flow principle; Hoerner, Fluid-Dynamic Drag, 1965, 3-2
+and 3-11: C_D = 1.2 for a round cylinder at Reynolds numbers of 300 to 3e5). A taut, massless cable passes the
+force to its ends as a lever does: of the force at the share s of its length from the vehicle, the share s
+acts on the load and 1 - s on the vehicle. The force is integrated by Gauss quadrature with three points. A
+slack cable has no defined shape and no drag.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def drag_of_cable(
     stage: int,
     truth: Truth,
 ) -> Ends:
-    """The force on the ends of the cable, x_L - x_A with its rate. The forces of the rotors, which make the
-    wake, are in the row `stage`."""
+    """Drag on the ends of the cable. `cable` is x_L - x_A, `cable_dot` its rate; the forces of the rotors,
+    which cause the wake, are in row `stage`."""
     length = norm(cable)
     q = scale(1.0 / length, cable)
     factor = 0.5 * truth.air.density * DRAG_COEFFICIENT * truth.air.cable_diameter * length

@@ -1,6 +1,6 @@
 """The ground: level, at z = 0, under the feet and blade tips of the vehicle and under the load.
 
-Every contact point is a spring and a damper along z, and friction across. The constants come from a natural
+Every contact point has a spring and a damper along z, and friction across. The constants come from a natural
 frequency and a damping ratio and from the mass of the body, so one step size is stable for all masses. The
 springs are longer by their own static deflection g / omega^2: a body at rest stands exactly at its height.
 """
@@ -26,7 +26,7 @@ def point_force(height: float, v: Vec3, mass: float, truth: Truth) -> Vec3:
     """Force of the ground on a point at `height` (m) above it that moves at `v` and carries `mass`.
 
     The damper fades in over the static deflection, so the force is continuous at the touch, and never pulls.
-    Friction brakes like a damper until Coulomb's limit: its rate is bounded however hard the blow.
+    Friction acts like a damper up to Coulomb's limit, so its rate is bounded, however hard the impact.
     """
     if height >= 0.0:
         return ZERO
@@ -53,7 +53,7 @@ def load_force(x_load: Vec3, v_load: Vec3, truth: Truth) -> Vec3:
 
 @kernel
 def quad_reach(truth: Truth) -> float:
-    """Radius in m of a ball about the vehicle that holds all its contact points."""
+    """Radius in m of a ball about the vehicle that contains all its contact points."""
     return truth.gear_height + 1.5 * truth.gear_spread + truth.rotor_reach + truth.rotor_height
 
 

@@ -1,22 +1,23 @@
-"""Between a command and the force of a rotor: thrust curve, resolution and voltage of its speed controller.
+"""From the command to the force of a rotor: thrust curve, resolution and voltage of its speed controller.
 
 | symbol | code | unit | |
 |---|---|---|---|
-| F | force | N | asked for, within the rotor's limits |
-| F_max | greatest | N | what the rotor gives at full throttle and full voltage |
+| F | force | N | requested, within the rotor's limits |
+| F_max | greatest | N | force of the rotor at full throttle and full voltage |
 | u | throttle | | 0 ... 1 |
 | a | thrust_curve | | quadratic share of the force in the throttle |
-| a_k | known_curve | | the same as it is taken to be |
-| n | esc_steps | | values of the throttle above none |
-| k | supply | | voltage, of that of a full battery without current |
+| a_k | known_curve | | the same as assumed where forces are converted to throttle |
+| n | esc_steps | | number of throttle values above zero |
+| k | supply | | voltage, relative to that of a full battery without current |
 
     F / F_max = C(u; a_k),    C(u; a) = (1 - a) u + a u^2
     u' = rint(n u) / n
     F' = F_max C(u' k; a)           the speed falls with the voltage
     F' = F_max C(min(u', k); a)     the speed is controlled, as long as the voltage allows
 
-C is the curve that flight controllers are told of (THR_MDL_FAC of PX4, MOT_THST_EXPO of ArduPilot). With
-a = a_k, n = 0 and k = 1 a rotor gives what is asked for. Only rotors with a greatest force are driven so.
+C is the curve that flight controllers are configured with (THR_MDL_FAC of PX4, MOT_THST_EXPO of ArduPilot).
+With a = a_k, n = 0 and k = 1 a rotor gives the requested force. The model applies only to rotors with a
+greatest force.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ from autopilot.vehicle.battery import (
 )
 from sitl.plant.records import Drive, Truth
 
-_TINY = 1e-30  # keeps 0 / 0 out
+_TINY = 1e-30  # avoids 0 / 0
 
 
 @kernel
 def is_driven(truth: Truth) -> bool:
-    """Whether anything lies between command and force."""
+    """Whether curve, resolution or battery may make the force of a rotor differ from its command."""
     drive = truth.drive
     different = drive.thrust_curve != drive.known_curve
     return truth.rotor_max < inf and (different or drive.esc_steps > 0.0 or drive.battery > 0.0)
@@ -65,7 +66,7 @@ def throttle_of(share: float, curve: float) -> float:
 
 @kernel
 def driven_force(force: float, greatest: float, drive: Drive, supply: float) -> float:
-    """F' of a rotor; a force below 0 is left as it is."""
+    """F' of a rotor; a force below 0 is returned unchanged."""
     share = if_above(force, 0.0, force / greatest, 0.0)
     throttle = throttle_of(share, drive.known_curve)
     if drive.esc_steps > 0.0:
@@ -78,20 +79,20 @@ def driven_force(force: float, greatest: float, drive: Drive, supply: float) -> 
 
 
 class Supply(NamedTuple):
-    """The battery at work."""
+    """The state of the battery."""
 
     used_as: float  # A s
     current: float  # A
     voltage: float  # V at its terminals
-    share: float  # of the voltage of the full battery without current
+    share: float  # voltage, relative to that of the full battery without current
 
 
-FULL = Supply(0.0, 0.0, 0.0, 1.0)  # also where there is none
+FULL = Supply(0.0, 0.0, 0.0, 1.0)  # also used without a battery
 
 
 @kernel
 def battery_of(truth: Truth, rotors: int) -> Battery:
-    """The battery of a vehicle of so many rotors."""
+    """The battery of a vehicle with this number of rotors."""
     drive = truth.drive
     scaled = watts_per(drive.hover_w, truth.quad_mass * truth.gravity, rotors)
     return Battery(drive.capacity_as, drive.cells, drive.resistance, scaled)
@@ -101,7 +102,7 @@ def battery_of(truth: Truth, rotors: int) -> Battery:
 def drained(supply: Supply, forces: Row, rotors: int, truth: Truth, h: float) -> Supply:
     """The battery h seconds later, when the rotors give these forces (N) at that instant."""
     battery = battery_of(truth, rotors)
-    empty = truth.drive.capacity_as * (1.0 - truth.drive.charge)  # A s, before the beginning
+    empty = truth.drive.capacity_as * (1.0 - truth.drive.charge)  # A s, used before the beginning
     used = supply.used_as + h * supply.current
     current = drawn_current(work_of(forces, rotors), empty + used, battery)
     voltage = terminal_voltage(empty + used, current, battery)

@@ -18,7 +18,7 @@ _STAGE_WEIGHT = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0, 0.0)
 
 
 class Flow(NamedTuple):
-    """Where a Runge-Kutta step leads."""
+    """The end of a Runge-Kutta step."""
 
     motion: Motion
     tension_before: float  # N, at the start of the step, negative if the cable would have to push
@@ -46,8 +46,8 @@ def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
 
 @kernel
 def flow(motion: Motion, rotors: RotorRows, truth: Truth, wind: Vec3, taut: float, h: float) -> Flow:
-    """One Runge-Kutta step of length h in one mode; the lag of the rotors is exact at every stage. Their
-    forces stay as they are; those at the end of the step are in the row END."""
+    """One Runge-Kutta step of length h in one mode; the lag of the rotors is exact at every stage. The
+    row FORCE stays unchanged; the forces at the end of the step are in the row END."""
     wrench, middle, end = wrenches(rotors, truth, h)
     nothing = Motion(ZERO, ZERO, ZERO, ZERO, (0.0, 0.0, 0.0, 0.0), ZERO, 0.0, 0.0)
     rate, total = nothing, nothing

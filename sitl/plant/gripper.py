@@ -1,6 +1,6 @@
-"""The gripper that holds the cable at the vehicle: what becomes of the plant when it opens and closes.
+"""The gripper that holds the cable at the vehicle: the plant when it opens and closes.
 
-A load whose cable was let go moves as one on a cable without end: slack, and never taut again.
+A released load moves like one on a cable of infinite length, which is slack and never becomes taut.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from sitl.plant.records import PlantState, Truth
 
 @kernel
 def without_cable(truth: Truth) -> Truth:
-    """The truth of a vehicle and a load that nothing ties together."""
+    """The truth of a vehicle and a load that no cable connects."""
     return with_field(truth, "cable_length", inf)
 
 
 @kernel
 def dropped(state: PlantState) -> PlantState:
-    """The state at the instant at which the cable is let go: positions and velocities go on as they are.
+    """The state at the instant at which the cable is released: positions and velocities are unchanged.
 
-    `accel_quad` stays that of the instant before, as at every instant at which the forces jump.
+    `accel_quad` keeps the value of the instant before, as at every instant at which the forces jump.
     """
     return with_field(with_field(state, "taut", 0.0), "tension", 0.0)
 
 
 @kernel
 def takes_hold(state: PlantState, truth: Truth) -> bool:
-    """Whether a gripper that closes has the cable: the load lies on the ground, and within reach."""
+    """Whether a closing gripper takes hold of the cable: the load lies on the ground within its length."""
     held = attached_at(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
     return state.load_on_ground > 0.0 and norm(sub(state.x_load, held)) <= truth.cable_length

@@ -3,11 +3,11 @@
 | symbol | code name | unit | |
 |---|---|---|---|
 | q | q_cable | | unit vector from vehicle to load |
-| v_c | speed | m/s | closing speed: q . (x_L' - x_Q'), less what the winch lets out |
+| v_c | speed | m/s | closing speed: q . (x_L' - x_Q') minus the rate at which the winch lets out |
 | m_Q, m_L | quad_mass, load_mass | kg | |
 
-Linear momentum stays and the ends part no more: x_L' loses m_Q / (m_Q + m_L) v_c along q, x_Q' gains
-m_L / (m_Q + m_L) v_c. The impulse of the snap is mu v_c with mu = m_Q m_L / (m_Q + m_L); energy is lost.
+Linear momentum is conserved and the ends stop separating: x_L' loses m_Q / (m_Q + m_L) v_c along q, x_Q'
+gains m_L / (m_Q + m_L) v_c. The impulse of the snap is mu v_c, mu = m_Q m_L / (m_Q + m_L); energy is lost.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from sitl.plant.records import Motion, Truth
 
 @kernel
 def stretched(motion: Motion, truth: Truth) -> Motion:
-    """The pair with its distance set to the cable length and no velocity along the cable but the winch's.
+    """Vehicle and load at the distance of the cable length, separating along the cable at the winch's rate.
 
-    Centre of mass and momenta stay. After a taut step this takes back the integrator's drift; at the
-    instant a slack cable comes taut it is the perfectly inelastic impact.
+    Centre of mass and momenta are unchanged. After a taut step this removes the integrator's drift; at the
+    instant at which a slack cable comes taut it is the perfectly inelastic impact.
     """
     cable, cable_dot = cable_of(motion, truth)
     length = norm(cable)

@@ -8,22 +8,23 @@
 | Omega | omega | body, rad/s | (2-35) |
 | f, M | thrust, moment | N; body, N m | (2-13) |
 | T | tension | N | below |
-| mu | reduced_mass | kg | m_L m_Q / (m_L + m_Q) |
+| mu | effective_mass | kg | m_L m_Q / (m_L + m_Q) |
 
-Let F_L and F_Q be all forces on load and vehicle but that of the cable. Then m_L x_L'' = F_L - T q and
-m_Q x_Q'' = F_Q + T q, and |x_L - x_Q| = L asks for T = mu (q . (F_L/m_L - F_Q/m_Q) + L |q'|^2 - L''), which
-without drag, ground and winch is (2-31) and (2-33). Slack is the same with T = 0. In the cable vector c = L q
-the two last terms are (c'.c' - L'^2) / L - L''.
+Let F_L and F_Q be all forces on load and vehicle except that of the cable. Then m_L x_L'' = F_L - T q and
+m_Q x_Q'' = F_Q + T q, and |x_L - x_Q| = L requires T = mu (q . (F_L/m_L - F_Q/m_Q) + L |q'|^2 - L''), which
+without drag, ground and winch is (2-31) and (2-33). A slack cable has T = 0. In the cable vector c = L q the
+two last terms are (c'.c' - L'^2) / L - L''.
 
-A cable that is attached at rho from the vehicle's centre of mass (`attachment`) turns it with T n, where
-n = rho x R^T q, and x_A'' has, beside x_Q'', R (Omega' x rho + Omega x (Omega x rho)). With alpha what Omega'
-is without the cable, and since q . R (J^-1 n x rho) = n . J^-1 n,
+A cable that is attached at rho from the vehicle's centre of mass (`attachment`) exerts the moment T n on it,
+with n = rho x R^T q, and x_A'' = x_Q'' + R (Omega' x rho + Omega x (Omega x rho)). With alpha, which is
+Omega' without the cable, and since q . R (J^-1 n x rho) = n . J^-1 n,
 
     T = mu (q . (F_L/m_L - F_Q/m_Q - R (alpha x rho + Omega x (Omega x rho))) + (c'.c' - L'^2) / L - L'')
     1/mu = 1/m_L + 1/m_Q + n . J^-1 n
 
-Assumed: cable massless, inextensible; the load is a point. What air and ground do to the rotors, and these to
-load and cable, is in `air`, `wake` and `cable_drag`; each is left out while its number is 0.
+Assumed: cable massless, inextensible; the load is a point. The effects of air and ground on the rotors, and
+of the rotors on load and cable, are in `air`, `wake` and `cable_drag`; each is skipped while its
+parameter is 0.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ def drag_force(v: Vec3, wind: Vec3, linear: float, quadratic: float) -> Vec3:
 def rates(
     motion: Motion, wrench: Wrench, rotors: RotorRows, stage: int, truth: Truth, wind: Vec3, taut: float
 ) -> Rates:
-    """Time derivative of `motion` under what the rotors do, `wrench`, and the wind (world, m/s); what each
-    rotor gives is in the row `stage`."""
+    """Time derivative of `motion` under the `wrench` of the rotors and the wind (world, m/s); the force of
+    each rotor is in row `stage`."""
     R = rotation_from_quat(quat_normalise(motion.quat))
     Omega = motion.omega
     v_quad = sub(motion.v_load, motion.apart_dot)
@@ -118,7 +119,7 @@ def rates(
     alpha = by_inertia(moment, truth)
 
     tension = 0.0
-    a_apart = sub(a_load, a_quad)  # gravity, the same for both, is not in it
+    a_apart = sub(a_load, a_quad)  # without gravity, which is the same for both
     if taut > 0.0:
         length = norm(cable)
         q_cable = scale(1.0 / length, cable)

@@ -1,4 +1,4 @@
-"""What the plant is made of: what is true of the vehicle, and the state it is in.
+"""The records of the plant: the true vehicle and its state.
 
 World ENU with z = 0 the ground, body FLU, SI. Flags are floats (1.0 yes, 0.0 no): kernels take floats only.
 """
@@ -12,27 +12,27 @@ from autopilot.geometry.so3 import Quat
 
 
 class Air(NamedTuple):
-    """What air in motion does to the rotors, and the rotors' wake to load and cable; see `air` and `wake`. An
-    effect whose number is 0 is left out."""
+    """Effects of moving air on the rotors, and of the rotors' wake on load and cable; see `air` and `wake`.
+    An effect whose parameter is 0 is left out."""
 
     density: float = 1.225  # kg/m^3
     rotor_radius: float = 0.0  # m
     rotor_drag: float = 0.0  # 1/s, induced drag of a rotor for each newton of its thrust, times g
-    rotor_flap: float = 0.0  # rad/(m/s), tilt of a disc against the air that it moves through
+    rotor_flap: float = 0.0  # rad/(m/s), backward tilt of a disc that moves through the air
     blade_stiffness: float = 0.0  # N m/rad, moment of a tilted disc at its hub
-    ground_effect: float = 0.0  # 1: as Cheeseman and Bennett have it
-    downwash: float = 0.0  # 1: as momentum theory has it
+    ground_effect: float = 0.0  # 1: the formula of Cheeseman and Bennett
+    downwash: float = 0.0  # 1: the velocity of momentum theory
     cable_diameter: float = 0.0  # m
 
 
 class Drive(NamedTuple):
-    """What lies between a command and a rotor's force, see `drive`. As it stands here: nothing."""
+    """Effects between a command and a rotor's force, see `drive`. By default there are none."""
 
     thrust_curve: float = 0.0  # quadratic share of the force in the throttle, 0 ... 1
-    known_curve: float = 0.0  # the same as who makes throttle of forces takes it
-    esc_steps: float = 0.0  # values of the throttle between none and all; 0: any
-    speed_controlled: float = 0.0  # 1: the speed is held as long as the voltage allows; 0: it falls with it
-    battery: float = 0.0  # 1: there is one that can be empty
+    known_curve: float = 0.0  # the same as assumed where forces are converted to throttle
+    esc_steps: float = 0.0  # throttle values above zero; 0: continuous
+    speed_controlled: float = 0.0  # 1: the speed is held while the voltage allows; 0: it falls with it
+    battery: float = 0.0  # 1: there is one, which discharges
     cells: float = 1.0
     capacity_as: float = 1.0  # A s
     resistance: float = 0.0  # ohm
@@ -41,7 +41,7 @@ class Drive(NamedTuple):
 
 
 class ChainModel(NamedTuple):
-    """The cable, and how the load hangs at it."""
+    """The cable of links, and the load as a rotating body."""
 
     links: int  # 0: the cable is the massless one of `sitl.plant.rates`
     mass: float  # kg/m
@@ -59,9 +59,9 @@ MASSLESS = ChainModel(0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Truth(NamedTuple):
-    """What really flies, which may differ from what the autopilot believes.
+    """The true vehicle, which is simulated and may differ from the one that the autopilot assumes.
 
-    Drag of vehicle and load: force -(linear + quadratic |v|) v on the velocity v relative to the air.
+    Drag of vehicle and load: force -(linear + quadratic |v|) v at the velocity v relative to the air.
     Contact: each body rests on springs of the given natural frequency and damping ratio, so the constants
     follow the masses; see `contact`.
     """
@@ -81,11 +81,11 @@ class Truth(NamedTuple):
     spin_drag: float  # N m/(rad/s)^2, moment -spin_drag |Omega| Omega
     load_drag: float  # N/(m/s)
     load_drag_quadratic: float  # N/(m/s)^2
-    gear_height: float  # m, centre of mass above the ground as the vehicle stands
+    gear_height: float  # m, centre of mass above the ground when the vehicle stands
     gear_spread: float  # m, the four feet stand at (+-spread, +-spread)
-    rotor_reach: float  # m, centre of mass to blade tip: what the vehicle lies on when it is not on its feet
+    rotor_reach: float  # m, centre of mass to blade tip; a vehicle that fell over lies on the tips
     rotor_height: float  # m, rotor plane above the centre of mass
-    load_radius: float  # m, height of the load's centre as it rests on the ground
+    load_radius: float  # m, height of the load's centre when it rests on the ground
     contact_frequency: float  # rad/s
     contact_damping: float  # damping ratio
     friction: float  # Coulomb coefficient
@@ -93,20 +93,20 @@ class Truth(NamedTuple):
     attachment: Vec3 = ZERO  # m, of the cable, from the centre of mass, body
     air: Air = Air()
     drive: Drive = Drive()
-    supply: float = 1.0  # voltage of the battery, of that of a full one without current
-    reel_rate: float = 0.0  # m/s, at which `cable_length` grows at the beginning of a step
+    supply: float = 1.0  # voltage of the battery, relative to that of a full one without current
+    reel_rate: float = 0.0  # m/s, growth rate of `cable_length` at the beginning of a step
     reel_accel: float = 0.0  # m/s^2, constant along a step
-    chain: ChainModel = MASSLESS  # a cable of links and a load that turns, `sitl.plant.chain`
+    chain: ChainModel = MASSLESS  # a cable of links and a load that rotates, `sitl.plant.chain`
 
 
 class PlantState(NamedTuple):
-    """The state of vehicle, cable and load at one instant, and what the sensors need of that instant. The
+    """The state of vehicle, cable and load at one instant, and what else the sensors need. The
     forces of the rotors are in `sitl.plant.rotors.RotorRows`.
 
     While the cable is slack `q_cable` still points from its attachment to the load; the distance is then
     below the cable length. `accel_quad` is the second derivative of `x_quad` (an accelerometer at the centre
-    of mass feels R^T (accel_quad + g e3)), at the end of the last step, with the forces that act there. The
-    jerk of a cable that comes taut is an impulse: it shows in the velocities and not in `accel_quad`.
+    of mass measures R^T (accel_quad + g e3)), at the end of the last step, with the forces that act there.
+    The snap of a cable that comes taut is an impulse: it appears in the velocities, not in `accel_quad`.
     """
 
     x_load: Vec3  # m
@@ -124,19 +124,19 @@ class PlantState(NamedTuple):
     accel_quad: Vec3  # m/s^2, world
     tension: float  # N, 0 while slack
     diverged: float  # 1.0: left the domain of the model; the state is held as it was before
-    snap_speed: float  # m/s, greatest at which the cable came taut in the last step; 0: it did not
+    snap_speed: float  # m/s, greatest with which the cable came taut in the last step; 0: it did not
 
 
 class Motion(NamedTuple):
-    """What is integrated; also its rate of change, field by field.
+    """The integrated quantities; also their rates of change, field by field.
 
-    The winch's part, `length` and `length_dot`, is known beforehand; it goes along so that every stage of a
-    step has it.
+    `length` and `length_dot`, which the winch determines, are known beforehand; they are integrated too, so
+    that every stage of a step has them.
 
-    The pair is written as the load and the vector from vehicle to load, `apart = x_load - x_quad`, in both
-    modes: a linear change of the coordinates (x_L, q) of (2-30)-(2-35), under which a Runge-Kutta step is the
-    same step, and linear momentum stays to rounding. `apart` is the cable's vector where the cable is
-    attached at the centre of mass (`attachment.cable_of`).
+    Vehicle and load are represented by the load and the vector from vehicle to load, `apart = x_load -
+    x_quad`, in both modes. This is a linear change of the coordinates (x_L, q) of (2-30)-(2-35): it leaves a
+    Runge-Kutta step unchanged, and linear momentum is conserved to rounding. `apart` is the
+    cable's vector where the cable is attached at the centre of mass (`attachment.cable_of`).
     """
 
     x_load: Vec3
@@ -150,7 +150,7 @@ class Motion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """The rate of change of a `Motion` and the forces found on the way."""
+    """The rate of change of a `Motion` and the forces computed with it."""
 
     motion: Motion
     accel_quad: Vec3  # m/s^2, of the centre of mass

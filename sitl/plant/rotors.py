@@ -1,12 +1,12 @@
-"""Any number of rotors: limits, first-order lag of each, and what they do to the body, (2-13).
+"""Any number of rotors: limits, first-order lag of each, and thrust and moment on the body, (2-13).
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
-| F_i | rows[FORCE, i] | N | force of a rotor, as it is |
-| u_i | rows[TARGET, i] | N | what it goes to: its command as far as it can follow it |
-| x_i, y_i | table | body, of `arm` | place |
-| c_i | table | of `torque_ratio` | drag torque by force, with the sign of the moment about the upward axis |
-| tau_i | table | of `rotor_tau` | F_i' = (u_i - F_i) / tau_i |
+| F_i | rows[FORCE, i] | N | present force of a rotor |
+| u_i | rows[TARGET, i] | N | its target: the command as far as it can follow |
+| x_i, y_i | table | body, in units of `arm` | position |
+| c_i | table | in units of `torque_ratio` | drag torque per force, signed as the moment about up |
+| tau_i | table | in units of `rotor_tau` | F_i' = (u_i - F_i) / tau_i |
 
     f = sum F_i     M_x = sum y_i F_i     M_y = -sum x_i F_i     M_z = sum c_i F_i
 """
@@ -27,18 +27,18 @@ from sitl.plant.records import Truth
 
 Array = NDArray[np.float64]
 
-# rows of `RotorRows.rows`, one column a rotor, with room for the most
+# rows of `RotorRows.rows`, one column per rotor, with room for the greatest number
 ASKED, COMMAND, TARGET, FORCE, END, SHARE, BEFORE, BEGIN, MIDDLE = range(9)
-# columns of `RotorRows.table`, one row a rotor
+# columns of `RotorRows.table`, one row per rotor
 ROLL, PITCH, YAW, STRENGTH, LAG, LEFT = range(6)
 
 
 class RotorRows(NamedTuple):
-    """The rotors of a vehicle, in arrays: all numbers of them are flown by the same machine code."""
+    """The rotors of a vehicle, in arrays: the same machine code flies any number of them."""
 
-    table: Array  # (n, 6) what only parameters change
-    rows: Array  # (9, MOST) N: asked at this tick, in force, what it goes to, as it is, at the end of a step;
-    # share of its command that it gives; as it was before a step; at the begin and in the middle of a step
+    table: Array  # (n, 6) constants, which only parameters change
+    rows: Array  # (9, MOST) N: requested at this tick, in force, target, present, at the end of a step;
+    # share of its command that it gives; before a step; at the beginning and in the middle of a step
 
 
 class Wrench(NamedTuple):
@@ -59,7 +59,7 @@ def rotor_table(layout: Layout, left: tuple[float, ...] = ()) -> Array:
 
 
 def rotors_at_rest() -> Array:
-    """The rows of whole rotors that stand still."""
+    """The rows of intact rotors at rest."""
     rows = np.zeros((9, MOST))
     rows[SHARE] = 1.0
     return rows
@@ -67,13 +67,13 @@ def rotors_at_rest() -> Array:
 
 @kernel
 def _clamp(force: float, low: float, high: float) -> float:
-    # a comparison with nan is false: a command that is no number gives the lower limit
+    # a comparison with nan is false: a command that is not a number gives the lower limit
     return if_above(force, low, if_above(high, force, force, high), low)
 
 
 @kernel
 def limit(rotors: RotorRows, truth: Truth) -> None:
-    """What each rotor goes to: its command as far as it can follow it at all."""
+    """Write the target of each rotor: its command within its limits, after drive and failure."""
     rows = rotors.rows
     driven = is_driven(truth)
     for i in range(rotors.table.shape[0]):
@@ -115,14 +115,14 @@ def decay(x: float) -> float:
 
 @kernel
 def wrenches(rotors: RotorRows, truth: Truth, h: float) -> tuple[Wrench, Wrench, Wrench]:
-    """What the rotors do now, after h/2 and after h (s), when each has the force in the row BEGIN, MIDDLE or
-    END."""
+    """Thrust and moment of the rotors now, after h/2 and after h (s); their forces at these times are written
+    to the rows BEGIN, MIDDLE and END."""
     table, rows = rotors.table, rotors.rows
     f0 = f1 = f2 = 0.0
     x0 = x1 = x2 = 0.0
     y0 = y1 = y2 = 0.0
     z0 = z1 = z2 = 0.0
-    lag, half = -1.0, 0.0  # what is left of the way to the target after h/2
+    lag, half = -1.0, 0.0  # share of the difference to the target that remains after h/2
     for i in range(table.shape[0]):
         if table[i, LAG] != lag:
             lag = table[i, LAG]

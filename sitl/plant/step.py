@@ -3,8 +3,8 @@
 `advance` cuts its step into segments of fourth-order Runge-Kutta. A segment ends at the end of the step, at a
 sub-step near the ground, or where the cable changes its mode: taut to slack when the tension passes zero,
 slack to taut when the distance reaches the cable length. The instant is found by a bracketed secant search
-(Illinois) over the length of the Runge-Kutta step itself, so that no interpolant enters. Coming taut is
-perfectly inelastic along the cable: the velocities along it become equal, linear momentum stays.
+(Illinois) over the length of the Runge-Kutta step itself, so that no interpolant is used. Coming taut is
+perfectly inelastic along the cable: the velocities along it become equal, linear momentum is conserved.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, keep, limit
 # Longest steps, from benchmarks/plant_convergence.py: docs/plant.md has the table.
 MAX_STEP = 4e-3  # s, in the air
 CONTACT_STEP = 5e-4  # s, where a contact is possible
-# a contact is possible within this height plus the way of one step, m
+# a contact is possible within this height plus the distance moved in one step, m
 _CONTACT_MARGIN = 0.02
 
-# The cable is longer or pushes only beyond these: a thousand times the rounding of the two quantities.
+# Excess length and pushing count only beyond these: a thousand times the rounding of the two quantities.
 _LENGTH_TOLERANCE = 1e-12  # m
 _TENSION_TOLERANCE = 1e-12  # N
 _TIME_TOLERANCE = 1e-13  # s
-_MAX_IMPACTS = 4  # in one step; what is left over is taken up at the start of the next
+_MAX_IMPACTS = 4  # in one step; a remaining distance is corrected at the start of the next
 _MAX_SEARCH = 60  # trials of the search; bisection alone would need 35
 
-# Outside these the model means nothing and the step no longer resolves it.
+# Outside these the model is not valid and the step no longer resolves the motion.
 _MAX_RATE = 200.0  # rad/s
 _MAX_SPEED = 200.0  # m/s
 _MAX_DISTANCE = 1e5  # m
 _LEAST_DISTANCE = 1e-6  # m
-_LEAST_SPEED = 1e-60  # m/s, rad/s: of what rests on the ground
+_LEAST_SPEED = 1e-60  # m/s, rad/s: anything slower counts as at rest
 
 
 @kernel
@@ -57,7 +57,7 @@ def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
         or load_clearance + MAX_STEP * motion.v_load[2] < _CONTACT_MARGIN
     ):
         longest = CONTACT_STEP
-    # a remainder that rounding left a bit above the limit is still one step
+    # a remainder that only rounding puts above the limit is still one step
     if not remaining > longest * (1.0 + 1e-9):
         return remaining
     return remaining / ceil(remaining / longest - 1e-9)
@@ -65,7 +65,8 @@ def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
 
 @kernel
 def _excess(motion: Motion, tension: float, taut: float, truth: Truth) -> float:
-    """Positive when the mode must change: N the cable would push, or m it is longer than it is."""
+    """Positive when the mode must change: while taut, the force (N) with which the cable would push; while
+    slack, the distance (m) by which its ends are further apart than its length."""
     if taut > 0.0:
         return -tension - _TENSION_TOLERANCE
     return norm(cable_of(motion, truth)[0]) - motion.length - _LENGTH_TOLERANCE
@@ -73,7 +74,7 @@ def _excess(motion: Motion, tension: float, taut: float, truth: Truth) -> float:
 
 @kernel
 def _closing(motion: Motion, truth: Truth) -> float:
-    """Speed in m/s at which the ends part faster than the cable is let out."""
+    """Speed in m/s at which the ends separate, minus the rate at which the cable is let out."""
     cable, cable_dot = cable_of(motion, truth)
     return dot(cable, cable_dot) / norm(cable) - motion.length_dot
 
@@ -117,10 +118,10 @@ def held(state: PlantState) -> PlantState:
 
 @kernel
 def _at_rest(speed: float) -> float:
-    """A component of a speed, or 0 once it has died away.
+    """A component of a velocity, or 0 once it has decayed.
 
-    On the ground speeds decay without end, and sums of numbers below 1e-308 cost a processor a hundred times
-    those of others.
+    On the ground, speeds decay but never reach zero, and a processor takes a hundred times as long to add
+    numbers below 1e-308 as others.
     """
     return if_above(abs(speed), _LEAST_SPEED, speed, 0.0)
 
@@ -134,7 +135,7 @@ def resting(v: Vec3) -> Vec3:
 def state_of(
     end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_speed: float, truth: Truth
 ) -> PlantState:
-    """The record of where a step led."""
+    """The state at the end of a step."""
     motion = end.motion
     v_load, apart_dot = resting(motion.v_load), resting(motion.apart_dot)
     q_cable, q_cable_dot = q_before, ZERO
@@ -167,13 +168,13 @@ def state_of(
 @kernel
 def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: float) -> PlantState:
     """The state h seconds later under constant wind (world, m/s) and the commands in `rotors`, whose forces
-    are brought there in place.
+    are advanced in place.
 
-    Meant for h up to MAX_STEP; a longer one is divided. A state that leaves the domain of the model (see the
-    limits above) is not returned: the one before it is, marked `diverged`, and stays.
+    Steps longer than MAX_STEP are divided. If the state would leave the domain of the model (see the limits
+    above), the state before the step is returned, marked `diverged`; all further steps return it again.
 
-    Of a winch at work `truth` says length, rate and acceleration as the step begins; the next step wants
-    them as they are then.
+    While a winch turns, `truth` holds cable length, rate and acceleration at the beginning of the step; the
+    caller updates them before the next step.
     """
     if state.diverged > 0.0:
         return state
@@ -217,7 +218,7 @@ def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: f
                 if taut <= 0.0 and impacts >= _MAX_IMPACTS:
                     break
                 if low_excess > 0.0:
-                    # overdue: the forces jumped, or the last step had used up its impacts
+                    # the switch is overdue: the forces jumped, or the last step had used up its impacts
                     switched = taut > 0.0 or _closing(motion, truth) > 0.0
                     break
                 if not excess > 0.0:

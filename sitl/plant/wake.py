@@ -1,11 +1,11 @@
-"""The wake of the rotors, where load and cable hang in it.
+"""The wake of the rotors, in which load and cable hang.
 
 | symbol | code | unit | |
 |---|---|---|---|
 | F_i, R_r, rho | | N, m, kg/m^3 | thrust and radius of a rotor, density |
-| v_h | | m/s | induced velocity of hover, sqrt(sum F / (2 rho n pi R_r^2)) |
+| v_h | | m/s | induced velocity in hover, sqrt(sum F / (2 rho n pi R_r^2)) |
 | d | along | | direction of the wake |
-| s, r | | m | of a point: from a rotor along d, and from the wake's axis |
+| s, r | | m | distances of a point: from a rotor along d, and from the axis of its wake |
 | beta | | m | width of the wake |
 
 Each rotor makes a round jet that carries its thrust as momentum at every distance (the far wake of momentum
@@ -15,16 +15,16 @@ theory at its beginning, a self-similar turbulent jet at its end):
     u_i^2  = 3 F_i / (pi rho beta^2) / (1 + r^2 / beta^2)^4
 
     rho integral u_i^2 2 pi r dr = F_i     for every s
-    u_i(0, 0) = 2 v_h of this rotor: twice what the disc induces, as far below a rotor (Leishman 2006, 2.2)
+    u_i(0, 0) = 2 v_h of this rotor: twice that at the disc, as far below a rotor (Leishman 2006, 2.2)
     u_i(s, 0) -> 2 B sqrt(F_i / (pi rho)) / s,   kappa = sqrt(3) / (2 B)
 
-with the profile of a jet of constant eddy viscosity (Schlichting; Pope 2000, 5.2.4) and the decay B = 5.8
-that was measured (Hussein, Capp and George 1994; Pope, table 5.1). Its half-width is then 0.096 s; measured
-were 0.094 to 0.102. Jets side by side add their momentum: u^2 = sum u_i^2 (Reichardt 1942).
+The profile is that of a jet of constant eddy viscosity (Schlichting; Pope 2000, 5.2.4), with the measured
+decay B = 5.8 (Hussein, Capp and George 1994; Pope, table 5.1). Its half-width is then 0.096 s; the measured
+values are 0.094 to 0.102. Adjacent jets add their momentum: u^2 = sum u_i^2 (Reichardt 1942).
 
-The wake flows along -v_h b3 less the vehicle's velocity through the air, so that a vehicle that flies leaves
-it behind: half of the speed on the axis is about the speed at which a jet as a whole moves. Left out: the
-time that it takes to get there, its swirl and turbulence, the ground below it.
+The wake flows along -v_h b3 minus the vehicle's velocity through the air, so a flying vehicle leaves it
+behind. v_h is half of the speed on the axis, about the speed at which a jet as a whole moves. Not modelled:
+the time that the air takes to reach a point, swirl and turbulence of the wake, the ground below it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from sitl.plant.rotors import RotorRows
 
 DECAY = 5.8  # B
 _SPREAD = sqrt(3.0) / (2.0 * DECAY)  # kappa
-_STILL = 1e-12  # m/s, of a wake: keeps 0 / 0 out
+_STILL = 1e-12  # m/s, added to a denominator to avoid 0 / 0
 
 
 class Wake(NamedTuple):
@@ -56,7 +56,7 @@ class Wake(NamedTuple):
 def wake_of(
     rotors: RotorRows, stage: int, x_quad: Vec3, v_quad: Vec3, R: Mat3, wind: Vec3, truth: Truth
 ) -> Wake:
-    """Where the wake goes; the forces of the rotors are in the row `stage`."""
+    """Direction and origin of the wake; the forces of the rotors are in row `stage`."""
     total = 0.0
     count = rotors.table.shape[0]
     for i in range(count):
@@ -83,6 +83,6 @@ def wake_at(point: Vec3, wake: Wake, rotors: RotorRows, stage: int, truth: Truth
         fall *= fall
         thrust = rotors.rows[stage, i]
         flow = 3.0 * thrust / (pi * air.density * width * fall * fall)
-        # above a rotor, and of one that pushes the other way, there is none
+        # no wake above a rotor, and none of a rotor with reversed thrust
         square += if_above(s, 0.0, if_above(flow, 0.0, flow, 0.0), 0.0)
     return scale(air.downwash * sqrt(square), wake.along)

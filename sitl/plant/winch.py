@@ -1,7 +1,7 @@
-"""The winch: how long the cable is, by the rate at which the drum is told to turn.
+"""The winch: the length of the cable, from the commanded rate of the drum.
 
-The rate follows what is wanted within a tick, or as fast as GREATEST_ACCEL allows: within a tick the length
-is a polynomial of degree two in time. The drum turns whatever pulls at it, and stands firm when it stands.
+The rate reaches the commanded one within a tick, or as fast as GREATEST_ACCEL allows; within a tick the
+length is a polynomial of degree two in time. The pull of the cable has no effect on the drum.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from sitl.plant.records import Truth
 
 GREATEST_RATE = 2.0  # m/s
 GREATEST_ACCEL = 5.0  # m/s^2
-SHORTEST = 0.05  # m, then the drum stops
-_STANDS = 1e-9  # m/s, a rate that is rounding
+SHORTEST = 0.05  # m, at which the drum stops
+_STANDS = 1e-9  # m/s, a smaller rate is only rounding
 
 
 @kernel
 def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
-    """The truth of a tick in which the drum goes to `wanted_rate`, m/s, positive: out; NaN: it stops."""
+    """The truth of a tick in which the drum approaches `wanted_rate` (m/s, positive: out; NaN: it stops)."""
     if isnan(wanted_rate):
         wanted_rate = 0.0
-    # inwards no faster than it can stop at the end
+    # inwards no faster than the drum can stop before the cable is shortest
     left = max(truth.cable_length - SHORTEST, 0.0)
     fastest_in = min(GREATEST_RATE, sqrt(GREATEST_ACCEL * left))
     wanted_rate = min(GREATEST_RATE, max(-fastest_in, wanted_rate))
@@ -36,7 +36,7 @@ def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
 
 @kernel
 def later(truth: Truth, h: float) -> Truth:
-    """The truth h seconds on, within the tick."""
+    """The truth h seconds later, within the tick."""
     rate, accel = truth.reel_rate, truth.reel_accel
     if rate == 0.0 and accel == 0.0:
         return truth

@@ -1,6 +1,6 @@
-"""Wind: a mean that the caller gives, and gusts as a first-order Gauss-Markov process on each axis.
+"""Wind: a mean given by the caller, and gusts as a first-order Gauss-Markov process on each axis.
 
-Like everything random here it takes its random numbers as an argument, so that a flight repeats.
+The random numbers are an argument, as everywhere in the simulator, so that a flight is reproducible.
 """
 
 from __future__ import annotations

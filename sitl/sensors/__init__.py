@@ -1,1 +1,1 @@
-"""What is measured of the true state, how well, how often and how late. One file per sensor."""
+"""Measurements of the true state, with their noise, rate and latency. One file per sensor."""

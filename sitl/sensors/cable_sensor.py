@@ -32,7 +32,7 @@ class CableState(NamedTuple):
 
 
 class CableReading(NamedTuple):
-    """Unit vector from vehicle to load, body FLU; `seen` is 0.0 where there is nothing to read."""
+    """Unit vector from vehicle to load, body FLU; `seen` is 0.0 if there is no reading."""
 
     direction_body: Vec3
     seen: float

@@ -1,7 +1,7 @@
-"""What the simulator's parameters say of the sensors, in place of the profile.
+"""Parameters of the simulator that replace values of the sensor profile.
 
-A parameter of this list that is negative leaves the profile as it is, which is the default; any other value
-takes the place of the profile's, 0 switches the effect off. Sensors that are not fitted stay so.
+A negative value, the default, leaves the profile unchanged; any other value replaces that of the profile, and
+0 switches the effect off. Sensors that are not fitted stay so.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from sitl.sensors.profile import Profile
 
-_TIMED = ("mocap", "load_tracker", "cable_sensor", "gnss")  # whose readings carry their time
+_TIMED = ("mocap", "load_tracker", "cable_sensor", "gnss")  # sensors whose readings carry their time
 _TRACKERS = ("mocap", "load_tracker")
 
 
@@ -55,7 +55,7 @@ Chosen = tuple[tuple[str, float], ...]
 
 
 def chosen_in(value_of: Callable[[str], float]) -> Chosen:
-    """The parameters that take the place of what the profile says, with their values."""
+    """The parameters that replace a value of the profile, with their values."""
     values = ((name, value_of(name)) for name in REPLACED)
     return tuple((name, value) for name, value in values if value >= 0.0)
 

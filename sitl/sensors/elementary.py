@@ -1,7 +1,7 @@
-"""Logarithm, sine and cosine of what a generator of random words gives, from sums, products, quotients and
+"""Logarithm, sine and cosine for the output of the random generator, from sums, products, quotients and
 bits.
 
-The libraries' functions differ by the last bit from machine to machine, and know one number at a time.
+Library functions differ in the last bit from machine to machine, and take one number at a time, not lanes.
 Coefficients and error bounds (below one unit in the last place) are those of fdlibm (Sun Microsystems, 1993:
 e_log.c, k_sin.c, k_cos.c).
 """
@@ -40,7 +40,7 @@ def logarithm(x: float) -> float:
 
 @kernel
 def cosine_sine(word: int) -> tuple[float, float]:
-    """Cosine and sine of the angle that is `word` 2^-32 of a turn; a word has 32 bits."""
+    """Cosine and sine of an angle of `word` times 2^-32 turns; a word has 32 bits."""
     quarter = (word + _EIGHTH) >> 30
     x = (word - (quarter << 30)) * _TURN  # within pi/4
     z = x * x
@@ -79,7 +79,7 @@ def cosine_sine(word: int) -> tuple[float, float]:
     half = 0.5 * z
     top = 1.0 - half
     cosine = top + (((1.0 - top) - half) + z * rest)
-    # of the two one is taken, with its sign: the other is multiplied by 0
+    # selects one of the two, with its sign: the other is multiplied by 0
     own = (1 - (quarter & 1)) * (1 - (quarter & 2)) * 1.0
     other = (quarter & 1) * ((quarter & 2) - 1) * 1.0
     return own * cosine + other * sine, own * sine - other * cosine

@@ -1,4 +1,4 @@
-"""Profile files: TOML, checked before anything starts; all that is wrong is said in one line."""
+"""Profile files: TOML, checked before anything starts; all errors are reported in one line."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ def parse_profile(text: str, where: str) -> Profile:
 
 
 def load_profile(name_or_path: str | PathLike[str]) -> Profile:
-    """A shipped profile by its name, or a file; else a ProfileError."""
+    """The profile of a shipped name or of a file; else a ProfileError."""
     found = PROFILES.read(name_or_path)
     return parse_profile(found.text, found.where)

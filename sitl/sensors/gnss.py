@@ -1,10 +1,11 @@
 """Satellite navigation receiver: position and velocity with white and slowly varying errors.
 
-Beside the error of orbits, clocks and air, which wanders over minutes, there may be multipath: the signals
-that come by way of a wall or of the ground, an error of tens of seconds that the receiver does not know of.
-A receiver with carrier phase now and then loses whole numbers of waves: its fix "floats" for a while, with an
-error of its own, and says so. It may also lose the fix altogether, and floats for a while when it has it
-again. All three begin by chance; how long they last is exponentially distributed.
+Besides the error of orbits, clocks and atmosphere, which varies over minutes, there may be multipath: an
+error from signals reflected by a wall or the ground, which varies over tens of seconds and is not stated by
+the receiver. A receiver with carrier phase occasionally loses the integer number of wavelengths: its fix
+"floats" for a while, with an additional error, and is reported as floating. The receiver may also lose the
+fix completely; after it returns, the fix floats for a while. Both begin at random and last for exponentially
+distributed times.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ FIXED, FLOATING, LOST = 0.0, 1.0, 2.0  # GnssReading.quality
 class GnssConfig(NamedTuple):
     """Deviations (east, north, up): white position (m), correlated position (m), white velocity (m/s).
 
-    `correlation` is a drift of unit deviation. `multipath` is a correlated error of its own, of deviations
-    `multipath_error`; a `float_error` of 0 is a receiver whose fixes never float.
+    `correlation` is a drift of unit deviation. `multipath` is a separate correlated error, of deviations
+    `multipath_error`; with a `float_error` of 0 fixes never float.
     """
 
     position_noise: Vec3
@@ -34,16 +35,16 @@ class GnssConfig(NamedTuple):
     multipath_error: Vec3
     multipath: Drift
     float_error: float  # m, deviation on each axis while it floats
-    float_chance: float  # that it begins with a sample
-    float_s: float  # for so long on average
+    float_chance: float  # probability that floating begins at a sample
+    float_s: float  # its mean duration
     lost_chance: float
     lost_s: float
     period_s: float
 
 
 class GnssState(NamedTuple):
-    """The correlated errors in units of their deviations; for how long (s) it is without a fix, and without
-    whole numbers of waves."""
+    """The correlated errors in units of their deviations; the remaining times (s) without a fix, and until
+    the fix no longer floats."""
 
     error: Vec3
     multipath: Vec3
@@ -53,7 +54,7 @@ class GnssState(NamedTuple):
 
 
 class GnssReading(NamedTuple):
-    """Position and velocity, ENU (m, m/s), and whether there is a fix: FIXED, FLOATING, LOST."""
+    """Position and velocity, ENU (m, m/s), and the quality of the fix: FIXED, FLOATING, LOST."""
 
     position: Vec3
     velocity: Vec3
@@ -74,7 +75,7 @@ def start(config: GnssConfig, noise: Noise) -> GnssState:
 
 @kernel
 def _left(config: GnssConfig, state: GnssState, noise: Noise) -> tuple[float, float]:
-    """For how long it is without a fix, and without whole numbers of waves, from this sample on."""
+    """Remaining times (s) without a fix, and until the fix no longer floats, from this sample on."""
     lost, floating = state.lost_left - config.period_s, state.float_left - config.period_s
     loses, floats = uniform(noise, 8)
     how_long = uniform(noise, 9)

@@ -6,14 +6,14 @@
 | u_i | | body FLU | unit vector from the centre to rotor i |
 | B | strength | gauss | the field at hover |
 
-The power of a rotor is its thrust times the induced speed, so at a given voltage the current goes with
-F^(3/2). The wires lie fixed in the body, and so do the directions of their fields: the leads of the battery
-run along the body and make a field to its left, which the currents of all rotors add up in; the wire along an
-arm makes one across the arm:
+The power of a rotor is its thrust times the induced speed, so at a given voltage the current is proportional
+to F^(3/2). The wires are fixed in the body, and so are the directions of their fields. The battery leads run
+along the body and cause a field to its left, in which the currents of all rotors add up; the wire along an
+arm causes a field across the arm:
 
     b = B / n sum_i (F_i / F_h)^(3/2) (e_left + u_i x e_up)
 
-At a level hover the arms' fields cancel and B remains; a turn or a climb brings the others out.
+In a level hover the arms' fields cancel and B remains; they appear when the forces of opposite rotors differ.
 """
 
 from __future__ import annotations

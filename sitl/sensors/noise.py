@@ -1,4 +1,4 @@
-"""Counter-based noise: a number depends on (seed, stream, step, block) alone, on nothing that ran before.
+"""Counter-based noise: a number depends on (seed, stream, step, block) alone, not on what ran before.
 
 The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011): key =
 seed, counter = (step, stream, block). Every sensor has its own stream and counts its own samples, hence a
@@ -25,7 +25,7 @@ Words = tuple[int, int, int, int]
 
 
 class Noise(NamedTuple):
-    """Names one sample of one stream; `scale` multiplies every deviation drawn from it."""
+    """Identifies one sample of one stream; `scale` multiplies every deviation drawn from it."""
 
     seed: int
     stream: int
@@ -78,7 +78,7 @@ def gaussian(noise: Noise, block: int) -> Vec3:
 
 @kernel
 def white(std: float, noise: Noise, block: int) -> Vec3:
-    """Three independent normal numbers of deviation `std` times the sample's scale; nan where `std` is."""
+    """Three independent normal numbers of deviation `std` times the sample's scale; nan if `std` is nan."""
     if isnan(std):
         return (std, std, std)
     if std == 0.0 or noise.scale == 0.0:

@@ -1,8 +1,8 @@
 """Sensor profiles: which sensors are fitted and how good they are. The units are in the key names.
 
 Every deviation is one sigma per axis. A `bias` is drawn once at switch-on; a `walk` is the growth of that
-bias over a second (its deviation rises with the square root of time). A table that is absent is a sensor that
-is not fitted; only the IMU must be there, and motion capture or GNSS, which tells where the vehicle is.
+bias over a second (its deviation rises with the square root of time). If a table is absent, that sensor is
+not fitted; required are only the IMU and one source of the vehicle's position, motion capture or GNSS.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from sitl.sensors.room import Room
 from sitl.sensors.vibration import VibrationConfig
 
 _HIGHEST_RATE_HZ = 20_000.0
-_LONGEST_JITTER = 5.0  # times its mean: one reading of 150 would be later
+_LONGEST_JITTER = 5.0  # times its mean: without the limit, one reading in 150 would be later
 
-# a sensor states at least these deviations, so that nobody divides by the zero of a perfect one
+# a sensor states at least these deviations, so that no receiver divides by the zero of a perfect one
 _LEAST_POSITION_STD = 1e-4  # m
 _LEAST_VELOCITY_STD = 1e-3  # m/s
 _LEAST_ANGLE_STD = 1e-4  # rad
@@ -55,7 +55,7 @@ class _Table(BaseModel):
 
 
 class Delivery(_Table):
-    """When readings come, and which do not. Outages begin by chance; their lengths are exponential."""
+    """Latency and loss of readings. Outages begin at random; their lengths are exponentially distributed."""
 
     latency_ms: Annotated[float, Field(ge=0.0, le=10_000.0)] = 0.0
     loss: Share = 0.0
@@ -64,7 +64,7 @@ class Delivery(_Table):
 
 
 class Sampled(Delivery):
-    """A sensor with a rate of its own."""
+    """A sensor with its own rate."""
 
     rate_hz: Rate
 
@@ -74,10 +74,10 @@ class Sampled(Delivery):
 
 
 class Stamped(Sampled):
-    """A sensor whose readings carry the time of their measurement, and come over a network or a serial line.
+    """A sensor whose readings carry the time of measurement, and arrive over a network or a serial line.
 
-    On top of the latency each reading is late by a time of its own, exponentially distributed: one may
-    overtake another. The clock of the sensor is off by a constant.
+    In addition to the latency, each reading is late by a random, exponentially distributed time: one may
+    overtake another. The clock of the sensor has a constant offset.
     """
 
     jitter_ms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
@@ -86,7 +86,7 @@ class Stamped(Sampled):
 
     @property
     def latest_ms(self) -> float:
-        """By how much a reading is late at most, beyond the latency."""
+        """The longest delay of a reading beyond the latency."""
         if self.jitter_ms == 0.0:
             return 0.0
         return _LONGEST_JITTER * self.jitter_ms if self.jitter_max_ms is None else self.jitter_max_ms
@@ -97,7 +97,7 @@ def _walk(bias: float, walk: float, period_s: float) -> Drift:
 
 
 def _correlated(std: float, correlation_s: float, period_s: float) -> Drift:
-    """An error of this deviation that forgets itself over a time (first-order Gauss-Markov)."""
+    """An error with this deviation and correlation time (first-order Gauss-Markov)."""
     decay = exp(-period_s / correlation_s) if correlation_s > 0.0 else 0.0
     return Drift(initial=std, decay=decay, drive=std * sqrt(1.0 - decay * decay))
 
@@ -142,10 +142,10 @@ class Imu(Delivery):
 
 
 class Tracker(Stamped):
-    """What motion capture makes of a place.
+    """Errors of a position measured by motion capture.
 
-    The correlated error has the given deviation and forgets itself over its time; the calibration error is a
-    distortion of the room with waves of the given length.
+    The correlated error has the given deviation and correlation time; the calibration error is a distortion
+    of the room with waves of the given length.
     """
 
     position_noise_m: Deviation
@@ -318,7 +318,7 @@ class Magnetometer(Sampled):
 
 
 class Profile(_Table):
-    """All sensors of a vehicle and of the place it flies in."""
+    """All sensors of a vehicle, and the properties of the place in which it flies."""
 
     description: str
     imu: Imu
@@ -337,7 +337,7 @@ class Profile(_Table):
 
 
 class Stated(NamedTuple):
-    """The deviations that readings state of themselves, per axis; nan where a sensor is not fitted."""
+    """The deviations that readings state, per axis; nan where a sensor is not fitted."""
 
     mocap_position: float
     mocap_attitude: float
@@ -347,11 +347,11 @@ class Stated(NamedTuple):
     direction: float
     gnss_horizontal: float
     gnss_vertical: float
-    gnss_float: float  # of a fix that floats, horizontal and vertical
+    gnss_float: float  # of a floating fix, horizontal and vertical
 
 
 def stated_of(profile: Profile, scale: float) -> Stated:
-    """What the sensors of a profile truthfully state when all noise is multiplied by `scale`."""
+    """The deviations that the sensors of a profile state when all noise is multiplied by `scale`."""
     mocap, load, cable, gnss = profile.mocap, profile.load_tracker, profile.cable_sensor, profile.gnss
 
     def std(least: float, *parts: float | None) -> float:

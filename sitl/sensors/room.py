@@ -1,12 +1,11 @@
-"""What is left of the calibration error of a motion capture room: a distortion of its space.
+"""The remaining calibration error of a motion capture room: a distortion of its space.
 
-Wherever a body is seen, it is seen a little beside its place, always by the same there, and by another
-distance elsewhere. Along each axis j the error is one wave, of a direction d_j and an angle phi_j that are
-drawn with the seed:
+A measured position has an error that depends only on the place. Along each axis j the error is one wave,
+whose direction d_j and phase phi_j are drawn with the seed:
 
     e_j(x) = sqrt(2) E cos(2 pi d_j . x / L + phi_j)
 
-Over the room it has the deviation E. Vehicle and load are seen in the same room, so at the same place their
+Its deviation over the room is E. Vehicle and load are measured in the same room, so at the same place their
 errors are the same.
 """
 
@@ -22,8 +21,8 @@ from sitl.sensors.elementary import cosine_sine
 from sitl.sensors.noise import Noise, gaussian, words
 
 _MASK = 0xFFFFFFFF
-_WORDS = 4294967296.0  # of a turn
-_STREAM = 9  # beside those of the sensors and of the gusts, `sitl.world`
+_WORDS = 4294967296.0  # in a turn
+_STREAM = 9  # separate from those of sensors and gusts, `sitl.world`
 _ANGLES = 3  # block
 
 
@@ -43,7 +42,7 @@ def _wave(axis: int, angle: int, place: Vec3, length: float, noise: Noise) -> fl
 
 @kernel
 def distortion(place: Vec3, room: Room, noise: Noise) -> Vec3:
-    """The error at a place (ENU, m); of `noise` its seed and scale count."""
+    """The error at a place (ENU, m); of `noise` only seed and scale are used."""
     own = Noise(noise.seed, _STREAM, 0, 1.0)
     angle = words(own, _ANGLES)
     size = sqrt(2.0) * room.error * noise.scale

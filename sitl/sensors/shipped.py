@@ -1,4 +1,4 @@
-"""Which sensor profiles are shipped: the files of this folder. No kernel is loaded, so help may ask."""
+"""The shipped sensor profiles: the files of this folder. Loads no kernel, so that help texts can use it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from missions.toml_files import FileError, TomlFiles
 
 
 class ProfileError(FileError):
-    """A sensor profile cannot be used: the fault of its file or of its name."""
+    """A sensor profile cannot be used: its file or its name is wrong."""
 
 
 PROFILES = TomlFiles("sensors", ProfileError)

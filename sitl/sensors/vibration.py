@@ -1,30 +1,30 @@
-"""Vibration of the airframe at the inertial unit, by rotors that are out of balance.
+"""Vibration of the airframe at the inertial unit, caused by rotors out of balance.
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
 | F_i | rows[FORCE, i] | N | thrust of rotor i; F_h at hover |
-| f_i | | Hz | its speed, that ESC_STATUS tells: f ~ sqrt(F) |
+| f_i | | Hz | its speed, as in ESC_STATUS: f ~ sqrt(F) |
 | phi_i | phases | | its angle: phi_i' = 2 pi f_i |
-| s_i | | +-1 | its sense of rotation, positive seen from above: counter-clockwise |
+| s_i | | +-1 | its sense of rotation, positive: counter-clockwise seen from above |
 | A, B | accel, gyro | m/s^2, rad/s | RMS of all n rotors together at hover, each axis, before the low-pass |
 | g(f) | | | low-pass of the inertial unit, 1 / sqrt(1 + (f / f_c)^4) (Butterworth of second order) |
 
 A mass that is off the axis pulls outwards with m e (2 pi f)^2, so the amplitude grows with the square of the
-speed, which is the thrust:
+speed, that is, with the thrust:
 
     a = sqrt(2/n) A sum_i F_i/F_h (g(f_i) cos phi_i, g(f_i) s_i sin phi_i, g(2 f_i) cos 2 phi_i)
 
-The force lies in the plane of the rotor. Along its axis the two blades pass the arm twice in a turn. The
+The force lies in the plane of the rotor. Along its axis the two blades pass the arm twice per turn. The
 torque of the force about the centre of mass, integrated over time, turns the body with an amplitude that
 grows with the speed:
 
     w = sqrt(2/n) B sum_i sqrt(F_i/F_h) g(f_i) (s_i cos phi_i, sin phi_i, z_i)
     z_i = -(x_i s_i cos phi_i + y_i sin phi_i) / r_i
 
-Beside these lines there is a broadband part (bearings, turbulence): white, a stated share of A and B, which
-grows with the mean thrust. Sampled once a tick, lines above half of the tick's rate alias. The phase shift of
-the low-pass is left out: the angles begin at random. It acts on the vibration only; what delay it has is part
-of the sensor's latency.
+In addition to these lines there is a broadband part (bearings, turbulence): white, a given share of A and B,
+which grows with the mean thrust. The unit is sampled once per tick, so lines above half of the tick rate
+alias. The phase shift of the low-pass is neglected, because the initial angles are random. The low-pass acts
+on the vibration only; its delay is part of the sensor's latency.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from sitl.sensors.elementary import cosine_sine
 from sitl.sensors.noise import Noise, gaussian, words
 
 _MASK = 0xFFFFFFFF
-_WORDS = 4294967296.0  # of a turn
+_WORDS = 4294967296.0  # in a turn
 _BLOCKS = 6, 7  # of the sample's noise
-_PHASES = 20  # of the first sample's noise, one block a rotor
+_PHASES = 20  # of the first sample's noise, one block per rotor
 
 
 class VibrationConfig(NamedTuple):
@@ -59,12 +59,12 @@ class VibrationConfig(NamedTuple):
 
 @kernel
 def hover_force(truth: Truth, count: int) -> float:
-    """Force of one of so many rotors that carry vehicle and load, N."""
+    """Force of each of `count` rotors that carry vehicle and load, N."""
     return (truth.quad_mass + truth.load_mass) * truth.gravity / count
 
 
 def draw_phases(phases: Array, count: int, noise: Noise) -> None:
-    """Let each rotor begin at an angle of its own."""
+    """Draw the initial angle of each rotor."""
     for i in range(count):
         phases[i] = words(noise, _PHASES + i)[0]
 
@@ -83,7 +83,7 @@ def shaking(
 ) -> tuple[Vec3, Vec3]:
     """What the rotors add to specific force (m/s^2) and body rate (rad/s), body FLU.
 
-    `phases` has the angle of each rotor in 2^-32 turns, and is moved by one period.
+    `phases` has the angle of each rotor in 2^-32 turns, and is advanced by one period.
     """
     table = rotors.table
     count = table.shape[0]
@@ -95,7 +95,7 @@ def shaking(
         word = each(phases[i] + hz * config.period_s * _WORDS) & _MASK
         phases[i] = word * 1.0
         cosine, sine = cosine_sine(word)
-        if table[i, YAW] > 0.0:  # it turns clockwise: its drag turns the body the other way
+        if table[i, YAW] > 0.0:  # this rotor turns clockwise: its drag turns the body the other way
             sine = -sine
         share = abs(force) / hover
         single, double = _gain(abs(hz), config.cutoff_hz), _gain(2.0 * abs(hz), config.cutoff_hz)

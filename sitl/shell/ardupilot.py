@@ -20,7 +20,7 @@ def run_ardupilot(
     say: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
-    """Tick for ever, each tick as the firmware asks for it, but no faster than `pacing` says."""
+    """Tick for ever, each tick when the firmware requests it, but no faster than `pacing` allows."""
     exchange, watch = Exchange(simulator), Watch(say)
     clock = None if pacing is None else Clock(pacing, simulator, say)
     link.timeout(LOOK_S)

@@ -1,4 +1,4 @@
-"""Whose autopilots the simulator flies, and what each wants of it."""
+"""The autopilots that the simulator serves, and what each requires of it."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ PLUMBLINE = "plumbline"
 
 
 class Kind(NamedTuple):
-    """What one autopilot wants, where the user says nothing else."""
+    """The defaults for one autopilot, unless the user sets others."""
 
-    awaited: str  # what the simulator says that it waits for
+    awaited: str  # name of what the simulator reports to wait for
     listen: Address
     truth_every: int  # ticks
     settings: Mapping[str, float]  # SIM_* parameters
-    run: Run | None = None  # its loop; None: those of our own
-    real_time: bool = False  # always: it does not wait for the world
+    run: Run | None = None  # its loop; None: the loops of our own autopilot
+    real_time: bool = False  # always in real time: it does not wait for the world
 
 
 def parameter_file(name: str) -> Path:
-    """Where the parameters are that a firmware wants beside its defaults."""
+    """Path of the file with the parameters that a firmware requires besides its defaults."""
     return ROOT / "sitl" / "interfaces" / f"{name}.parm"
 
 

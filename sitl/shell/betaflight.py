@@ -19,7 +19,7 @@ def run_betaflight(
     say: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
-    """Tick for ever by the wall clock, once a firmware is there; the world begins anew with each."""
+    """Tick for ever by the wall clock once a firmware answers; the world restarts with each new firmware."""
     exchange = Exchange(simulator)
 
     def ask() -> None:
@@ -37,7 +37,7 @@ def run_betaflight(
         exchange.receive(motors)
 
     link.timeout(LOOK_S)
-    while link.peer is None:  # it says nothing until it is told of a state
+    while link.peer is None:  # the firmware sends nothing until it receives a state
         stop.check()
         ask()
         arrived = link.receive()

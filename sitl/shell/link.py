@@ -1,4 +1,4 @@
-"""The sockets of the simulator: the one that autopilots speak to, and the one that truth leaves by."""
+"""The sockets of the simulator: one for the autopilots, and one from which the truth is sent."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
 from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
 
-_TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
-_MOST_NAMED = 8  # of the autopilots that are turned away
-_TELL_AGAIN_S = 1.0  # between two words to them
+_TAKE_OVER_S = 0.5  # silence of the autopilot that is served, after which another may take its place
+_MOST_NAMED = 8  # of the refused autopilots
+_TELL_AGAIN_S = 1.0  # between two messages to refused autopilots
 _TEXT_LENGTH = 50  # of STATUSTEXT
-TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
+TRUTH_WINDOW_US = 20_000  # in lockstep: time whose truth is sent in one datagram
 
 
 class Link:
-    """The socket that autopilots speak to, the one that is served, and where truth goes."""
+    """The socket for the autopilots, the autopilot that is served, and the address for the truth."""
 
     def __init__(self, listen: Address, truth: Address, say: Callable[[str], None]) -> None:
         try:
@@ -40,7 +40,7 @@ class Link:
             raise ValueError(
                 f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
             ) from None
-        self.truth = truth  # where it goes
+        self.truth = truth  # address to which it is sent
         self.address = listen
         self._gathered: list[bytes] = []  # truth of this window
         self.window_ends_us = 0
@@ -48,10 +48,10 @@ class Link:
         self._say = say
         self._heard = 0.0  # when the peer last answered, monotonic clock
         self._turned_away: set[Address] = set()
-        self._met_s: float | None = None  # when the first peer was, monotonic clock
+        self._met_s: float | None = None  # when the first peer was met, monotonic clock
         self.peer: Address | None = None
-        self._told_away_s = -_TELL_AGAIN_S  # when somebody was, monotonic clock
-        # a count of its own: the frames of the autopilot that is served are numbered without a gap
+        self._told_away_s = -_TELL_AGAIN_S  # when a refused autopilot was last notified, monotonic clock
+        # a separate sequence counter: the frames to the autopilot that is served are numbered without a gap
         self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
 
     @property
@@ -65,13 +65,13 @@ class Link:
         self._truth_socket.close()
 
     def timeout(self, seconds: float) -> None:
-        """How long `receive` waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
+        """Set how long `receive` waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
         if seconds != self._timeout_s:
             set_timeout(self._socket, seconds)
             self._timeout_s = seconds
 
     def wait(self, seconds: float) -> None:
-        """Until a datagram is there, or so long."""
+        """Wait until a datagram has arrived, but no longer than this."""
         select.select([self._socket], [], [], seconds)
 
     def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
@@ -79,19 +79,19 @@ class Link:
         return receive(self._socket, flags)
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """To the autopilot that is served, or to another address. What cannot be sent counts as lost."""
+        """Send to the autopilot that is served, or to `address`. What cannot be sent counts as lost."""
         address = address or self.peer
         if address is not None:
             send(self._socket, datagram, address)
 
     def send_truth(self, simulator: HilSimulator) -> None:
-        """The truth of the present tick, if there is any."""
+        """Send the truth of the present tick, if there is any."""
         truth = _truth_of(simulator)
         if truth:
             send(self._truth_socket, truth, self.truth)
 
     def gather_truth(self, simulator: HilSimulator) -> None:
-        """The truth of the present tick, if there is any; sent at the end of the window with all of it."""
+        """Store the truth of the present tick, if there is any; all is sent at the end of the window."""
         truth, now_us = _truth_of(simulator), simulator.core.now_us
         if truth:
             self._gathered.append(truth)
@@ -100,20 +100,20 @@ class Link:
             self._tell_gathered()
 
     def take_gathered(self) -> bytes:
-        """The truth of this window so far, for who gathers on."""
+        """Hand over the truth of this window so far to a caller that continues to gather it."""
         gathered = b"".join(self._gathered)
         self._gathered.clear()
         return gathered
 
     def gather(self, truth: bytes, window_ends_us: int) -> None:
-        """Take back what `take_gathered` gave, with what has come to it, and when that window ends."""
+        """Take back the truth that `take_gathered` gave, with what was added, and the end of that window."""
         self.window_ends_us = window_ends_us
         if truth:
             self._gathered.append(truth)
 
     @property
     def sockets(self) -> tuple[socket.socket, socket.socket]:
-        """That which autopilots speak to, and that which truth leaves by."""
+        """The socket for the autopilots, and the socket from which the truth is sent."""
         return self._socket, self._truth_socket
 
     def _tell_gathered(self) -> None:
@@ -122,7 +122,7 @@ class Link:
             self._gathered.clear()
 
     def serves(self, sender: Address) -> bool:
-        """Whether an autopilot that asks to be served is: while one answers, no other takes its place."""
+        """Whether the sender is the autopilot that is served: while one answers, no other takes its place."""
         if sender == self.peer:
             return True
         if self.peer is not None and time.monotonic() - self._heard < _TAKE_OVER_S:
@@ -134,7 +134,7 @@ class Link:
         return True
 
     def _turn_away(self, sender: Address, peer: Address) -> None:
-        """Say so, once to each of the first of them: a flood has as many addresses as it likes."""
+        """Report it on the terminal, once for each of the first: a flood can have any number of addresses."""
         if sender in self._turned_away or len(self._turned_away) == _MOST_NAMED:
             return
         self._turned_away.add(sender)
@@ -142,16 +142,16 @@ class Link:
         self._say(f"the autopilot at {shown(sender)} is not served: that at {shown(peer)} answers{others}")
 
     def met(self) -> None:
-        """An autopilot is met."""
+        """Note when the first autopilot is met."""
         if self._met_s is None:
             self._met_s = time.monotonic()
 
     def heard(self) -> None:
-        """The autopilot that is served has answered."""
+        """Note that the autopilot that is served has answered."""
         self._heard = time.monotonic()
 
     def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
-        """Hand a datagram on. True if it is a heartbeat whose sender is served from now on."""
+        """Pass a datagram on. True if it is a heartbeat whose sender is served from now on."""
         if sender == self.peer and simulator.receive(datagram):
             self.heard()
             return False
@@ -164,7 +164,7 @@ class Link:
         return True
 
     def _tell_turned_away(self, sender: Address) -> None:
-        """Tell an autopilot who is served in its place: not all of a flood, and none often."""
+        """Notify an autopilot which one is served in its place, but not for every datagram of a flood."""
         now_s = time.monotonic()
         if now_s - self._told_away_s < _TELL_AGAIN_S:
             return
@@ -175,5 +175,5 @@ class Link:
 
 
 def _truth_of(simulator: HilSimulator) -> bytes:
-    """The truth of the present tick, behind the number of this run of the world where that is due."""
+    """The truth of the present tick, preceded by the number of this run of the world when that is due."""
     return (simulator.run_datagram() or b"") + (simulator.truth_datagram() or b"")

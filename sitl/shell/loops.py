@@ -15,31 +15,31 @@ from sitl.shell.tick_loop import TickLoop
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
-LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
-LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
-WAITED_S = 1.0  # for one answer: longer than a busy machine makes it wait, and said
-SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
-_SLOW_SHARE = 0.95  # of the clock that was asked for: a slower one is said
-_SLOW_AGAIN_NS = 10_000_000_000  # between two words about it
-_STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
-_STOOD_NS = 2_000_000_000  # between two ticks, nobody waited for: longer than on a busy machine
+LOOK_S = 0.2  # between two checks for a request to stop, while nothing arrives
+LOST_S = 3.0  # of silence, after which the autopilot is reported as silent
+WAITED_S = 1.0  # for one answer: longer than on a busy machine; such a wait is reported
+SPIN_NS = 150_000  # before a due time: longer than a sleep overruns
+_SLOW_SHARE = 0.95  # of the requested speed of the clock: a slower one is reported
+_SLOW_AGAIN_NS = 10_000_000_000  # between two reports of it
+_STALL_NS = 200_000_000  # a greater lateness moves the schedule and is not caught up with
+_STOOD_NS = 2_000_000_000  # between two ticks, without waiting for an answer: longer than on a busy machine
 
 
 class Watch:
-    """Says when the autopilot falls silent and when it is back, once each."""
+    """Reports when the autopilot falls silent and when it answers again, once each."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
         self._lost: Address | None = None
 
     def heard(self, link: Link) -> None:
-        """An answer came."""
+        """Note that an answer came."""
         lost, self._lost = self._lost, None
-        if lost is not None and lost == link.peer:  # else another has taken its place, which was said
+        if lost is not None and lost == link.peer:  # else another has taken its place, which was reported
             self._say(f"autopilot at {shown(link.peer)} answers again")
 
     def silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
-        """No answer since that time of the monotonic clock."""
+        """Note that no answer has come since that time of the monotonic clock."""
         if self._lost is None and time.monotonic() - since > LOST_S:
             self._lost = link.peer
             self._say(
@@ -49,7 +49,7 @@ class Watch:
 
 
 def meet(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
-    """Wait until an autopilot speaks."""
+    """Wait for the heartbeat of an autopilot."""
     link.timeout(LOOK_S)
     while link.peer is None:
         stop.check()
@@ -65,7 +65,7 @@ def run_lockstep(
     say: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
-    """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` says."""
+    """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` allows."""
     watch = Watch(say)
     clock = None if pacing is None else Clock(pacing, simulator, say)
     ticks = TickLoop(link, simulator) if pacing is None else None
@@ -77,7 +77,7 @@ def run_lockstep(
         link.gather_truth(simulator)
         link.send(simulator.sensor_datagram())
         if ticks is None:
-            asked_s = time.monotonic()  # what is not counted as waiting looks like a busy machine
+            asked_s = time.monotonic()  # waiting that is not counted would look like a busy machine
             arrived = link.receive()
         else:
             moved, arrived = ticks.run()
@@ -95,23 +95,23 @@ def run_lockstep(
 
 
 class Clock:
-    """The wall clock that lockstep keeps to where the machine can; says where it cannot."""
+    """The wall clock that lockstep follows if the machine is fast enough; reports when it is not."""
 
     def __init__(self, pacing: Pacing, simulator: HilSimulator, say: Callable[[str], None]) -> None:
         self._pacing, self._simulator, self._say = pacing, simulator, say
         self._period_ns = round(simulator.tick_us * 1000 / pacing.speed)
         self._due = time.perf_counter_ns()
         self._told_ns = 0
-        self._began_ns = time.perf_counter_ns()  # the last tick, or the end of a wait for somebody else
+        self._began_ns = time.perf_counter_ns()  # the last tick, or the end of a wait for an answer
 
     def skip(self, seconds: float) -> None:
-        """The clock stood for so long because nobody answered."""
+        """Leave out a time for which the clock stood because no answer came."""
         self._due = self._began_ns = time.perf_counter_ns()
         self._pacing.pause(round(seconds * 1e9))
 
     def wait(self) -> None:
-        """Until the next tick is due."""
-        # what was waited for is not caught up with
+        """Wait until the next tick is due."""
+        # a greater lateness than _STALL_NS is not caught up with
         self._due = max(self._due, time.perf_counter_ns() - _STALL_NS) + self._period_ns
         before, now = self._began_ns, _sleep_until(self._due)
         self._began_ns = now
@@ -137,13 +137,13 @@ class Clock:
 def _insist(
     link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool, began: float
 ) -> float:
-    """Until the present tick is answered, send it again; `again`: at once, as nothing came or a greeting.
+    """Resend the present tick until it is answered; `again`: immediately, because nothing or a greeting came.
     Returns how long the answer took, in s, since the tick was sent at `began` (monotonic)."""
     sent = time.monotonic()
     silence_s = _RESEND_FIRST_S
     while not simulator.answered:
         stop.check()
-        # not for every stray datagram: the answer to one doubled tick would double all that follow
+        # not for every stray datagram: the second answer to a resent tick would double all ticks that follow
         now = time.monotonic()
         if again or now - sent >= silence_s:
             link.send(simulator.sensor_datagram())
@@ -169,7 +169,7 @@ def run_real_time(
 ) -> None:
     """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted.
 
-    `ask` tells the autopilot of the present tick, `take` is given what comes back.
+    `ask` sends the present tick to the autopilot, `take` processes each datagram that comes back.
     """
     watch = Watch(say)
     period_ns = simulator.tick_us * 1000 / pacing.speed
@@ -199,7 +199,7 @@ def run_real_time(
 def _await_answer(
     link: Link, simulator: HilSimulator, due_ns: int, take: Callable[[bytes, Address], object]
 ) -> bool:
-    """Until the present tick is answered (True) or the next one is due."""
+    """Wait until the present tick is answered (True) or the next one is due."""
     while True:
         arrived = link.receive(socket.MSG_DONTWAIT)
         if arrived:
@@ -214,7 +214,7 @@ def _await_answer(
 
 
 def _sleep_until(due_ns: int) -> int:
-    """Sleep, then spin over the last part; returns the time it is."""
+    """Sleep, then spin for the last part; returns the present time."""
     left = due_ns - time.perf_counter_ns()
     if left > SPIN_NS:
         time.sleep((left - SPIN_NS) * 1e-9)

@@ -1,4 +1,4 @@
-"""The loop of the simulator around PX4: a TCP server for one firmware after the other."""
+"""The loop of the simulator around PX4: a TCP server for one firmware after another."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sitl.pacing import Pacing
 from sitl.shell.link import Link
 from sitl.shell.loops import LOOK_S, LOST_S, WAITED_S, Clock
 
-_FREE_S = 0.004  # from tick to tick until its first answer: about real time, as it starts by the wall clock
+_FREE_S = 0.004  # between ticks before the first answer: about real time, as the firmware starts by its clock
 _PIECE = 65_536
 _UNREAD = 65_536  # bytes that may wait for a firmware that does not read: hundreds of ticks
 
@@ -27,7 +27,7 @@ def run_px4(
     say: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
-    """Serve firmwares for ever; the world begins anew with each."""
+    """Serve firmwares for ever; the world restarts with each."""
     exchange = Exchange(simulator)
     with _server(link.address) as server:
         door, served = Door(server, say), False
@@ -61,20 +61,20 @@ class Door:
         self._looked_s = 0.0
 
     def enter(self) -> tuple[socket.socket, Address] | None:
-        """Who is served from now on; None if nobody has come for a while."""
+        """The firmware that is served from now on; None if none has connected for LOOK_S."""
         came, self._next = self._next or self._asking(LOOK_S), None
         self._inside = None if came is None else came[1]
         return came
 
     def turn_away(self) -> None:
-        """Who asks while another answers; looked for now and then."""
+        """Refuse a firmware that connects while another answers; checks at most once in LOOK_S."""
         came = self._knocking()
         if came is not None:
             came[0].close()
             self._say(f"PX4 at {shown(came[1])} is not served: that at {shown(self._inside)} answers")
 
     def give_place(self) -> None:
-        """To who asks while that inside is silent: then a ConnectionError says so."""
+        """If another firmware connects while the present one is silent, raise ConnectionError to serve it."""
         self._next = self._knocking()
         if self._next is not None:
             raise ConnectionError("it is silent, and another asks")
@@ -91,7 +91,7 @@ class Door:
             return None
         try:
             came, peer = self._server.accept()
-        except ConnectionError:  # it has gone again
+        except ConnectionError:  # it has disconnected already
             return None
         return came, peer[:2]
 
@@ -121,7 +121,7 @@ def _serve(
     say: Callable[[str], None],
     clock: Clock | None,
 ) -> str:
-    """Tick while it is there; why it no longer is."""
+    """Tick while the firmware is connected; returns why it no longer is."""
     began = time.monotonic()
     try:
         while True:
@@ -154,7 +154,7 @@ def _await(
     stop: StopRequest,
     say: Callable[[str], None],
 ) -> float:
-    """Until the tick is answered or, before the first answer, a while; how long that took, in s."""
+    """Wait until the tick is answered or, before the first answer, for _FREE_S; returns the time in s."""
     began = time.monotonic()
     told = False
     while True:

@@ -1,8 +1,8 @@
-"""Lockstep in machine code: tick after tick without Python, as long as there are but answers and frames.
+"""Lockstep in machine code: tick after tick without Python, as long as there are only answers and frames.
 
-`exchange` stands where the sensors of a tick have been sent. It waits for the answer, moves the world on, and
-sends the frames of the next tick, until something else is to be done: a datagram comes that is not the plain
-answer to this tick, none comes in time, or a tick is due at which more is to be said than sensors and truth.
+`exchange` begins after the sensors of a tick have been sent. It waits for the answer, moves the world on, and
+sends the frames of the next tick, until something else must be done: a datagram comes that is not the plain
+answer to this tick, none comes in time, or at a tick more must be sent than sensors and truth.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ from sitl.ticks import TRUTH_OF_A_TICK, goes_on, move_on, put_sensors_next, put_
 # why `exchange` returns
 SILENCE, HEARD, MOVED = 0, 1, 2
 _TRUTH_ROOM = 65_507  # bytes of the longest datagram; a window has less
-# what `Wire.sizes` are
+# entries of `Wire.sizes`
 _ADDRESS, _HEARD, _GATHERED = range(3)
 
 
 class Wire(NamedTuple):
-    """The sockets, and what goes through them."""
+    """The sockets, and the data that pass through them."""
 
     fd: int
     truth_fd: int
-    peer: Bytes  # the addresses of the autopilot that is served, of who has spoken, and where truth goes
+    peer: Bytes  # the addresses of the autopilot that is served, of the last sender, and for the truth
     sender: Bytes
     truth_to: Bytes
     heard: Bytes  # the last datagram
     gathered: Bytes  # truth of this window
-    sizes: Ints  # of a system's address; of `heard`; of `gathered`
+    sizes: Ints  # bytes of the sender's address, of `heard`, of `gathered`
     window_ends_us: Ints  # (1,)
 
 
 @kernel
 def _tell(wire: Wire, run: Running) -> None:
-    """Send the sensors of this tick; gather its truth, and at the end of a window send that."""
+    """Send the sensors of this tick; gather its truth, and send the truth at the end of a window."""
     now_us = run.numbers[NOW_US]
     wire.sizes[_GATHERED] += put_truth_due(run, wire.gathered[wire.sizes[_GATHERED] :])
     ends_us = wire.window_ends_us[0]
@@ -74,8 +74,8 @@ def _tell(wire: Wire, run: Running) -> None:
 
 @threaded
 def exchange(wire: Wire, run: Running) -> int:
-    """Ticks of the world, each as soon as the one before is answered: SILENCE or HEARD where the present one
-    is not, MOVED where the world stands at a tick of which nothing is framed yet."""
+    """Run ticks of the world, each as soon as the one before is answered. Returns SILENCE or HEARD if the
+    present tick is not answered, MOVED if the world is at a tick of which no frames are written yet."""
     while True:
         wire.sizes[_ADDRESS] = SYSTEM_ADDRESS_BYTES
         size = receive_from_at(
@@ -95,7 +95,7 @@ def exchange(wire: Wire, run: Running) -> int:
 
 
 class TickLoop:
-    """Runs `exchange` where it can be run."""
+    """Runs `exchange` where that is possible."""
 
     def __init__(self, link: Link, simulator: HilSimulator) -> None:
         self._link, self._simulator = link, simulator
@@ -103,11 +103,11 @@ class TickLoop:
         self._usable = all(map(usable, link.sockets)) and self._truth_to is not None
         self._peer: Address | None = None
         self._wire: Wire | None = None
-        self._exchange: Any = None  # machine code, once it was asked for
+        self._exchange: Any = None  # machine code, after its first use
 
     def run(self) -> tuple[bool, tuple[bytes, Address] | None]:
-        """Behind the sending of a tick's sensors: whether the world has moved on to a tick that is still to
-        be told of, else the datagram that has come, if any, as `Link.receive` gives it."""
+        """Run after the sensors of a tick were sent. Returns whether the world has moved on to a tick that is
+        still to be sent, and otherwise the datagram that came, if any, as `Link.receive` returns it."""
         link, simulator = self._link, self._simulator
         run = simulator.running() if self._usable else None
         wire = None if run is None else self._ready()
@@ -132,7 +132,7 @@ class TickLoop:
         return False, (wire.heard[: wire.sizes[_HEARD]].tobytes(), address_of_system(sender))
 
     def _ready(self) -> Wire | None:
-        """The wire towards the autopilot that is served now; None: machine code cannot speak to it."""
+        """The wire to the autopilot that is served now; None: machine code cannot send to its address."""
         peer = self._link.peer
         if peer != self._peer:
             self._peer = peer
@@ -161,7 +161,7 @@ def _new_wire(fd: int, truth_fd: int, peer: bytes, truth_to: bytes) -> Wire:
 
 
 def rehearse(simulator: HilSimulator) -> None:
-    """Have the machine code of `exchange` ready, if this simulator can use it."""
+    """Prepare the machine code of `exchange`, if this simulator can use it."""
     run = simulator.running()
     if SUPPORTED and run is not None:
         entry_of(exchange, _new_wire(-1, -1, b"", b""), run)

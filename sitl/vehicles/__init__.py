@@ -1,1 +1,1 @@
-"""What is really flying; it may differ from what the autopilot believes."""
+"""The true vehicle; it may differ from the vehicle that the autopilot assumes."""

@@ -1,4 +1,4 @@
-"""The simulator's parameters, SIM_*: what an experiment changes without writing a vehicle file."""
+"""The simulator's parameters, SIM_*, which an experiment can change without a new vehicle file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ATTACHMENT = ("attachment_x", "attachment_y", "attachment_z")
 
 @cache
 def definitions() -> ParameterFile:
-    """What `sim_parameters.toml` says."""
+    """The definitions in `sim_parameters.toml`."""
     text = (files("sitl") / FILE).read_text(encoding="utf-8")
     return parameter_file(tomllib.loads(text), FILE)
 
@@ -41,7 +41,7 @@ def sim_parameters(truth: Truth) -> ParameterTable:
 
 
 def apply(truth: Truth, table: ParameterTable) -> Truth:
-    """`truth` with what the table says of the plant itself."""
+    """`truth` with the values of the plant from the table."""
     drag = table["SIM_DRAG_SCALE"]
     chain = ChainModel(
         links=int(table["SIM_CBL_LINKS"]),

@@ -1,4 +1,4 @@
-"""The plant's record of a vehicle: what really flies, with the names that the equations of the plant use."""
+"""The plant's record of the true vehicle, with the names that the equations of the plant use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from sitl.plant.records import Air, ChainModel, Drive, Truth
 
-# keys of the vehicle file that are not named as the fields, with their unit behind
+# keys of the vehicle file that are not the name of the field followed by its unit
 _NAMED = {
     "known_curve": "thrust_curve_known",
     "speed_controlled": "esc_speed_controlled",
@@ -20,17 +20,17 @@ _NAMED = {
     "density": "air_density_kg_m3",
 }
 _RECORDS = ("air", "drive")  # of numbers
-_SCALES = {"capacity_as": 3.6}  # A s of a mAh
+_SCALES = {"capacity_as": 3.6}  # A s per mAh
 
 
 def _keys(record: type[Truth] | type[Air] | type[Drive]) -> dict[str, str]:
-    """Key of the vehicle file for each field, as `_NAMED` says, or the field's name with its unit behind."""
+    """Key of the vehicle file for each field: from `_NAMED`, or the field's name followed by its unit."""
     found = {}
     for field in record._fields:
         if field in _RECORDS:
             continue
         keys = [key for key in Vehicle.model_fields if key == field or key.startswith(f"{field}_")]
-        if field in _NAMED or keys:  # else it is no number of the vehicle: the winch, the voltage
+        if field in _NAMED or keys:  # else the field is not in the vehicle file: the winch, the voltage
             found[field] = _NAMED.get(field) or min(keys, key=len)
     return found
 
@@ -51,8 +51,8 @@ CHAIN_KEYS = {
 
 
 def truth_of(vehicle: Vehicle) -> Truth:
-    """The vehicle as the plant's kernels take it: all rotors whole, the winch at rest, the battery without
-    current."""
+    """The vehicle as the plant's kernels require it: all rotors intact, the winch at rest, the battery
+    without current."""
     values = {field: getattr(vehicle, key) for field, key in KEYS.items()}
     air = {field: float(getattr(vehicle, key)) for field, key in AIR_KEYS.items()}
     drive = {
@@ -63,5 +63,5 @@ def truth_of(vehicle: Vehicle) -> Truth:
 
 
 def load_truth(name_or_path: str | PathLike[str]) -> Truth:
-    """The truth of a shipped vehicle (`bebop`, `thesis`) or of a vehicle file; else a VehicleFileError."""
+    """The truth of a shipped vehicle (`bebop`, `thesis`) or of a vehicle file; otherwise VehicleFileError."""
     return truth_of(load_vehicle(name_or_path))

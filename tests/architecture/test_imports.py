@@ -1,14 +1,13 @@
-"""Which room may import which, and who may touch the world.
+"""Which room may import which, and which modules may use sockets, clocks, threads and logging.
 
-Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
-laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
-everything below. A law is known by its folder: nothing outside imports one by name. `sitl` knows of the
-autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
-the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
+Missions and geometry import no other room; trajectory imports both, the wire these; the vehicle the wire;
+services, laws, estimator and guidance those; the supervisor guidance and services; the core of the flight
+everything below it. A law is found in its folder: nothing outside imports one by name. `sitl` imports
+geometry and wire of the autopilot, and is layered like it: the plant imports geometry, the sensors the plant,
+the world's tick both. `gcs` also imports the paths and the definitions of parameters; only
 `gcs/closed_loop.py`, `gcs/sweep` and `plumbline/learning` join the cores. `plumbline`, which scripts import,
-stands on it. What a
-vehicle is and how a TOML file is read are leaves that every program shares. Sockets, clocks, threads and
-logging belong to the shells alone.
+imports `gcs`. The definition of a vehicle and the reading of TOML files are leaves that every program shares.
+Only the shells use sockets, clocks, threads and logging.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ VEHICLE = (  # the record of a vehicle, its file, and where its rotors are
     "autopilot.vehicle.shipped",
     "autopilot.vehicle.layout",
 )
-PLANT = ("sitl.plant.records", "sitl.plant.rotors")  # what the sensors may know of it
-RECORDS = "autopilot.control.records"  # what the laws speak of: vehicle, state, reference, command
-OWN = (  # what somebody brings, by its name
+PLANT = ("sitl.plant.records", "sitl.plant.rotors")  # what the sensors may import of it
+RECORDS = "autopilot.control.records"  # the records of the laws: vehicle, state, reference, command
+OWN = (  # custom laws, estimators and planners, by name
     "autopilot.own.brought",
     "autopilot.own.chosen",
     "autopilot.own.doubts",
@@ -56,7 +55,7 @@ GCS = (
     "sitl.sensors.shipped",
     "missions",
 )
-# room: what it may import besides itself. A module belongs to the longest room that begins its name.
+# room: what it may import besides itself. A module belongs to the longest room with which its name begins.
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "missions": (),
     "autopilot.geometry": (),
@@ -100,7 +99,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.__main__": ("autopilot",),
     "sitl.plant": ("autopilot.geometry", "autopilot.vehicle.battery", "autopilot.vehicle.layout"),
     "sitl.sensors": ("autopilot.geometry", "missions.toml_files", *PLANT),
-    # it stands at the speed that the speed controllers tell
+    # its lines stand at the speed that the speed controllers report
     "sitl.sensors.vibration": ("autopilot.geometry", "autopilot.wire.convert", *PLANT, "sitl.sensors"),
     "sitl.vehicles": (*VEHICLE, "autopilot.wire", "sitl.plant.records"),
     "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.chosen"),
@@ -230,7 +229,8 @@ def imports(tree: ast.AST, module: str, is_package: bool) -> Iterator[tuple[int,
 
 
 def room_of(module: str) -> str | None:
-    """The longest room that begins its name; a file at the top of `autopilot` is in none."""
+    """The longest room with which the name of the module begins; a file at the top of `autopilot` is in
+    none."""
     rooms = [room for room in MAY_IMPORT if begins(module, room)]
     if module in ROOMS:
         return module

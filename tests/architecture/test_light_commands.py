@@ -1,4 +1,4 @@
-"""Commands that only speak to a vehicle load no numba, which takes longer than all else that they do."""
+"""Commands that only talk to a vehicle do not load numba, which takes longer than all else that they do."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MODULES = [*(f"gcs.commands.{name}" for name in COMMANDS), *(f"gcs.workflows.{na
 
 @pytest.fixture(scope="module")
 def loads_numba() -> dict[str, bool]:
-    """Of each module, imported in this order in one process, whether numba is there by then."""
+    """Whether numba is loaded after each module, when they are imported in this order in one process."""
     loads = "import_module(name); print(name, 'numba' in sys.modules)"
     program = f"import sys; from importlib import import_module\nfor name in {MODULES!r}: {loads}"
     told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

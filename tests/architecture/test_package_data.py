@@ -1,4 +1,4 @@
-"""What the packages need beside their modules is declared, so that it is in a wheel."""
+"""The files that the packages need beside their modules are declared, so that a wheel contains them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NO_DATA = {"__pycache__", ".egg-info"}
 
 
 def undeclared(root: Path, declared: dict[str, list[str]]) -> list[str]:
-    """Files of packages, but for modules, that no pattern of package-data names."""
+    """Files of packages, except modules, that no pattern of package-data matches."""
     patterns = [
         f"{package.replace('.', '/')}/{name}" for package, names in declared.items() for name in names
     ]

@@ -1,8 +1,8 @@
-"""Tests see the product as its users do: no private names, no sources loaded or listed by their place.
+"""Tests see the product as its users do: no private names, no sources loaded or listed by their path.
 
-A name that begins with one underscore may change with any edit; a test that depends on it tests the way in
-which something is done. What a test needs is either reached by the public face or deserves a public name.
-Source files are found by importing their modules: a list of paths goes stale when a file moves.
+A name that begins with one underscore may change with any edit; a test that depends on it tests how something
+is done. What a test needs is either reached through the public interface or deserves a public name. Source
+files are found by importing their modules: a list of paths goes stale when a file moves.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ EXCEPTIONS = {
     ("tests/clients/programs/dronekit_flight.py", "_master"): "DroneKit has no mode names for PX4",
     ("tests/wire/test_tlog.py", "_timestamp"): "where pymavlink puts the time of a record",
 }
-# files whose subject is which sources count
+# tests whose subject is the set of source files
 ABOUT_SOURCES = ("tests/architecture/", "tests/gcs/batch/test_closure.py")
 LOADERS = {"spec_from_file_location", "SourceFileLoader", "run_path"}
 BY_STRING = {"getattr", "setattr", "delattr", "hasattr", "object", "patch"}  # also of monkeypatch and mock
 
 
 def is_private(name: str) -> bool:
-    """One leading underscore; a name of two belongs to the language."""
+    """Whether the name has one leading underscore; a name with two belongs to the language."""
     return name.startswith("_") and not name.startswith("__") and name not in NAMED_TUPLE
 
 
@@ -48,7 +48,8 @@ def called_name(call: ast.Call) -> str:
 
 
 def own_names(tree: ast.AST) -> set[str]:
-    """What the classes of a file define themselves: methods, attributes of the class and of `self`."""
+    """The names that the classes of a file define themselves: methods, attributes of the class and of
+    `self`."""
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef):
@@ -89,7 +90,8 @@ def private_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 
 def places(tree: ast.AST, sources: frozenset[str]) -> Iterator[tuple[int, str]]:
-    """(line, what) of every source that is loaded by its place, and of every path of a product's source."""
+    """(line, what) of every source that is loaded by its path, and of every path of a source of the
+    product."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name) | ast.Attribute(attr=name) if name in LOADERS:

@@ -1,7 +1,7 @@
-"""Vehicles in real time, and the programs that people fly them with; all are gone when the tests are over.
+"""Vehicles in real time, and the programs that people fly them with; all are ended after the tests.
 
-A flight in real time takes its time, so those that the collected tests ask for are all begun with the first
-of them and flown side by side; each test then judges what one of them left. See `staged`.
+A flight in real time takes long, so all flights that the collected tests use begin with the first of these
+tests and are flown side by side; each test then judges the results of one of them. See `staged`.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from gcs.analysis.samples import CARRIED
 from gcs.shell.link import LOOPBACK, free_port
 
 PROGRAMS = Path(__file__).with_name("programs")
-LONG_S = 300.0  # of a busy machine
+LONG_S = 300.0  # on a busy machine
 END_S = 10.0
-AT_ONCE = 2  # flights: what two cores fly, beside other tests, without a client that loses messages
+AT_ONCE = 2  # flights: as many as two cores fly, beside other tests, without a client that loses messages
 
-# What no client may say, whatever it means by it
+# Words that no client may print, whatever it means by them
 COMPLAINT = re.compile(
     r"(?i:warn|error|fail|time(d )?-?out|breach|traceback|exception|no such|unknown|denied|reject|lost)"
     r"|refused|UNSUPPORTED"
@@ -46,7 +46,7 @@ COMPLAINT = re.compile(
 
 
 def complaints(text: str) -> list[str]:
-    """The lines of a client's output with which it complains."""
+    """The lines of a client's output that are complaints."""
     return [line for line in text.splitlines() if COMPLAINT.search(line)]
 
 
@@ -55,12 +55,12 @@ Place = tuple[float, float, float]  # east, north, up
 
 @dataclass
 class Witness:
-    """What is said at two ports: by the simulated world, and by the vehicle to a station that is silent."""
+    """Listens at two ports: to the simulated world, and to the vehicle as a station that is silent."""
 
     truth: socket.socket
     ground: socket.socket
     load: list[tuple[float, Place]] = field(default_factory=list)  # vehicle's clock, s; true place, m
-    asked: list[tuple[float, Place]] = field(default_factory=list)  # where the carried load shall be
+    asked: list[tuple[float, Place]] = field(default_factory=list)  # setpoint of the carried load
     phases: list[int] = field(default_factory=list)
     tilt: float = 0.0  # greatest of all, rad
     yaw: float = 0.0  # the last one, rad from north
@@ -69,14 +69,14 @@ class Witness:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def watch(self) -> None:
-        """Until the end."""
+        """Receive until the end."""
         while not self._over.is_set():
             for sock in select.select([self.truth, self.ground], [], [], 0.2)[0]:
                 for one in decode(sock.recv(65535))[0]:
                     self._take(one)
 
     def _take(self, one: Received) -> None:
-        """Of other messages it does not even decode the fields: the processor is the clients'."""
+        """Note a message; other messages are not even decoded, to leave the processor to the clients."""
         match one.id:
             case mavlink.MAVLINK_MSG_ID_LOAD_STATE:
                 message = one.message
@@ -97,11 +97,11 @@ class Witness:
                 self.texts.append(one.message.text)
 
     def nearest(self, place: Place) -> float:
-        """How near the load truly came to a place, m; between two samples it is taken to go straight."""
+        """Least true distance of the load from a place, m; between two samples a straight path is assumed."""
         return min(_beside(place, before, after) for (_, before), (_, after) in pairwise(self.load))
 
     def worst_error(self) -> float:
-        """Of the carried load, between where it truly was and where it should be, m."""
+        """Greatest distance of the carried load's true position from its setpoint, m."""
         times = np.array([at for at, _ in self.load])
         tracks = np.array([where for _, where in self.load]).T
         asked_times = np.array([at for at, _ in self.asked])
@@ -110,7 +110,7 @@ class Witness:
         return float(np.linalg.norm(true - asked, axis=1).max())
 
     def longest_silence(self, begin: float, end: float) -> tuple[float, float]:
-        """Of ATTITUDE, between two times of the wall clock: s of that, and s of the vehicle's clock."""
+        """Longest gap in ATTITUDE between two wall clock times, in s of that and of the vehicle's clock."""
         heard = [(wall, own) for wall, own in self.attitudes if begin < wall < end]
         walls = [begin, *(wall for wall, _ in heard), end]
         of_wall = max(after - before for before, after in pairwise(walls))
@@ -121,7 +121,7 @@ class Witness:
 
 
 def _beside(place: Place, before: Place, after: Place) -> float:
-    """Distance of a place from a straight way."""
+    """Distance of a place from a straight path between two others."""
     way = [b - a for a, b in zip(before, after, strict=True)]
     to = [b - a for a, b in zip(before, place, strict=True)]
     length = sum(w * w for w in way)
@@ -137,7 +137,7 @@ def _bound() -> tuple[socket.socket, str]:
 
 
 class Mavproxy:
-    """MAVProxy as it is started by hand, without a screen: lines in, text out."""
+    """MAVProxy as started by hand, without a screen: lines in, text out."""
 
     def __init__(self, master: str, directory: Path) -> None:
         directory.mkdir()
@@ -162,7 +162,7 @@ class Mavproxy:
         self.process.stdin.flush()
 
     def expect(self, text: str, timeout_s: float = LONG_S) -> None:
-        """Wait until it has said `text`; what was said until then is forgotten."""
+        """Wait until it has printed `text`; discard what it printed until then."""
         until = time.monotonic() + timeout_s
         while text not in self.text:
             assert self._read(until - time.monotonic()), (
@@ -171,8 +171,8 @@ class Mavproxy:
         self.text = self.text.partition(text)[2]
 
     def insist(self, line: str, text: str) -> None:
-        """Type `line` every few seconds until it has said `text`: a busy MAVProxy misses answers; and what it
-        hears before the first HEARTBEAT it takes for the parameters of another vehicle."""
+        """Type `line` every few seconds until it has printed `text`: a busy MAVProxy misses answers; and it
+        takes what it receives before the first HEARTBEAT for the parameters of another vehicle."""
         until = time.monotonic() + LONG_S
         while True:
             self.type(line)
@@ -193,7 +193,7 @@ class Mavproxy:
         return bool(data)
 
     def end(self) -> str:
-        """As when its window is closed; all that it said."""
+        """End it as when its window is closed; return all that it printed."""
         self.process.kill()
         while self._read(END_S):
             continue
@@ -203,14 +203,14 @@ class Mavproxy:
 
 @dataclass
 class Told:
-    """What a program of `programs` said: JSON in its last line, and everything before."""
+    """The output of a program in `programs`: JSON in its last line, and everything before."""
 
     value: dict[str, Any]
     output: str
 
 
 class Stage:
-    """One vehicle with its simulator, and who speaks with it."""
+    """One vehicle with its simulator, and the programs that connect to it."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -221,8 +221,8 @@ class Stage:
         self._mavproxies: list[Mavproxy] = []
 
     def begin(self, *options: str, speed: float = 1.0) -> None:
-        """Start the vehicle with such options, wait until it flies with its simulator."""
-        # a free port may be taken by others until it is used
+        """Start the vehicle with these options, and wait until it flies with its simulator."""
+        # a free port may be taken by others before it is used
         self.gcs, self.second_gcs, self.api, self.tcp = (str(free_port()) for _ in range(4))
         (truth, truth_at), (ground, ground_at) = _bound(), _bound()
         self.witness = Witness(truth, ground)
@@ -230,7 +230,7 @@ class Stage:
         sim = f"{LOOPBACK}:{free_port()}"
         at = f"{LOOPBACK}:".__add__
         world = ("--listen", sim, "--truth", truth_at, "--truth-every", "5", "--sensors", "lab")
-        # in lockstep a busy machine makes it slower, and nothing else
+        # in lockstep, a busy machine makes the flight slower, and nothing else
         self._start("sitl", *world, "--lockstep", "--speed", str(speed))
         where = ("--gcs", at(self.gcs), "--gcs", at(self.second_gcs), "--gcs", ground_at)
         more = ("--api", at(self.api), "--tcp", at(self.tcp), "--storage", str(self.storage))
@@ -255,7 +255,7 @@ class Stage:
         return process, log
 
     def program(self, name: str, *arguments: str) -> Callable[[], Told]:
-        """Begin one of our programs that use a client library; call what is returned to wait for its end."""
+        """Begin one of our programs that use a client library; the returned function waits for its end."""
         log = self.directory / f"{name}-{len(self._running)}.log"
         with log.open("wb") as output:
             process = subprocess.Popen(
@@ -275,7 +275,7 @@ class Stage:
         return told
 
     def run_gcs(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """A gcs command at the second ground station's port, to its end."""
+        """Run a gcs command at the second ground station's port, to its end."""
         return subprocess.run(
             [sys.executable, "-m", "gcs", *arguments, "--connect", self.second_gcs],
             capture_output=True,
@@ -291,11 +291,11 @@ class Stage:
         return self._mavproxies[-1]
 
     def wait_for(self, text: str, timeout_s: float = LONG_S) -> None:
-        """Until the vehicle has said so to everybody."""
+        """Wait until the vehicle has sent this text to all."""
         self.wait_until(lambda: text in self.witness.texts, timeout_s)
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
-        """Until the witness has seen it."""
+        """Wait until the condition holds."""
         turn = threading.Event()
         for _ in range(round(timeout_s / 0.05)):
             if condition():
@@ -321,7 +321,7 @@ class Stage:
 
 
 class Stages:
-    """All flights that are asked for, some at a time."""
+    """All flights that the tests use, some at a time."""
 
     def __init__(self) -> None:
         self._directory = Path(tempfile.mkdtemp(prefix="clients-"))
@@ -368,7 +368,7 @@ PLAYS: dict[str, Callable[[Stage], Any]] = {}
 
 
 def staged(play: Callable[[Stage], Any]) -> Any:
-    """A flight as a fixture: called, it is what the flight left, or what went wrong in it."""
+    """A flight as a fixture: a function that returns the result of the flight, or raises its exception."""
     name = play.__name__
     PLAYS[name] = play
 

@@ -1,4 +1,4 @@
-"""The programs that come with pymavlink, as docs/tools.md starts them, with the log of a flight of ours."""
+"""The programs that come with pymavlink, as docs/tools.md starts them, with the log of one of our flights."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OURS = {kind.msgname for number, kind in m.mavlink_map.items() if 60100 <= numbe
 
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The directory of a flight that is over."""
+    """The directory of a finished flight."""
     out = tmp_path_factory.mktemp("flown") / "out"
     command = [sys.executable, "-m", "gcs", "fly", str(FAST), "--out", str(out), "--quiet"]
     flown = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
@@ -36,7 +36,7 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def tool(name: str, *arguments: str, cwd: Path) -> str:
-    """What it printed, once it has ended well."""
+    """The output of a tool, which must end without an error."""
     command = [sys.executable, str(Path(sys.executable).with_name(f"{name}.py")), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120.0, cwd=cwd, check=False)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stdout[-500:] + done.stderr
@@ -72,7 +72,7 @@ def test_mavflighttime_counts_the_fast_part_of_the_flight(flight: Path) -> None:
     speeds = np.array([np.hypot(state.vx, state.vy) * 0.01 for state in truth])
     fast_s = float(np.diff(times_s)[speeds[1:] > COUNTED_M_S].sum())
     assert fast_s > 4.0
-    # it counts in whole seconds, out and back
+    # it counts in whole seconds, on the way out and back
     assert 60 * int(minutes) + int(seconds) == pytest.approx(fast_s, abs=2.0)
     assert float(metres) == pytest.approx(48.0, abs=2.0)
 

@@ -1,4 +1,4 @@
-"""Numbers beside what they are proved to be."""
+"""Comparison of numbers with their proved values."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ EXACT = 1e-12  # a handful of roundings on numbers of order one
 
 
 def close(actual: Any, expected: Any, tolerance: float) -> None:
-    """All numbers equal within the tolerance times the size of what is expected (at least 1); NaN never
-    is."""
+    """Assert that all numbers are equal within the tolerance times the largest expected magnitude (at least
+    1); NaN always fails."""
     actual, expected = np.asarray(actual, float), np.asarray(expected, float)
     error = np.max(np.abs(actual - expected))
     assert error <= tolerance * max(1.0, float(np.max(np.abs(expected)))), f"{actual} is not {expected}"

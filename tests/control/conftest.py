@@ -18,7 +18,7 @@ from tests.control.plain_laws import plain_laws, sources
 
 @pytest.fixture(scope="session")
 def bebop() -> Vehicle:
-    """Table 4-1."""
+    """The vehicle of Table 4-1."""
     return Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
 
 
@@ -45,7 +45,7 @@ def model() -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def law_sources() -> dict[str, str]:
-    """Source texts, by module, of the thesis's cascade with all they are made of."""
+    """Source texts, by module, of the laws of the thesis and of all modules that they are made of."""
     return sources(thesis_cascade, height, quad_position, mixer)
 
 

@@ -1,4 +1,4 @@
-"""Every sign of a source text, turned over one at a time, and which of them no proof finds."""
+"""Reverses every sign of a source text, one at a time, and finds the reversals that no proof detects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autopilot.control.records import Vehicle
 from tests.control.plain_laws import plain_laws, with_function
 
 NEGATE = "(lambda v: tuple(-c for c in v) if isinstance(v, tuple) else -v)({})"
-# terms of these calls by position: each may stand with the wrong sign
+# positions of the terms of these calls: each term may have the wrong sign
 TERMS = {"add": (0, 1), "sub": (0, 1), "add3": (0, 1, 2), "axpy": (0, 2), "scale": (0,), "cross": (0,)}
 
 
@@ -75,7 +75,8 @@ def surviving(
     model: SimpleNamespace,
     vehicle: Vehicle,
 ) -> tuple[list[str], int]:
-    """Flips that no proof finds, and how many were tried. The proof that found the last is asked first."""
+    """Flips that no proof detects, and the number of flips tried. The proof that detected the previous flip
+    is tried first."""
     laws = plain_laws(texts)
     order = [(proof, called(proof, laws, model, vehicle)) for proof in proofs]
     survivors, count, spared = [], 0, set()

@@ -15,7 +15,7 @@ from autopilot.vehicle.rotors import allocate
 from tests.control.closeness import EXACT, close
 from tests.doubles.mixing import mix
 
-SLACK = 1e-9  # what a linear programme may give up of an optimum found before: its own feasibility is 1e-7
+SLACK = 1e-9  # what a linear programme may lose of an earlier optimum; its own feasibility is 1e-7
 PROGRAMME = 2e-6  # forces found by the linear programmes
 
 # thrust (N) and moments (N m) that four rotors of Table 4-1 cannot give
@@ -34,7 +34,7 @@ SATURATING = (
     (2.0, 0.02, 0.09, 0.05),
 )
 
-# unlike each other, at places of no symmetry
+# rotors that differ from each other, in positions without symmetry
 UNEVEN: Layout = (
     Rotor(-1.0, 0.1, -1.0, 1.0),
     Rotor(-0.3, -0.9, 1.1, 1.1),
@@ -43,14 +43,14 @@ UNEVEN: Layout = (
     Rotor(-0.4, 0.9, -1.2, 0.8),
 )
 
-# of which these can give all but the moments about level axes
+# a demand of which these rotors can give all but the moments about the horizontal axes
 ROOM_FOR_YAW = (3.87, 0.15, -0.27, -0.007)
 MOST_ROTORS = UNEVEN[:4] + UNEVEN * 2
 
 
 def forces_make_the_demand(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """The inverse of (2-13) is its inverse, by the matrix as printed, with limits out of reach and with
-    none."""
+    """The mixer inverts (2-13), checked with the matrix as printed, with limits out of reach and without
+    limits."""
     arm, c = vehicle.arm, vehicle.torque_ratio
     matrix = np.array([[1, 1, 1, 1], [0, -arm, 0, arm], [arm, 0, -arm, 0], [-c, c, -c, c]])
     for limited, thrust, moment in ((1.0, 4.0, (0.01, -0.02, 0.003)), (0.0, 9.0, (-0.4, 0.3, 0.05))):
@@ -62,9 +62,9 @@ def forces_make_the_demand(laws: SimpleNamespace, model: SimpleNamespace, vehicl
 
 @cache
 def best_forces(vehicle: Vehicle, demand: tuple[float, ...]) -> tuple[float, ...]:
-    """Thrust and moment nearest to the demand, roll and pitch first, then thrust, then yaw: linear
-    programmes one after the other, each with the optimum of those before it as a constraint. Forces in
-    newtons, errors over l."""
+    """Thrust and moment nearest to the demand, roll and pitch first, then thrust, then yaw: linear programmes
+    one after the other, each with the optimum of those before it as a constraint. Forces and errors in
+    newtons: the moments of roll and pitch are divided by l, that of yaw by c."""
     arm, c = vehicle.arm, vehicle.torque_ratio
     rows = np.array([[0, -1, 0, 1], [1, 0, -1, 0], [1, 1, 1, 1], [-1, 1, -1, 1]])
     wanted = np.array([demand[1] / arm, demand[2] / arm, demand[0], demand[3] / c])
@@ -86,8 +86,8 @@ def best_forces(vehicle: Vehicle, demand: tuple[float, ...]) -> tuple[float, ...
 
 
 def cuts_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Demands beyond the limits: what is done is what the linear programmes find, and the bits name the
-    rotors."""
+    """For demands beyond the limits, the mixer does what the linear programmes find, and the bits name the
+    saturated rotors."""
     arm, c = vehicle.arm, vehicle.torque_ratio
     inverse = np.linalg.inv(np.array([[1, 1, 1, 1], [0, -arm, 0, arm], [arm, 0, -arm, 0], [-c, c, -c, c]]))
     for limits in ((0.0, 1.96), (0.1, 1.5)):
@@ -103,8 +103,8 @@ def cuts_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Veh
 
 @cache
 def best_efforts(vehicle: Vehicle, layout: Layout, demand: tuple[float, ...]) -> tuple[float, ...]:
-    """Efforts along the columns of the mixer, made here by themselves, that keep its priorities: linear
-    programmes for how far along each one can go. N, of a rotor of strength 1."""
+    """Efforts along the columns of the mixer (computed here independently) that keep its priorities: linear
+    programmes find how far each column can be followed. In N for a rotor of strength 1."""
     does = np.array([(1.0, r.y, -r.x, r.yaw) for r in layout]).T * [r.strength for r in layout]
     columns = np.linalg.pinv(does[:3])
     unseen = does[3] - does[3] @ columns @ does[:3]
@@ -141,9 +141,9 @@ def best_efforts(vehicle: Vehicle, layout: Layout, demand: tuple[float, ...]) ->
 
 
 def any_rotors_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Rotors unlike each other: what they are asked for is what the linear programmes find, within limits
-    and beyond them, what they do is the sum of (2-13), and the bits name those that were asked for too
-    much."""
+    """For rotors that differ from each other, the forces are those that the linear programmes find, within
+    limits and beyond them; thrust and moments are the sum of (2-13); the bits name the rotors of which too
+    much is demanded."""
     arm, c = vehicle.arm, vehicle.torque_ratio
     strengths = np.array([rotor.strength for rotor in UNEVEN])
     does = np.array([(1.0, arm * r.y, -arm * r.x, c * r.yaw) for r in UNEVEN]).T
@@ -158,8 +158,8 @@ def any_rotors_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicl
 
 
 def what_is_no_number_is_zero(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """A demand that is no number: no thrust and no moment, or as near to it as the limits allow, and the bit
-    of every rotor."""
+    """A demand that is not a number gives no thrust and no moment, or as near to that as the limits allow,
+    and sets the bit of every rotor."""
     limits = vehicle._replace(rotor_min=0.1)
     for layout in (UNEVEN, MOST_ROTORS):
         for demand in ((np.nan, 0.0, 0.0, 0.0), (1.0, 0.0, np.inf, 0.0)):
@@ -171,7 +171,7 @@ def what_is_no_number_is_zero(laws: SimpleNamespace, model: SimpleNamespace, veh
 
 
 def the_same_of_each_that_is_left(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Rotors that idle: each the same force, but for those that are lost; the thrust is their sum."""
+    """Idling rotors all give the same force, except those that are lost; the thrust is their sum."""
     for layout, lost in ((UNEVEN, 0b100), (MOST_ROTORS, 0)):
         rotors = laws.new_rotors()
         result = laws.spread(0.05, allocate(layout, lost), rotors)

@@ -1,5 +1,5 @@
 """An independent NumPy model of the vehicle with its load, written from (2-30)-(2-35) with arrays; it shares
-no function with the laws or the geometry leaf.
+no function with the laws or the geometry package.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A published closed loop (Sreenath, Lee, Kumar): its figures, and its cascade made of our laws."""
+"""A published closed loop (Sreenath, Lee, Kumar): its numbers, and its cascade built from our laws."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def oracle_start() -> np.ndarray:
 
 def oracle_command(laws: Any, t: float, y: np.ndarray) -> tuple[float, Any, Any]:
     """Thrust, attitude result and direction result of the published cascade: the laws without filters, and
-    the derivatives of q_c and R_c taken from the path (its flatness), as there.
+    the derivatives of q_c and R_c taken from the path (its flatness), as in the publication.
 
     On x_d = 3 [sin t, cos t, 1] the tension per mass has constant length n = sqrt(9 + g^2), so that q and the
     nominal force are a few sines.

@@ -1,6 +1,6 @@
-"""Plain-Python copies of the laws, made of their source text, which may be altered before it is run.
+"""Plain-Python copies of the laws, made from their source text, which may be altered before it is run.
 
-Which modules make up a law follows from what they import: nobody lists files.
+The modules of a law are found by their imports; no test lists files.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ def text_of(module: str) -> str:
 
 
 def sources(*roots: ModuleType, without: Collection[str] = ()) -> dict[str, str]:
-    """Source texts, by module, of these laws and of all compiled modules of the room that they import, the
-    imported before the importing; but for those of `without`."""
+    """Source texts, by module, of these laws and of all compiled modules of the room that they import, except
+    those of `without`. A module comes after the modules that it imports."""
     found: dict[str, str] = {}
 
     def visit(module: str) -> None:
         if module in found or module in without:
             return
         text = text_of(module)
-        if JIT_IMPORT not in text:  # records, which nothing compiles
+        if JIT_IMPORT not in text:  # records, which are not compiled
             return
         for node in ast.parse(text).body:
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(ROOM + "."):
@@ -47,8 +47,8 @@ def sources(*roots: ModuleType, without: Collection[str] = ()) -> dict[str, str]
 
 
 def plain_laws(texts: dict[str, str]) -> SimpleNamespace:
-    """The laws of these source texts, by module, as plain Python that nothing compiles; all their names in
-    one namespace, and the modules by name as `modules`."""
+    """The laws of these source texts, by module, as plain Python, not compiled; all their names in one
+    namespace, and the modules by name as `modules`."""
     namespace = SimpleNamespace()
     kept, modules = {}, {}
     try:
@@ -72,7 +72,7 @@ def plain_laws(texts: dict[str, str]) -> SimpleNamespace:
 
 @contextmanager
 def with_function(laws: SimpleNamespace, module: str, function: ast.FunctionDef) -> Iterator[None]:
-    """Plain laws with this in place of their function of that name, in all that use it."""
+    """Replace the function of the same name in the plain laws by this one, in all modules that use it."""
     original = vars(laws.modules[module])[function.name]
     made: dict[str, Any] = {}
     source = ast.Module([function], [])

@@ -103,7 +103,7 @@ def columns_turn_with_the_body(laws: SimpleNamespace, model: SimpleNamespace, ve
 
 
 def rates_of_a_rotation_are_3_28(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Of a turning rotation, R' = R hat(W), R'' = R hat(W)^2 + R hat(W'): W and W' come back."""
+    """W and W' are recovered from R' = R hat(W) and R'' = R hat(W)^2 + R hat(W') of a turning rotation."""
     for rng in motions(9):
         R, (W, W_dot) = model.random_rotation(rng), rng.normal(size=(2, 3)) * 3.0
         R_dot = R @ model.hat(W)
@@ -117,13 +117,13 @@ def rates_of_a_rotation_are_3_28(laws: SimpleNamespace, model: SimpleNamespace, 
 def filters_feed_rates_but_not_the_attitude(
     laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """e_R is that of the attitude asked for, Omega_c and Omega_c' are those of an array filter of the
+    """e_R is that of the commanded attitude, Omega_c and Omega_c' are those of an array filter of the
     elements of R_c, stepped by SciPy's matrix exponential."""
     omega_n, zeta, dt = 30.0, 0.98, 0.004
     filters, gains = laws.thesis_filters(dt), laws.THESIS_GAINS
     J, zero = np.array(vehicle.inertia), (0.0, 0.0, 0.0)
     A = np.array([[0.0, 1.0, 0.0], [-(omega_n**2), -2.0 * zeta * omega_n, omega_n**2], [0.0, 0.0, 0.0]])
-    # the command runs straight: it is a third and, with its slope, a fourth state
+    # the command changes linearly: it is a third state, and its slope a fourth
     A = np.block([[A, np.array([[0.0], [0.0], [1.0]])], [np.zeros((1, 4))]])
     E = expm(A * dt)
     for rng in motions(10):
@@ -154,8 +154,8 @@ def filters_feed_rates_but_not_the_attitude(
 
 
 def computed_attitude_points_as_3_27(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """A rotation, its thrust axis along F, its nose in the half plane of the heading; also at 90 deg of
-    pitch."""
+    """The result is a rotation with its thrust axis along F and its nose in the half plane of the heading;
+    also at 90 deg of pitch."""
     for rng in motions(4):
         F, angle = rng.normal(size=3), rng.uniform(0, 6.0)
         b1_d = np.array([cos(angle), sin(angle), 0.0])
@@ -173,9 +173,9 @@ def computed_attitude_points_as_3_27(laws: SimpleNamespace, model: SimpleNamespa
 
 
 def published_se3_numbers(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Thrust and moment of the tracking law on SE(3), fdcl-gwu/uav_geometric_control test_controller.cpp,
-    in the
-    form of the feed-forward that the thesis uses. There e3 points down: turned by half a turn about x."""
+    """Thrust and moment of the tracking law on SE(3), fdcl-gwu/uav_geometric_control test_controller.cpp, in
+    the form of the feed-forward that the thesis uses. There e3 points down; the numbers are rotated by half a
+    turn about x."""
     flip = np.diag([1.0, -1.0, -1.0])
     m, g, k_x, k_v, s = 1.95, 9.81, 10.0, 8.0, 0.707106781186548
     J = np.array([0.02, 0.02, 0.04])
@@ -183,7 +183,7 @@ def published_se3_numbers(laws: SimpleNamespace, model: SimpleNamespace, vehicle
     jet = np.array([[-1, 0, 0], [0, -2, 0], [0, 0, -5], [0, 1.2, 0], [2.1, 0, 0]], float)
     R = np.diag([-1.0, -1.0, 1.0])
     b1 = np.array([[s, s, 0], [0, s, s], [s, 0, s]])
-    # A is the force wanted, f = -A . R e3 the thrust; A' and A'' along the motion
+    # A is the wanted force, f = -A . R e3 the thrust; A' and A'' along the motion
     A = -k_x * (x - jet[0]) - k_v * (v - jet[1]) - m * g * E3 + m * jet[2]
     f = -A @ R[:, 2]
     a = g * E3 - f / m * R[:, 2]
@@ -193,7 +193,7 @@ def published_se3_numbers(laws: SimpleNamespace, model: SimpleNamespace, vehicle
     A_ddot = -k_x * (a - jet[2]) - k_v * (a_dot - jet[3]) + m * jet[4]
     close(f, 68.4795, FDCL_THRUST)
 
-    # e3 up: the world turns by `flip` and so does the body, R_up = flip R flip; the force wanted is A itself
+    # e3 up: the world turns by `flip` and so does the body, R_up = flip R flip; the wanted force is A itself
     up = [model.vec(flip @ F) for F in (A, A_dot, A_ddot)]
     heading = [model.vec(flip @ h) for h in b1]
     command = laws.attitude_from_axes(*up, *heading)
@@ -258,7 +258,8 @@ def cable_error_obeys_3_33(laws: SimpleNamespace, model: SimpleNamespace, vehicl
 
 
 def load_error_obeys_3_41(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """When the cable is where (3-42) wants it and F carries (3-44), m e_v' = -k_x e_x - k_v e_v."""
+    """When the cable has the direction of (3-42) and F is the normal force of (3-44), m e_v' = -k_x e_x - k_v
+    e_v."""
     m, m_Q, L = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass, vehicle.cable_length
     for rng in motions(6):
         q = model.unit(rng.normal(size=3) * 0.4 - E3)
@@ -266,7 +267,7 @@ def load_error_obeys_3_41(laws: SimpleNamespace, model: SimpleNamespace, vehicle
         q_dot = np.cross(w, q)
         k_x, k_v = rng.uniform(2, 6, 3), rng.uniform(1, 3, 3)
         x_d, v_d, a_d, e_v = rng.normal(size=(4, 3))
-        A = -5.0 * q  # wanted: A along the cable, so solve the law for the e_x that gives it
+        A = -5.0 * q  # A must be along the cable, so solve the law for the e_x that gives it
         e_x = (-k_v * e_v + m * (a_d + vehicle.gravity * E3) + m_Q * L * (q_dot @ q_dot) * q - A) / k_x
         result = laws.load_position_force(
             *(model.vec(p) for p in (x_d + e_x, v_d + e_v, q, q_dot, x_d, v_d, a_d, k_x, k_v)),
@@ -287,8 +288,8 @@ def load_error_obeys_3_41(laws: SimpleNamespace, model: SimpleNamespace, vehicle
 
 
 def vehicle_error_obeys_its_law(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Position law of the vehicle: m e_v' = -k_x e_x - k_v e_v, and limits that keep the direction
-    sideways."""
+    """Position law of the vehicle: m e_v' = -k_x e_x - k_v e_v, and limits that keep the horizontal direction
+    of the force."""
     for rng in motions(7):
         x, v, x_d, v_d, a_d = rng.normal(size=(5, 3))
         gains = laws.QUAD_POSITION_GAINS
@@ -314,8 +315,8 @@ def lift_of_the_attitude_modes(laws: SimpleNamespace, model: SimpleNamespace, ve
 
 
 def filter_is_4_2(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """One period of the filter against its Taylor series, the command going straight: all of x_1, x_2,
-    x_2'."""
+    """One period of the filter against its Taylor series, with a command that changes linearly: all of x_1,
+    x_2, x_2'."""
     for omega_n, zeta, dt in ((30.0, 0.98, 0.004), (25.0, 1.0, 0.002), (40.0, 1.3, 0.004), (12.0, 0.5, 0.01)):
         for rng in motions(8):
             x1, x2, u0, u1 = rng.normal(size=(4, 3))
@@ -344,7 +345,7 @@ def filter_is_4_2(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicl
 
 
 def first_moment_of_the_oracle(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Thrust and moment of the published closed loop at t = 0, which is far from its path."""
+    """Thrust and moment of the published closed loop at t = 0, far from its path."""
     sample = model.oracle["samples"][0]
     f, result, direction = model.oracle_command(laws, 0.0, model.oracle_start())
     close(f, sample["f"], EXACT)
@@ -395,7 +396,7 @@ def hover_asks_for_weight_alone(laws: SimpleNamespace, model: SimpleNamespace, v
 
 
 def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Away from the target the modes report the errors of the state, and push back."""
+    """Away from the target the modes report the errors of the state, and compensate a push."""
     y = model.pack((0.1, -0.2, 1.3), (0.3, 0.1, -0.2), -E3, (0.2, -0.1, 0.0), np.eye(3), (0.0, 0.0, 0.0))
     state = model.state_of(y, vehicle)
     zero = (0.0, 0.0, 0.0)
@@ -406,7 +407,7 @@ def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehi
     command = laws.load_position(memory, state, reference, gains, filters, vehicle)[1]
     close(command.e_x, np.subtract(state.x_load, x_d), EXACT)
     close(command.e_v, state.v_load, EXACT)
-    # so near that the force is within its limits
+    # a target so close that the force is within its limits
     x_d = model.vec(np.add(state.x_quad, (0.0, 0.1, -0.1)))
     reference = Reference((x_d, v_d, zero, zero, zero, zero, zero), (1.0, 0.0, 0.0))
     command = laws.quad_position(

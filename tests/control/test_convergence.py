@@ -17,7 +17,7 @@ ZERO = (0.0, 0.0, 0.0)
 HEADING = (1.0, 0.0, 0.0)
 DT = 0.004
 # each with its reason
-SHRUNK = 1e-3  # of the first Psi_R: 2 s are 18 time constants of the slow pole of k_R, k_Omega, J
+SHRUNK = 1e-3  # of the initial Psi_R: 2 s are 18 time constants of the slow pole of k_R, k_Omega, J
 ALIGNED = 1e-4  # Psi_q after 6 s; near the opposite pole the start is slow
 SETTLED = 1e-6  # m, rad, N: 12 s of the slowest mode (2.2 rad/s with k_x, k_v)
 FLAT = 1e-9  # two derivations of the same path, up to the sixth derivative of it
@@ -58,8 +58,8 @@ def test_attitude_converges_from_almost_everywhere(
 
 
 def test_cable_converges_from_almost_everywhere(model: SimpleNamespace, bebop: Vehicle) -> None:
-    """(2-36) under (3-31), the vehicle's thrust along F at once; from a random direction, also nearly
-    opposite."""
+    """(2-36) under (3-31), with the vehicle's thrust immediately along F; from a random direction, also
+    nearly opposite."""
     m_Q_L = bebop.quad_mass * bebop.cable_length
     gains, h = thesis.THESIS_GAINS, 0.004
     rng = np.random.default_rng(7)
@@ -145,8 +145,8 @@ def test_load_position_settles_without_error(model: SimpleNamespace, bebop: Vehi
 
 
 def test_load_attitude_is_held(model: SimpleNamespace, bebop: Vehicle) -> None:
-    """A cable held slanting: the pair accelerates sideways for ever, and the errors go to zero all the
-    same."""
+    """A cable held at a slant: vehicle and load accelerate sideways for ever, and the errors nevertheless go
+    to zero."""
     q_d = model.vec(model.unit([0.3, 0.0, -1.0]))
     y, commands = fly(model, bebop, "load_attitude", swinging(model), q_d, 8.0)
     np.testing.assert_allclose(y[6:9], q_d, atol=SETTLED)
@@ -154,8 +154,8 @@ def test_load_attitude_is_held(model: SimpleNamespace, bebop: Vehicle) -> None:
 
 
 def test_vehicle_position_damps_the_load_enough(model: SimpleNamespace, bebop: Vehicle) -> None:
-    """With the load hanging the vehicle law must not feed the swing: its energy after 12 s is less than at
-    first."""
+    """With the load hanging the vehicle law must not feed the swing: after 12 s it is less than half of what
+    it was at first."""
     y0 = swinging(model)
     y, commands = fly(model, bebop, "quad_position", y0, (0.3, -0.2, 2.0), 12.0)
     assert np.linalg.norm(y[6:8]) < 0.5 * np.linalg.norm(y0[6:8])
@@ -163,9 +163,9 @@ def test_vehicle_position_damps_the_load_enough(model: SimpleNamespace, bebop: V
 
 
 def test_start_is_bumpless(model: SimpleNamespace, bebop: Vehicle) -> None:
-    """The filters begin at the present R and q with their rates: asked to go on as it is, the cascade sees
-    hardly
-    an error, where a filter that began at rest would see the whole rate."""
+    """The filters begin at the present R and q with their rates: when the present motion is commanded to
+    continue, the cascade sees hardly an error, whereas a filter that began at rest would see the whole
+    rate."""
     y = swinging(model)
     state = model.state_of(y, bebop)
     filters, gains = thesis.thesis_filters(DT), thesis.THESIS_GAINS
@@ -184,8 +184,8 @@ def test_start_is_bumpless(model: SimpleNamespace, bebop: Vehicle) -> None:
 
 
 def test_half_turn_of_the_command_yields_numbers(model: SimpleNamespace, bebop: Vehicle) -> None:
-    """A commanded attitude and cable direction that jump to the opposite: the filters begin again, never
-    NaN."""
+    """A commanded attitude and cable direction that jump to the opposite: the filters start again and never
+    give NaN."""
     y = model.pack((0, 0, 0), ZERO, (0, 0, -1), ZERO, np.eye(3), ZERO)
     state = model.state_of(y, bebop)
     filters, gains = thesis.thesis_filters(DT), thesis.THESIS_GAINS
@@ -214,9 +214,8 @@ def test_free_fall_and_no_force_yield_numbers(model: SimpleNamespace, bebop: Veh
 
 @pytest.mark.parametrize("t", [0.0, 0.7, 1.3, 2.9, 4.7])
 def test_flat_path_gives_the_flat_inputs(model: SimpleNamespace, bebop: Vehicle, t: float) -> None:
-    """On a flat path, with its exact derivatives in place of the filters, the cascade asks for exactly the
-    thrust
-    and moment of the path: feed-forward and feedback agree, no term is left over."""
+    """On a flat path, with its exact derivatives in place of the filters, the cascade commands exactly the
+    thrust and moment of the path: feed-forward and feedback agree, no term is left over."""
     jet = tuple(
         (
             2.0 * (np.pi / 2) ** k * -np.cos(np.pi / 2 * t + k * np.pi / 2) + (2.0 if k == 0 else 0.0),

@@ -1,4 +1,4 @@
-"""The gains of `plumbline`: they keep what is asked for, whatever the vehicle."""
+"""The gains of `plumbline` meet the requirements for any vehicle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from autopilot.control.design import Timing, Wanted, design, feedback, gains_of,
 from autopilot.control.records import Vehicle
 
 WANTED = Wanted(0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0)
-# four times as heavy a vehicle, a longer cable
+# a vehicle five times as heavy, with a longer cable
 HEAVY = Vehicle(2.0, 0.5, 2.0, (0.02, 0.022, 0.04), 9.81, 0.25, 0.02, 0.0, 10.0)
 
 
@@ -30,7 +30,8 @@ def test_tolerance_is_what_was_asked_for_and_costs_bandwidth(bebop: Vehicle) -> 
 
 @pytest.mark.parametrize(("rotor_max", "sigmas"), [(1.96, 1.5), (1.5, 3.0)])
 def test_noise_takes_over_where_it_is_great(bebop: Vehicle, rotor_max: float, sigmas: float) -> None:
-    """What it has: the share that paths leave to control, and where hover is near a limit the way to it."""
+    """The room for noise is the share that paths leave to control or, where hover is near a limit, the
+    distance to that limit."""
     timing = Timing(0.0, 0.02, 0.01, 0.004)
     vehicle = bebop._replace(rotor_max=rotor_max)
     room = 0.15 * rotor_max if sigmas == 1.5 else rotor_max - 0.25 * 0.5 * 9.81
@@ -42,7 +43,7 @@ def test_noise_takes_over_where_it_is_great(bebop: Vehicle, rotor_max: float, si
 
 @pytest.mark.parametrize("vehicle", ["bebop", "heavy"])
 def test_poles_are_those_of_the_three_loops(vehicle: str, bebop: Vehicle) -> None:
-    """Of the chain with the law's own gains, written down loop by loop."""
+    """The poles of the chain with the gains of the law, written down loop by loop."""
     v = bebop if vehicle == "bebop" else HEAVY
     omega_i, omega_x, omega_q, omega_R, zeta = 0.5, 2.5, 4.0, 15.0, 0.8
     gains = gains_of(omega_i, omega_x, omega_q, omega_R, zeta, v)

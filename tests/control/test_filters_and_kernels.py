@@ -21,7 +21,7 @@ SCIPY = 1e-10  # lsim's own matrix exponential, over 500 steps
     ("omega_n", "zeta", "dt"), [(30.0, 0.98, 0.004), (25.0, 1.0, 0.01), (25.0, 1.7, 0.002)]
 )
 def test_filter_agrees_with_scipy(omega_n: float, zeta: float, dt: float) -> None:
-    """(4-3) driven by a command that runs straight between samples, which is what lsim takes too."""
+    """(4-3) driven by a command that changes linearly between samples, which lsim assumes too."""
     rng = np.random.default_rng(3)
     u = np.cumsum(rng.normal(size=500)) * 0.05
     t = np.arange(len(u)) * dt

@@ -51,11 +51,11 @@ FOLLOWED: dict[str, dict[str, Any]] = {
     "quad_attitude": {"R_d": Mat3, "thrust": float},
 }
 EXACT = 1e-9  # N, N m: a few dozen roundings of 5 N, divided by a period of 4 ms
-# N for each m/s: the filter of `thesis` begins as if the command before had been where the load is, a period
-# ago; begun at the reference itself it would ask for 24.5 (measured: 0.82)
+# N per m/s: the filter of `thesis` begins as if the command one period ago had been the position of the load;
+# if it began at the reference itself, it would command 24.5 (measured: 0.82)
 SLIP = {"thesis": 1.0}
 
-# N m: what is symmetric in the filtered R_c' of the thesis is of second order; measured 1.2e-6
+# N m: the symmetric part of the filtered R_c' of the thesis is of second order; measured 1.2e-6
 TURNING = {"thesis": 1e-5}
 
 every_law = pytest.mark.parametrize("law", LAWS.values(), ids=lambda law: law.name)
@@ -105,7 +105,7 @@ def test_records_of_a_law_are_known_by_their_types(law: Law) -> None:
     assert (len(rows.constants), len(rows.memory)) == (width(law.constants), width(law.memory))
     assert chosen_law(parameters(law)) is law_of(built) is law_of(rows) is law
     assert kernels_of(built) is kernels_of(rows) is law.kernels
-    # no two laws share a type: by it the compiler tells them apart
+    # no two laws share a type: the compiler distinguishes them by their types
     others = [other for other in LAWS.values() if other is not law]
     assert not {law.constants, law.rows} & {
         kind for other in others for kind in (other.constants, other.rows)
@@ -120,8 +120,8 @@ def test_records_of_a_law_are_known_by_their_types(law: Law) -> None:
 @every_law
 @pytest.mark.parametrize("climb", [0.0, 0.4, -0.4])
 def test_a_law_that_begins_on_a_steady_climb_goes_on_with_it(law: Law, climb: float) -> None:
-    """Thrust of the weight and no moment, from the first tick on, for the load that is where this law keeps
-    it behind a reference that rises; and for the vehicle alone."""
+    """Thrust equal to the weight and no moment, from the first tick on, with the load as far behind the
+    rising reference as this law keeps it; and the same for the vehicle alone."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0, VEH_ACT_DELAY=10.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
     cable, observed = Cable(vehicle.cable_length), observer.aloft(vehicle)
@@ -153,7 +153,7 @@ def test_a_law_that_begins_on_a_steady_climb_goes_on_with_it(law: Law, climb: fl
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 @pytest.mark.parametrize("angle", [0.0, 2.5])
 def test_a_law_turns_with_its_heading(law: Law, angle: float, rate: float) -> None:
-    """Over a load at rest, of a vehicle that turns as it is asked to: nothing is to be done about it."""
+    """A vehicle over a load at rest turns as commanded: no moment is needed."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
     cable, observed = Cable(vehicle.cable_length), observer.aloft(vehicle)
@@ -176,7 +176,8 @@ def test_a_law_turns_with_its_heading(law: Law, angle: float, rate: float) -> No
 
 @every_law
 def test_a_law_begins_to_turn_as_its_heading_does(law: Law) -> None:
-    """The vehicle is as it shall be and its heading begins to turn: a moment about the vertical, that way."""
+    """The vehicle is in the commanded state and the heading begins to turn: a moment about the vertical in
+    the same sense."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
     behind = steady((vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity, rows_of(constants))
@@ -188,14 +189,14 @@ def test_a_law_begins_to_turn_as_its_heading_does(law: Law) -> None:
             built, memory, at, reference, behind, observer.aloft(vehicle), Cable(vehicle.cable_length)
         )
         assert command.moment[:2] == pytest.approx((0.0, 0.0), abs=EXACT)
-        if law.name != "thesis":  # which asks its filter, and that has seen nothing yet
+        if law.name != "thesis":  # which takes it from its filter, which has seen nothing yet
             assert sense * command.moment[2] > 0.5 * vehicle.inertia[2]
 
 
 @every_law
 def test_attitude_modes_begin_at_the_present_rates(law: Law) -> None:
-    """In the middle of a swing and a turn, asked for these: the rates asked for are the present ones, but for
-    what the filters lose in the first of their 30 ms."""
+    """In the middle of a swing and a turn that are commanded to continue, the commanded rates are the present
+    ones, except for what the filters, of 30 ms, lose in the first tick."""
     table = parameters(law)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
     rng = np.random.default_rng(4)
@@ -251,8 +252,8 @@ def numbers(value: Any) -> Iterator[float]:
 
 
 def fingerprints() -> dict[str, str]:
-    """Of all commands and memories of every law in every mode: swinging, slack, standing and lying, with a
-    cable that is reeled, under commands on their way."""
+    """Hashes of all commands and memories of every law in every mode: swinging, slack, standing and lying,
+    with a cable that is being reeled, and with commands on their way to the rotors."""
     found = {}
     for law in LAWS.values():
         table = parameters(law, VEH_ACT_DELAY=10.0)
@@ -303,7 +304,7 @@ def fingerprints() -> dict[str, str]:
 
 
 def told(program: str, path: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A Python program that finds the project at `path`."""
+    """Run a Python program that imports the project from `path`."""
     return subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": str(path), **environment},
@@ -474,7 +475,7 @@ print(json.dumps({"laws": LAWS, "asked": asked, "phase": core.flight.phase.name,
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A copy of what flies."""
+    """A copy of the packages that fly."""
     for package in (autopilot, missions):
         source = Path(str(package.__file__)).parent
         shutil.copytree(source, tmp_path / source.name, ignore=shutil.ignore_patterns("__pycache__"))

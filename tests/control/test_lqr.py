@@ -46,7 +46,7 @@ PRINT = 0.5e-4  # half a unit of the last printed decimal
 ROUNDING = 1e-12  # of numbers up to a hundred, a few dozen operations
 
 
-# ---- a second way between coordinates and the motion
+# ---- a second, independent conversion from coordinates to the motion
 
 
 def motion_of(x: Array) -> tuple[Array, Array, Array, Array, Array, Array, Rotation, Array]:
@@ -148,7 +148,7 @@ def test_the_model_is_the_plant_near_hover(bebop: Vehicle, truth: Truth, model: 
     A, B = state_space(bebop)
     both = np.zeros((20, 20))
     both[:16, :16], both[:16, 16:] = A, B
-    # inputs are divided by what they accelerate, to be of the size of the states
+    # inputs are divided by the mass or inertia that they accelerate, to be of the size of the states
     size = np.concatenate([np.ones(16), [bebop.quad_mass + bebop.load_mass, *bebop.inertia]])
     expected = expm(both * STEP * STEPS)[:16]
     np.testing.assert_allclose(np.array(columns).T * size, expected * size, atol=LINEAR)
@@ -174,7 +174,8 @@ def test_the_model_is_what_the_equations_say(bebop: Vehicle) -> None:
 
 
 def test_the_matrices_are_those_of_a_5(bebop: Vehicle) -> None:
-    """M1 x'' + M2 x = M3 u, with masses that are symmetric and positive and I_L, m_T where they belong."""
+    """M1 x'' + M2 x = M3 u, with a mass matrix that is symmetric and positive, and with I_L and m_T in their
+    places."""
     M1, M2, M3 = second_order(bebop)
     A, B = state_space(bebop)
     np.testing.assert_allclose(M1 @ A[8:, :8], -M2, atol=ROUNDING)
@@ -197,7 +198,7 @@ def test_what_agrees_with_the_printed_gain(regulator: lqr.Lqr) -> None:
 
 
 def test_the_printed_roll_and_pitch_rows_are_of_another_model(bebop: Vehicle, regulator: lqr.Lqr) -> None:
-    """With them the true linear model is unstable, whichever way the cable's angles are counted."""
+    """With them the true linear model is unstable, whatever the signs of the cable's angles."""
     A, B = state_space(bebop)
     assert np.linalg.eigvals(A - B @ np.array(regulator.K)).real.max() < -1.2
     for phi_L, theta_L in product((1.0, -1.0), repeat=2):
@@ -240,7 +241,7 @@ def test_the_command_is_the_gain_times_the_error(
 
 
 def test_no_direction_of_the_compass_is_special(model: SimpleNamespace, regulator: lqr.Lqr) -> None:
-    """The whole situation turned about the vertical asks for the same thrust and moment."""
+    """The whole situation rotated about the vertical gives the same thrust and moment."""
     rng = np.random.default_rng(13)
     for angle in rng.uniform(-np.pi, np.pi, size=10):
         H = Rotation.from_euler("z", angle).as_matrix()
@@ -285,7 +286,7 @@ def load_flown(
     mission: str, model: SimpleNamespace, truth: Truth, vehicle: Vehicle, regulator: lqr.Lqr
 ) -> tuple[Array, Array, Array]:
     """(n,) s, (n, 3) m desired and (n, 3) m flown load path of a shipped mission's signals, from rest in the
-    air, the state known, the rotors without limits."""
+    air, with the state known and the rotors without limits."""
     signals = next(s for s in load_mission(mission).steps if isinstance(s, Signals))
     table = signal_table(signals.terms)
     start = np.zeros(16)

@@ -45,8 +45,8 @@ def test_linear_model_is_that_of_the_equations(model: SimpleNamespace) -> None:
 def test_published_delay_margins(
     k_R: float, k_Omega: float, J: float, crossover: float, delay: float
 ) -> None:
-    """(k_Omega s + k_R)/(J s^2) with ideal rotors, for three published sets of gains. The hold of a period
-    takes half of it; the printed figures have two or three digits."""
+    """(k_Omega s + k_R)/(J s^2) with ideal rotors, for three published sets of gains. Holding a command for a
+    period costs half a period of delay; the printed figures have two or three digits."""
     period = 0.02 / crossover
     gains = cascade_margin.thesis.THESIS_GAINS._replace(k_R=(k_R,) * 3, k_Omega=(k_Omega,) * 3)
     vehicle = cascade_margin.BEBOP._replace(inertia=(J, J, J))
@@ -56,7 +56,7 @@ def test_published_delay_margins(
 
 
 def test_margin_ends_where_the_loop_is_lost() -> None:
-    """With the delay that was said to be left the loop still holds, with a little more it does not."""
+    """With the remaining delay that was reported, the loop is still stable; with a little more it is not."""
     settings = cascade_margin.Settings(rotor_tau=0.02, period=0.004)
     left = cascade_margin.margin(settings).delay
     law = cascade_margin.linearised_law(settings, cascade_margin.BEBOP)

@@ -1,5 +1,4 @@
-"""Properties of the mixer, for any demand; linear programmes tell what four rotors could have done at
-best."""
+"""Properties of the mixer, for any demand; linear programmes compute the best that four rotors can do."""
 
 from __future__ import annotations
 
@@ -46,8 +45,8 @@ def test_demand_within_limits_is_done_exactly(forces: tuple[float, float, float,
 @settings(max_examples=60, deadline=None)
 @given(thrusts, moments)
 def test_roll_and_pitch_are_kept_whenever_possible(thrust: float, moment: tuple[float, float, float]) -> None:
-    """A programme looks for any four forces with that roll and pitch; what is impossible is cut to the
-    limit."""
+    """A programme looks for any four forces with that roll and pitch; a moment that is impossible is cut to
+    the limit."""
     result = mix(thrust, moment, BEBOP, 1.0)
     rows = rotor_rows(BEBOP)[1:3]
     found = linprog(np.zeros(4), A_eq=rows, b_eq=moment[:2], bounds=[(BEBOP.rotor_min, BEBOP.rotor_max)] * 4)
@@ -61,8 +60,8 @@ def test_roll_and_pitch_are_kept_whenever_possible(thrust: float, moment: tuple[
 @settings(max_examples=60, deadline=None)
 @given(thrusts, moments)
 def test_thrust_comes_before_yaw(thrust: float, moment: tuple[float, float, float]) -> None:
-    """Beside the roll and pitch that are done, no four forces come nearer to the thrust; beside these, to
-    the yaw."""
+    """With the roll and pitch that are done, no four forces come nearer to the thrust; with these and the
+    thrust that is done, none come nearer to the yaw."""
     result = mix(thrust, moment, BEBOP, 1.0)
     rows, bounds = rotor_rows(BEBOP), [(BEBOP.rotor_min, BEBOP.rotor_max)] * 4
     kept = np.array(result.moment_done[:2])
@@ -74,7 +73,7 @@ def test_thrust_comes_before_yaw(thrust: float, moment: tuple[float, float, floa
 
     low, high = reach(rows[0], rows[1:3], kept)
     assert result.thrust_done == pytest.approx(min(high, max(low, thrust)), abs=PROGRAMME)
-    # a programme without room left may be called infeasible by a rounding: stay that much inside
+    # a rounding may make a programme without room infeasible: stay inside by that much
     done = min(high, max(low, result.thrust_done))
     low, high = reach(rows[3], rows[:3], np.array([done, *kept]))
     assert result.moment_done[2] == pytest.approx(min(high, max(low, moment[2])), abs=PROGRAMME)
@@ -112,8 +111,8 @@ def test_no_demand_makes_nan(
 
 @st.composite
 def layouts(draw: st.DrawFn) -> Layout:
-    """Five to eight rotors around the vehicle, unlike each other, by which it can be held. A table takes what
-    is nearer to an axis than 1e-9 arms for a rounding of zero."""
+    """Five to eight rotors around the vehicle, all different, that can hold it. A table of rotors treats a
+    coordinate of less than 1e-9 arms as a rounding of zero."""
     count = draw(st.integers(5, 8))
     near = st.floats(0.6, 1.2)
     rotors = []
@@ -135,7 +134,7 @@ def rows_of(layout: Layout, vehicle: Vehicle) -> np.ndarray:
 def test_any_rotors_stay_within_limits_and_do_what_is_told(
     layout: Layout, thrust: float, moment: tuple[float, float, float], lost: int
 ) -> None:
-    """Also without one that is lost, which does nothing. Roll and pitch are cut, never turned round."""
+    """Also with one rotor lost, which gives no force. Roll and pitch are cut, never reversed."""
     gone = 1 << lost if 0 <= lost < len(layout) else 0
     result = mix(thrust, moment, BEBOP, 1.0, layout, gone)
     for i, (rotor, force) in enumerate(zip(layout, result.forces, strict=True)):
@@ -155,7 +154,8 @@ def test_any_rotors_stay_within_limits_and_do_what_is_told(
 def test_unlimited_it_is_the_least_squares_inverse(
     layout: Layout, thrust: float, moment: tuple[float, float, float]
 ) -> None:
-    """Of efforts, so that rotors of different strength are used alike; beside NumPy's."""
+    """The inverse is of efforts, so that rotors of different strength are used alike; compared with
+    NumPy's."""
     result = mix(thrust, moment, BEBOP, 0.0, layout)
     strengths = np.array([rotor.strength for rotor in layout])
     efforts = np.linalg.pinv(rows_of(layout, BEBOP) * strengths) @ np.array([thrust, *moment])

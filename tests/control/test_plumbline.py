@@ -1,5 +1,5 @@
 """The law `plumbline`: its derivatives against differences along the independent model, its feed-forward
-against the flat trajectory, its rotors against rotors, and what it flies.
+against the flat trajectory, its rotor model against simulated rotors, and its flights.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ SECOND_DIFFERENCE = 5e-6
 # of differences over 2 ms along the motion: 4e-6/12 of fourth derivatives of up to 1e3
 ALONG = 1e-3
 ROUNDING = 1e-9  # sixth derivatives of 1e3, a hundred operations
-# m, largest load error on the true vehicle, the state known. Case C begins at once with all that the rotors
-# can give, at which the pace slows down: 23 mm.
+# m, largest load error on the true vehicle, with the state known. Case C needs all that the rotors can give
+# from its first instant, which slows the pace down: 23 mm.
 FLOWN = {("case-b", 0): 0.010, ("case-b", 18): 0.025, ("case-c", 0): 0.025}
 
 
@@ -131,8 +131,8 @@ def differences(f: Callable[[float], Any]) -> tuple[Array, Array]:
 def random_path(
     rng: np.random.Generator, model: SimpleNamespace, vehicle: Vehicle, asked: Any = None
 ) -> tuple[Callable[[float], State], float, float]:
-    """State of the model at t near 0 under a thrust f + f' t, or one that is asked for, and a moment; with f
-    and f'."""
+    """State of the model at t near 0 under a moment and a thrust f + f' t, or the thrust that `asked`
+    returns; and f and f'."""
     f, f_rate = 5.0 + rng.normal(), 8.0 * rng.normal()
     M = 0.01 * rng.normal(size=3)
     q = model.unit(0.5 * rng.normal(size=3) - [0.0, 0.0, 1.0])
@@ -185,13 +185,14 @@ def motion_is_that_of_the_model(law: SimpleNamespace, model: SimpleNamespace, ve
 
 
 def as_asked(law: SimpleNamespace, path: Array, gains: Any, model: SimpleNamespace, vehicle: Vehicle) -> Any:
-    """(thrust of a state at t, A there): the thrust that pulls at the cable as A asks."""
+    """Function that returns, for a state at t, the thrust that pulls at the cable as A demands, and the
+    position jet there with A and its derivatives."""
 
     def asked(start: State, state: State, t: float) -> tuple[float, Any]:
         jet = polynomial(path, t)
         e_x, e_v = np.array(start.x_load) - path[0], np.array(start.v_load) - path[1]
         now = np.array(state.v_load) - np.array(jet[1])
-        # of an integral that is zero at t = 0; e_x' is linear in t to the third power of it
+        # an integral that is zero at t = 0, for an e_x' that is linear in t: right to the third power of t
         e_i = model.vec(t * e_x + t * t * (2.0 * e_v + now) / 6.0)
         q, b3 = np.array(state.q_cable), np.array(state.R)[:, 2]
         thrust, found = 0.0, None
@@ -206,13 +207,13 @@ def as_asked(law: SimpleNamespace, path: Array, gains: Any, model: SimpleNamespa
 
 def direction_is_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """A, q_c and their two derivatives, with feedback and a moving reference, against differences along the
-    motion under the pull that A asks for, s' and s'' of the reference put in the place of its own."""
+    motion under the pull that A demands, with s' and s'' of the motion replaced by those of the reference."""
     k_x, k_v, k_i = (6.0, 5.0, 7.0), (2.75, 2.0, 3.0), (1.0, 2.0, 1.5)
     reach = vehicle.quad_mass * vehicle.cable_length
     for seed in range(3):
         rng = np.random.default_rng([22, seed])
         path = rng.normal(size=(7, 3))
-        path[2, 2] += 8.0  # upwards, so that nothing has to be held up
+        path[2, 2] += 8.0  # upwards, so that `held_up` changes nothing
         asked = as_asked(law, path, (k_i, k_x, k_v), model, vehicle)
         at = random_path(rng, model, vehicle, asked)[0]
         states = {k * H: at(k * H) for k in range(-2, 3)}
@@ -248,8 +249,8 @@ def direction_is_differentiated(law: SimpleNamespace, model: SimpleNamespace, ve
 def attitude_and_thrust_do_not_move_the_direction_asked_for(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """Were A' or A'' to follow from what the rotors give now, the commanded attitude would run from the
-    attitude: with the cable at rest they are the same whatever the vehicle does."""
+    """If A' or A'' depended on the present forces of the rotors, the commanded attitude would run away from
+    the attitude. With the cable at rest, both are the same whatever the vehicle does."""
     rng = np.random.default_rng(33)
     state = random_path(rng, model, vehicle)[0](0.0)._replace(q_cable_dot=ZERO)
     jet, gains = (
@@ -272,7 +273,7 @@ def level_state(model: SimpleNamespace) -> State:
 
 
 def drag_is_flown_against(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """It opposes the velocity, moves the load as a force does, and is made up for by thrust."""
+    """Drag opposes the velocity, moves the load as a force does, and is compensated by thrust."""
     v = (1.0, -2.0, 2.0)
     agree(law.air_force(v, Drag(0.1, 0.2)), -0.7 * np.array(v), ROUNDING)
     at, f, _ = random_path(np.random.default_rng(23), model, vehicle)
@@ -300,7 +301,8 @@ def drag_is_flown_against(law: SimpleNamespace, model: SimpleNamespace, vehicle:
 def on_the_path_it_asks_for_what_the_path_needs(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """On its reference, everything as flatness says, it gives the flat thrust, moment and thrust rate."""
+    """On its reference, in the state that flatness gives, the law gives the flat thrust, moment and thrust
+    rate."""
     for seed in range(3):
         path = 0.6 * np.random.default_rng([24, seed]).normal(size=(7, 3))
         m_Q, m_L, L, J, g = vehicle[:5]
@@ -340,8 +342,9 @@ def on_the_path_it_asks_for_what_the_path_needs(
 def what_the_path_needs_across_is_not_bounded(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """The reference's share is -m_Q L q_d'' across the cable, by differences; a weight at most, where its
-    cable whirls, as it does where it falls. On a path that asks for 2.3 N across, nothing is missing."""
+    """The reference's share is -m_Q L q_d'' across the cable, compared with differences; it is at most the
+    weight, which it reaches where the reference's cable whirls. Where the path falls, a quarter of the weight
+    keeps the cable upright. On a path that needs 2.3 N across, nothing is missing."""
     m_Q, m_L, L, J, g = vehicle[:5]
     weight = (m_Q + m_L) * g
     q = (0.0, 0.0, -1.0)
@@ -352,12 +355,12 @@ def what_the_path_needs_across_is_not_bounded(
 
     whirl = differences(q_d)[1]
     expected = -m_Q * L * np.array([whirl[0], whirl[1], 0.0])
-    # what is as small as this is shortened by a 10^-6 of itself
+    # a force as small as this is shortened by a 10^-6 of itself
     agree(law.flat_across(q, polynomial(path, 0.0), vehicle), expected, SECOND_DIFFERENCE)
     wild = (ZERO, ZERO, ZERO, ZERO, (3e4, -4e4, 0.0), ZERO, ZERO)
     agree(law.flat_across(q, wild, vehicle), weight * np.array([0.6, -0.8, 0.0]), 1e-4)
     falling = (ZERO, ZERO, (0.0, 0.0, -2.0 * g), ZERO, (2.0, 0.0, 9.0), EAST, EAST)
-    # of a cable that a quarter of the weight keeps upright
+    # for a cable that a quarter of the weight keeps upright
     agree(law.flat_across(q, falling, vehicle), np.array([m_Q * L * 2.0 / (0.25 * g), 0.0, 0.0]), 1e-4)
 
     path[4] = [80.0, 0.0, 0.0]
@@ -376,12 +379,13 @@ def what_the_path_needs_across_is_not_bounded(
     motion = law.load_motion(state, there.thrust, 0.0, ZERO, vehicle)
     found = law.wanted_force(state, motion, ZERO, jet, ZERO, GAINS, vehicle)
     flat = there.thrust * np.array(there.R)[:, 2]
-    # the rotors' thrust is taken for constant
+    # the rotors' thrust is assumed to be constant
     agree(found.F, flat, ALONG)
 
 
 def rotors_follow_as_wanted(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Rotors of 20 ms asked as `hasten` says follow a changing wish as rotors of 8 ms would."""
+    """Rotors with a lag of 20 ms, commanded through `hasten`, follow a changing demand as rotors of 8 ms
+    would."""
     lag, wanted = 0.020, 0.008
     gain = law.lag_gain(lag, wanted, TICK)
     held, fast = math.exp(-TICK / lag), math.exp(-TICK / wanted)
@@ -399,8 +403,8 @@ def rotors_follow_as_wanted(law: SimpleNamespace, model: SimpleNamespace, vehicl
 
 
 def it_comes_back(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """From 0.18 m off and a swinging cable the model is back after 5 s, but for what the integral still lets
-    go of: measured 11 mm."""
+    """From 0.18 m off and with a swinging cable, the model is back after 5 s, except for what the integral
+    still has to release: measured 11 mm."""
     dt = 0.008
     q = model.unit([0.03, -0.02, -1.0])
     y = model.pack((0.15, -0.1, 0.05), ZERO, q, np.cross(q, (0.1, 0.1, 0.0)), np.eye(3), ZERO)
@@ -419,7 +423,7 @@ def it_comes_back(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 
 
 def what_errors_ask_for_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """`saturated` is the identity near zero, bounded far off, and its derivatives are its own."""
+    """`saturated` is the identity near zero, bounded far off, and its derivatives are those of its value."""
     rng = np.random.default_rng(31)
     for size in (1.0, 5.0):
         path = size * rng.normal(size=(7, 3))
@@ -441,7 +445,8 @@ def what_errors_ask_for_is_bounded(law: SimpleNamespace, model: SimpleNamespace,
 
 
 def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """`held_up` is the identity from 0.4 of the weight, a quarter upwards at least, smooth in between."""
+    """`held_up` is the identity from 0.4 of the weight, points upwards with at least a quarter of it, and is
+    smooth in between."""
     weight = 4.0
     for upward in (1.6, 2.0, -1.0):
         A, A_dot, A_ddot = law.held_up((3.0, 4.0, upward), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), weight)
@@ -452,7 +457,7 @@ def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Ve
             0.0,
         )
     for upward, expected in ((0.401, 1.0), (1.599, 1.599)):
-        # slopes begin and end with the third power of what is left
+        # near its ends the transition departs with the third power of the distance
         agree(law.held_up((0.0, 0.0, upward), ZERO, ZERO, weight)[0], np.array([0.0, 0.0, expected]), 1e-8)
     for upward in (0.6, 1.0, 1.4):
         path = np.random.default_rng(39).normal(size=(7, 3))
@@ -468,7 +473,7 @@ def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Ve
 
 
 def the_reference_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Each derivative of a path that has no more derivatives than are used, 0.1 s on."""
+    """Each derivative of a path that has no more derivatives than are used, 0.1 s later."""
     rng = np.random.default_rng(32)
     for entry, last in ((0, 4), (1, 5), (2, 6), (3, 6), (4, 6), (5, 6), (6, 6)):
         path = np.zeros((7, 3))
@@ -478,7 +483,7 @@ def the_reference_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle:
 
 
 def the_state_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """0.01 s on and back, against the model: third-order terms are left out."""
+    """0.01 s later and earlier, against the model: third-order terms are left out."""
     for seed in range(3):
         rng = np.random.default_rng([33, seed])
         at, f, f_rate = random_path(rng, model, vehicle)
@@ -496,9 +501,9 @@ def the_state_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle: Veh
 
 
 def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """In steady flight, under wind and drag, with thrust and lean in balance, no moment is asked for.
+    """In steady flight, under wind and drag, with thrust and lean in balance, no moment is commanded.
 
-    What the integral asks for is bounded.
+    The demand of the integral is bounded.
     """
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     push, v = np.array([0.4, -0.3, 0.0]), np.array([1.0, 2.0, 0.0])
@@ -529,12 +534,12 @@ def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle
 def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """f' and the moment are those of F', F'' along the model, off the path and in motion.
 
-    The model's thrust grows steadily, its moment stays; the reference stands still.
+    The model's thrust grows steadily, its moment is constant; the reference stands still.
     """
     gains, rate = GAINS._replace(k_i=(20.0, 20.0, 20.0)), 10.0
     rng = np.random.default_rng(34)
     h = 1e-3
-    # the last swings and turns so that Omega' counts
+    # the last case swings and turns so much that Omega' matters
     for size, turning in ((1.0, 1.0), (1.0, 1.0), (6.0, 20.0)):
         q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
         w = np.cross(q, 0.05 * size * rng.normal(size=3))
@@ -591,8 +596,8 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
 
 
 def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Belief and a simulation of the commands, each from the instant it is in force, over whole and broken
-    delays; no more commands are remembered than the delay asks for."""
+    """The belief against a simulation in which each command acts from the instant it is in force, for delays
+    of whole ticks and of fractions; no more commands are stored than the delay requires."""
     for delay, lag in ((0.0, 0.02), (0.010, 0.02), (0.012, 0.0), (0.0719, 0.03), (0.2, 0.01)):
         constants = law.actuation_constants(delay, lag, TICK)
         rng = np.random.default_rng(35)
@@ -605,7 +610,7 @@ def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace
 
         steady = true
         for k in range(70):
-            # what is to come until the command of this tick is in force
+            # the rotors until the command of this tick is in force
             ahead = true
             steps = round(delay / h)
             for i in range(steps):
@@ -672,7 +677,6 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
         drag = (0.02 + 0.012 * np.linalg.norm(state.v_quad)) * np.array(state.v_quad)
         gained = (np.array([0.0, 0.4, 0.0]) - drag) * delay / vehicle.quad_mass
         agree(np.array(pushed.v_quad) - np.array(alone.v_quad), gained, 5e-3)
-        # momentum of both, which the cable does not change
         torque = np.array([0.01, -0.02, 0.005])
         turned = law.predict(
             state, 1.0, belief, constants, TICK, ZERO, model.vec(torque), CALM_AIR, vehicle
@@ -680,6 +684,7 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
         more = np.array(turned.omega_body) - np.array(found.state.omega_body)
         agree(more, torque * delay / np.array(vehicle.inertia), 0.02)
         slowed = law.predict(state, 1.0, belief, constants, TICK, ZERO, ZERO, Drag(0.5, 0.0), vehicle).state
+        # momentum of both, which the cable does not change
         lost = [
             vehicle.quad_mass * np.array(s.v_quad) + vehicle.load_mass * np.array(s.v_load)
             for s in (found.state, slowed)
@@ -692,8 +697,8 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
 
 
 def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Of a vehicle that goes to and fro across its cable with thrice the believed drag, of one whose
-    believed drag is none, and of one that has none; and but half of it at 0.2 m/s."""
+    """Drag is learned on a vehicle that moves to and fro across its cable with three times the assumed drag,
+    on one with no assumed drag, and on one without drag; at 0.2 m/s only half of the difference is."""
     none, thrice = Drag(0.0, 0.0), Drag(0.06, 0.036)
     wind = np.array([0.2, -0.1, 0.0])
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
@@ -717,7 +722,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
         agree(found, true, 0.03 * max(true) + 1e-3)
         agree(observed.push, push, 0.005)
         agree(observed.steady, wind, 0.02)
-    # what drags along the rotors' axis passes for the cable's, and tells nothing
+    # drag along the rotors' axis is attributed to the cable, and gives no information
     climbing, _ = learned(
         BEBOP_DRAG, thrice, lambda k: [1.5 * math.sin(0.1 * k), math.cos(0.1 * k), 2.0 * math.sin(0.23 * k)]
     )
@@ -727,7 +732,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 
 
 def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """The push is learned the slower, the noisier the accelerometer is, and less so in wind."""
+    """The noisier the accelerometer, the more slowly the push is learned; less so in wind."""
     constants = law.observer_constants(0.3, 0.1, 0.2, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
     still = law.aloft(vehicle)
     breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
@@ -739,12 +744,12 @@ def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: 
             rested = law.rested(constants, observed, noise * noise)
             agree(rested.push, constants.push / slower, 1e-9 * constants.push)
             assert rested._replace(push=constants.push) == constants
-    # what the wind does to the load is believed in 0.15 s
+    # the effect of the wind on the load is filtered with 0.15 s
     blown = law.blown(still._replace(load_air=(0.3, -0.2, 0.1)), (0.1, 0.5, 0.4), 0.02, constants)
     share = TICK / 0.15
     agree(blown.load_air, (0.3 - 0.2 * share, -0.2 + 0.7 * share, 0.1 + 0.3 * share), 1e-12)
     assert blown.load_drag == 0.02
-    # of a pull, what is felt along the rotors' axis; one that slants more than 60 deg is taken for that
+    # the pull follows from its part along the rotors' axis; a cable that slants more counts as 60 deg
     lean = 0.4
     axis = (math.sin(lean), 0.0, math.cos(lean))
     agree(law.pulled((-2.0 * axis[2], 1.0, 2.0 * axis[0] - 3.0), (0.0, 0.0, -1.0), axis), 3.0, 1e-12)
@@ -752,7 +757,8 @@ def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: 
 
 
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Of a vehicle that goes to and fro, leans and turns, with discs that tilt and a cable off its centre."""
+    """The torque on a vehicle that moves to and fro, leans and turns, with rotor discs that tilt and a cable
+    off its centre."""
     constants = law.observer_constants(0.3, 0.1, 1.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
     rng = np.random.default_rng(41)
     J, beside, tilt = np.array(vehicle.inertia), np.array([0.01, -0.006, 0.004]), 0.004
@@ -774,12 +780,12 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
 
     observed, state, _, torque = learned(lambda k: [1.5 * math.sin(0.02 * k), math.cos(0.03 * k), 0.3])
     agree(observed.torque.now, torque, 1e-4)
-    # 4 % of what follows the motion is left to this: 0.2 m/s of 1 m/s, squared
+    # 4 % of the torque that follows the motion remains in this: 0.2 m/s of 1 m/s, squared
     agree(observed.torque.steady, beside, 0.04 * 1.5 * tilt)
     assert observed.torque.together / observed.torque.alone == pytest.approx(tilt, rel=0.02)
     slow, _, swept, _ = learned(lambda k: [0.2 * math.sqrt(2.0) * math.sin(0.02 * k), 0.0, 0.0])
     agree(np.array(slow.torque.now) - slow.torque.steady, 0.5 * tilt * swept, 0.1 * tilt * 0.2)
-    # no more than the rotors could fly against, and nothing where the cable is slack
+    # no more than the rotors could compensate, and nothing while the cable is slack
     for k in range(500):
         spun = state._replace(omega_body=model.vec((-1.0) ** k * np.array([3.0, 3.0, 3.0])))
         observed = law.observe(observed, spun, 1.0, lift, (9.0, -9.0, 9.0), constants, BEBOP_DRAG, vehicle)
@@ -788,7 +794,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
     agree(observed.torque.now, (-level, level, -yaw), ROUNDING)
     slack = law.observe(observed, state, 0.0, 5.0, (0.1, 0.1, 0.1), constants, BEBOP_DRAG, vehicle)
     assert slack.torque == observed.torque._replace(now=ZERO, omega_body=state.omega_body)
-    # who is not to learn does not
+    # an observer that is configured not to learn does not
     deaf = law.observer_constants(0.3, 0.1, 1.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     for _ in range(100):
         unmoved = law.observe(
@@ -798,7 +804,8 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
 
 
 def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Of a load half as heavy again that swings, under wind across the rotors' axis and drag as believed."""
+    """With a swinging load half as heavy again as assumed, under wind across the rotors' axis and the assumed
+    drag."""
     heavy = vehicle._replace(load_mass=1.5 * vehicle.load_mass)
     constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     rng = np.random.default_rng(37)
@@ -818,12 +825,13 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
         a = np.array(motion.a_load) - vehicle.cable_length * np.array(motion.q_ddot)
         state = state._replace(a_quad=model.vec(a))
         observed = law.observe(observed, state, 1.0, f, ZERO, constants, BEBOP_DRAG, vehicle)
-    # eight times the memory's length: exp(-8) of the error is left
+    # eight time constants: exp(-8) of the error is left
     assert observed.load_mass == pytest.approx(heavy.load_mass, rel=1e-3)
-    # the vehicle leans each way by turns: along the rotors' axis nothing is seen of the wind
+    # the vehicle leans in every direction in turn: the wind along the rotors' axis is not observed
     agree(observed.push[:2], wind[:2], 0.06)
     assert observed.support == 0.0
-    # nothing is learned of a load on the ground, and little is believed of a vehicle that stands
+    # nothing is learned from a load on the ground; of a standing vehicle the support is found; the push is
+    # bounded
     lying = observed._replace(load_ground=state.x_load[2])
     assert law.lying(lying, state)
     assert not law.lying(observed, state)
@@ -845,7 +853,7 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
 def a_pace_multiplies_the_bandwidths_of_load_and_cable(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """It rises to the whole in 0.3 s."""
+    """The pace rises from nothing to the whole in 0.3 s."""
     loops, pace = (0.6, 3.0, 5.0), 0.8
     slow = gains_of(*(pace * omega for omega in loops), 20.0, 0.9, vehicle)
     for found, wanted in zip(law.paced(gains_of(*loops, 20.0, 0.9, vehicle), pace), slow, strict=True):
@@ -911,7 +919,8 @@ HARMLESS = {
 
 @pytest.fixture(scope="module")
 def own_sources(law_sources: dict[str, str]) -> dict[str, str]:
-    """Source texts, by module, of the law and its actuators, without what the thesis has proved."""
+    """Source texts, by module, of the law and its actuators, without those that the proofs of the thesis's
+    law cover."""
     return sources(plumbline, rotor_lag, actuation, prediction, observer, without=law_sources)
 
 
@@ -921,7 +930,7 @@ def test_proved(proved: Callable[..., None], model: SimpleNamespace, bebop: Vehi
 
 
 def test_each_flip_fails_a_proof(own_sources: dict[str, str], model: SimpleNamespace, bebop: Vehicle) -> None:
-    """Every sign of the law's own files, turned over one at a time, makes a proof fail."""
+    """Every sign of the law's own files, reversed one at a time, makes a proof fail."""
     survivors, count = surviving(own_sources, PROOFS, HARMLESS, model, bebop)
     assert not survivors, "\n".join(survivors)
     assert count > 40, f"only {count} flips were found"
@@ -984,7 +993,7 @@ def test_no_reference_gives_a_command_that_is_no_number(
 def test_rotors_that_are_fast_enough_are_left_alone() -> None:
     assert rotor_lag.lag_gain(0.02, 0.02, TICK) == 1.0
     assert rotor_lag.lag_gain(0.0, 0.01, TICK) == 1.0
-    # at once: a whole lag made up for in one period
+    # immediately: a whole lag compensated in one period
     assert rotor_lag.lag_gain(0.02, 0.0, TICK) == pytest.approx(1.0 / (1.0 - math.exp(-0.2)))
 
 
@@ -1097,7 +1106,8 @@ def sensed(state: PlantState) -> State:
 
 
 def test_a_vehicle_that_the_ground_holds_is_not_turned(bebop: Vehicle) -> None:
-    """Leaning and turning, of one that stands nothing is asked; of one in the air all that the law wants."""
+    """Leaning and turning, a vehicle that stands gets no moment; one in the air gets all that the law
+    commands."""
     law, truth = built(VEH_ACT_DELAY=72.0), load_truth("bebop")
     leaning = Rotation.from_rotvec([0.02, -0.03, 0.01]).as_matrix()
     state = sensed(aloft(truth))._replace(

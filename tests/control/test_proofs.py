@@ -1,8 +1,8 @@
 """The proofs hold, and they are proofs: flipping any single sign of the laws makes one of them fail.
 
-The flips are made in the source text, one at a time and all of them: every term of every sum and
-difference, every factor in front of a vector, every order of a cross product. So a term added to a law
-tomorrow is flipped too.
+The flips are made in the source text, one at a time and all of them: every term of every sum and difference,
+every factor in front of a vector, every order of a cross product. A term added to a law later is therefore
+flipped too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rotors that give less than they are asked for, as their speeds tell."""
+"""Rotors that give less than commanded, as their speeds show."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ HOVER_N = 4.905
 
 
 def told(forces, vehicle):
-    """The memory of rotors whose speeds tell these forces."""
+    """The memory of rotors whose reported speeds correspond to these forces."""
     rotors = new_rotors()
     rotors[TOLD, :4] = [speed_rpm(force, vehicle.rotor_max) for force in forces]
     return rotors
 
 
 def test_the_factor_is_found_in_the_time_constant(bebop):
-    """A hover is asked for with the factor that is known, and four fifths of what is asked come."""
+    """A hover is commanded with the known factor, and the rotors give four fifths of the command."""
     factor, factors = 1.0, []
     for _ in range(2000):
         rotors = told([0.8 * HOVER_N / factor / 4.0] * 4, bebop)
@@ -40,7 +40,7 @@ def test_the_factor_is_found_in_the_time_constant(bebop):
 @pytest.mark.parametrize(
     ("forces", "thrust", "missed"),
     [
-        ([0.0] * 4, HOVER_N, 0.0),  # nothing was ever told
+        ([0.0] * 4, HOVER_N, 0.0),  # no speed was ever reported
         ([1.0] * 4, 0.3, 0.0),  # standing, rotors idle
         ([1.3, 1.3, 1.3, 0.0], HOVER_N, 1.0),  # one of them has failed
     ],

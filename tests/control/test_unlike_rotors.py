@@ -1,4 +1,4 @@
-"""Rotors of different lag, asked for what makes them lag as one."""
+"""Rotors with different lags, commanded so that all follow with the same lag."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ACTUATION = actuation_constants(0.0, TAU, PERIOD)
 
 
 def flown(layout, wanted, limited, vehicle):
-    """What rotors of their own lag give, tick by tick, and what they are asked for."""
+    """Forces that rotors with their own lags give, tick by tick, and the commanded forces."""
     table, rotors, gives = with_lags(allocate(layout), layout, ACTUATION), new_rotors(), np.zeros(len(layout))
     found, asked = [], []
     for force in wanted:
@@ -44,7 +44,8 @@ def test_all_lag_as_the_one_that_is_told(bebop):
 
 
 def test_limits_are_kept_and_made_up_for(bebop):
-    """A slow rotor cannot be hurried beyond its greatest force; it gets there all the same."""
+    """A slow rotor cannot be commanded beyond its greatest force; it reaches the wanted force
+    nevertheless."""
     found, asked = flown(UNLIKE, np.full(300, 1.9), 1.0, bebop)
     assert asked.max() <= bebop.rotor_max
     assert asked.min() >= bebop.rotor_min

@@ -1,4 +1,4 @@
-"""A cable attached beside the centre of mass, by belief."""
+"""A cable attached beside the centre of mass, as assumed by the autopilot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_belief_is_in_the_parameters():
 
 
 def test_what_the_rotors_undo_is_what_the_plant_s_cable_does():
-    """A level hover under the forces that carry both: the plant turns as the moment says."""
+    """In a level hover with forces that carry vehicle and load, the plant turns as the moment says."""
     truth = load_truth("thesis")._replace(attachment=RHO)
     lift = (truth.quad_mass + truth.load_mass) * truth.gravity
     hanging = initial_state(truth)._replace(
@@ -48,7 +48,7 @@ def test_what_the_rotors_undo_is_what_the_plant_s_cable_does():
     R = rotation_from_quat(hanging.quat_wxyz)
     at = State((0.0,) * 3, (0.0,) * 3, (0.0, 0.0, -1.0), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, R, (0.0,) * 3)
     moment = cable_moment(at, lift, truth.load_mass, truth.cable_length, vehicle)
-    # the plant's tension is less by what the turning vehicle gives way: n . J^-1 n of 1 / mu
+    # the turning vehicle gives way, which reduces the plant's tension: n . J^-1 n, compared with 1 / mu
     n = np.cross(RHO, (0.0, 0.0, -1.0))
     mu = truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
     gives_way = 1.0 + mu * float(n @ (n / np.array(truth.inertia)))

@@ -17,7 +17,7 @@ from tests.doubles.craft import ACCEPTED, Craft
 
 @pytest.mark.parametrize("command", ["hold", "return"])
 def test_a_stop_is_laid_out_in_portions(command: str) -> None:
-    """Whoever commands one again and again must not cost the vehicle its ticks."""
+    """Stops that are commanded again and again must not cost the vehicle its ticks."""
     craft = Craft(Takeoff(1.5), Waypoint(6.0, 0.0, 1.5), Land(), sensors="ideal")
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION and norm(c.truth.v_load) > 0.8)

@@ -14,7 +14,7 @@ TICKS = 150
 
 
 def fingerprint() -> str:
-    """Of all answers and of the estimator's state after a short run; the vehicle is armed and rises."""
+    """Hash of all answers and of the estimator's state after a short run; the vehicle is armed and rises."""
     craft = Craft(sensors="lab", seed=5)
     for _ in range(40):
         craft.tick()

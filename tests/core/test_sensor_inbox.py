@@ -246,11 +246,11 @@ def test_only_a_later_tick_changes_the_sample_and_the_fix_that_are_kept() -> Non
     assert np.array_equal(inbox.fix, fix)
 
 
-# ---- frames that are not plain are read by the general decoder, and say the same
+# ---- frames that are not plain are read by the general decoder, and give the same readings
 
 
 def version_1(frame: bytes) -> bytes:
-    """The frame of a message with an id below 256 as MAVLink 1 has it."""
+    """The frame of a message with an id below 256 in the format of MAVLink 1."""
     received = decode(frame)[0][0].message
     payload = frame[10:-2].ljust(type(received).unpacker.size, b"\0")
     head = bytes((0xFE, len(payload), *frame[4:8]))

@@ -1,4 +1,5 @@
-"""One tick: the same bits interpreted, sound whatever the sensors say, flown on with other parameters."""
+"""One tick: the same bits interpreted, finite whatever the sensors report, continued with other
+parameters."""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ def new_core(**values: float) -> FlightCore:
 
 
 def put_hover(core: FlightCore, now_us: int, tick: int) -> int:
-    """Readings of a load that hangs still, but for a little sway; how many they are."""
+    """Put readings of a load that hangs still except for a little sway; return their number."""
     sway, length = 0.01 * math.sin(0.3 * tick), core.setup.vehicle.cable_length
     over = (sway, 0.0, HOVER_M + length)
     imu = ImuReading((0.01, -0.02, 0.005), (0.1 * sway, 0.05, core.setup.vehicle.gravity))
@@ -68,7 +69,7 @@ def put_hover(core: FlightCore, now_us: int, tick: int) -> int:
 
 
 def hold(core: FlightCore, mode: int, now_us: int) -> None:
-    """Let the core fly in this control mode from now on, a little off where it is."""
+    """Let the core fly in this control mode from now on, to a target a little off its position."""
     place = np.zeros((50, COLUMNS))
     place[:, :3] = (
         0.05,
@@ -84,7 +85,7 @@ def hold(core: FlightCore, mode: int, now_us: int) -> None:
 
 
 def sense(core: FlightCore, count: int, now_us: int, tick: int, dt: float = TICK_US * 1e-6) -> None:
-    """The first half of a tick, behind which the supervisor is asked: nothing was decided yet."""
+    """The first half of a tick, after which the supervisor has to decide."""
     assert fly_tick(core.rows, core.law, count, now_us, tick, dt, False) == TO_DECIDE
 
 
@@ -114,7 +115,7 @@ def rows_of(core: FlightCore) -> dict[str, Any]:
 
 
 def fingerprints() -> dict[str, str]:
-    """Hash of every array behind some ticks of each law in each mode."""
+    """Hash of every array after some ticks of each law in each mode."""
     found = {}
     for number, law in LAWS.items():
         for name, mode in MODES.items():
@@ -137,7 +138,7 @@ def test_every_law_in_every_mode_leaves_the_same_rows_compiled_and_interpreted()
     assert [name for name in compiled if compiled[name] != plain[name]] == []
 
 
-# ---- whatever the sensors say
+# ---- any readings of the sensors
 
 HOSTILE = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e10, -1e5, 3.0, 1.0, 0.0, -0.0, -1.0, 1e-30)
 INSTANTS_US = (0, -TICK_US, -299_000, -301_000, -BEGIN_US, 1, 10**9, math.nan, math.inf, -math.inf)
@@ -147,7 +148,7 @@ ROW = st.tuples(
     st.lists(st.sampled_from(HOSTILE), min_size=14, max_size=14),
 )
 SCRIPTS = st.lists(st.lists(ROW, max_size=6), min_size=1, max_size=4)
-REPEATS = 70  # ticks: more than the refusals after which a tracker is believed all the same
+REPEATS = 70  # ticks: more than the refusals after which the estimate restarts from a tracker
 
 
 def put_rows(core: FlightCore, rows: list[Any], now_us: int) -> int:
@@ -157,7 +158,8 @@ def put_rows(core: FlightCore, rows: list[Any], now_us: int) -> int:
 
 
 def numbers_of(core: FlightCore) -> list[float]:
-    """All numbers of the estimate, but for the ages, which are infinite of what was never heard."""
+    """All numbers of the estimate except the ages, which are infinite for sensors that have never
+    reported."""
     e = core.estimator
     e = e._replace(
         vehicle=e.vehicle._replace(age_s=0.0),
@@ -228,7 +230,7 @@ def set_parameter(craft: Craft, name: str, value: float) -> None:
 
 
 def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_tick_on() -> None:
-    """Nothing is forgotten of what the rotors were asked for: they are not believed to have stood still."""
+    """The earlier commands to the rotors are kept: the rotors are not assumed to have stood still."""
     craft = Craft(Takeoff(1.0), Delay(60.0), Land(), SIM_ACT_DELAY_MS=20.0)
     craft.begin()
     craft.run(lambda craft: craft.flight.phase == Phase.MISSION)

@@ -1,4 +1,4 @@
-"""A stand-in for Betaflight's simulator target: reads its packets and mixes its motors as its sources say,
+"""A stand-in for Betaflight's simulator target: reads its packets and mixes its motors as in its sources,
 with simple laws in place of its own."""
 
 from __future__ import annotations
@@ -8,27 +8,27 @@ from math import asin, atan2, degrees
 
 # motors 1 to 4 (rear right, front right, rear left, front left) under demands of roll, pitch and yaw
 MIX = ((-1, 1, -1), (-1, -1, 1), (1, 1, 1), (1, -1, -1))
-SENT = (1, 2, 3, 0)  # which of them each number of the packet is
+SENT = (1, 2, 3, 0)  # the motor of each number of the packet
 FULL_ANGLE_DEG, FULL_RATE_DEG_S = 60.0, 670.0
 CENTRE_RATE_DEG_S = 70.0
-PER_DEGREE_S = 8e-4  # of throttle, per deg/s that the rate is wrong
-PER_DEGREE = 5.0  # deg/s, per degree that the angle is wrong
+PER_DEGREE_S = 8e-4  # of throttle, per deg/s of rate error
+PER_DEGREE = 5.0  # deg/s, per degree of angle error
 IDLE = 0.055
 
 
 def rates_of(stick: float) -> float:
-    """deg/s that a stick asks for in ACRO, by the rates that the firmware begins with."""
+    """The rate, in deg/s, that a stick commands in ACRO, with the default rates of the firmware."""
     return stick * CENTRE_RATE_DEG_S + stick * abs(stick) * (FULL_RATE_DEG_S - CENTRE_RATE_DEG_S)
 
 
 def flies(state: bytes, channels: bytes) -> bytes:
-    """Its servo_packet after these fdm_packet and rc_packet."""
+    """The servo_packet in answer to these fdm_packet and rc_packet."""
     numbers = struct.unpack("<18d", state)
     (p, q, r), (w, x, y, z) = numbers[1:4], numbers[7:11]
     roll, pitch, throttle, _, arm, angle = (us / 500.0 - 3.0 for us in struct.unpack("<d16H", channels)[1:7])
     if arm < 0.4:
         return struct.pack("<4f", *(0.0,) * 4)
-    rates = (degrees(p), -degrees(q), -degrees(r))  # of its gyroscope: right, forward, to the left
+    rates = (degrees(p), -degrees(q), -degrees(r))  # of its gyroscope: roll right, pitch forward, yaw left
     if angle > 0.4:
         leans = (
             degrees(atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))),

@@ -1,7 +1,7 @@
 """A headless Chromium, driven over WebDriver and listened to over the DevTools protocol.
 
-It finds no host but the loopback, so that a page that asks for anything else fails, and `requests` tells
-of it.
+It finds no host but the loopback, so that requests of a page for anything else fail, and `requests` shows
+them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _SWITCHES = (
 
 
 def missing() -> str:
-    """Why there is no browser here, or empty."""
+    """Why there is no browser here; empty if there is one."""
     if not any(map(shutil.which, _CHROMIUM)):
         return "no chromium is installed (Debian: apt-get install chromium chromium-driver)"
     if not shutil.which("chromedriver"):
@@ -45,7 +45,7 @@ class Browser:
 
     def __init__(self, driver: Any) -> None:
         self.driver = driver
-        self.requests: list[str] = []  # addresses asked for since `open`, web sockets included
+        self.requests: list[str] = []  # addresses requested since `open`, web sockets included
         self.errors: list[str] = []  # of the console since `open`, exceptions included
 
     def open(self, url: str, width: int = 1280, height: int = 800, theme: str = "dark") -> None:
@@ -59,21 +59,21 @@ class Browser:
         self.driver.get(url)
 
     def resize(self, width: int, height: int) -> None:
-        """Give the page so many CSS pixels."""
+        """Set the size of the page in CSS pixels."""
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
     def prefer(self, theme: str) -> None:
-        """Let the reader prefer "dark" or "light"."""
+        """Set the theme that the reader prefers, "dark" or "light"."""
         features = [{"name": "prefers-color-scheme", "value": theme}]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
     def run(self, script: str, *arguments: Any) -> Any:
-        """What a function body of JavaScript returns; its arguments are `arguments[0]`, ..."""
+        """The value that a function body of JavaScript returns; its arguments are `arguments[0]`, ..."""
         return self.driver.execute_script(script, *arguments)
 
     def wait(self, expression: str, seconds: float = WAIT_S) -> Any:
-        """The value of an expression of JavaScript once it is true; AssertionError with the console else."""
+        """The value of a JavaScript expression once it is true; otherwise AssertionError with the console."""
         from selenium.common.exceptions import TimeoutException
         from selenium.webdriver.support.ui import WebDriverWait
 
@@ -88,7 +88,7 @@ class Browser:
         return self.driver.find_element("css selector", selector)
 
     def click_at(self, selector: str, x: float, y: float, clicks: int = 1) -> None:
-        """Press and release the mouse at that pixel of the element, so many times."""
+        """Press and release the mouse at that pixel of the element, `clicks` times."""
         box = self.run(
             "const b = arguments[0].getBoundingClientRect(); return [b.x, b.y]", self.find(selector)
         )
@@ -98,11 +98,11 @@ class Browser:
                 self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {"type": kind, **place})
 
     def screenshot(self, path: Path) -> None:
-        """Write what is seen as PNG."""
+        """Write a screenshot as PNG."""
         self.driver.save_screenshot(str(path))
 
     def listen(self) -> None:
-        """Bring `requests` and `errors` up to now."""
+        """Bring `requests` and `errors` up to date."""
         for entry in self.driver.get_log("performance"):
             event = json.loads(entry["message"])["message"]
             self._hear(event["method"], event["params"])

@@ -34,10 +34,10 @@ LOAD_WEIGHT_N = TRUTH.load_mass * TRUTH.gravity
 
 
 class Craft:
-    """Onboard and simulator joined tick by tick, without a ground station but for the commands given here.
+    """Onboard and simulator joined tick by tick, without a ground station except for the commands given here.
 
-    `truth` reads the simulator's state; nothing of it reaches the autopilot but by sensors. The clock waits
-    for the autopilot unless it is told otherwise.
+    `truth` reads the simulator's state; nothing of it reaches the autopilot except by sensors. The clock
+    waits for the autopilot unless `clock_waits` is False.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Craft:
         self._writer = FrameWriter(255, 190)
         self.heard: list[Any] = []
         self.answers: list[bytes] = []
-        self.worst_error = 0.0  # of the load, from where it is to be held, m
+        self.worst_error = 0.0  # of the load, from the position where it is held, m
 
     @property
     def truth(self) -> PlantState:
@@ -97,7 +97,7 @@ class Craft:
         self.onboard.receive_ground(self._writer.frame(message), GCS)
 
     def command(self, command: int, *p: float) -> int:
-        """Send a COMMAND_LONG; its result."""
+        """Send a COMMAND_LONG; return its result."""
         params = (*p, *([0.0] * (7 - len(p))))
         self.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *params))
         self.tick()
@@ -145,7 +145,7 @@ _HEARD = {
 
 
 def least_tension(craft: Craft, until: Callable[[Craft], bool]) -> float:
-    """Fly on; the least tension on the way, as a share of the load's weight."""
+    """Fly on; return the least tension on the way, as a share of the load's weight."""
     least = 9.9
     while not until(craft):
         craft.tick()

@@ -1,4 +1,4 @@
-"""A process that is killed at any of its system calls that change a file, or half way through a write."""
+"""A process that is killed at any of its system calls that change a file, or halfway through a write."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ WRITING = frozenset("wax+")
 
 
 def killed_at(number: int, what: Callable[[], Any]) -> bool:
-    """Do `what` in a process that dies by SIGKILL at its system call `number`, before it is made.
+    """Do `what` in a process that dies by SIGKILL before its system call `number`; return whether it did.
 
-    Of what is written in one call a half is taken, as a system may do: the rest is a call of its own.
+    Each call to write takes only half of the data, as a system may do; the rest takes a separate call.
     """
     child = os.fork()
     if child == 0:
@@ -24,7 +24,7 @@ def killed_at(number: int, what: Callable[[], Any]) -> bool:
         try:
             what()
         finally:
-            os.kill(os.getpid(), signal.SIGTERM)  # by the end, without the cleaning up of the test program
+            os.kill(os.getpid(), signal.SIGTERM)  # at the end, without the clean-up of the test program
     _, status = os.waitpid(child, 0)
     assert os.WIFSIGNALED(status)
     return os.WTERMSIG(status) == signal.SIGKILL
@@ -47,7 +47,7 @@ def _count_calls(number: int) -> None:
         return made
 
     class File(io.FileIO):
-        """A file that is written as it is asked to, and not when a buffer is full."""
+        """A file that is written when requested, and not when a buffer is full."""
 
         def write(self, data: Any) -> int:
             for part in (data[: len(data) // 2], data[len(data) // 2 :]):

@@ -29,7 +29,7 @@ def mix(
     lost: int = 0,
     room: Any = mixer,
 ) -> Mixed:
-    """What the rotors of a vehicle are asked for, see `autopilot.control.actuators.mixer.mix`; by the
+    """The forces commanded to the rotors of a vehicle, see `autopilot.control.actuators.mixer.mix`; by the
     functions of `room`, the mixer or a copy of it."""
     rotors = room.new_rotors()
     result = room.mix(thrust, moment, vehicle, limited, allocate(layout, lost), rotors)

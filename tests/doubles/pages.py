@@ -1,6 +1,6 @@
-"""Pages of the documentation as what they hold: code blocks with their marks, headings and links.
+"""Pages of the documentation split into their contents: code blocks with their marks, headings and links.
 
-A block is a fence with a language; a comment in the line above says what is special about it:
+A block is a fence with a language; a comment in the line above states what is special about it:
 
     <!-- not run: REASON: more -->   REASON is display, firmware, network or minutes
     <!-- run by: tests/... -->       another test runs it
@@ -60,7 +60,7 @@ def split(page: Path) -> tuple[list[Block], list[tuple[int, str]]]:
 
 
 def anchors(page: Path) -> set[str]:
-    """What may stand behind # in a link to the page, as GitHub and the site make them."""
+    """The anchors that may follow # in a link to the page, as GitHub and the site make them."""
     found: dict[str, int] = {}
     names = set()
     for _, line in split(page)[1]:
@@ -76,6 +76,6 @@ def anchors(page: Path) -> set[str]:
 
 
 def links(page: Path) -> list[str]:
-    """Where the page leads."""
+    """The targets of the links of a page."""
     text = "\n".join(re.sub(r"`[^`]*`", "", line) for _, line in split(page)[1])
     return _LINK.findall(text)

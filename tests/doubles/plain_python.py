@@ -1,4 +1,4 @@
-"""What a function of the tests returns where the compiler is switched off, in a process of its own."""
+"""The result of a function of the tests with the compiler switched off, in a separate process."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CALL = "import json, sys; from {module} import {name}; print(json.dumps({name}()
 
 
 def in_plain_python(function: Callable[[], Any]) -> Any:
-    """What `function`, of a module of the tests, returns in plain Python; it must be a value of JSON."""
+    """The result of `function`, of a module of the tests, in plain Python; it must be a JSON value."""
     done = subprocess.run(
         [sys.executable, "-c", CALL.format(module=function.__module__, name=function.__name__)],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

@@ -21,7 +21,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 
 
 class Readings(NamedTuple):
-    """What the sensors said since the last tick; each kind in the order in which it came."""
+    """The readings of the sensors since the last tick; each kind in the order of arrival."""
 
     imu: ImuReading | None
     poses: tuple[PoseReading, ...] = ()
@@ -40,7 +40,7 @@ def estimate(
     dt: float,
     thrust: float = 0.0,
 ) -> EstimatorState:
-    """The state after `dt` seconds and the readings, the cable as long as the tuning has it."""
+    """The state after `dt` seconds and the readings, with the cable length of the tuning."""
     inbox = box.new_inbox(64)
     count = 0
     if readings.imu is not None:

@@ -14,7 +14,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.telemetry import telemetry_of
 from gcs.analysis.tracks import Telemetry
 
-# of the record that `gcs fly --json` prints: programs rely on them
+# keys of the record that `gcs fly --json` prints: programs rely on them
 STABLE_KEYS = {
     "mission",
     "law",
@@ -46,7 +46,7 @@ ROTOR_MAX_N = 1.96
 INERTIA = np.array((2.2e-3, 2.2e-3, 4.3e-3))
 ARM_M = 0.126
 
-PHASES = (  # name, duration in s; MISSION is put in
+PHASES = (  # name, duration in s; that of MISSION is inserted
     (mavlink.PLUMBLINE_PHASE_ARMED, 0.5),
     (mavlink.PLUMBLINE_PHASE_TAUTEN, 1.5),
     (mavlink.PLUMBLINE_PHASE_LIFT, 3.0),
@@ -66,7 +66,7 @@ def _ned(v: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Flight:
-    """Columns (n, ...) in ENU; whoever wants a fault writes into them before asking for the records."""
+    """Columns (n, ...) in ENU; to make a fault, write into them before requesting the records."""
 
     time_s: np.ndarray
     phase: np.ndarray
@@ -89,8 +89,8 @@ class Flight:
     psi_q: np.ndarray
     control_mode: np.ndarray
     texts: list[tuple[float, int, str]] = field(default_factory=list)
-    winds: list[tuple[float, tuple]] = field(default_factory=list)  # from when on which gust pulse, ENU
-    snaps: list[tuple[float, float, float]] = field(default_factory=list)  # when, speed, impulse
+    winds: list[tuple[float, tuple]] = field(default_factory=list)  # time of the beginning, gust pulse, ENU
+    snaps: list[tuple[float, float, float]] = field(default_factory=list)  # time, speed, impulse
     drop: Callable[[int, str], bool] = lambda i, kind: False
 
     @property
@@ -217,7 +217,7 @@ Path3 = Callable[[np.ndarray], np.ndarray]  # times (n,) since the mission began
 
 
 def flight(duration_s: float, path: Path3, error: Path3 | None = None, altitude_m: float = 1.5) -> Flight:
-    """A whole flight around a path, everything quiet but what the path and the error ask for."""
+    """A whole flight around a path, without motion other than that of the path and the error."""
     n = round((BEFORE_S + duration_s + sum(d for _, d in PHASES[5:])) / TICK_S) + 1
     time_s = np.arange(n) * TICK_S
     phase = np.zeros(n, dtype=int)
@@ -274,7 +274,7 @@ def flight(duration_s: float, path: Path3, error: Path3 | None = None, altitude_
 
 
 def still(t: np.ndarray) -> np.ndarray:
-    """A path that stays where it is."""
+    """A path that stays at its start."""
     return np.zeros((len(t), 3))
 
 
@@ -322,7 +322,7 @@ def case_b(seed: int = 1, duration_s: float = 50.0) -> Flight:
 
 
 def delivery() -> Flight:
-    """A load that is let go in the middle of the mission; it lies there while the vehicle flies on."""
+    """A load that is released in the middle of the mission; it lies there while the vehicle flies on."""
     made = flight(10.0, still)
     alone = np.flatnonzero(made.mission & (made.time_s > made.time_s[made.mission][0] + 4.0))[0]
     vehicle = made.actual - made.distance[:, None] * made.q_cable

@@ -51,7 +51,7 @@ def entered(flight: Flight, phase: Phase, seen: View, settings: Settings) -> Fli
 
 
 class Sky:
-    """Load and vehicle are where the present leg wants them; the ground and the cable are as they are."""
+    """Load and vehicle are where the present leg commands them to be, as far as ground and cable allow."""
 
     def __init__(self, *steps: Step, settings: Settings = SETTINGS) -> None:
         items = encode_steps(steps, Home()) if steps else ()
@@ -94,7 +94,7 @@ class Sky:
         self.run(lambda sky: sky.now_us >= end)
 
     def airborne(self) -> Sky:
-        """Taken off by command to 2 m, holding."""
+        """Take off by command to 2 m, and hold."""
         assert self.ask(Arm(True, False)).result == ACCEPTED
         assert self.ask(Takeoff(2.0)).result == ACCEPTED
         self.run(lambda sky: sky.flight.phase == Phase.HOLD)
@@ -102,7 +102,7 @@ class Sky:
         return self
 
     def obey(self) -> View:
-        """What is seen after a tick in which all went as the present leg wants it."""
+        """The view after a tick in which everything moved as the present leg commands."""
         last, flight = self.view, self.flight
         if not flight.legs:
             return last._replace(now_us=self.now_us, v_quad=ZERO, v_load=ZERO)
@@ -112,7 +112,7 @@ class Sky:
             x, v = jet[0], jet[1]
             if x[2] < LOAD_RADIUS:
                 x, v = (x[0], x[1], LOAD_RADIUS), ZERO
-            # the cable leans as the load's acceleration wants it to
+            # the cable leans as the load's acceleration requires
             a, L = jet[2], self.settings.cable_length_m
             pull = (a[0], a[1], a[2] + self.settings.gravity_m_s2)
             n = norm(pull)
@@ -124,7 +124,7 @@ class Sky:
                 x, v = (x[0], x[1], GEAR), ZERO
             taut = norm(sub(x, last.x_load)) >= self.settings.cable_length_m
             return View(self.now_us, x, v, last.x_load, ZERO, taut, 0.0, ())
-        # an attitude is asked for: the pair drifts north at the speed it has
+        # an attitude is commanded: vehicle and load drift north at constant speed
         drift = (0.0, 0.3 * STEP_US * 1e-6, 0.0)
         return last._replace(
             now_us=self.now_us,

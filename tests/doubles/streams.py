@@ -1,4 +1,4 @@
-"""What a stream of telemetry sends of a snapshot."""
+"""The messages that a telemetry stream sends of a snapshot."""
 
 from __future__ import annotations
 

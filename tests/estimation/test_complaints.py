@@ -1,4 +1,4 @@
-"""What keeps an estimate from being flown on: the limits, and the words for the operator."""
+"""What makes an estimate unfit to fly on: the limits, and the texts for the operator."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from autopilot.estimation.records import (
 
 OLDEST_S = 0.5
 PROMISED = 0.1  # m, slow part of a receiver's error
-# with a receiver: 0.15 m and 1.2 times what it promises
+# with a receiver: 0.15 m and 1.2 times the error that it states
 FIX_LEVEL = 0.15 + 1.2 * PROMISED
 NO_DOUBT = Doubt(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 VEHICLE_AGE, LOAD_AGE = "age of the vehicle", "age of the load"
@@ -58,16 +58,16 @@ LIMITS = [
     (TRACKER, TRACKER, "vertical", 0.05, POSITION),
     (TRACKER, TRACKER, "tilt", 0.05, ATTITUDE),
     (TRACKER, TRACKER, "heading", 0.05, ATTITUDE),
-    (TRACKER, TRACKER, LOAD_AGE, 2.0, NO_LOAD),  # the pendulum bridges so long, from measured velocities
+    (TRACKER, TRACKER, LOAD_AGE, 2.0, NO_LOAD),  # the pendulum bridges this time, from measured velocities
     (TRACKER, TRACKER, "load", 0.05, LOAD),
     (TRACKER, TRACKER, "relative", inf, ""),
-    (RECEIVER, CAMERA, VEHICLE_AGE, 2.0, NO_FIX),  # the inertial unit bridges so long
+    (RECEIVER, CAMERA, VEHICLE_AGE, 2.0, NO_FIX),  # the inertial unit bridges this time
     (RECEIVER, CAMERA, "horizontal", FIX_LEVEL, FIX),
     (RECEIVER, CAMERA, "relative", FIX_LEVEL, FIX),
     (RECEIVER, CAMERA, "vertical", inf, ""),
     (RECEIVER, CAMERA, "tilt", 0.05, ATTITUDE),
     (RECEIVER, CAMERA, "heading", 0.15, HEADING),
-    (RECEIVER, CAMERA, LOAD_AGE, 1.0, NO_SIGHT),  # the pendulum bridges so long
+    (RECEIVER, CAMERA, LOAD_AGE, 1.0, NO_SIGHT),  # the pendulum bridges this time
     (RECEIVER, CAMERA, "load", 0.1, LOAD),
 ]
 ABOUT_THE_LOAD = (NO_LOAD, NO_SIGHT, LOAD)
@@ -104,11 +104,11 @@ def test_a_load_that_no_sensor_has_ever_seen_is_flown_by_its_pull(
 @pytest.mark.parametrize(
     ("load_source", "age_s", "std_m", "words"),
     [
-        (CAMERA, 0.0, 1.0, ()),  # where it was laid
+        (CAMERA, 0.0, 1.0, ()),  # in the place where it was laid
         (TRACKER, 0.0, 0.049, ()),
         (TRACKER, 0.0, 0.051, (LOAD,)),  # by a poor tracker
         (TRACKER, 0.0, nan, (LOAD,)),
-        (TRACKER, 0.25, 0.051, ()),  # hidden: so far it might have fallen since
+        (TRACKER, 0.25, 0.051, ()),  # hidden: it might have fallen that far since
         (TRACKER, 1.9, 1.0, ()),
         (TRACKER, 2.1, 1.0, (NO_LOAD,)),
     ],
@@ -116,7 +116,7 @@ def test_a_load_that_no_sensor_has_ever_seen_is_flown_by_its_pull(
 def test_a_load_on_the_ground_may_be_hidden_as_long_as_one_that_hangs(
     load_source: float, age_s: float, std_m: float, words: tuple[str, ...]
 ) -> None:
-    # the doubt is as of the last prediction: a reading that has come since has settled it
+    # the doubt is that of the last prediction; a reading since then has settled it
     state = settled(TRACKER, load_source, "load", 1.0)
     load = state.load._replace(taut=0.0, age_s=age_s, covariance=(std_m**2, 0.0, 1.0))
     assert complaints(state._replace(load=load), OLDEST_S) == words

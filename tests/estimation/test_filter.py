@@ -39,13 +39,13 @@ from tests.doubles.motion import CABLE_LENGTH, TICK_S, Array, Motion, Noise, Tra
 from tests.doubles.readings import Readings, estimate
 
 SETTLED_S = 3.0
-# Mean of error^2 / stated variance per axis. 1 is exact; one path of 17 s is a small sample of what is slow,
-# and a delay of 60 ms leaves out the noise that came in meanwhile.
+# Mean of error^2 / stated variance per axis. 1 is exact; one path of 17 s is a small sample of slow errors,
+# and a delay of 60 ms leaves out the noise of that time.
 CONSISTENT = (0.4, 2.0)
 # Share of the samples that may lie beyond the 99.9 % bound of chi-square; samples are correlated in time
 BEYOND = 0.03
-# Stated standard deviations by which the mean error of 5 s may be off: what is left of the gyro bias makes
-# the attitude's error slow, up to 0.9
+# Stated standard deviations by which the mean error of 5 s may be off: the rest of the gyro bias makes the
+# attitude's error slow, up to 0.9
 MEAN_ERROR = 1.2
 IDEAL_M, IDEAL_RAD = 1e-3, 1e-3
 ROUNDING = 1e-9  # of the least eigenvalue of a correlation matrix, with readings of 0.02 mm after metres
@@ -176,13 +176,14 @@ def test_a_drop_out_grows_the_covariance_and_readings_end_it(motion: Motion) -> 
         assert std[gone][-1] > 10.0 * std[round(4.9 / TICK_S)]
         assert std[-1] == pytest.approx(std[round(4.9 / TICK_S)], rel=0.1)
     assert trace.states[-1].resets == 2.0, "a second without readings is bridged, not started over"
-    # the load's place is known by the pendulum for longer
+    # the pendulum keeps the load's position known for longer
     assert complaints(trace.states[round(5.9 / TICK_S)], 0.5) == ("no vehicle pose from a tracker",)
     assert complaints(trace.states[-1], 0.5) == ()
 
 
 def test_slack_and_taut_are_told_by_the_distance() -> None:
-    """The vehicle rises from 0.6 cable lengths over a resting load until the cable is taut, and sinks."""
+    """The vehicle rises from 0.6 cable lengths over a resting load until the cable is taut, and sinks
+    again."""
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     taut_at: list[float] = []
     for k in range(2000):
@@ -206,9 +207,10 @@ def test_slack_and_taut_are_told_by_the_distance() -> None:
 
 
 def test_a_quiet_tracker_is_believed_while_the_cable_comes_taut() -> None:
-    """It counts as taut before it is: the vehicle then rises on, and the load it is tied to still lies.
+    """The cable counts as taut before it is: the vehicle then continues to rise, and the load on it still
+    lies.
 
-    Readings of 0.1 mm that part at 0.15 m/s must not be held to a cable of one length.
+    Readings with 0.1 mm deviation that move apart at 0.15 m/s must not be tied to a cable of constant length.
     """
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     refused = wrong = fastest = 0.0
@@ -228,7 +230,7 @@ def test_a_quiet_tracker_is_believed_while_the_cable_comes_taut() -> None:
             fastest = max(fastest, abs(state.vehicle.v_quad[2]))
     assert state.load.taut == 1.0
     assert refused == 0.0
-    # the vehicle stops from one tick to the next, which takes four readings of 0.6 mm to be believed: 2.3 mm
+    # the vehicle stops from one tick to the next, which is accepted after four readings of 0.6 mm: 2.3 mm
     assert wrong < 4e-3
     assert fastest < 0.2
     assert state.load.length == pytest.approx(CABLE_LENGTH, abs=2e-4)
@@ -238,8 +240,8 @@ def test_a_quiet_tracker_is_believed_while_the_cable_comes_taut() -> None:
 def test_a_knock_between_two_samples_of_the_accelerometer_is_followed_at_once(std: float) -> None:
     """The vehicle sinks beside its load and stands from one tick to the next; no sample shows the impact.
 
-    Waiting for the new start would take 50 refused poses, and the load's doubt would grow beyond what may be
-    flown on.
+    Waiting for a restart of the estimate would take 50 refused poses, and the load's doubt would grow beyond
+    the limit for flight.
     """
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     refused, doubt = 0.0, 0.0
@@ -263,7 +265,8 @@ def test_a_knock_between_two_samples_of_the_accelerometer_is_followed_at_once(st
 
 
 def test_a_cable_a_little_too_short_to_be_taut_is_found_slack() -> None:
-    """Above 96.5 % of its length; where its load's readings would be refused for a quarter of a second."""
+    """At more than 96.5 % of its length, where the readings of its load would be refused for a quarter of a
+    second."""
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     since = 0.0
     for k in range(500):
@@ -282,11 +285,11 @@ def test_a_cable_a_little_too_short_to_be_taut_is_found_slack() -> None:
 
 
 def definite(state: EstimatorState, history: History) -> bool:
-    """Whether what is in use of the covariance is symmetric to the bit and positive but for rounding."""
+    """Whether the used part of the covariance is symmetric to the bit and positive except for rounding."""
     used = [i for i in range(state.size) if history.covariance[i, i] != 0.0]
     P = history.covariance[np.ix_(used, used)]
     if not used:
-        return True  # nobody has placed anything
+        return True  # no reading has placed anything
     scale = 1.0 / np.sqrt(np.diag(P))
     if not np.isfinite(scale).all() or not (P == P.T).all():
         return False

@@ -1,4 +1,4 @@
-"""What is believed of a receiver whose fix floats before it is fixed."""
+"""How far a receiver is trusted whose solution floats before it is fixed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SLOW_SHARE = math.sqrt(1.0 - TUNING.rtk_white**2)
 
 
 def started(stated: float) -> tuple[EstimatorState, History]:
-    """A vehicle at home whose first fix stated this deviation, m, and was off by 0.2 m in both."""
+    """A vehicle at home whose first fix stated this deviation, m, and was off by 0.2 m."""
     history = new_history()
     history.covariance[:SIZE, :SIZE] = 1e-6 * np.eye(SIZE)
     slow = SLOW_SHARE * stated

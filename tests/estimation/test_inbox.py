@@ -1,4 +1,4 @@
-"""Which readings are believed, and how far: what is dropped leaves no trace in the estimate."""
+"""Which readings are accepted, and with which deviations: a dropped one leaves no trace in the estimate."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def row_of(kind: int, reading: Any, shows_us: float = NOW_US) -> Any:
 
 
 def changed(reading: Any, place: int, value: float) -> Any:
-    """A row's reading with another number at this place of its record."""
+    """The row of a reading with another number at this place of its record."""
     numbers = packed(reading)
     numbers[place] = value
     kind = {
@@ -76,7 +76,7 @@ def changed(reading: Any, place: int, value: float) -> Any:
         (4000, 0.0, 0.004),
         (300_000, 0.0, 0.3),
         (50_000, 0.02, 0.03),
-        (10_000, 0.02, 0.0),  # no reading overtakes the inertial unit
+        (10_000, 0.02, 0.0),  # no reading is newer than the inertial sample
         (320_000, 0.02, 0.3),
         (300_001, 0.0, NAN),
         (-1, 0.0, NAN),
@@ -226,13 +226,13 @@ def test_an_inertial_sample_is_a_number_within_any_sensors_range(gyro: Any, acce
     assert box.is_sane(ImuReading(gyro, accel)) == sane
 
 
-# ---- what the estimate makes of an inbox
+# ---- the estimate from an inbox
 
 TUNING = bebop_tuning()
 
 
 def begun(rows: list[Any], ticks: int = 20) -> tuple[EstimatorState, History]:
-    """An estimate that has heard these rows for some ticks."""
+    """An estimate that has received these rows for some ticks."""
     state, history = blank_state(), new_history()
     for _ in range(ticks):
         state = heard(state, history, rows)
@@ -320,7 +320,8 @@ def test_rows_behind_the_count_are_not_read() -> None:
     ids=["a vertical field", "free fall", "nearly a vertical field"],
 )
 def test_a_fix_waits_for_an_attitude_to_start_with(field: Any, accel: Any) -> None:
-    """The receiver's vehicle is levelled by the accelerometer and headed by the magnetometer."""
+    """With a receiver, the vehicle takes its level from the accelerometer and its heading from the
+    magnetometer."""
     fallen = row_of(box.IMU, ImuReading((0.0, 0.0, 0.0), accel))
     state, history = begun([fallen, row_of(box.FIELD, field), *AIDED[2:]])
     assert state.vehicle.source == 0.0

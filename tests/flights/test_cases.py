@@ -36,19 +36,19 @@ def test_case_a_beats_the_thesis_with_true_rotor_limits() -> None:
 
 
 def test_a_gust_into_a_figure_eight_is_flown_off() -> None:
-    """Turning the vehicle takes for a while more than all that its rotors can give."""
+    """For a while, turning the vehicle takes more than its rotors can give."""
     gust = {"SIM_GUST_N": 6.0, "SIM_GUST_AT_S": 32.0}
     assert (flown("case-c", Conditions(settings=gust))["load_error_max_m"] or 1.0) < 0.1  # measured: 73 mm
 
 
 def test_a_heavy_load_is_lifted_outdoors_by_a_vehicle_that_is_not_as_it_is_believed() -> None:
-    """Its battery sags while the cable is still slack: what the rotors give is learned from their speeds."""
+    """Its battery sags while the cable is still slack: the rotor forces are learned from the rotor speeds."""
     found = flown("case-b", Conditions(vehicle="heavy-real", sensors="field"))
     assert (found["load_error_max_m"] or 1.0) < 0.15  # measured: 103 mm
 
 
 def test_it_flies_a_figure_eight_slower_than_asked_by_the_parameters_it_is_delivered_with() -> None:
-    """With the reserve that `heavy` leaves it would lose it."""
+    """With the reserve that `heavy` leaves, the load would be lost."""
     windy = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
     found = flown("case-c", Conditions(vehicle="heavy-real", sensors="field", settings=windy))
     assert (found["load_error_max_m"] or 1.0) < 0.2  # measured: 119 to 132 mm

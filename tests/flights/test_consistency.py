@@ -1,7 +1,7 @@
-"""What the estimator says of its own error, against the truth of flights with the simulator's sensors.
+"""The error that the estimator states, compared with the truth of flights with the simulator's sensors.
 
 NEES is error^T P^-1 error of a part of the error state, NIS the same of the innovations; each is, on average,
-its number of degrees of freedom if the filter knows itself. Averages are over seeds and over instants one
+its number of degrees of freedom if the stated error is right. Averages are over seeds and over instants one
 second apart; a slow error (of the receiver, of the levelling) makes the instants of one flight alike, so the
 seeds are what counts.
 """
@@ -48,13 +48,13 @@ PARTS = {
     "direction": (DIRECTION, 2),
     "rate": (RATE, 2),
 }
-# readings of one kind have so many scalars
+# number of scalars in a reading of each kind
 SCALARS = {POSE: 6, LOAD: 3, FIX: 6, PRESSURE: 1, MAGNETIC: 1, SIGHT: 2}
 
 
 def error_of(craft: Craft) -> NDArray[Any]:
-    """The error state but for biases, truth minus estimate, of one more tick."""
-    truth = craft.truth  # a tick ends with the world moved on
+    """The error state without biases, truth minus estimate, after one more tick."""
+    truth = craft.truth  # read before the tick, which ends by advancing the world
     craft.tick()
     estimate = craft.estimate
     vehicle, load = estimate.vehicle, estimate.load
@@ -96,11 +96,11 @@ def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
 
 
 # Means over 10 seeds and 8 instants. Instants of one flight are alike: the chi-square bounds are those of
-# the seeds with three instants that count. Direction and rate are believed worse than they are: the noise of
-# the pendulum stands for drag on a fast load. Measured per axis, position to rate: lab 1.00, 1.00,
+# the seeds with three instants that count. The stated error of direction and rate is too large: the noise
+# of the pendulum stands for drag on a fast load. Measured per axis, position to rate: lab 1.00, 1.00,
 # 1.08, 0.86, 0.63; rtk 0.91, 0.94, 1.04, 0.90, 0.62.
 COUNTING = 3 * len(SEEDS)
-MODEL_MARGIN = 0.5  # share of the stated variance that the believed error of the pendulum may be too much
+MODEL_MARGIN = 0.5  # share of the stated variance of the pendulum that the true one must reach
 
 
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])
@@ -127,7 +127,7 @@ def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tup
 
 def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
     """For 3 s at a time each fix is off by the same 0.15 m. Measured as RMS: 20.9 mm without, 28.2 mm with
-    such fixes; 57 mm if each is believed to have an error of its own."""
+    such fixes; 57 mm if each is assumed to have an independent error."""
     hover = load_mission("hover")
 
     def square(floats_per_min: float) -> float:

@@ -19,7 +19,7 @@ from tests.doubles.craft import ACCEPTED, GCS, LOAD_WEIGHT_N, Craft, at_phase
 HEIGHT_M = 1.5
 ROUTE = (Takeoff(HEIGHT_M), Waypoint(3.0, 0.0, HEIGHT_M), Waypoint(0.0, 0.0, HEIGHT_M), Land())
 FIRM_M_S = 1.0
-SOFT_M_S = 0.3  # vertical, of a vehicle that is set down: it creeps at 0.2 m/s
+SOFT_M_S = 0.3  # vertical speed of a vehicle that is set down: it sinks at 0.2 m/s
 INERTIAL, POSE, LOAD, CAMERA, RECEIVER, BAROMETER, MAGNETOMETER = (1 << bit for bit in range(7))
 
 
@@ -29,7 +29,7 @@ def set_parameter(craft: Craft, name: str, value: float) -> None:
 
 
 def under_way(sensors: str = "lab", speed: float = 0.5, lockstep: bool = True, **settings: float) -> Craft:
-    """A mission that is being flown, the load hanging, at no less than this speed (m/s)."""
+    """A craft on its mission, with the load hanging and moving at no less than this speed (m/s)."""
     craft = Craft(*ROUTE, sensors=sensors, lockstep=lockstep, **settings)
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION and norm(c.truth.v_load) >= speed)
@@ -38,7 +38,7 @@ def under_way(sensors: str = "lab", speed: float = 0.5, lockstep: bool = True, *
 
 
 def landed(craft: Craft, limit_s: float = 60.0) -> float:
-    """Fly until disarmed: the vertical speed at which the vehicle touched the ground, m/s."""
+    """Fly until disarmed; return the vertical speed at which the vehicle touched the ground, m/s."""
     touched = None
     end_us = craft.onboard.now_us + round(limit_s * 1e6)
     while craft.flight.phase != Phase.DISARMED:
@@ -52,7 +52,7 @@ def landed(craft: Craft, limit_s: float = 60.0) -> float:
 
 
 def restart(craft: Craft, sensors: str = "lab") -> None:
-    """As kill -9 and a new start do: the new autopilot knows the stored mission, and what it is told."""
+    """As after kill -9 and a new start: the new autopilot knows the stored mission, and what it receives."""
     mission = craft.onboard.endpoint.mission
     craft.onboard = build_onboard(Conditions(sensors=sensors), Home(), mission)
     craft.onboard.add_link(GCS)
@@ -62,16 +62,16 @@ def restart(craft: Craft, sensors: str = "lab") -> None:
 
 
 def lose_ticks(craft: Craft, seconds: float) -> None:
-    """The world goes on without an autopilot, as in real time; then there is one."""
+    """Let the world continue without an autopilot, as in real time; then the autopilot is back."""
     end_us = craft.simulator.now_us + round(seconds * 1e6)
     while craft.simulator.now_us < end_us:
         craft.simulator.advance()
-    for _ in range(2):  # a clock that far ahead is believed when three ticks say it
+    for _ in range(2):  # a clock that far ahead is accepted when three ticks state it
         craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
         craft.simulator.advance()
 
 
-# ---- the autopilot, started again
+# ---- the autopilot, restarted
 
 
 @pytest.mark.parametrize("sensors", ["lab", "ideal", "rtk"])
@@ -95,7 +95,7 @@ def test_an_autopilot_that_is_started_again_in_the_air_holds_the_load(sensors: s
 
 
 def send_load(craft: Craft, east_m: float, speed: float) -> None:
-    """As `goto` does: the load to this place on the line through home, at the height at which it hangs."""
+    """Send the load, as `goto` does, to this place on the line through home, at the height where it hangs."""
     lat, lon, _ = geodetic_from_enu((east_m, 0.0, 0.0), Home())
     frame, ahead = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, (speed, 1.0, 0.0, nan)
     go = mavlink.MAV_CMD_DO_REPOSITION
@@ -148,7 +148,7 @@ def test_one_that_finds_its_load_on_the_ground_lands_beside_it(sensors: str, pha
     craft.run(at_phase(phase))
     craft.wait(1.0)
     restart(craft, sensors)
-    # by a receiver the vehicle is flown without its place for two seconds, a metre above the ground
+    # with a receiver, the vehicle flies without a known position for two seconds, a metre above the ground
     assert landed(craft) < (SOFT_M_S if sensors == "lab" else FIRM_M_S)
     assert craft.texts[0].startswith("Restarted in flight: ")
     assert craft.texts[-1] == "Landed, disarmed"
@@ -218,7 +218,7 @@ def test_in_real_time_the_rotors_have_stopped_before_it_is_back_and_it_says_so()
     assert "".join(craft.texts) == "Restarted in flight after the rotors had stopped: disarmed"
 
 
-# ---- the simulator, started again; ticks that are lost
+# ---- the simulator, restarted; lost ticks
 
 
 def test_a_simulator_that_is_started_again_is_known_by_its_own_word() -> None:
@@ -283,7 +283,7 @@ def test_a_sensor_that_is_lost_leads_to_a_soft_landing(sensors: str, failed: int
 
 
 def hide_load(craft: Craft, seconds: float) -> float:
-    """The load hidden from its tracker: the greatest error of its estimated place meanwhile, m."""
+    """Hide the load from its tracker; return the greatest error of its estimated position meanwhile, m."""
     set_parameter(craft, "SIM_SENS_FAIL", LOAD)
     worst = 0.0
     end_us = craft.onboard.now_us + round(seconds * 1e6)
@@ -306,13 +306,13 @@ def test_a_load_that_is_hidden_while_its_cable_is_tautened_lies_where_it_was_see
     craft.begin()
     craft.run(at_phase(Phase.TAUTEN))
     craft.wait(0.5)
-    assert hide_load(craft, 0.5) < 0.1  # 0.1 m/s is how well a tracker knows its velocity
+    assert hide_load(craft, 0.5) < 0.1  # a tracker gives its velocity to within 0.1 m/s
     craft.run(at_phase(Phase.MISSION), 20.0)
     assert not any("Failsafe" in text for text in craft.texts)
 
 
 def cable_told(craft: Craft) -> tuple[float, int]:
-    """Tension and tautness as the vehicle told them last."""
+    """Tension and tautness as the vehicle reported them last."""
     told = [m for m in craft.heard if m.get_type() == "LOAD_STATE"][-1]
     return told.tension, told.taut
 

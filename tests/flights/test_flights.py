@@ -16,13 +16,13 @@ from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, TRUTH, Craft, at_phase, least_tension
 
-# m, of a load held at a point: tracker noise of 1 mm leaves 0.3 mm in the estimate, the rest is its swing
+# m, error of a held load: tracker noise of 1 mm leaves 0.3 mm in the estimate, the rest is the load's swing
 HELD = {"lab": 0.005, "ideal": 0.002}
-# m, once a move is over: the tail of the cascade's own settling, 78 ms behind its reference
+# m, error after a move has ended: the tail of the cascade's settling, 78 ms behind its reference
 SETTLING = 0.03
 # Share of the load's weight that the cable still carries at the worst moment; lowering alone takes 0.12
 TENSION = 0.8
-GROUND = 0.02  # m over what is underneath
+GROUND = 0.02  # m above the height at rest on the ground
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -43,7 +43,7 @@ def test_hovering_holds_the_load_and_lands_beside_it(sensors: str) -> None:
 
 @pytest.mark.parametrize(("scale", "seed"), [(0.1, 2), (0.1, 7), (0.25, 3)])
 def test_quiet_trackers_lift_and_set_down(scale: float, seed: int) -> None:
-    """What the model of the taut cable leaves out is more than the noise of such readings."""
+    """The model of the taut cable leaves out more than the noise of such readings."""
     craft = Craft(Takeoff(1.0), Land(), seed=seed, SIM_NOISE_SCALE=scale)
     craft.begin()
     craft.run(at_phase(Phase.DISARMED))
@@ -60,7 +60,7 @@ def test_a_load_too_heavy_to_be_lifted_is_told_and_set_down() -> None:
 
 @pytest.mark.parametrize("law", range(len(LAWS)), ids=LAWS)
 def test_every_law_lifts_with_noisy_readings(law: int) -> None:
-    """A law that takes derivatives of the load's velocity is the first to mind how noisy that is."""
+    """A law that differentiates the load's velocity is the first to suffer from its noise."""
     craft = Craft(Takeoff(1.0), Delay(1.0), Land(), CTL_LAW=float(law))
     craft.begin()
     craft.run(at_phase(Phase.LOWER))
@@ -71,7 +71,7 @@ def test_every_law_lifts_with_noisy_readings(law: int) -> None:
 
 
 def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
-    """The estimate is of the instant that the inertial unit shows, the command for that at which it acts."""
+    """The estimate is that of the instant of the inertial reading, the command that for when it acts."""
     ticks, late_ms = 10, 40.0
     craft = Craft(Takeoff(1.0), Waypoint(6.0, 0.0, 1.0), Land(), SIM_SENS_LAT_MS=late_ms)
     craft.begin()
@@ -93,22 +93,22 @@ def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
     assert craft.texts[-1] == "Landed, disarmed"
 
 
-# each was lost: never taut, slack as it was lifted, climb not known, too early on the ground
+# each of these once failed: never taut, slack while lifted, climb unknown, too early on the ground
 @pytest.mark.parametrize("seed", [1, 7, 9, 13])
 def test_a_plain_receiver_lifts_and_sets_down(seed: int) -> None:
-    """Its height is known to decimetres; the cable that comes taut tells it better."""
+    """Its height is accurate to decimetres; the cable that becomes taut gives a better one."""
     craft = Craft(*load_mission("hover").steps, sensors="gps", seed=seed)
     craft.begin()
     craft.run(at_phase(Phase.LIFT))
     estimated = craft.estimate.vehicle.x_quad[2]
-    assert abs(estimated - craft.truth.x_quad[2]) < 0.06  # at most 0.03; 0.10 to 0.15 without
+    assert abs(estimated - craft.truth.x_quad[2]) < 0.06  # at most 0.03; 0.10 to 0.15 without the cable
     craft.run(at_phase(Phase.DISARMED), 90.0)
     assert "Load on the ground" in craft.texts
     assert "Cable slack: falling with the load to catch it" not in craft.texts
 
 
 def test_a_fast_load_is_where_the_estimate_has_it() -> None:
-    """Its drag, which the pendulum does not know, is half a degree of lean at 12 m/s."""
+    """Its drag, which the pendulum model leaves out, makes the cable lean by half a degree at 12 m/s."""
     craft = Craft(Takeoff(2.0), Waypoint(200.0, 0.0, 2.0), Land(), MIS_SPEED=12.0, MIS_ACCEL=3.0)
     craft.begin()
     craft.run(at_phase(Phase.MISSION))

@@ -83,7 +83,7 @@ def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
             fly(2.5, (2.5, -1.0, 1.5))
         else:
             fly(0.4)
-            fly(0.1, (2.5, -1.0, 1.5))  # heard, not followed
+            fly(0.1, (2.5, -1.0, 1.5))  # received, not followed
     craft.run(lambda craft: craft.flight.mission.step >= 2)  # the first waypoint is passed
     assert not any("given up" in text or "slack" in text for text in craft.texts)
     # measured 11 mm from the reference and 0.279 m; a stop that coasted on downwards ended on the ground

@@ -27,10 +27,10 @@ AND_YAW, AND_YAW_RATE = ~0x400, ~0x800
 
 
 class Seen(NamedTuple):
-    """What a while of a flight was like."""
+    """The worst errors in a part of a flight."""
 
-    error: float  # m, of the load, at worst
-    lag: float  # rad, of the nose behind the heading that is asked, at worst
+    error: float  # m, of the load
+    lag: float  # rad, of the nose behind the commanded heading
 
 
 def flying(**settings: float) -> Craft:
@@ -80,7 +80,7 @@ def test_a_quarter_turn_and_back_by_the_other_side(law: float, lag_deg: float) -
     seen = watched(craft, 6.0)
     assert nose(craft) == pytest.approx(0.5 * math.pi, abs=0.01)
     assert seen.error < 0.006 and seen.lag < math.radians(lag_deg)
-    assert craft.command(m.MAV_CMD_CONDITION_YAW, 90.0, 0.0, -1.0) == ACCEPTED  # on to the left
+    assert craft.command(m.MAV_CMD_CONDITION_YAW, 90.0, 0.0, -1.0) == ACCEPTED  # further to the left
     halfway = watched(craft, 2.5)
     assert abs(turn(nose(craft))) > 0.75 * math.pi, "turned the shorter way"
     seen = watched(craft, 10.0)
@@ -89,7 +89,7 @@ def test_a_quarter_turn_and_back_by_the_other_side(law: float, lag_deg: float) -
     assert craft.flight.heading.rests
 
 
-# measured 6.5 mm at 1.5 m/s (without turning 5.9 mm); thesis and lqr lag behind what moves, the nose does not
+# measured 6.5 mm at 1.5 m/s (without turning 5.9 mm); thesis and lqr lag behind motion, the nose does not
 @pytest.mark.parametrize(("law", "error"), [(PLUMBLINE, 0.012), (THESIS, 0.2)])
 def test_the_nose_goes_round_and_round_over_a_load_in_motion(law: float, error: float) -> None:
     craft = flying(CTL_LAW=law)
@@ -111,7 +111,7 @@ def test_forward_is_where_the_nose_points() -> None:
     watched(craft, 5.0, south)
     watched(craft, 3.0, saying(craft, VELOCITY, frame=8, vx=0.8))
     assert craft.truth.v_load == pytest.approx((0.0, -0.8, 0.0), abs=0.03)
-    # nothing was said of yaw since
+    # no later setpoint states a yaw
     assert nose(craft) == pytest.approx(-0.5 * math.pi, abs=0.01)
 
 
@@ -120,7 +120,7 @@ def test_an_acceleration_alone_is_followed_by_the_load() -> None:
     say = saying(craft, ACCELERATION, afx=0.4)
     offboard(craft, say)
     seen = watched(craft, 4.0, say)
-    # the smoother is behind by 2 sqrt(L / g) = 0.53 s
+    # the smoother lags by 2 sqrt(L / g) = 0.53 s
     assert craft.truth.v_load == pytest.approx((0.0, 0.4 * (4.0 - 0.53), 0.0), abs=0.06)
     assert seen.error < 0.012
     coasting = saying(craft, ACCELERATION)

@@ -1,5 +1,5 @@
-"""Estimators that somebody has brought: the law flies by them, and one that fails does not take the load
-along."""
+"""Custom estimators: the law flies by their estimates, and the flight with its load survives an estimator
+that fails."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from missions.model import Delay, Land, Takeoff
 from plumbline.estimators import Estimate, Parameter, Sensed, estimated, no_estimate
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
-HELD = 0.004  # m, of a load that is held by the example: measured 1.3 mm
-SWING = 0.05  # m, by which the load moves at most as the built-in filter takes over
+HELD = 0.004  # m, error of a load that is held by the example: measured 1.3 mm
+SWING = 0.05  # m, greatest motion of the load when the built-in filter takes over
 EXAMPLE = "plumbline.examples.luenberger:Luenberger"
 UP = {"OWN_UP": Parameter(0.0, -1.0, 1.0, "m", "How much lower than it is the load is believed")}
 
 
 class Same:
-    """What the built-in filter says."""
+    """The estimate of the built-in filter."""
 
     def estimate(self, memory: Any, now: Sensed) -> tuple[Any, Estimate]:
         return memory, estimated(*now.built_in)
 
 
 class Lower(Same):
-    """Believes the load, and with it the vehicle, to be lower than they are."""
+    """Estimates the load, and with it the vehicle, to be lower than they are."""
 
     parameters = UP
 
@@ -57,7 +57,7 @@ class FailsInHold(Same):
 
 
 class NoNumberInHold(FailsInHold):
-    """Gives what is no number some seconds after lift-off."""
+    """Gives NaN some seconds after lift-off."""
 
     def estimate(self, began_s: float, now: Sensed) -> tuple[Any, Estimate]:
         v_load = (0.0, nan, 0.0) if now.time_s - began_s > 14.0 else now.built_in.v_load
@@ -65,7 +65,7 @@ class NoNumberInHold(FailsInHold):
 
 
 class Undecided:
-    """Never knows anything."""
+    """Never has an estimate."""
 
     def estimate(self, memory: Any, now: Sensed) -> tuple[Any, Estimate]:
         return memory, no_estimate()

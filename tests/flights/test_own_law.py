@@ -1,5 +1,5 @@
-"""Control laws that somebody has brought: they fly each mode, and one that fails does not take the load
-along."""
+"""Custom control laws: they fly each mode, and the flight with its load survives a law that
+fails."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from plumbline.examples.load_pid import LoadPid
 from plumbline.laws import Asked, Now, Parameter, attitude, force, rates, wrench
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
-HELD = 0.008  # m, of a load that is held: measured 4 mm with the PID, 2 mm with the geometric controller
-SWING = 0.05  # m, by which the load moves at most as the built-in law takes over
+HELD = 0.008  # m, error of a held load: measured 4 mm with the PID, 2 mm with the geometric controller
+SWING = 0.05  # m, greatest motion of the load when the built-in law takes over
 EXAMPLES = ("plumbline.examples.load_pid:LoadPid", "plumbline.examples.geometric:Geometric")
 PARAMETERS = {"OWN_LIFT": Parameter(0.0, -1.0, 1.0, "m", "How much higher the load is held")}
 
@@ -31,7 +31,7 @@ def vector(values: Any) -> Any:
 
 
 class AllModes(LoadPid):
-    """The PID, with modes besides."""
+    """The PID, with all modes."""
 
     def quad_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
         x_d, v_d, a_d = map(np.array, now.reference.jet[:3])
@@ -49,7 +49,7 @@ class AllModes(LoadPid):
 
 
 class AsAttitude(LoadPid):
-    """The PID, which turns its force to an attitude itself."""
+    """The PID, which converts its force to an attitude itself."""
 
     def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
         memory, asked = super().load_position(memory, now)
@@ -65,7 +65,7 @@ class AsAttitude(LoadPid):
 
 
 class AsRates(AsAttitude):
-    """The same by body rates."""
+    """The same, but commands body rates."""
 
     def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
         memory, asked = LoadPid.load_position(self, memory, now)
@@ -78,7 +78,7 @@ class AsRates(AsAttitude):
 
 
 class AsWrench(AsRates):
-    """The same by moments."""
+    """The same, but commands moments."""
 
     def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
         memory, asked = LoadPid.load_position(self, memory, now)
@@ -98,7 +98,7 @@ class FailsInHold(LoadPid):
 
 
 class FailsAtTouchdown(LoadPid):
-    """Fails where the vehicle lands beside the load."""
+    """Fails when the vehicle lands beside the load."""
 
     begun = 0
 
@@ -110,7 +110,7 @@ class FailsAtTouchdown(LoadPid):
 
 
 class Lifted(LoadPid):
-    """Holds the load higher by a parameter, of which it cannot take all that are in its range."""
+    """Holds the load higher by a parameter, but accepts only some of the values in its range."""
 
     parameters = {**LoadPid.parameters, **PARAMETERS}  # noqa: RUF012
 

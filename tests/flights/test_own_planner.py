@@ -1,4 +1,4 @@
-"""Path planners that somebody has brought: their paths are flown, and what cannot be flown is told before."""
+"""Custom path planners: their paths are flown, and what cannot be flown is reported beforehand."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ NEAR = 0.05  # m of a waypoint
 
 
 class Hasty(MinimumSnap):
-    """Three times as quick as the vehicle can."""
+    """Three times as fast as `MinimumSnap`, too fast for the vehicle."""
 
     def plan(self, route: Route) -> Planned:
         return slower(super().plan(route), 1.0 / 3.0)
 
 
 class Fails(MinimumSnap):
-    """Fails where it is to plan for this mission."""
+    """Fails when it plans for this mission."""
 
     def plan(self, route: Route) -> Planned:
         if len(route.points) == 3 and abs(route.points[1][0] - 1.5) < NEAR:

@@ -1,4 +1,4 @@
-"""Whether the vehicle may be armed, as SYS_STATUS tells it before, during and after a flight."""
+"""Whether the vehicle may be armed, as SYS_STATUS states it before, during and after a flight."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 
 class Heard:
-    """The log of a flight: of each SYS_STATUS whether the vehicle was armed, and whether it might be."""
+    """The log of a flight: for each SYS_STATUS, whether the vehicle was armed, and whether it could be."""
 
     def __init__(self) -> None:
         self.armed = False

@@ -15,11 +15,11 @@ from tests.doubles.sky import ACCEPTED
 
 GRIPPER, TAKEOFF, ARM = 211, 22, 400
 DENIED = mavlink.MAV_RESULT_DENIED
-# The load's weight, a fifth of all, is taken away at once; measured: 3 mm, and 6 mm
+# The load's weight, a fifth of the total, vanishes in an instant; measured: 3 mm, and 6 mm
 JUMP_M = 0.01
 SLOW_ROTORS = {"SIM_ACT_DELAY_MS": 12.0, "SIM_ROTOR_TAU_MS": 30.0}
 SLOW_JUMP_M = 0.015
-STEADY_M = 0.02  # of the vehicle, seconds later; measured 2 mm
+STEADY_M = 0.02  # of the vehicle, some seconds later; measured 2 mm
 
 
 def held(sensors: str = "lab", **settings_: float) -> Craft:
@@ -55,7 +55,7 @@ def test_the_vehicle_stays_where_it_was_and_the_load_falls(settings_: dict[str, 
         away = max(away, math.dist(craft.truth.x_quad, before.x_quad))
     assert 0.0 < away < jump
     assert math.dist(craft.truth.x_quad, before.x_quad) < STEADY_M
-    # straight down, but for what it had of speed: millimetres a second
+    # straight down, except for its speed at the release: millimetres a second
     assert craft.truth.x_load == pytest.approx((before.x_load[0], before.x_load[1], 0.02), abs=0.03)
     assert (craft.truth.taut, craft.truth.tension) == (0.0, 0.0)
     # the estimate follows the load down
@@ -114,12 +114,12 @@ def test_released_on_the_ground_the_vehicle_takes_off_alone() -> None:
 
 
 def test_with_receiver_and_camera_the_vehicle_flies_on_as_well() -> None:
-    """What is believed of a load that nobody sees: it lies under where it was let go."""
+    """A load that no sensor sees is assumed to lie under the place of its release."""
     craft = held("rtk")
     craft.command(GRIPPER, 1.0, 0.0)
     before = craft.truth.x_quad
     craft.wait(4.0)
-    assert math.dist(craft.truth.x_quad, before) < 0.15  # as well as the receiver knows; measured 0.05
+    assert math.dist(craft.truth.x_quad, before) < 0.15  # the accuracy of the receiver; measured 0.05
     assert craft.estimate.load.x_load[2] < 0.3
     assert craft.command(21) == ACCEPTED
     landed(craft)

@@ -1,4 +1,4 @@
-"""Vehicles of any rotors fly; one that can do without a rotor lands with its load when it has lost it."""
+"""Vehicles with any rotors fly; one that can do without a rotor lands with its load after losing it."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from tests.doubles.craft import ACCEPTED, Craft, at_phase
 ROUTE = (Takeoff(1.0), Delay(3.0), Land())
 MOTOR, OFF = mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_OFF
 ROTOR = '[[rotor]]\nx_m = {}\ny_m = {}\nspin = "{}"\n'
-# five in a ring, unlike and unequally apart; coaxial pairs at the ends of a cross, the lower ones weaker
+# five in an irregular ring; coaxial pairs at the ends of a cross, the lower ones weaker
 FIVE = ((-0.12, 0.02, "+"), (-0.03, -0.13, "-"), (0.11, -0.06, "+"), (0.1, 0.08, "-"), (-0.02, 0.12, "+"))
 CROSS = ((-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1), (0.1, 0.1))
 PAIRS = [(x, y, spin) for x, y in CROSS for spin in "+-"]
 
 
 def vehicle(tmp_path: Path, head: str, rotors: str) -> str:
-    """The file of a vehicle that is `bebop` but for its rotors."""
+    """The file of a vehicle that is `bebop` except for its rotors."""
     path = tmp_path / "own.toml"
     path.write_text(head + VEHICLES.read("bebop").text + rotors, encoding="utf-8")
     return str(path)
 
 
 def held(craft: Craft) -> None:
-    """The route is flown, and the load stays where it is to be."""
+    """Fly the route to its end: the vehicle lands, and the load lies on the ground."""
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     craft.wait(3.0)
@@ -89,7 +89,7 @@ def test_a_rotor_that_the_vehicle_does_not_have_cannot_fail() -> None:
 
 @pytest.mark.parametrize("delay_ms", [60, 72, 84])
 def test_rotors_that_answer_late_are_not_taken_for_lost(delay_ms: int) -> None:
-    """It trembles on its feet under such a delay: a rotor gives little while much is asked of it."""
+    """The vehicle trembles on its gear under such a delay: a rotor gives little while much is commanded."""
     craft = Craft(Takeoff(0.4), Delay(0.5), Land(), SIM_ACT_DELAY_MS=delay_ms)
     craft.begin()
     craft.run(at_phase(Phase.DISARMED), 60.0)

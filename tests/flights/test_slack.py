@@ -1,4 +1,4 @@
-"""Slack cables: gently taut at take-off, caught in the air, and the stops that used to bring them about."""
+"""Slack cables: tautened gently at take-off, caught in the air, and the stops that used to cause them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HIGH = (Takeoff(5.0), Delay(60.0), Land())
 
 
 def snaps(craft: Craft, until, limit_s: float = 60.0) -> list[float]:
-    """Closing speeds (m/s) of every snap until something is the case."""
+    """Closing speeds (m/s) of every snap until a condition holds."""
     found = []
     end = craft.onboard.now_us + round(limit_s * 1e6)
     while not until(craft):
@@ -41,7 +41,7 @@ def test_the_cable_comes_taut_no_faster_than_the_parameter_says(limit: float, se
 
 
 def kicked(sensors: str, speed: float) -> tuple[Craft, float]:
-    """A load that hangs at 5 m is struck upwards; the craft when it is held again, and the hardest snap."""
+    """Strike a load that hangs at 5 m upwards; return the craft seconds later, and the hardest snap."""
     craft = Craft(*HIGH, sensors=sensors, **PLUMBLINE)
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
@@ -93,7 +93,7 @@ def test_a_hold_in_full_flight_stops_along_the_path(after_s: float) -> None:
         jet = craft.flight.legs[0].jet((craft.onboard.now_us - craft.flight.leg_start_us) * 1e-6)
         worst = max(worst, math.dist(jet[0], craft.truth.x_load))
     assert fast > 0.5
-    # measured 19 mm over the same stops in Case C; as it was, 6.7 m/s was asked for, and the flight was lost
+    # measured 19 mm over the same stops in Case C; formerly, 6.7 m/s was commanded, and the flight lost
     assert worst < 0.04
 
 

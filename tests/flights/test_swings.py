@@ -11,7 +11,7 @@ from missions.fileformat import load_mission
 from missions.model import AttitudeRun, Land, Takeoff
 from tests.doubles.craft import ACCEPTED, Craft, at_phase, least_tension
 
-# m, once a swing is over: the tail of the cascade's own settling, 78 ms behind its reference
+# m, error after a swing has ended: the tail of the cascade's settling, 78 ms behind its reference
 SETTLING = 0.03
 # Share of the load's weight that the cable still carries at the worst moment; 0 is slack
 IN_PAIRS, CUT_SHORT = 0.85, 0.6

@@ -15,13 +15,13 @@ from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff
 from sitl.vehicles.truth import load_truth
 
-SIMULATOR = 27  # component of its truth telemetry, as far as it is in our dialect
-RESTING = 2e-3  # m, by which the ground may give way under the load, and an exchange of telemetry
+SIMULATOR = 27  # component of its truth telemetry in our dialect
+RESTING = 2e-3  # m, for the ground that gives way under the load, and for the interval of the telemetry
 
 
 def test_a_load_that_lags_is_not_taken_for_one_on_the_ground() -> None:
-    """The linear regulator keeps 75 mm behind a setpoint that sinks at 0.2 m/s, more than the 50 mm that
-    tell a load which is stopped."""
+    """The linear regulator keeps 75 mm behind a setpoint that sinks at 0.2 m/s, more than the 50 mm by which
+    a stopped load is recognised."""
     mission = Mission("down", "Down", "", (), (Takeoff(0.3), Land()))
     log = io.BytesIO()
     outcome = fly(mission, Conditions("thesis", "ideal", settings={"CTL_LAW": 1.0}), TlogWriter(log))
@@ -49,8 +49,8 @@ def test_a_vehicle_that_trembles_on_the_ground_stands(seed: int) -> None:
 
 @pytest.mark.parametrize("noise", [0.25, 0.5])
 def test_quiet_trackers_that_are_late_see_a_load_that_lies(noise: float) -> None:
-    """The vehicle holds still above the load, its cable a centimetre loose: too little for a slack cable at
-    once, too much for a pendulum by readings of 0.1 mm."""
+    """The vehicle holds still above the load, its cable a centimetre loose: too little to count as slack
+    immediately, too much for a pendulum with readings of 0.1 mm."""
     mission = load_mission("case-b")
     settings = {"CTL_LAW": 2.0, "SIM_SENS_LAT_MS": 30.0, "SIM_NOISE_SCALE": noise}
     flown = sweep_fly(

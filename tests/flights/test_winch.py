@@ -1,4 +1,4 @@
-"""The winch in flight: the vehicle stays, the load moves, belief and truth of the cable's length agree."""
+"""The winch in flight: the vehicle stays, the load moves, assumed and true length of the cable agree."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LENGTH, HOLD, RETRACT = 1.0, 5.0, 6.0
 # 12 ms of delay and 30 ms of lag; both hover to 3 mm
 OFF_M = 0.012
 SLOW_ROTORS = {"SIM_ACT_DELAY_MS": 12.0, "SIM_ROTOR_TAU_MS": 30.0}
-# of the length at its end: what float32 leaves of the rate; measured 3e-9
+# m, of the final length: the rate is rounded to float32; measured 3e-9
 LENGTH_M = 1e-7
 
 
@@ -38,7 +38,7 @@ def true_length(craft: Craft) -> float:
 
 
 def reeled(craft: Craft, seconds: float) -> tuple[float, float]:
-    """Fly on; how far at worst the load was from where it is asked to be, the vehicle from where it was."""
+    """Fly on; return the greatest distance of the load from its setpoint, of the vehicle from its start."""
     start, load, vehicle = craft.truth.x_quad, 0.0, 0.0
     end = craft.onboard.now_us + round(1e6 * seconds)
     while craft.onboard.now_us < end:
@@ -76,7 +76,7 @@ def test_with_another_length_it_is_carried_landed_and_lifted_again() -> None:
     assert craft.command(21) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED))
     assert "Landed, disarmed" in craft.texts
-    # beside the load by half of the cable as it is
+    # beside the load by half of the present cable length
     assert math.dist(craft.truth.x_quad[:2], place) == pytest.approx(0.6, abs=0.05)
     craft.command(ARM, 1.0)
     craft.command(TAKEOFF, 0.0, 0.0, 0.0, 0.0, math.nan, math.nan, 1.0)
@@ -93,7 +93,7 @@ def test_a_hold_stops_the_winch_and_belief_and_truth_stop_alike() -> None:
     assert craft.command(WINCH, 1.0, HOLD) == ACCEPTED
     load, vehicle = reeled(craft, 4.0)
     assert max(load, vehicle) < OFF_M
-    assert 0.31 < true_length(craft) < 0.5  # two seconds of stopping behind two of getting under way
+    assert 0.31 < true_length(craft) < 0.5  # two seconds of stopping after two of starting
     assert craft.flight.cable.length_m == pytest.approx(true_length(craft), abs=LENGTH_M)
     assert isinstance(craft.flight.legs[0], Hold)
     assert craft.command(WINCH, 1.0, RETRACT) == ACCEPTED

@@ -38,7 +38,7 @@ class World:
             self.simulator.advance()
 
     def set(self, name: str, value: float) -> list[Any]:
-        """PARAM_SET from the ground; the events for the shell."""
+        """Send PARAM_SET from the ground; return the events for the shell."""
         message = mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32)
         return self.onboard.receive_ground(self._writer.frame(message), LINK)
 
@@ -51,7 +51,7 @@ class World:
 @pytest.fixture
 def world() -> World:
     made = World(SIM_WIND_N=2.0)
-    made.run(40)  # by which the simulator has told all its parameters
+    made.run(40)  # after these, the simulator has reported all its parameters
     return made
 
 

@@ -1,4 +1,4 @@
-"""A kernel that calls another one by its address gets what a call would give."""
+"""A kernel that calls another one by its address gets what a direct call would return."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Rows(NamedTuple):
 
 
 class Own(NamedTuple):
-    """The same arrays, as somebody else names them, and what else there is."""
+    """The same arrays as fields of another record, with an address beside them."""
 
     first: Row
     second: Row

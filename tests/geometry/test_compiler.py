@@ -1,4 +1,4 @@
-"""What is special about how kernels are compiled."""
+"""Special properties of the compilation of kernels."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def both(rows: Rows, factor: float) -> float:
 
 
 def compiled(function: Any) -> Any:
-    """The kernel compiled here and now, not loaded."""
+    """The kernel, compiled now and not loaded from the cache."""
     return Kernel(function.py_func, lambda _: NullCache())
 
 

@@ -1,4 +1,5 @@
-"""Eight flights at once: in each lane the bits that one number gives, and a note of who parted."""
+"""Eight flights at once: in each lane the bits that one number gives, and a record of the lanes that
+parted."""
 
 from __future__ import annotations
 
@@ -84,7 +85,7 @@ def test_each_lane_has_the_bits_of_one_number(flights: list[tuple[float, float, 
         computed(row, found)
     lanes, found = aligned(x.T), aligned(np.zeros((13, LANES)))
     computed_in_lanes(lanes, found)
-    # a NaN has no sign that means anything
+    # the sign of a NaN has no meaning
     assert np.array_equal(np.isnan(found.T), np.isnan(out))
     known = ~np.isnan(out)
     assert found.T[known].tobytes() == out[known].tobytes()
@@ -146,7 +147,7 @@ def test_what_can_have_one_answer_only_is_that_of_lane_0() -> None:
 @kernel
 def turned(quat: Any, out: Any) -> None:
     R = rotation_from_quat((quat[0], quat[1], quat[2], quat[3]))
-    # of records and tuples whose numbers are partly the same for all
+    # records and tuples in which some numbers are the same for all flights
     motion = Motion(
         (0.0, R[0][1], 1.0),
         R[1],
@@ -198,7 +199,7 @@ def test_each_flight_has_its_own_table_and_row() -> None:
     tables = tuple(np.arange(3.0 * (k + 2)).reshape(-1, 3) + 100.0 * k for k in range(LANES))
     at = np.array([[0.0, 1.0, 2.0, 1.0, 0.0, 3.0, 9.0, 2.0]])
     out = aligned(np.zeros((2, LANES)))
-    # the row of lane 6 is not there: what it finds is not used
+    # the row of lane 6 does not exist: the number found for it is not used
     assert looked_up(tables, aligned(at), out) == 1000 + 0b1000000
     for lane, (table, row) in enumerate(zip(tables, at[0].astype(int).tolist(), strict=True)):
         assert out[1, lane] == len(table)

@@ -1,4 +1,4 @@
-"""Machine code is compiled once, by the process that comes first; it is known when all of it is there."""
+"""Machine code is compiled once, by the first process that needs it; a mark records that all of it exists."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def compiled(environment: dict[str, str], *orders: tuple[str, ...]) -> Counter[s
 @NUMBA_IS_OFF
 def test_no_kernel_is_compiled_by_two_processes(empty: dict[str, str]) -> None:
     together = compiled(empty, ("s2", "so3"), ("so3", "s2"), ("s2", "so3"))
-    # what these call becomes a part of each of them
+    # kernels that these call become a part of each of them
     called = {name: count for name, count in together.items() if name.startswith(("unit_der", "quat_exp "))}
     assert len(called) == 2
     assert set(called.values()) == {1}, together
@@ -160,7 +160,7 @@ def test_what_is_not_used_for_long_is_deleted_and_its_mark_before_it(
     assert machine_code.is_marked(source, "used")
     machine_code.note_use(folder)
 
-    machine_code.drop_unused(machine_code.KEPT_S + 43200.0)  # half a day too long
+    machine_code.drop_unused(machine_code.KEPT_S + 43200.0)  # half a day beyond the limit
     assert machine_code.is_marked(source, "used") and not machine_code.is_marked(source, "unused")
     assert (folder / "code").is_dir() and (other / "code").is_dir()
     machine_code.drop_unused(time.time())

@@ -1,4 +1,4 @@
-"""Records in rows of numbers come back as they were, to the bit, in machine code and in Python alike."""
+"""Records packed into rows of numbers come back equal to the bit, in machine code and in Python."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from autopilot.geometry.packed import Row, pack, packed, unpack, width, with_fie
 from autopilot.supervisor.quiescence import Stretch
 from sitl.world import World, WorldModel
 
-FIRST, BEHIND = 3, 2  # numbers before and after the record that are none of its own
+FIRST, BEHIND = 3, 2  # numbers before and after the record that do not belong to it
 NEIGHBOUR = 7.25
 FLOATS = (0.0, -0.0, inf, -inf, nan, 5e-324, 1.7976931348623157e308, 0.1, -1.0 / 3.0)
 INTS = (0, -1, 2**53, -(2**53), 1_700_000_000_000_000)
@@ -88,7 +88,7 @@ def numbers(value: Any) -> Iterator[float]:
 
 
 def through(kind: Any) -> Callable[[Row, Row], Any]:
-    """Take a record out of a row and put it into another; what was taken."""
+    """Function that takes a record out of a row, puts it into another and returns it."""
 
     def trip(row: Row, out: Row) -> Any:
         record = unpack(kind, row, FIRST)
@@ -110,7 +110,7 @@ def comes_back(trip: Callable[[Row, Row], Any], kind: Any) -> None:
         row = row_with(record)
         out = np.full(row.shape, NEIGHBOUR)
         taken = trip(row, out)
-        # of the same types all the way down, with the sign of zero
+        # of the same types at all levels, with the sign of zero
         assert repr(taken) == repr(record)
         assert type(taken) is kind
         assert out.tobytes() == row.tobytes()

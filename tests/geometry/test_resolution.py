@@ -1,4 +1,4 @@
-"""Tests for the memory of what calls in compiled code stand for."""
+"""The memory of how calls in compiled code are resolved."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_candidates_are_asked_once_for_the_same_types(monkeypatch: pytest.Monkey
 
 
 def test_types_that_do_not_fit_are_refused_each_time() -> None:
-    """What was not found is not remembered as found."""
+    """A failed resolution is not remembered as a successful one."""
     context = cpu_target.typing_context
     context.refresh()
     plus = context.resolve_value_type(operator.add)
@@ -42,7 +42,8 @@ def test_types_that_do_not_fit_are_refused_each_time() -> None:
 
 
 def test_functions_that_are_compiled_otherwise_do_not_mix() -> None:
-    """What they call is compiled as each of them asks for: division by zero is an exception, or infinite."""
+    """Functions that they call are compiled with the options of each: division by zero is an exception, or
+    infinite."""
 
     def ratio(x: float, y: float) -> float:
         return x / y

@@ -78,7 +78,7 @@ def test_errors_do_not_depend_on_the_frame(a: int, b: int, c: int) -> None:
 @given(seeds, seeds, vectors)
 @many
 def test_the_error_is_the_gradient_of_the_error_function(a: int, b: int, omega: Vec3) -> None:
-    """d Psi_q / dt = e_q . q_dot for a fixed q_d: the property that (3-10) is made for."""
+    """d Psi_q / dt = e_q . q_dot for a fixed q_d: the property that (3-10) is designed for."""
     q, q_d = unit(a), unit(b)
 
     def psi(t: float) -> float:

@@ -171,7 +171,7 @@ def test_the_attitude_error_function(a: int, b: int) -> None:
 @given(seeds, seeds, vectors)
 @many
 def test_the_attitude_error_is_the_gradient_of_the_error_function(a: int, b: int, direction: Vec3) -> None:
-    """d Psi_R / dt = e_R . Omega for a fixed R_d: the property that (3-3) is made for."""
+    """d Psi_R / dt = e_R . Omega for a fixed R_d: the property that (3-3) is designed for."""
     R, R_d = mat(rotation(a)), mat(rotation(b))
     omega = tuple(1e-3 * x for x in direction)
     turned = [

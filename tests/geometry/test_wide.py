@@ -52,7 +52,7 @@ def test_rows_are_combined_number_by_number(seed: int, to: int, of: int, j: int,
     for k in range(j, j + 8):
         expected[to, k] = expected[to, k] + factor * expected[of, k] - expected[of, k]
     if to == of:
-        return  # what is read is written meanwhile
+        return  # the row that is read is also written
     for function in (combined, plain(combined)):
         array = numbers(seed)
         function(array, to, of, j, factor)

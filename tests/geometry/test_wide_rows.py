@@ -1,4 +1,5 @@
-"""Sums of rows, and squares taken from a square: the bits of numpy, for one flight and in lanes."""
+"""Sums of rows, and squares of rows subtracted from a matrix: the bits of numpy, for one flight and in
+lanes."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ SIZES = [22, 29, 31]
 
 @kernel
 def all_rows(square: Any, rows: Any, into: Any, which: Any, shares: Any, count: int, n: int) -> None:
-    """Everything that is done to rows, one after the other."""
+    """All operations on rows, one after the other."""
     for k in range(count):
         combine(rows, k, square, which, shares, n)
     take_row(rows, 1, shares[2, 2], 0, n)
@@ -66,13 +67,14 @@ def moved_in_lanes(square: Any, n: int) -> None:
 
 
 def numbers(*shape: int) -> list[Any]:
-    """Of each lane its own."""
+    """Random arrays of this shape, one for each lane."""
     random = np.random.default_rng(shape)
     return [random.normal(size=shape) for _ in range(LANES)]
 
 
 def beside(arrays: list[Any], columns: int = 0) -> Any:
-    """(..., LANES) arrays side by side, from a whole cache line on; with more columns if so wished."""
+    """(..., LANES) arrays side by side, beginning at a whole cache line; padded to `columns` if that is
+    more."""
     shape = (arrays[0].shape[0], max(columns, arrays[0].shape[1]), LANES)
     block = np.zeros(int(np.prod(shape)) + 8)
     first = -block.ctypes.data // 8 % 8

@@ -1,4 +1,4 @@
-"""The heading on its way: to an angle, round and round, to a place; no faster than it may, without a jump."""
+"""The motion of the heading to an angle, at a rate, or towards a place: within its limits, without a jump."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ QUARTER = 0.5 * math.pi
 
 
 def flown(heading: Heading, seconds: float, place=ZERO, velocity=ZERO, limits=LIMITS) -> list[Heading]:
-    """The heading at each tick; the vehicle moves on from a place."""
+    """The heading at each tick; the vehicle moves from a place at a constant velocity."""
     found = [heading]
     for _ in range(round(seconds * 1e6 / STEP_US)):
         now_us = found[-1].at_us + STEP_US
@@ -57,14 +57,14 @@ def test_at_first_the_nose_points_east_and_rests() -> None:
 def test_it_comes_to_rest_at_the_angle(angle: float) -> None:
     path = towards(Towards(angle), 20.0)
     assert path[-1].rests and path[-1].angle == angle
-    # it is led on, not thrown past: measured 2e-3 of the way
+    # it arrives without overshooting: measured 2e-3 of the way
     assert max(abs(h.angle) for h in path) < abs(angle) * 1.005
     way = [math.copysign(1.0, angle) * h.angle for h in path]
     assert way[0] == 0.0 and max(way) == pytest.approx(abs(angle), rel=5e-3)
 
 
 def test_a_quarter_turn_takes_about_what_its_limits_say() -> None:
-    """At 1 rad/s and 1 rad/s^2, of which 0.7 are planned with for braking: 2.8 s at least."""
+    """At 1 rad/s and 1 rad/s^2, of which 0.7 are used to plan the braking: 2.8 s at least."""
     path = towards(Towards(QUARTER), 20.0)
     there = next(k for k, h in enumerate(path) if abs(h.angle - QUARTER) < math.radians(2.0))
     assert 2.5 < there * STEP_US * 1e-6 < 4.5

@@ -1,4 +1,4 @@
-"""Setpoints laid out tick by tick against the legs they are of, asked one by one."""
+"""Setpoints laid out tick by tick, compared with those of their legs evaluated one by one."""
 
 from __future__ import annotations
 

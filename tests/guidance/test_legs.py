@@ -1,4 +1,4 @@
-"""Legs: each jet is its own derivative, joins do not jump, and what must end at rest does."""
+"""Legs: each jet holds its own derivatives, joins do not jump, and legs that must end at rest do."""
 
 from __future__ import annotations
 
@@ -144,7 +144,8 @@ def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit
 
 
 def test_a_stop_flies_no_part_of_its_path_faster() -> None:
-    """The run reaches 2 m/s at the peak of its sine; out of an acceleration the stop must not gain on it."""
+    """The run reaches 2 m/s at the peak of its sine; a stop that begins while it accelerates must not become
+    faster than that."""
     run = Run(HERE, unshaped(SIGNALS))
     fastest = max(norm(run.jet(0.02 * k)[1]) for k in range(200))
     leg = slow_leg(run, 0.75, 1.0, LEAST_S)

@@ -22,7 +22,8 @@ LIMITS = VehicleLimits(
 
 
 def table_row(name: str) -> str:
-    """The row of a mission: the extremes over all of its items but take-off and landing, or over those."""
+    """The row of a mission: the extremes over all of its items except take-off and landing, or over these if
+    there are no others."""
     mission = load_mission(name)
     surveys = peaks(mission, LIMITS)
     inner = [p for i, p in surveys.items() if not isinstance(mission.steps[i], Takeoff | Land)]

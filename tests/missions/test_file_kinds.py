@@ -1,4 +1,4 @@
-"""A file of another kind than the one that is wanted is told as such, and not key by key."""
+"""A file of another kind than the wanted one is reported as such, and not key by key."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_shipped_files_of_the_other_kinds_are_told_as_what_they_are(
     for other, _ in KINDS:
         for name in other.names():
             text = other.read(name).text
-            if other is wanted or "believed =" in text:  # which is not whole by itself
+            if other is wanted or "believed =" in text:  # which is not complete by itself
                 continue
             path = tmp_path / f"{name}.toml"
             path.write_text(text, encoding="utf-8")

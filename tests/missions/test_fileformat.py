@@ -103,7 +103,7 @@ BAD = {
     ): "items[1].altitude: unknown key; write altitude_m (in metres)",
     WAYPOINT.replace("north_m", "nroth_m"): "items[1].nroth_m: unknown key; write north_m (in metres)",
     WAYPOINT + "colour = 1": ("items[1].colour: unknown key; allowed: east_m, north_m, altitude_m, hold_s"),
-    # what another key gives already is not what this one was meant to be
+    # a key that the item already has is not proposed for an unknown one
     '[[items]]\ntype = "winch"\nlength_m = 0.2\nnorth_m = 1.0': (
         "items[1].north_m: unknown key; allowed: length_m, speed_m_s"
     ),
@@ -306,7 +306,7 @@ def test_no_text_raises_anything_but_a_mission_file_error(text: str) -> None:
     )
 )
 def test_no_value_breaks_the_messages(value: object) -> None:
-    """Values go in as TOML would give them, past the parser."""
+    """Values enter as TOML would give them, without the parser."""
     for key in ("altitude_m", "terms", "axis", "speed_m_s"):
         for kind in missions.fileformat.ITEMS:
             document = {"title": "T", "items": [{"type": kind, key: value}]}

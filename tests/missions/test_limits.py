@@ -1,4 +1,4 @@
-"""What a mission file accepts the wire carries: every number at each of its limits, and just inside them."""
+"""MAVLink carries what a mission file accepts: every number at each of its limits, and just inside them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def bound(spec: type[Spec], key: str, low: bool) -> float:
     names = ("ge", "gt") if low else ("le", "lt")
     field = spec.model_fields[key]
     rules = list(field.metadata)
-    if not rules:  # of an optional number they are within
+    if not rules:  # the rules of an optional number are inside its annotation
         rules = [rule for one in field.annotation.__args__ for rule in getattr(one, "__metadata__", ())]
         rules = [inner for rule in rules for inner in getattr(rule, "metadata", [rule])]
     inclusive, exclusive = (

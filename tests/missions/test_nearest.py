@@ -1,4 +1,4 @@
-"""What somebody may have meant who wrote a name that there is not."""
+"""The name that a user may have meant by an unknown one."""
 
 from __future__ import annotations
 

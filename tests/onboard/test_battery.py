@@ -1,4 +1,4 @@
-"""Which battery is told to the ground: the measured one while there is one, else that of the model."""
+"""Which battery is reported to the ground: the measured one while there is one, else that of the model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gcs.closed_loop import Conditions, build_onboard, build_simulator
 
 
 def told(seconds, ends_at=None, **settings):
-    """The last BATTERY_STATUS of each second that the ground hears; from `ends_at` on none is measured."""
+    """The last BATTERY_STATUS of each second that the ground receives; from `ends_at` on none is measured."""
     conditions = Conditions(settings=settings)
     onboard, simulator = build_onboard(conditions, Home()), build_simulator(conditions, Home())
     onboard.add_link("ground")
@@ -33,7 +33,7 @@ def told(seconds, ends_at=None, **settings):
 
 
 def test_the_measured_battery_is_told():
-    """Half empty, while the model believes that it is full."""
+    """Half empty, while the model assumes that it is full."""
     measured, model = told(2, SIM_BATTERY=1.0, SIM_BAT_CHARGE=50.0), told(2)
     assert 11.2 < measured[1].voltage < 3 * 3.82
     assert measured[1].remaining == 0.5

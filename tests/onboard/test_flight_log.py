@@ -1,4 +1,4 @@
-"""The on-board log of a flight: when it begins and ends, what is in it; the flight does not notice it."""
+"""The on-board log of a flight: when it begins and ends, what is in it; it does not affect the flight."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_the_load_was_held_where_the_mission_says(log: ULog) -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
     weight = (table["VEH_QUAD_MASS"] + table["VEH_LOAD_MASS"]) * table["VEH_GRAVITY"]
     assert np.median(forces) == pytest.approx(weight, rel=0.02)
-    # what does not move feels gravity upwards, which is negative in FRD
+    # an accelerometer at rest measures gravity upwards, which is negative in FRD
     accel = log.get_dataset("sensor_combined").data["accelerometer_m_s2[2]"][held]
     assert np.median(accel) == pytest.approx(-table["VEH_GRAVITY"], abs=0.02)
 
@@ -142,7 +142,7 @@ def no_sample() -> Any:
 
 def test_a_second_flight_gets_a_name_of_its_own() -> None:
     log = make_log()
-    with pytest.raises(AssertionError):  # due at once
+    with pytest.raises(AssertionError):  # due immediately
         log.step(0, True, lambda: {"2026-01-01_00-00-00.ulg", "2026-01-01_00-00-00_001.ulg"}, no_sample)
     assert log.path == ("log", "2026-01-01_00-00-00_002.ulg")
 
@@ -224,7 +224,7 @@ def test_a_diverged_flight_is_still_logged(flown: Flown, tmp_path: Path) -> None
 
 
 def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None:
-    """Every number of an instant is one of its own, so that none can stand in another's place."""
+    """All numbers of an instant differ, so that none can stand in another's place."""
     sample = flown.onboard.log_sample()
     rng = np.random.default_rng(3)
     row = np.zeros(width(Instant))
@@ -266,7 +266,7 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     most = said.rotor_max if said.rotor_max > 0.0 else 1.0
     shares = [min(max(force / most, 0.0), 1.0) for force in said.forces[:6]]
     assert vector("actuator_motors", "control", 6) == float32(shares)
-    assert np.isnan(vector("actuator_motors", "control", 14)[6:]).all()  # rotors that there are not
+    assert np.isnan(vector("actuator_motors", "control", 14)[6:]).all()  # rotors that do not exist
     assert logged("actuator_outputs", "noutputs") == (6.0,)
     assert vector("actuator_outputs", "output", 16) == float32(
         (*(1000.0 + 1000.0 * one for one in shares), *(0.0,) * 10)

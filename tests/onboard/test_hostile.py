@@ -1,4 +1,4 @@
-"""What strangers say changes no bit of a flight; benchmarks/hostile.py says it by the million."""
+"""Messages of strangers change no bit of a flight; benchmarks/hostile.py sends them by the million."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ def test_half_the_control_rate_flies() -> None:
 
 
 def test_lost_ticks_and_a_sample_that_is_no_number_do_not_end_a_flight() -> None:
-    """In real time the world goes on without an answer."""
+    """In real time the world continues without an answer."""
     craft = Craft(Takeoff(1.0), Delay(3.0), Land())
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
@@ -229,7 +229,7 @@ def test_a_mission_is_not_uploaded_over_the_one_being_flown() -> None:
 
 
 def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it() -> None:
-    """A height change behind a return stays over the home to which the return leads."""
+    """A height change after a return stays over the home to which the return leads."""
     home = Home()
     up, back, low = (
         WireItem(6, 22, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 4.0),
@@ -290,7 +290,7 @@ def test_a_reboot_is_handed_to_the_simulator_and_both_begin_anew() -> None:
     craft.run(at_phase(Phase.DISARMED))
     assert craft.command(reboot, 1.0) == ACCEPTED
     craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
-    for _ in range(3):  # the answer that asks, and the ticks of the new world
+    for _ in range(3):  # the answer that requests the reboot, and the ticks of the new world
         answer = craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
         if answer is not None:
             craft.simulator.receive(answer)

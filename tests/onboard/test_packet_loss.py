@@ -1,4 +1,4 @@
-"""A lossy ground link: as many datagrams are lost as asked, and the same ones every time."""
+"""A lossy ground link: as many datagrams are lost as configured, and the same ones every time."""
 
 from __future__ import annotations
 

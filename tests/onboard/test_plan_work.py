@@ -1,4 +1,4 @@
-"""Paths take long to prepare: they are left to another where the clock does not wait."""
+"""Paths take long to prepare: they are left to another process where the clock does not wait."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 
 
 def upload(craft: Craft, *steps: Takeoff | Delay | Signals | Land) -> None:
-    """A mission, item by item as a ground station sends it."""
+    """Upload a mission, item by item as a ground station does."""
     operation = MissionUpload(Target(1, 1), encode_steps(steps, Home()))
     heard = len(craft.heard)
 
@@ -108,7 +108,7 @@ def modes(craft: Craft) -> list[tuple[int, int]]:
 
 
 def test_a_mission_asked_for_right_after_its_upload_in_the_air_begins_by_itself() -> None:
-    """One answer, at once: MAVSDK calls its user back at the first, and crashes at a second."""
+    """There is one answer, immediately: MAVSDK calls its user back at the first, and crashes at a second."""
     craft = flown_to_hold()
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
     work = craft.onboard.work
@@ -125,7 +125,7 @@ def test_a_mission_asked_for_right_after_its_upload_in_the_air_begins_by_itself(
 
 
 def test_a_vehicle_stays_armed_while_its_mission_waits_for_paths() -> None:
-    """On a machine that is busy they take longer than an armed vehicle is left without a task."""
+    """On a busy machine, paths take longer than an armed vehicle without a task stays armed."""
     craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
     craft.wait(1.0)
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())

@@ -1,4 +1,4 @@
-"""What telemetry is told of the vehicle's own sensors, and of the flight under way."""
+"""What telemetry receives of the vehicle's own sensors, and of the present flight."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def test_the_slower_sensors_are_kept_between_their_readings() -> None:
         sensed = moment(craft).sensed
         assert sensed is not None
         read_us.add((sensed.field_us, sensed.pressure_us))
-        # a barometer of 0.3 m, at rest: 12 Pa to the metre
+        # a barometer of 0.3 m, at rest: 12 Pa per metre
         assert sensed.pressure_pa == pytest.approx(pressure_pa(0.0), abs=30.0)
-        assert 0.2 < sum(b * b for b in sensed.field_gauss) ** 0.5 < 0.7  # the Earth's
+        assert 0.2 < sum(b * b for b in sensed.field_gauss) ** 0.5 < 0.7  # the Earth's field
         assert sensed.accel[2] == pytest.approx(9.81, abs=1.0)
     assert 1 < len(read_us) < 100
 

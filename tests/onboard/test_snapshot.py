@@ -1,4 +1,4 @@
-"""What telemetry says of an instant, read from rows that were laid out, against the legs that are flown."""
+"""The telemetry of an instant, read from rows that were laid out, compared with the legs that are flown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A law is called with what is, and asked for what can be done; what it does wrong is told."""
+"""A law is called with the present state, and its answers are checked; its errors are reported."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_who_interrupts_is_not_the_laws_fault() -> None:
         signal.raise_signal(signal.SIGINT)
         return memory, UPWARD
 
-    # a program that a shell has started in the background ignores it
+    # a program that a shell has started in the background ignores SIGINT
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""What somebody brings is found, and what is wrong with it is told with its place."""
+"""Custom code is found, and errors in it are reported with their place."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_what_a_law_must_not_say_is_told(line: str) -> None:
 
 
 def test_an_entry_point_is_a_law(here: Path) -> None:
-    """As an installed package names it."""
+    """As an installed package declares it."""
     written(FINE, "brought.py")
     written("[plumbline.laws]\nsteady = brought:Fine\n", "brought-1.0.dist-info/entry_points.txt")
     written("Metadata-Version: 2.1\nName: brought\nVersion: 1.0\n", "brought-1.0.dist-info/METADATA")

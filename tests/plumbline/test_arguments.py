@@ -1,4 +1,4 @@
-"""Whatever a public function is given that it cannot take, the answer is an Error of one line, and no other
+"""For any argument that it cannot take, a public function raises an Error of one line, and no other
 exception."""
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NO_MAPPING: tuple[Any, ...] = (3, "x", b"x", [1], [("SIM_WIND_E", 3)], object(),
 NO_PATH: tuple[Any, ...] = (3, "", b"x", *NEITHER_TEXT_NOR_NUMBER)
 NO_LIST: tuple[Any, ...] = (3, "x", b"x", object(), {1: 2})
 
-# what is called with one value, and the values that it cannot take
+# calls with one value, and the values that each cannot take
 CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "fly mission": (plumbline.fly, (None, *NO_TEXT)),
     "fly law": (lambda v: plumbline.fly("hover", law=v), NO_TEXT),

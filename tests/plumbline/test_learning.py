@@ -1,4 +1,4 @@
-"""The Gymnasium environments: what gymnasium asks of them, and that they are the simulator's own flight."""
+"""The Gymnasium environments: what gymnasium requires of them, and that they fly as the simulator does."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_vehicle_has_an_action_for_each_of_its_rotors() -> None:
     assert np.abs(seen[:3] - start[:3]).max() < 1e-3
     for _ in range(10):
         seen, *_ = env.step(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5], np.float32))
-    assert np.linalg.norm(seen[21:24]) > 0.2  # rad/s: one of them turns it
+    assert np.linalg.norm(seen[21:24]) > 0.2  # rad/s: a single rotor turns it
 
 
 def test_a_rotor_that_fails_can_be_drawn_by_episode() -> None:
@@ -166,7 +166,7 @@ def test_a_rate_and_an_acceleration_are_what_is_asked_for() -> None:
     for _ in range(100):
         seen, *_ = env.step(np.array([0.25, 0.0, 0.0], np.float32))
         speeds.append(float(seen[3]))
-    # a quarter of 4 m/s^2, less the air's drag, after the cable has turned there
+    # a quarter of 4 m/s^2, less the air's drag, after the cable has turned to it
     assert (speeds[99] - speeds[89]) / 0.2 == pytest.approx(1.0, abs=0.1)
 
 
@@ -204,7 +204,7 @@ def test_an_action_that_is_none_is_refused() -> None:
     for action, told in WRONG_ACTIONS.values():
         with pytest.raises(plumbline.Error, match=told):
             env.step(action)
-    assert env.step(np.array([9.0, 0.0, 0.0, 0.0]))[4] == {}  # cut to 1
+    assert env.step(np.array([9.0, 0.0, 0.0, 0.0]))[4] == {}  # clipped to 1
     envs = gymnasium.make_vec(HOVER, 2)
     envs.reset(seed=1)
     with pytest.raises(plumbline.Error, match=r"actions of shape \(4,\); must be \(2, 4\)"):

@@ -19,7 +19,7 @@ TICK_HZ = 250.0
 
 
 def made(size: int, actions: int, options: dict[str, Any]) -> Policy:
-    """A policy that does small things."""
+    """A policy with small actions."""
     rng = np.random.default_rng(1)
     shapes = [(8, size), (actions, 8)]
     return Policy([(0.05 * rng.normal(size=shape), np.zeros(shape[0])) for shape in shapes], options)
@@ -127,7 +127,7 @@ class Model:
 def test_a_network_of_stable_baselines_becomes_one() -> None:
     policy = policy_of_sb3(Model(Tanh()), {})
     inner = np.tanh(np.tanh(2.0 * 0.1) + 0.5)
-    assert policy(np.array([0.1], np.float32)) == pytest.approx([inner, 1.0])  # the second is cut
+    assert policy(np.array([0.1], np.float32)) == pytest.approx([inner, 1.0])  # the second is clipped
     with pytest.raises(plumbline.Error, match="ReLU between its layers"):
         policy_of_sb3(Model(ReLU()), {})
 
@@ -156,7 +156,7 @@ def test_a_trained_policy_flies_a_mission_as_a_law() -> None:
     up = plumbline.Mission("up", [Takeoff(0.6), Waypoint(0.0, 0.0, 0.6, hold_s=2.0), Land()])
     flight = plumbline.fly(up, law="plumbline.examples.hover_policy:HoverPolicy", quiet=True)
     assert (flight.outcome, flight.reason) == ("completed", "")
-    assert 0.002 < flight.summary["load_error_max_m"] < 0.05  # what no shipped law leaves, and no more
+    assert 0.002 < flight.summary["load_error_max_m"] < 0.05  # more than shipped laws leave, but bounded
 
 
 def test_a_law_without_its_policy_is_told(tmp_path: Path) -> None:

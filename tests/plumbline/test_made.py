@@ -89,7 +89,7 @@ TITLES = TEXTS.filter(str.isprintable)
 
 @st.composite
 def missions(draw: st.DrawFn) -> Mission:
-    """Any that a file can hold, named as its file can be."""
+    """Any mission that a file can hold, with a name that its file can have."""
     return Mission(
         draw(st.from_regex(r"[a-z][a-z0-9-]{0,20}", fullmatch=True)),
         [Takeoff(draw(HEIGHTS)), *draw(st.lists(WITH_LOAD, max_size=5)), *draw(st.lists(ALONE)), Land()],
@@ -236,6 +236,6 @@ def test_a_sweep_takes_objects() -> None:
 
 
 def test_importing_is_light() -> None:
-    """The simulator is loaded when it flies."""
+    """The simulator is loaded only for a flight."""
     program = "import sys, plumbline; sys.exit('numba' in sys.modules or 'sitl.world' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

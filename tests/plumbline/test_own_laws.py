@@ -1,4 +1,4 @@
-"""Laws of one's own as scripts and the command line name them: the same flight, told in the same way."""
+"""Custom laws as scripts and the command line name them: the same flight, reported in the same way."""
 
 from __future__ import annotations
 
@@ -111,14 +111,14 @@ def test_one_that_there_is_not_is_told(command: str) -> None:
 
 
 def test_what_it_prints_is_no_part_of_the_json(tmp_path: Path) -> None:
-    """Nor is anything else in the way of whoever reads stdout."""
+    """Nor does anything else disturb a program that reads stdout."""
     path = tmp_path / "mine.py"
     path.write_text(PRINTS)
     result = run("check", "square", "--planner", str(path), "--json")
     assert result.exit_code == EXIT_DONE, result.stderr
     assert json.loads(result.stdout)["mission"] == "square"
     assert result.stderr.startswith("loading\nplanning\n")
-    assert "planning" in run("check", "square", "--planner", str(path)).stdout  # to people as it comes
+    assert "planning" in run("check", "square", "--planner", str(path)).stdout  # without --json: to stdout
 
 
 class Misspelt(LoadPid):
@@ -147,7 +147,7 @@ def test_a_planner_that_is_never_asked_is_told() -> None:
 
 
 def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """And flies each as `fly` does."""
+    """And it flies each as `fly` does."""
     path = tmp_path / "mine.py"
     path.write_text(SAYS)
     laws = (f"{__file__}:Heavier", f"{path}:Fails")

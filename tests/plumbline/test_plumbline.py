@@ -1,4 +1,4 @@
-"""What a script can do: fly, sweep, read the tables; and what it is told where it is wrong."""
+"""What a script can do: fly, sweep, read the tables; and the errors that it gets."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_a_recorded_flight_is_read(flight: plumbline.Flight, tmp_path: Path) -> 
     flight.report(tmp_path)
     found = plumbline.Flight.load(tmp_path)
     assert (found.tlog, found.outcome, found.reason, found.mission) == (flight.tlog, "completed", "", None)
-    # files keep nine digits of the wall time, from which the factor is worked out
+    # files keep nine digits of the wall time, from which the factor is computed
     factor = pytest.approx(flight.summary["real_time_factor"], rel=1e-8)
     assert found.summary == {**flight.summary, "real_time_factor": factor}
     assert repr(found) == repr(flight)
@@ -281,7 +281,7 @@ def test_a_picture_that_there_is_not(flight: plumbline.Flight) -> None:
 
 
 def test_a_folder_of_the_same_name_beside_the_script_hides_nothing(tmp_path: Path) -> None:
-    """As of a script that lies beside the clone."""
+    """As for a script that lies beside the clone."""
     (tmp_path / "plumbline").mkdir()
     script = tmp_path / "script.py"
     script.write_text("from importlib.util import find_spec; print(find_spec('plumbline').origin)")

@@ -26,7 +26,7 @@ WRONG: dict[str, tuple[Any, str]] = {
 
 UNMET = RunningVehicle.__new__(
     RunningVehicle
-)  # never met a vehicle: what is wrong is told before one is asked
+)  # not connected to a vehicle: errors are reported before any request
 ARGUMENTS: dict[str, tuple[Any, str]] = {
     "goto": (lambda: UNMET.goto("a", 0, 1), "east_m = 'a'; must be a finite number"),  # type: ignore[arg-type]
     "goto nowhere": (lambda: UNMET.goto(float("nan"), 0, 1), "east_m = nan; must be a finite number"),

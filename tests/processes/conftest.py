@@ -1,4 +1,4 @@
-"""The real programs as a user starts them; every one is gone when its test is over."""
+"""The real programs as a user starts them; each is ended after its test."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Program:
             )
 
     def says(self, pattern: bytes) -> None:
-        """Wait until it has said what matches `pattern`; it must not end before."""
+        """Wait until its output matches `pattern`; it must not end before."""
         while not re.search(pattern, self.log.read_bytes()):
             try:
                 code = self.process.wait(0.2)
@@ -75,9 +75,9 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
 
 @pytest.fixture
 def command() -> Callable[..., Result]:
-    """Give a command to a vehicle that runs, in this process: command("arm", "--connect", "14550").
+    """Give a command to a running vehicle, in this process: command("arm", "--connect", "14550").
 
-    What `gcs` loads for that is then loaded once for all of them.
+    `gcs` then loads its modules only once for all commands.
     """
 
     def run(*arguments: str) -> Result:
@@ -88,7 +88,7 @@ def command() -> Callable[..., Result]:
 
 @pytest.fixture
 def gcs(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run a gcs command to its end, in a process of its own: gcs("fly", "hover")."""
+    """Run a gcs command to its end, in a separate process: gcs("fly", "hover")."""
 
     def run(*arguments: str, file_bytes: int = resource.RLIM_INFINITY) -> subprocess.CompletedProcess[str]:
         """`file_bytes`: no file may grow larger, as on a disk that is full."""

@@ -1,4 +1,4 @@
-"""Third-party autopilots in whole flights: where PLUMBLINE_ARDUCOPTER names the program of ArduCopter.
+"""Third-party autopilots in whole flights: where PLUMBLINE_ARDUCOPTER or PLUMBLINE_PX4 names the program.
 
 PLUMBLINE_ARDUCOPTER=./arducopter pytest tests/processes/test_autopilots.py
 """
@@ -94,7 +94,7 @@ def children(process: subprocess.Popen[str]) -> dict[str, int]:
 
 
 def flies(process: subprocess.Popen[str]) -> None:
-    """Wait until it says that it flies."""
+    """Wait until the process reports that it flies."""
     assert process.stderr
     said = [process.stderr.readline()]
     while "flying" not in said[-1]:
@@ -109,7 +109,7 @@ def test_the_load_is_lifted_carried_and_set_down(
     assert process.returncode == 0, wrong
     record = json.loads(said)
     assert (record["outcome"], record["law"]) == ("completed", kind)
-    # it knows of no load: what it does is seen in the truth, and bounded as loosely as its GNSS is
+    # it knows of no load: the error is that of the truth, and its bound is as loose as its GNSS
     assert 0.01 < record["load_error_max_m"] < 0.6
     assert 5.0 < record["flight_s"] < 60.0
     assert record["tension_max_n"] > 0.3 * 9.81

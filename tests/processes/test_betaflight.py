@@ -1,9 +1,9 @@
-"""Betaflight's SITL target in a whole flight of the docs' example: where PLUMBLINE_BETAFLIGHT names it.
+"""Betaflight's SITL target in a whole flight of the example in the docs: where PLUMBLINE_BETAFLIGHT names it.
 
 PLUMBLINE_BETAFLIGHT=obj/betaflight_4.6.0_SITL pytest tests/processes/test_betaflight.py
 
 Its ports are fixed: nothing else may use UDP 9002 to 9004 and TCP 5761 meanwhile. Its clock is the wall
-clock: on a busy machine its loop may stop (docs/autopilots.md), so it goes before others where it may.
+clock: on a busy machine its loop may stop (docs/autopilots.md), so it gets priority where permitted.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
     begun: list[subprocess.Popen[str]] = []
 
     def begin(*words: str, stdout: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
-        """A program in the folder where the firmware keeps its settings."""
+        """Start a program in the folder where the firmware keeps its settings."""
         begun.append(subprocess.Popen(words, cwd=tmp_path, stdout=stdout, text=True))
         return begun[-1]
 

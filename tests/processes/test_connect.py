@@ -1,4 +1,4 @@
-"""A script commands a vehicle that somebody started by hand."""
+"""A script commands a vehicle that was started by hand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.doubles.pages import ROOT, split
 pytestmark = pytest.mark.processes
 
 OUT_AND_DOWN = Mission("out", [Takeoff(0.8), Waypoint(0.5, 0.0, 0.8), Land()])
-PATIENCE_S = 60.0  # a machine may be as busy as it likes: what is tested is not how fast it is
+PATIENCE_S = 60.0  # the machine may be busy: its speed is not what is tested
 
 
 def test_the_script_of_docs_python_md_flies(start: Callable[..., Any]) -> None:
@@ -33,7 +33,7 @@ def test_the_script_of_docs_python_md_flies(start: Callable[..., Any]) -> None:
 
 
 def running(start: Callable[..., Any]) -> tuple[str, Any]:
-    """Start a simulator and an autopilot that nobody else meets, as far as it flies; where it is met, and the
+    """Start a simulator and an autopilot on free ports, and wait until it flies; return its address and the
     autopilot."""
     simulator, truth, port = (f"127.0.0.1:{free_port()}" for _ in range(3))
     start("sitl", "--listen", simulator, "--truth", truth, "--speed", "20", "--sensors", "ideal")

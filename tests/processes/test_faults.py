@@ -1,4 +1,4 @@
-"""Programs that die, stand still or come back while the vehicle flies: docs/faults.md says what follows."""
+"""Programs that die, stand still or come back while the vehicle flies: docs/faults.md states what follows."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
 Command = Callable[..., "Result"]
-TRIES = 60  # to arm on a busy machine
+TRIES = 60  # attempts to arm on a busy machine
 LONG_S = 240.0
 TOLD = (
     "armed",
@@ -32,8 +32,8 @@ TOLD = (
     "load_up_m",
     "mission_items",
     "time_s",
-)  # once it is known
-# paced as without options, the world waits for everybody, but its seconds are shorter
+)  # known in a complete status
+# paced as without options: the world waits for all programs, but its seconds are shorter
 QUICK = ("--speed", "4")
 
 
@@ -64,7 +64,7 @@ class Flight:
         return json.loads(self.do("status", "--json"))
 
     def until(self, wanted: Callable[[Any], bool]) -> Any:
-        """The first status that is as it is wanted."""
+        """Wait for the first status that is as wanted, and return it."""
         with Session(parse_address(self.ground)) as session:
 
             def seen() -> bool:
@@ -76,7 +76,7 @@ class Flight:
             return status_record(session.view)
 
     def take_off(self) -> None:
-        """In real time a machine that is busy at this moment refuses to arm."""
+        """Take off; arming is repeated, because in real time it is refused while the machine is busy."""
         self.do("takeoff", "2")
         for _ in range(TRIES):
             if self._command("arm", "--connect", self.ground).exit_code == 0:
@@ -128,7 +128,7 @@ def test_a_simulator_killed_in_flight_begins_anew_with_the_vehicle_on_the_ground
 
 @pytest.mark.parametrize("who", ["autopilot", "sitl"])
 def test_a_program_that_stood_still_goes_on_where_it_was(fly: Callable[..., Flight], who: str) -> None:
-    """As by Ctrl-Z, or a machine that sleeps: the world waits, and nobody takes it for a restart."""
+    """As by Ctrl-Z, or on a machine that sleeps: the world waits, and this does not count as a restart."""
     flight = fly(*QUICK)
     flight.into_the_mission()
     stopped, other = flight.autopilot, flight.sitl
@@ -142,7 +142,7 @@ def test_a_program_that_stood_still_goes_on_where_it_was(fly: Callable[..., Flig
     if who == "sitl":
         texts = json.loads(flight.do("texts", "--json"))
         severity = {text["text"]: text["severity"] for text in texts}
-        # what is critical tells `gcs fly` that the flight has been given up
+        # a critical text would tell `gcs fly` that the flight has been given up
         assert severity["Simulator silent: time stands still"] == "error"
     flight.until(lambda status: not status["armed"])
     assert b"has started again" not in flight.autopilot.log.read_bytes()
@@ -231,7 +231,7 @@ def test_an_autopilot_that_stands_still_is_named_where_the_flight_is_lost(
         if b"autopilot" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
     )
     os.kill(autopilot, signal.SIGSTOP)
-    with pytest.raises(subprocess.TimeoutExpired):  # for seconds nothing is lost
+    with pytest.raises(subprocess.TimeoutExpired):  # for some seconds the flight is not lost
         flight.process.wait(7.0)
     os.kill(autopilot, signal.SIGCONT)
     flight.says(b"  (lower|set down)  ")

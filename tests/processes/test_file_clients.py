@@ -31,12 +31,12 @@ LONG_S = 120.0
 
 @pytest.fixture
 def port(start: Start, tmp_path: Path) -> str:
-    """Where a vehicle speaks that stands on the ground and has one log."""
+    """The port of a vehicle that stands on the ground and has one log."""
     return vehicle(start, tmp_path)
 
 
 def vehicle(start: Start, tmp_path: Path, *options: str) -> str:
-    """Start one, wait until it flies with its simulator; the port at which it speaks."""
+    """Start a vehicle and wait until it flies with its simulator; return its port."""
     sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
     logs = tmp_path / "storage" / "card" / "log"
     logs.mkdir(parents=True)
@@ -111,7 +111,7 @@ class Mavproxy:
         self.process.stdin.flush()
 
     def expect(self, text: str) -> None:
-        """Wait until it has said `text`; what was said until then is forgotten."""
+        """Wait until it has printed `text`; discard what it printed until then."""
         assert self.process.stdout is not None
         until = time.monotonic() + LONG_S
         while text not in self.text:
@@ -132,7 +132,7 @@ def mavproxy(port: str, tmp_path: Path) -> Iterator[Mavproxy]:
 
 
 def test_mavproxy(mavproxy: Mavproxy, tmp_path: Path) -> None:
-    mavproxy.expect("parameters (ftp)")  # which it fetches by itself
+    mavproxy.expect("parameters (ftp)")  # MAVProxy fetches them by itself
     mavproxy.type("log list")
     mavproxy.expect(f"Log 0  numLogs 1 lastLog 0 size {len(LOG)}")
     mavproxy.type("log download 0 log.ulg")

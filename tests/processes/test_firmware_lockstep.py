@@ -1,4 +1,4 @@
-"""How far the firmwares are deterministic: flown by a pilot in lockstep, then fed with what was recorded.
+"""How far the firmwares are deterministic: flown by a pilot in lockstep, then fed with the recording.
 
 PLUMBLINE_ARDUCOPTER=./arducopter PLUMBLINE_PX4=build/px4_sitl_default/bin/px4 pytest THIS FILE
 """
@@ -23,9 +23,9 @@ from sitl.interfaces import ardupilot, px4
 PATIENCE_S = 20.0
 FORCED = 21196.0  # of COMPONENT_ARM_DISARM: without checks
 READY_S, ARM_S, CLIMB_S, END_S = 8.0, 14.0, 16.0, 20.0  # of the firmware's time
-# of full throttle: PX4's threads run as the machine lets them
+# share of full throttle: PX4's threads run when the machine schedules them
 PX4_WITHIN = 0.1
-PX4_INSTANCE = 9  # its ports are those of instance 0 and so many more
+PX4_INSTANCE = 9  # added to the ports of instance 0
 
 pytestmark = pytest.mark.processes
 
@@ -68,7 +68,7 @@ class Pilot:
         return 1540 if lean else 1500, 1460 if lean else 1500, 1700 if at_s > CLIMB_S else 1000, 1500
 
     def override(self, tick: int) -> list[bytes]:
-        """By messages of a ground station."""
+        """The controls as messages of a ground station."""
         said = []
         if tick >= READY_S * self.rate_hz and tick % self.rate_hz == 0:
             said.append(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
@@ -81,7 +81,7 @@ class Pilot:
         return [self.writer.frame(message) for message in said]
 
     def radio(self, tick: int) -> bytes:
-        """By a radio whose seventh channel arms."""
+        """The controls as those of a radio whose seventh channel arms."""
         if tick % 10:
             return b""
         armed = 2000 if tick > ARM_S * self.rate_hz else 1000
@@ -91,7 +91,7 @@ class Pilot:
 
 
 def fly_ardupilot(folder: Path, answers: Sequence[bytes] = ()) -> tuple[list[bytes], list[bytes]]:
-    """The packets of a flight and the answers to them, `answers` if there are any, else our world's."""
+    """The packets of a flight and the answers to them: `answers` if given, else those of our simulator."""
     folder.mkdir()
     parameters = [
         *shipped("ardupilot"),
@@ -124,7 +124,7 @@ def fly_ardupilot(folder: Path, answers: Sequence[bytes] = ()) -> tuple[list[byt
                 packet, sender = physics.recvfrom(65535)
                 servos = ardupilot.read_servo_packet(packet)
                 assert servos and servos.number == len(packets)
-                # a clock that never shows an answer as lost
+                # a clock by which no answer ever counts as lost
                 answer = answers[servos.number] if answers else exchange.receive(servos, 0.0).answer
                 with suppress(BlockingIOError):
                     while True:
@@ -149,7 +149,7 @@ def test_arducopter_says_the_same_bytes_to_one_seed_and_to_what_was_recorded(tmp
 
 
 def fly_px4(folder: Path, sensors: Sequence[bytes] = ()) -> tuple[dict[int, tuple[float, ...]], list[bytes]]:
-    """The throttles by their time (us), and what was sent at each tick: `sensors` if there are any."""
+    """The throttles by their time (us), and what was sent at each tick: `sensors` if given."""
     binary = program("PLUMBLINE_PX4")
     folder.mkdir()
     radio = ["COM_RC_IN_MODE 0", "RC_CHAN_CNT 8", "RC_MAP_ARM_SW 7", "RC3_TRIM 1000", "RC7_TRIM 1000"]
@@ -181,7 +181,7 @@ def fly_px4(folder: Path, sensors: Sequence[bytes] = ()) -> tuple[dict[int, tupl
                 link.sendall(pilot.radio(tick) + sent[-1])
                 answered = False
                 while not answered:
-                    # before its first answer it starts by the wall clock, and is not waited for
+                    # until its first answer it starts by the wall clock, and is not waited for
                     link.settimeout(PATIENCE_S if exchange.in_step else 1.0 / px4.RATE_HZ)
                     try:
                         piece = link.recv(65536)
@@ -199,12 +199,12 @@ def fly_px4(folder: Path, sensors: Sequence[bytes] = ()) -> tuple[dict[int, tupl
 
 
 def test_px4_answers_each_tick_and_differs_by_little(tmp_path: Path) -> None:
-    """It is not deterministic: its threads read what they share when the machine lets them."""
+    """It is not deterministic: its threads read shared data when the machine schedules them."""
     first, sent = fly_px4(tmp_path / "first")
     again, _ = fly_px4(tmp_path / "again", sent)
     both = sorted(set(first) & set(again))
     assert min(first[both[-1]]) > 0.4
-    # all ticks but those of its start
+    # all ticks except those of its start
     assert len(both) > (END_S - 2.0) * px4.RATE_HZ
     apart = max(abs(a - b) for at in both for a, b in zip(first[at], again[at], strict=True))
     assert apart < PX4_WITHIN

@@ -1,4 +1,4 @@
-"""Programs that are killed, and what is still there when they come back."""
+"""Programs that are killed, and what is still there after their restart."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
 Command = Callable[..., "Result"]
-# on a busy machine a phase may pass between two words; "mission" is also in what is compiled before
+# on a busy machine a phase may pass between two outputs; "mission" also occurs in that of the compilation
 IN_THE_AIR = b"(tauten|lift|hold|lower)"
 
 
@@ -70,7 +70,7 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(
 def test_ctrl_c_stops_everything_and_still_writes_what_was_captured(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "out"
     flight = start("gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(out))
-    flight.says(b"  " + IN_THE_AIR + b"  ")  # progress is printed where there is no terminal
+    flight.says(b"  " + IN_THE_AIR + b"  ")  # progress is printed even without a terminal
     children = _children(flight.process.pid)
     assert len(children) == 2
     code = flight.interrupt()
@@ -81,10 +81,10 @@ def test_ctrl_c_stops_everything_and_still_writes_what_was_captured(start: Start
 
 
 def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
-    """The terminal is gone first, so that nothing more can be said; then shell and system tell of it."""
+    """The terminal closes first, so that nothing more can be printed; then shell and system send SIGHUP."""
     ours, theirs = pty.openpty()
     words = ["gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(tmp_path / "out")]
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a child takes it over, as ignored under nohup
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a child inherits it; under nohup it is ignored
     flight = subprocess.Popen(
         [sys.executable, "-m", *words], stdin=theirs, stdout=theirs, stderr=theirs, cwd=tmp_path
     )
@@ -95,7 +95,7 @@ def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
         while not re.search(IN_THE_AIR, said):
             try:
                 said += os.read(ours, 4096)
-            except OSError:  # nobody is left at the other end
+            except OSError:  # the other end is closed
                 raise AssertionError(said.decode(errors="replace")) from None
         os.close(ours)
         flight.send_signal(signal.SIGHUP)
@@ -109,7 +109,7 @@ def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
 
 
 def _runs(pid: int) -> bool:
-    """False also of one that has ended, whose parent has not yet looked after it."""
+    """Whether a process runs; False also if it has ended and its parent has not yet waited for it."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] not in "ZX"
     except (FileNotFoundError, ProcessLookupError):

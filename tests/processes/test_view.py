@@ -1,4 +1,4 @@
-"""The live page of real flights, in a browser: it shows what flies, and what a person asks is done."""
+"""The live page of real flights, in a browser: it shows the flight, and a person's requests are executed."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from websockets.sync.client import connect
 
+import missions
 import plumbline
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
@@ -23,7 +24,7 @@ FLYING = "/^(hold|mission|lift)/.test(document.getElementById('phase').textConte
 STATE = "Plumbline.live.page.vehicles.get(1).state"
 ANSWER = "document.getElementById('answer').textContent"
 
-# the colours of the pixels about a place, as the scene shows the vehicle at this moment
+# the colours of the pixels around some places, as the scene shows the vehicle at this moment
 SEEN = """
 const scene = Plumbline.live.scene, vehicle = scene.vehicles.get(1), gl = scene.renderer.getContext();
 const load = vehicle.load.position, top = vehicle.position;
@@ -54,9 +55,9 @@ def page_of(program: Any) -> str:
 def test_a_flight_is_seen_and_led_by_hand(
     start: Callable[..., Any], browser: Browser, tmp_path: Path
 ) -> None:
-    # it hovers until it is led elsewhere, however slowly this machine draws the page
+    # it hovers until it is commanded elsewhere, however slowly this machine draws the page
     patient = tmp_path / "patient.toml"
-    hover = Path("missions/hover.toml").read_text()
+    hover = Path(missions.__file__).with_name("hover.toml").read_text(encoding="utf-8")
     patient.write_text(hover.replace("duration_s = 10.0", "duration_s = 600.0"))
     out = str(tmp_path / "out")
     flight = start("gcs", "fly", str(patient), "--view", "--speed", "2", "--out", out, "--quiet")
@@ -66,9 +67,9 @@ def test_a_flight_is_seen_and_led_by_hand(
 
     seen = browser.run(SEEN)
     red, green, blue = seen["load"]
-    assert red > 150 > blue, seen["load"]  # amber, as nothing else there
+    assert red > 150 > blue, seen["load"]  # amber, like nothing else there
     assert red > green > blue
-    # white, but a line as thin as a pixel is shared by two; the ground's least colour is below 60
+    # white, but a line one pixel wide may be spread over two; the ground's least component is below 60
     assert max(min(pixel) for pixel in seen["cable"]) > 80
     assert max(min(pixel) for pixel in seen["vehicle"]) > 150
     red, green, blue = seen["nothing"]  # ground, or a line on it: dim and bluish
@@ -80,7 +81,7 @@ def test_a_flight_is_seen_and_led_by_hand(
     browser.wait(f"{ANSWER}.includes('denied') && {ANSWER}.includes('in the air')")
 
     browser.find("[data-camera=top]").click()
-    # two metres east of the load, as seen from above
+    # one metre east of the load, as seen from above
     x, y = browser.run(
         f"const p = {STATE}.load.position; return Plumbline.live.scene.project([p[0], p[1] + 1, p[2]])"
     )
@@ -113,7 +114,7 @@ def test_a_flight_is_seen_and_led_by_hand(
     browser.open(browser.run("return document.querySelector('#banner a').href"))
     assert "report" in browser.run("return document.title")
     browser.driver.get("about:blank")
-    # the page is closed: the command ends, with the flight's own code
+    # the page is closed: the command ends with the exit code of the flight
     assert flight.process.wait(30.0) == {"completed": 0, "interrupted": 3}[outcome]
 
 

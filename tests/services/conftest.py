@@ -1,4 +1,4 @@
-"""A vehicle endpoint on fake time, and the ground side of the protocols as small as it can be."""
+"""A vehicle endpoint on fake time, and a minimal ground side of the protocols."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Rig:
         self.events += self.endpoint.receive(datagram, link, self.now_us, self.decide)
 
     def poll(self) -> dict[str, list[Received]]:
-        """What goes out at this tick, by link; then the clock moves on."""
+        """The messages sent at this tick, by link; then the clock advances."""
         out: dict[str, list[Received]] = {}
         made = self.endpoint.poll(lambda: snapshot(self.now_us, **self.changes), self.now_us)
         for link, datagram in made:
@@ -95,14 +95,14 @@ class Rig:
         return out
 
     def replies(self, *messages: Any, link: str = "gcs", **origin: int) -> list[Any]:
-        """What one link gets for messages, besides the streams of the same tick."""
+        """What one link receives in answer to messages, without the streams of the same tick."""
         self.poll()
         self.send(*messages, link=link, **origin)
         streamed = set(STREAMED)
         return [r.message for r in self.poll().get(link, []) if r.message.get_type() not in streamed]
 
     def run(self, duration_us: int, link: str = "gcs") -> list[Received]:
-        """All that goes out on a link for a while."""
+        """All messages sent on a link during this time."""
         out: list[Received] = []
         for _ in range(duration_us // TICK_US):
             out += self.poll().get(link, [])
@@ -159,7 +159,7 @@ def rig() -> Rig:
 
 @pytest.fixture
 def rig_with() -> Callable[..., Rig]:
-    """Makes a vehicle that has a mission, or another identity."""
+    """Make a vehicle that has a mission, or another identity."""
     return make_rig
 
 
@@ -175,7 +175,7 @@ def snap() -> Callable[..., Snapshot]:
 
 @dataclass
 class MissionClient:
-    """The ground side of a mission transfer: says its last word again after a silence, gives up never."""
+    """The ground side of a mission transfer: repeats its last message after a silence, never gives up."""
 
     items: tuple[WireItem, ...] = ()
     result: int | None = None  # of an upload
@@ -183,7 +183,7 @@ class MissionClient:
     last: Any = None
     said_us: int = 0
     uploading: bool = False
-    wanted: int = -1  # next item of a download; -1: how many there are
+    wanted: int = -1  # next item of a download; -1: the count
     count: int = 0
     retry_us: int = 300_000
 

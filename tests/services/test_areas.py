@@ -1,4 +1,4 @@
-"""Fence and rally points over the mission protocol: in, out, cleared, refused."""
+"""Fence and rally points over the mission protocol: uploaded, downloaded, cleared, refused."""
 
 from __future__ import annotations
 

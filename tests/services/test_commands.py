@@ -1,4 +1,4 @@
-"""Commands: one table from what clients send to what the supervisor is asked, and what comes back."""
+"""Commands: a table of what clients send, the request to the supervisor, and the answer."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ OK, DENIED, UNSUPPORTED = (
 )
 PACKED_LAND = float(AUTO_LAND << 24 | AUTO << 16)
 
-# what is sent as COMMAND_LONG, what the supervisor is asked (None: nothing), the result
+# what is sent as COMMAND_LONG, the request to the supervisor (None: none), the result
 LONG = [
     (400, (1,), Arm(True, False), OK),
     (400, (0,), Arm(False, False), OK),
@@ -113,7 +113,7 @@ LONG = [
     (207, (1,), EnableFence(True), OK),
     (207, (2,), None, DENIED),
     (420, (101, 1, 5), None, DENIED),
-    (420, (101, 1, 1), None, DENIED),  # of a simulator that has told of no parameters
+    (420, (101, 1, 1), None, DENIED),  # the simulator has reported no parameters
     (420, (101, 5, 1), None, UNSUPPORTED),
     (420, (0, 1, 0), None, DENIED),  # the same
     (420, (0, 2, 0), None, UNSUPPORTED),
@@ -382,7 +382,7 @@ def test_a_repeated_command_is_acknowledged_but_done_once(rig):
 
 
 def test_a_command_that_comes_again_because_its_ack_was_lost_is_not_refused(rig):
-    """As MAVSDK repeats: with no mark of it."""
+    """MAVSDK repeats a command without marking it as a repetition."""
     take_off = (NAN,) * 7
     rig.replies(long(22, take_off))
     rig.verdict = lambda request: Verdict(DENIED, "already flying")
@@ -543,7 +543,7 @@ def test_the_simulators_parameters_are_saved_on_request_alone(rig):
     rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
     assert not any(isinstance(event, WorldSaved) for event in rig.events)
-    rig.table.set("SIM_WIND_E", 3.0)  # as the simulator says then
+    rig.table.set("SIM_WIND_E", 3.0)  # as the simulator then reports
     rig.send(long(245, (1,)))
     assert rig.events[-2:] == [ParametersSaved(), WorldSaved({"SIM_WIND_E": 3.0})]
     rig.send(long(245, (2,)))

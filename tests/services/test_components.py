@@ -1,4 +1,4 @@
-"""Whoever is addressed answers: the vehicle is an autopilot, a winch and the component of the dialect."""
+"""The addressed component answers: the vehicle is an autopilot, a winch and the component of the dialect."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def long(to, command, *params):
 
 
 def heard(rig, message, kind, **origin):
-    """Who says what of a kind just after a message."""
+    """The messages of a kind that follow a message, each with its source."""
     rig.poll()
     rig.send(message, **origin)
     got = rig.poll().get("gcs", [])
@@ -128,7 +128,7 @@ def test_components_have_no_parameters_files_or_missions_and_say_so(rig, to):
 
 
 def test_the_winch_shows_itself_where_it_is_addressed(rig):
-    """DroneKit and pymavlink would take its HEARTBEAT for that of the vehicle."""
+    """And nowhere else: DroneKit and pymavlink would mistake its HEARTBEAT for that of the vehicle."""
     rig.endpoint.add_link("api")
 
     def hearts(link):

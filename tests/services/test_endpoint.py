@@ -1,4 +1,4 @@
-"""Links, addresses, datagrams and the small questions."""
+"""Links, addresses, datagrams, texts and small requests."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def test_links_are_bounded_and_the_most_silent_makes_room(rig):
 
 
 def test_a_crowd_of_newcomers_makes_room_one_by_one(rig):
-    """A link costs much to begin: a flood from many ports must not begin them all at each tick."""
+    """A link is expensive to set up: a flood from many ports must not set up all of them at each tick."""
     for number in range(MAX_LINKS + 100):
         rig.send(GCS_BEAT, link=f"n{number}")
     first, last = f"n{MAX_LINKS}", f"n{MAX_LINKS + 99}"
@@ -277,7 +277,7 @@ def test_texts_come_together_again(rig, length):
     assert "".join(x.text for x in got) == text
     assert [x.chunk_seq for x in got] == list(range(len(got)))
     assert all(bool(x.id) == (length > CHUNK) for x in got)
-    # a receiver takes a chunk that is not full as the end
+    # a receiver takes a chunk that is not full for the end of the text
     assert len(got[-1].text) < CHUNK or length <= CHUNK
 
 
@@ -296,7 +296,7 @@ def test_texts_are_one_line_of_ascii(rig):
     assert got.message.text == "Wind is 5 m/s ? east"
 
 
-# ---- small questions
+# ---- small requests
 
 
 def test_timesync_questions_are_answered_and_answers_are_events(rig):

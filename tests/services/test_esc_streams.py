@@ -1,4 +1,4 @@
-"""Speed controllers towards the ground: four of them a message."""
+"""Telemetry of the speed controllers: four of them in each message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A service that fails, for whatever reason, brings nothing down: who asked is answered, the others told."""
+"""A service that fails, for whatever reason, stops nothing: the sender is answered, a text is sent to all."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def decide(request: Any) -> Verdict:
 
 
 class Client:
-    """One client: sends packets, hears packets."""
+    """One client: sends and receives packets."""
 
     def __init__(self, card: Card, peer: Peer = GCS, service: FtpService | None = None) -> None:
         self.tree = FileTree(card, {("@MADE", "file"): lambda query: MADE})
@@ -107,7 +107,7 @@ class Client:
         return data
 
     def open_sessions(self) -> int:
-        """How many sessions are open, of all clients: those that a stranger finds taken."""
+        """The number of open sessions of all clients: those that another client finds taken."""
         own, self.peer = self.peer, STRANGER
         free = 0
         while self.ask(Op.OPEN_RO, b"@MADE/file", session=free).opcode == Op.ACK:
@@ -197,7 +197,7 @@ def test_folders_and_names(client: Client) -> None:
 def test_the_checksum_is_the_one_of_the_protocol(client: Client) -> None:
     client.put(b"/fs/microsd/a", b"123456789")
     (crc,) = struct.unpack("<I", client.good(Op.CHECKSUM, b"/fs/microsd/a").data)
-    # polynomial of CRC-32, but begun at 0 and not inverted
+    # the polynomial of CRC-32, but starting from 0 and not inverted
     expected = 0
     for byte in b"123456789":
         expected ^= byte
@@ -331,7 +331,7 @@ def test_hostile_paths_lead_nowhere(client: Client, tmp_path: Path, path: bytes)
     path = path[:DATA_BYTES]
     for op in (Op.OPEN_RO, Op.CREATE, Op.OPEN_WO, Op.REMOVE, Op.MAKE_FOLDER, Op.LIST, Op.CHECKSUM):
         if len(path) == DATA_BYTES and op in (Op.CREATE, Op.MAKE_FOLDER, Op.OPEN_WO):
-            continue  # cut at the end of the packet it is a name like any other
+            continue  # cut at the end of the packet, it is a valid name
         assert client.ask(op, path).opcode == Op.NAK
     assert (tmp_path / "secret").read_bytes() == b"key"
 
@@ -379,7 +379,7 @@ def test_the_card_can_be_full(client: Client) -> None:
 
 
 def test_folders_do_not_nest_for_ever(client: Client) -> None:
-    """A folder within a folder, moved into the next one, is deeper than any path that can be written."""
+    """Folders moved one into the next would become deeper than any path that can be written."""
     top = b"/fs/microsd/"
     client.good(Op.MAKE_FOLDER, top + b"0")
     refused = 0
@@ -403,7 +403,7 @@ def test_a_path_has_so_many_names_at_most(client: Client) -> None:
 
 @pytest.fixture
 def deep_folder(tmp_path: Path) -> Iterator[Path]:
-    """A folder within a folder, deeper than calls of Python may be nested."""
+    """Folders nested more deeply than Python calls may be."""
     top = tmp_path / "card"
     top.mkdir()
     inner = os.open(top, os.O_RDONLY)
@@ -413,11 +413,11 @@ def deep_folder(tmp_path: Path) -> Iterator[Path]:
         os.close(outer)
     os.close(inner)
     yield top
-    subprocess.run(["rm", "-r", top], check=True)  # pytest cannot
+    subprocess.run(["rm", "-r", top], check=True)  # pytest cannot remove it
 
 
 def test_a_card_is_counted_however_deep_it_is(deep_folder: Path) -> None:
-    """Whoever fills the directory by other means: the vehicle starts, and serves it."""
+    """However the directory was filled, the vehicle starts and serves it."""
     client = Client(DirectoryCard(deep_folder))
     assert client.names(b"/fs/microsd") == ["Da"]
     client.put(b"/fs/microsd/b", b"1")
@@ -436,7 +436,7 @@ def test_what_is_taken_away_makes_room(client: Client) -> None:
 
 
 def test_a_checksum_is_counted_over_many_ticks(client: Client) -> None:
-    """A tick reads so much at most; who asks again meanwhile is not answered twice."""
+    """A tick reads a limited amount; a client that repeats its request meanwhile is not answered twice."""
     client.put(b"/fs/microsd/a", b"")
     client.good(Op.TRUNCATE, b"/fs/microsd/a", offset=100_000)
     asked = Packet(1, 0, Op.CHECKSUM, 14, data=b"/fs/microsd/a\0")
@@ -452,7 +452,7 @@ def test_a_checksum_is_counted_over_many_ticks(client: Client) -> None:
 
 
 def test_checksums_of_many_clients_are_counted_in_turn(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tick reads no more for many than for one."""
+    """A tick reads no more for many clients than for one."""
     first = Client(card)
     first.put(b"/fs/microsd/a", b"")
     first.good(Op.TRUNCATE, b"/fs/microsd/a", offset=100_000)

@@ -1,4 +1,4 @@
-"""Whatever arrives: no exception, and nothing changes but by a valid message."""
+"""Whatever arrives: no exception, and only a valid message changes anything."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _INTEGER = {
 }
 _ADDRESS = {"target_system": (0, 1, 2), "target_component": (0, 1, 169), "mission_type": (0, 0, 0, 1, 255)}
 _NAMES = (b"LOAD_MASS", b"CTRL_RATE_HZ", b"MIS_TAKEOFF_ALT")
-# those that the vehicle handles, besides a few that it does not
+# messages that the vehicle handles, and a few that it does not
 HANDLED = [
     11, 4, 20, 21, 23, 37, 38, 39, 40, 41, 43, 44, 45, 47, 48, 51, 66, 73, 75, 76, 110, 111, 117, 119, 121,
     122, 256, 0, 84, 253, 69, 82, 86,
@@ -81,7 +81,7 @@ def state(rig: Any) -> Any:
 
 
 def replay(rig: Any) -> Any:
-    """What the events say that mission and parameters are."""
+    """Mission and parameters according to the events."""
     mission, parameters = None, {}
     for event in rig.events:
         match event:
@@ -164,7 +164,7 @@ def item_of(kind: int, seq: int, which: int) -> Any:
     )
 
 
-# sensible messages, in whatever order: uploads come about, and are disturbed
+# sensible messages in any order: uploads succeed, and are disturbed
 SENSIBLE = (
     st.builds(m.MAVLink_mission_count_message, st.just(1), st.just(1), st.integers(0, 3), KINDS)
     | st.builds(item_of, KINDS, st.integers(0, 2), st.integers(0, 3))
@@ -188,7 +188,8 @@ SENSIBLE = (
 def upload(
     owner: Any, other: Any, kind: int, whole: list[int], odd_kind: int, disturbances: list[tuple[int, Any]]
 ) -> list[tuple[Any, Any]]:
-    """An upload of one peer, and what another says between its items: its own item for the same place."""
+    """An upload of one peer; between its items, another peer sends its own item for the same place, and the
+    uploading peer an item of another kind."""
     said = [(owner, m.MAVLink_mission_count_message(1, 1, len(whole), kind))]
     said += [(owner, item_of(kind, seq, which)) for seq, which in enumerate(whole)]
     for at, which in disturbances:
@@ -213,7 +214,7 @@ TURN = UPLOAD | st.lists(st.tuples(PEER, SENSIBLE | ANY_MESSAGE), min_size=1, ma
 
 @dataclass
 class Model:
-    """What mission, fence, rally points and parameters are, by the rules of the manual alone."""
+    """Mission, fence, rally points and parameters as they follow from the rules of the manual alone."""
 
     table: Any
     accepts: bool
@@ -302,7 +303,7 @@ def test_what_changes_is_what_a_model_says(rig_with, items, turns, result):
             rig.poll()
             assert repr({0: rig.endpoint.mission.items} | rig.endpoint.areas) == repr(model.plans)
             assert repr(rig.table.values()) == repr(model.values)
-    # what is stored is what holds
+    # what is stored is what is in force
     stored, values = plans | {}, {}
     for event in rig.events:
         match event:
@@ -322,7 +323,7 @@ def test_what_changes_is_what_a_model_says(rig_with, items, turns, result):
     key=st.sampled_from([None, bytes(range(1, 33))]),
 )
 def test_with_a_key_no_service_hears_what_is_not_signed_with_it(rig_with, items, steps, key):
-    """Unsigned or signed with another key: no answer, no request, no change, no link but by a HEARTBEAT."""
+    """Unsigned or signed with another key: no answer, no request, no change, a link only by a HEARTBEAT."""
     rig = rig_with(items(3), setup_signing=True)
     rig.send(m.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 0))
     rig.poll()

@@ -24,7 +24,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 
 HOME = Home()
-POSITION, VELOCITY, BOTH = 0x9F8, 0xDC7, 0xDC0  # as MAVSDK sends them, MAVLink's bits
+POSITION, VELOCITY, BOTH = 0x9F8, 0xDC7, 0xDC0  # MAVLink's bits, as MAVSDK sends them
 
 
 def local(frame, mask, x=0.0, y=0.0, z=0.0, vx=0.0, vy=0.0, vz=0.0, a=(0.0, 0.0, 0.0), yaw=0.0, rate=0.0):
@@ -51,7 +51,7 @@ NOTHING = (math.nan,) * 3
         (local(1, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (2.0, 1.0, 3.0), False),
         (local(1, BOTH, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0), (2.0, 1.0, 3.0), (5.0, 4.0, -6.0), False),
         (local(7, POSITION, 1.0, 2.0, -3.0), (2.0, 1.0, 3.0), NOTHING, True),
-        # of the nose: forward, left, up
+        # axes of the nose: forward, left, up
         (local(8, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (1.0, -2.0, 3.0), True),
         (local(9, POSITION, 1.0, 2.0, -3.0), (1.0, -2.0, 3.0), NOTHING, True),
         # north and down ignored
@@ -118,7 +118,7 @@ def test_an_acceleration_alone_is_followed():
     [
         (0x9F8, 0.0, 9.0, 0.5 * math.pi, math.nan),  # north
         (0x9F8, 0.5 * math.pi, 9.0, 0.0, math.nan),  # east
-        (0x9F8, math.nan, 9.0, math.nan, math.nan),  # MAVSDK: as it is
+        (0x9F8, math.nan, 9.0, math.nan, math.nan),  # MAVSDK: the heading is kept
         (0x5F8, 9.0, 0.3, math.nan, -0.3),  # clockwise
         (0x1F8, math.pi, -0.3, -0.5 * math.pi, 0.3),
         (0xDF8, 9.0, 9.0, math.nan, math.nan),
@@ -154,7 +154,7 @@ def test_body_rates_without_an_attitude():
 
 def test_an_attitude_is_its_thrust_axis():
     half = math.radians(5.0)
-    # nose down by 10 deg with the nose north: leans north
+    # pitched down by 10 deg with the nose to the north: leans north
     pitched = read_attitude(attitude((math.cos(half), 0.0, -math.sin(half), 0.0), 0.6))
     assert isinstance(pitched, FollowAttitude)
     assert same(pitched.upward, (0.0, math.sin(2 * half), math.cos(2 * half)))

@@ -1,4 +1,4 @@
-"""Who the vehicle says it is, read back by pymavlink's own tables."""
+"""The identity that the vehicle reports, read back by pymavlink's own tables."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_modes_told_are_those_that_are_flown(flavour):
         mode = flavour.mode_of_number(one.custom_mode)
         assert mode is not None
         pairs.add(mode.pair)
-    # take-off has no number of its own with ArduPilot, and OFFBOARD is GUIDED
+    # with ArduPilot, take-off has no separate number, and OFFBOARD is GUIDED
     hidden = {(AUTO, AUTO_TAKEOFF), (OFFBOARD, 0)} if flavour is ARDUPILOT else set()
     assert pairs == set(FLOWN) - hidden
 

@@ -1,4 +1,4 @@
-"""The last texts of the vehicle, told again to who asks."""
+"""The last texts of the vehicle, sent again to a client that requests them."""
 
 from __future__ import annotations
 

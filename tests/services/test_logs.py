@@ -1,4 +1,4 @@
-"""The LOG_ messages: list, download in any order and with losses, erase; whatever is asked."""
+"""The LOG_ messages: list, download in any order and with losses, erase; any requests."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Rig:
         return self._messages(self.service.poll(self.now_us))
 
     def run(self) -> list[Any]:
-        """All that is still to come."""
+        """All messages still to come."""
         messages = []
         while self.service.next_timer() != NEVER_US:
             messages += self.poll()

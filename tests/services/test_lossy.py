@@ -1,4 +1,4 @@
-"""A hundred items over a bad line: a fifth of the datagrams lost, doubled or late, each way."""
+"""A hundred items over a bad line: each way it loses, doubles and delays a fifth of the datagrams each."""
 
 from __future__ import annotations
 

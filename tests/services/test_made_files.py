@@ -54,7 +54,7 @@ def test_every_parameter_is_described() -> None:
 
 
 def test_they_are_made_again_once_a_parameter_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many clients that read them take no time from the loop."""
+    """And only then, so that many clients that read them take no time from the loop."""
     table = autopilot_parameters(load_vehicle("bebop"))
     files, described = made(table), []
     describe = table.describe

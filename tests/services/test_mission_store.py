@@ -1,4 +1,4 @@
-"""A mission on disk: what was written is read, anything else is a reason and no mission."""
+"""A mission on disk: what was written is read; anything else gives a reason and no mission."""
 
 from __future__ import annotations
 

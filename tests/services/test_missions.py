@@ -1,4 +1,4 @@
-"""Mission transfer step by step on fake time: what MAVSDK tests of its client, seen from the vehicle."""
+"""Mission transfer step by step on fake time: what MAVSDK tests in its client, seen from the vehicle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
 
 
 def said(messages: list[Any]) -> list[tuple[str, int]]:
-    """(type, seq or result) of the mission messages among what the vehicle said."""
+    """(type, seq or result) of the mission messages among those that the vehicle sent."""
     pick = {ACK: "type", INT: "seq", REQUEST: "seq", "MISSION_COUNT": "count", "MISSION_ITEM_INT": "seq"}
     return [(x.get_type(), getattr(x, pick[x.get_type()])) for x in messages if x.get_type() in pick]
 
@@ -35,7 +35,7 @@ def silence(rig, duration_us: int, link: str = "gcs") -> list[tuple[str, int]]:
 
 
 def upload(rig, items, as_message, **origin) -> list[tuple[str, int]]:
-    """A whole upload without any trouble; what was said last."""
+    """Make a whole upload without any trouble; return the last answers."""
     answers = said(rig.replies(count(len(items)), **origin))
     for seq, item in enumerate(items):
         assert answers == [(INT, seq)]
@@ -110,11 +110,11 @@ def test_the_last_ack_is_repeated_where_messages_are_lost(rig, items, as_message
     sent = items(2)
     rig.send(count(2))
     rig.send(as_message(0, sent[0]))
-    silence(rig, 3 * ASK_US // 2)  # item 1 is asked for twice
+    silence(rig, 3 * ASK_US // 2)  # item 1 is requested twice
     accepted = (ACK, m.MAV_MISSION_ACCEPTED)
     assert said(rig.replies(as_message(1, sent[1])))[-1] == accepted
     assert silence(rig, 10 * ECHO_US) == [accepted] * ECHOES
-    # what the peer does next shows that it knows
+    # the peer's next request shows that it received the acknowledgement
     rig.send(count(2))
     rig.send(as_message(0, sent[0]))
     silence(rig, 3 * ASK_US // 2)
@@ -339,7 +339,7 @@ def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_
     assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 1)]
     answers = rig.replies(m.MAVLink_mission_request_int_message(1, 1, 0))
     (home,) = [as_item(x) for x in answers if x.get_type() == "MISSION_ITEM_INT"]
-    # what is uploaded behind it is the mission, and home is not flown to
+    # what is uploaded after it is the mission, and home is not flown to
     sent = (home, *items(2))
     assert upload(rig, sent, as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
     assert rig.endpoint.mission.items == sent
@@ -351,7 +351,7 @@ def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_
 def test_the_home_of_a_file_is_the_vehicles_own_for_clients_of_ardupilot(
     rig_with, items, as_message, current
 ):
-    """Its height above the sea, or its place, would be flown to: of another home it is a waypoint."""
+    """Another home would be a waypoint: the vehicle would fly to its place and its height above the sea."""
     rig = rig_with(identity=Identity(flavour=ARDUPILOT))
     canberra = WireItem(0, 16, current, 1, 0.0, 0.0, 0.0, 0.0, -353632620, 1491652370, 584.0)
     assert upload(rig, (canberra, *items(2)), as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
@@ -371,7 +371,7 @@ def test_an_item_that_is_not_there(rig_with, items, ask):
     assert said(rig.replies(ask(1, 1, 2))) == [(ACK, m.MAV_MISSION_INVALID_SEQUENCE)]
 
 
-# ---- clients that know floats only
+# ---- clients that use floats only
 
 
 def float_message(seq: int, item: WireItem) -> Any:
@@ -472,7 +472,7 @@ def test_a_plan_has_a_number_that_tells_its_versions_apart(rig, items, as_messag
         assert answers[-1].opaque_id != 0
         assert numbers() == (answers[-1].opaque_id,) * 2
         seen.add(answers[-1].opaque_id)
-    assert len(seen) == 2  # equal plans have equal numbers, and so after a restart
+    assert len(seen) == 2  # equal plans have equal numbers, also after a restart
     (cleared,) = rig.replies(m.MAVLink_mission_clear_all_message(1, 1))
     assert cleared.opaque_id == 0
     assert numbers() == (0, 0)

@@ -1,4 +1,4 @@
-"""The modes that `gcs` asks for are those that the vehicle hears, whatever identity it has."""
+"""The modes that `gcs` requests are those that the vehicle receives, whatever its identity."""
 
 from __future__ import annotations
 

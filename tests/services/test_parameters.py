@@ -1,4 +1,4 @@
-"""The parameter protocol, with a ground station that misses what it likes."""
+"""The parameter protocol, with a ground station that misses any messages."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_a_list_begins_with_the_hash_that_px4_would_send(rig):
 
 
 def test_the_hash_is_that_of_the_values_in_force_to_the_bit(rig):
-    # hundreds of values, so that some are signalling NaN: a passage through a float would change them
+    # hundreds of values, so that some hashes are signalling NaN, which conversion to a float would change
     seen = set()
     for step in range(600):
         rig.table.set("LOAD_MASS", 0.1 + step * 1e-4)
@@ -293,7 +293,7 @@ def test_nothing_is_set_in_a_simulator_that_is_silent(rig):
 
 
 def test_a_list_waits_until_the_table_is_complete(rig):
-    """A client that fetches while parameters are learned would keep those of the first count."""
+    """A client that fetches it while parameters are being added would keep only those of the first count."""
     rig.endpoint.expect_parameters()
     rig.send(m.MAVLink_param_request_list_message(1, 1))
     assert not [r for r in rig.run(500_000) if r.message.get_type() == "PARAM_VALUE"]

@@ -1,4 +1,4 @@
-"""A vehicle with a signing key: who is heard, how its own frames leave, and what is stored."""
+"""A vehicle with a signing key: whose messages it accepts, how it signs its own, and what is stored."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HEARTBEAT = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 
 @pytest.fixture
 def signed(rig: Any) -> Any:
-    """The rig with a key from the start; `rig.endpoint` is another one."""
+    """The rig with a key from the start, in a new `rig.endpoint`."""
     rig.endpoint = VehicleEndpoint(
         Identity(), Home(), rig.table, signing=Signing(KEY, BOOT), boot_unix_us=BOOT_US
     )
@@ -95,7 +95,7 @@ def changes(rig: Any) -> list[SigningChanged]:
 
 @pytest.fixture
 def open_to_all(rig: Any) -> Any:
-    """The rig with a vehicle that takes a first key from whoever sends one."""
+    """The rig with a vehicle that accepts a first key from any sender."""
     rig.endpoint = VehicleEndpoint(Identity(), Home(), rig.table, boot_unix_us=BOOT_US, setup_signing=True)
     rig.endpoint.add_link("gcs")
     return rig

@@ -1,4 +1,4 @@
-"""Streams written in machine code against those that the general writer makes of the same instant."""
+"""Streams written in machine code, compared with those that the general writer makes of the same instant."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing
 from tests.services.conftest import make_table
 
-HOME = Home(-33.5, 179.9999, 120.0)  # where degrees of longitude end
+HOME = Home(-33.5, 179.9999, 120.0)  # beside the date line
 ALL = sum(BITS.values())
 KINDS = [get_type_hints(Instant)[name] for name in Instant._fields]
 ROTORS = sum(width(kind) for kind in KINDS[: Instant._fields.index("rotors")])
 
 
 def row_of(rng: np.random.Generator, hostile: bool) -> Any:
-    """A packed instant; `hostile`: of numbers that no float32 holds as well, infinite ones and NaN."""
+    """A packed instant; `hostile`: also with numbers beyond float32, infinite ones and NaN."""
     row = rng.normal(size=width(Instant))
     if hostile:
         row *= 10.0 ** rng.integers(-50, 60, size=len(row))
@@ -61,7 +61,7 @@ def made_one_by_one(streams: int, said: Instant, writers: dict[int, FrameWriter]
 
 
 def numbers(datagram: bytes) -> list[tuple[int, int, int, list[Any]]]:
-    """(sequence, component, id, fields) of each frame, a NaN as a word: NaN of either sign is one."""
+    """(sequence, component, id, fields) of each frame, NaN as a word: the sign of a NaN does not count."""
     received, junk = decode(datagram)
     assert junk == 0
     found = []
@@ -95,7 +95,7 @@ def test_they_stand_in_the_order_of_the_streams() -> None:
 
 
 class _Heard:
-    """An endpoint with one link and instants at hand, and what a ground station hears of it."""
+    """An endpoint with one link and given instants, and what a ground station receives from it."""
 
     def __init__(self, by_kernel: bool, snap: Any, signing: Signing | None = None) -> None:
         self.endpoint = VehicleEndpoint(Identity(), Home(), make_table(), signing=signing)
@@ -121,7 +121,7 @@ class _Heard:
 
 
 def test_a_link_hears_the_same_by_either_way(snap: Any) -> None:
-    """With other rates from a moment on, answers between the streams, and datagrams that are full."""
+    """With rates that change on the way, answers between the streams, and full datagrams."""
     said = []
     for by_kernel in (False, True):
         heard = _Heard(by_kernel, snap)
@@ -137,7 +137,7 @@ def test_a_link_hears_the_same_by_either_way(snap: Any) -> None:
         said.append(datagrams)
     assert said[0] == said[1]
     assert max(len(datagram) for tick in said[1] for datagram in tick) <= DATAGRAM_BYTES
-    assert max(map(len, said[1])) > 1  # full ones
+    assert max(map(len, said[1])) > 1  # full datagrams
     heard_of = Counter(one.id for tick in said[1] for datagram in tick for one in decode(datagram)[0])
     assert all(heard_of[key] > 300 for key in BITS)
 

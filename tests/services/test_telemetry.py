@@ -1,4 +1,4 @@
-"""Every stream is built, from any numbers, and says in NED and FRD what the snapshot says in ENU and FLU."""
+"""Every stream is built from any numbers, and states in NED and FRD what the snapshot has in ENU and FLU."""
 
 from __future__ import annotations
 

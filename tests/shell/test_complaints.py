@@ -1,4 +1,4 @@
-"""What is wrong on the command line of `sitl` or `autopilot` ends with 2, and a line for each thing."""
+"""An error on the command line of `sitl` or `autopilot` ends it with 2, and a line for each error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ load_mass_kg = "heavy"
 
 @pytest.fixture
 def invoke(tmp_path: Path):
-    """Run a program, which is not to come so far as to look for the other one."""
+    """Run a program, which must end before it looks for the other one."""
     places = {"sitl": ["--listen", str(free_port())], "autopilot": ["--storage", str(tmp_path / "storage")]}
 
     def invoke(program: click.Command, *words: str):

@@ -1,4 +1,4 @@
-"""The sockets towards ground stations: a flood must not stop the clock, and everybody has a turn."""
+"""The sockets towards ground stations: a flood must not stop the clock, and each link has a turn."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.parameter_table import ParameterTable
 from gcs.shell.link import LOOPBACK, free_port
 
-SLOW_S = 1e-3  # for one message: longer than there is for all
-HEARS_S = 0.1  # what was sent arrives within
-MOST_TICKS = 50  # until what had to wait for a later tick is sent
-MOST_READ = 2048  # bytes at a time, of a datagram or of a client by TCP
+SLOW_S = 1e-3  # for one message: more than a tick has for all
+HEARS_S = 0.1  # within which a datagram arrives
+MOST_TICKS = 50  # until a datagram that had to wait for a later tick is sent
+MOST_READ = 2048  # bytes read at a time, from a datagram or a TCP client
 LONGEST = 65_507  # bytes that a datagram can have
 
 
@@ -48,7 +48,7 @@ def pings(first: int, count: int) -> bytes:
 
 
 class Slow:
-    """An onboard that takes its time with each datagram."""
+    """An onboard software that is slow with each datagram."""
 
     def __init__(self) -> None:
         self.now_us = 0
@@ -89,7 +89,7 @@ class Ground:
         self.theirs = [self.address_towards(peer) for peer in self.peers]
 
     def address_towards(self, peer: socket.socket) -> tuple[str, int]:
-        """Where a peer hears us from; what a tick has no time for is sent by a later one."""
+        """The address from which a peer hears us; what a tick has no time for is sent by a later one."""
         for _ in range(MOST_TICKS):
             self.exchange()
             with suppress(TimeoutError):
@@ -101,7 +101,7 @@ class Ground:
         self.stations.exchange(self.onboard, lambda events: None, StopRequest())
 
     def connect(self) -> socket.socket:
-        """A client by TCP, accepted or refused."""
+        """A TCP client, accepted or refused."""
         client = socket.create_connection(self.address, 5.0)
         self.exchange()
         return client
@@ -174,7 +174,7 @@ def test_a_client_by_tcp_is_read_2_kb_at_a_time(ground: Callable[[], Ground]) ->
 
 
 class Searching:
-    """An onboard that is its endpoint alone; it counts the checksums that were computed of what it hears."""
+    """An onboard software that is only its endpoint; it counts the checksums computed of what it receives."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_us, self.checksums = 0, 0
@@ -200,7 +200,7 @@ class Searching:
 def test_a_whole_datagram_of_begins_of_frames_is_soon_given_up(
     ground: Callable[[], Ground], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each 0xFE may begin a frame, whose checksum is then computed: twice for one."""
+    """Each 0xFE may begin a frame, whose checksum is then computed: twice for each."""
     autopilot = ground()
     searching: Any = Searching(monkeypatch)
     autopilot.onboard = searching

@@ -1,4 +1,4 @@
-"""The ground station that shares the clock: what it is told in a window, and when it is waited for."""
+"""The ground station that shares the clock: what it receives in a window, and when it is waited for."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TICK_US, WINDOW_US = 4_000, 20_000
 
 
 class Vehicle:
-    """An onboard software that says its time at each tick, and asks at the first of each window."""
+    """An onboard software that sends its time at each tick, and a question at the first of each window."""
 
     def __init__(self) -> None:
         self.now_us = 0
@@ -48,7 +48,7 @@ class Waits(Exception):
 
 
 class NoPatience:
-    """Raises where the vehicle has looked so often whether it should stop: it waits in vain."""
+    """Raises when the vehicle has checked this often whether it should stop: it waits in vain."""
 
     def __init__(self, looks: int) -> None:
         self.looks = looks
@@ -71,7 +71,7 @@ class Rig:
         self.step.join(self.vehicle)
         self.writer = FrameWriter(255, 190)
         with pytest.raises(Waits):
-            self.tick(looks=1)  # and tells the ground where it is
+            self.tick(looks=1)  # the datagram tells the ground the vehicle's address
         self.address = self.ground.recvfrom(65535)[1]
         assert [m.get_type() for m in self.told()] == ["TIMESYNC"], "what is not answered is asked again"
 
@@ -79,7 +79,7 @@ class Rig:
         self.ground.sendto(self.writer.frame(message), self.address)
 
     def waits(self, time_us: int) -> None:
-        """It waits at this time, whatever it gets that is no answer."""
+        """Check that the vehicle waits at this time, whatever it receives that is no answer."""
         for _ in range(9):
             self.ground.sendto(b"no answer", self.address)
         with pytest.raises(Waits):
@@ -123,7 +123,7 @@ def test_a_window_is_one_datagram_that_ends_with_the_question(rig: Rig) -> None:
 def test_who_promises_silence_is_not_waited_for_until_it_is_over(rig: Rig) -> None:
     rig.answer(0, 60_000_000)
     rig.ticks_to(60_000)
-    for time_us in (20_000, 40_000):  # these come late, and nobody waits for them
+    for time_us in (20_000, 40_000):  # these come late, and the vehicle does not wait for them
         rig.answer(time_us, 60_000_000)
     rig.waits(60_000)
     rig.say(mavlink.MAVLink_system_time_message(0, 7))
@@ -175,8 +175,8 @@ def test_it_can_be_stopped_while_it_waits(rig: Rig) -> None:
 
 
 def test_one_that_is_silent_for_long_ends_the_program(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where it was stopped (SIGSTOP), or is gone without a word: the clock has waited for it meanwhile."""
-    ticking = count(0.0, 2.0)  # s of the monotonic clock, which each look takes
+    """As when it was stopped (SIGSTOP), or ended without notice: the clock has waited for it meanwhile."""
+    ticking = count(0.0, 2.0)  # s of the monotonic clock, which advances at each look
     monkeypatch.setattr(time, "monotonic", lambda: next(ticking))
     with pytest.raises(AutopilotError, match="the ground station was silent for 30 s; stopping"):
         rig.tick(looks=40)

@@ -1,4 +1,4 @@
-"""The process that prepares paths: it answers, gives up what is of no use any more, and its death is told."""
+"""The process that prepares paths: it answers, gives up useless work, and its death is reported."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from autopilot.trajectory.prepare import Prepared
 from missions.model import Waypoint
 from tests.doubles.craft import Craft
 
-LIMIT_S = 600.0  # for what takes a second on an idle machine, and may get a hundredth of a busy one
+LIMIT_S = 600.0  # for work that takes a second on an idle machine, and may get a hundredth of a busy one
 
 
 class Waiting:
-    """What `Aside` knows of the autopilot, with work to be done."""
+    """What `Aside` uses of the autopilot, with work to be done."""
 
     def __init__(self, phase: Phase = Phase.HOLD) -> None:
         self.phase = phase
@@ -71,7 +71,7 @@ def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
 
 
 def test_one_that_branched_off_does_the_same(aside: Aside, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("threading.active_count", lambda: 1)  # those of the tests hold no lock of ours
+    monkeypatch.setattr("threading.active_count", lambda: 1)  # the threads of the tests hold no lock of ours
     onboard = Waiting()
     aside.branch_off()
     (process,) = multiprocessing.active_children()

@@ -35,7 +35,7 @@ ON, NOT_TAKEN = (
 
 @pytest.fixture
 def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Craft]]:
-    """`autopilot` with these options, in a world where its ground station hears it."""
+    """Start `autopilot` with these options; return a craft with it, whose ground station receives from it."""
     found: list[Onboard] = []
 
     class Begun(program.Program):
@@ -59,7 +59,7 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
 
 def keep_fence(folder: Path, damaged: bool) -> Path:
-    """A stored fence around home; its file."""
+    """Store a fence around home; return its file."""
     Storage(folder).keep_areas(FENCE, TRIANGLE)
     path = folder / "fence.bin"
     whole = path.read_bytes()
@@ -72,7 +72,7 @@ def test_a_damaged_file_is_told_to_the_operators(started: Callable[..., Craft], 
     parameters.write_bytes(b"rubbish")
     craft = started()
     craft.wait(1.0)
-    told = "".join(craft.texts)  # a long one comes in parts
+    told = "".join(craft.texts)  # a long text comes in parts
     assert f"Storage: {parameters}: it has no checksum; starting with the defaults" in told
     assert f"Storage: {fence}: " in told and told.endswith("; starting without it")
     severities = {x.severity for x in craft.heard if x.get_type() == "STATUSTEXT"}

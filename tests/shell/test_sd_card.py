@@ -1,7 +1,7 @@
-"""The card when the process is killed: what is being written may be there in part, all else is untouched.
+"""The card when the process is killed: a file being written may be incomplete, all else is untouched.
 
-A file that a client makes anew is emptied first, as it asked; it is put together on the card, where others
-may read what is there of it. What was acknowledged is there.
+A file that a client overwrites is emptied first, as requested; it is assembled on the card, where others
+may read the part that is already there. What was acknowledged is there.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ Files = dict[str, bytes]
 
 
 class Change(NamedTuple):
-    """What is done, and what may be found on the card meanwhile, in this order."""
+    """A change, and the states of the card that may be found meanwhile, in this order."""
 
     make: Callable[[Storage], object]
     found: list[Files]
 
 
 def but(**changes: bytes | None) -> Files:
-    """The card as it was but for these files; None: it is not there. `log_3` is that log."""
+    """The card as it was except for these files; None: the file is missing. `log_3` is that log."""
     named = {name.replace("log_", "log/") + ".ulg" * ("_" in name): data for name, data in changes.items()}
     return {name: data for name, data in (BEFORE | named).items() if data is not None}
 
 
 def parts(before: bytes = b"", behind: bytes = b"") -> list[bytes]:
-    """What stands in a file while `NEW` is written there, over what is as long."""
+    """The contents of a file while `NEW` is written there, over a part of the same length."""
     return [before + NEW[:size] + behind[size:] for size in range(len(NEW) + 1)]
 
 
 def upload(storage: Storage, name: bytes) -> None:
-    """As a client puts a file there, in two parts."""
+    """Upload a file as a client does, in two parts."""
     tree = FileTree(storage.card, {})
     file = tree.open_to_write(b"/fs/microsd/" + name, empty=True)
     tree.write(file, 0, NEW[:5])

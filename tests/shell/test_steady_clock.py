@@ -1,4 +1,4 @@
-"""A wall clock that is set, by hours, while the autopilot flies: nothing of it is noticed."""
+"""A wall clock that is set by hours while the autopilot flies: this has no effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What outlives the process: missions and parameters come back, and a bad file is said and set aside."""
+"""What outlives the process: missions and parameters come back, and a bad file is reported and set aside."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_logs_are_stored_in_parts_and_the_oldest_make_room(tmp_path: Path) -> No
         path = ("log", f"{name}.ulg")
         storage.keep_log(LogChunk(path, bytes(600_000), False), 1.0)
         storage.keep_log(LogChunk(path, b"end", True), 1.0)
-    # room is made when a log begins: what was there before it is no more than a megabyte
+    # room is made when a log begins: the logs before it are no more than a megabyte
     assert sorted(log.name for log in folder.iterdir()) == ["b.ulg", "c.ulg"]
     assert (folder / "c.ulg").read_bytes() == bytes(600_000) + b"end"
 
@@ -241,7 +241,7 @@ def test_a_directory_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
     storage.keep_parameter("NGC_KX", 5.0)
-    (tmp_path / "parameters.new").mkdir()  # as good as a full or read-only disk, also for root
+    (tmp_path / "parameters.new").mkdir()  # has the effect of a full or read-only disk, also for root
     with pytest.raises(OSError, match=r"parameters\.new"):
         storage.keep_parameter("NGC_KX", 7.0)
     again = table()

@@ -1,4 +1,4 @@
-"""Storing aside: in order, told when it is done, and what is said to the ground waits for it."""
+"""Storing in a thread: in order, reported when it is done, and messages to the ground wait for it."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def test_where_the_clock_waits_it_is_done_at_once() -> None:
 def test_the_loop_does_not_wait_for_a_disk_and_the_ground_does(
     aside: Storing, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A disk that takes its time: ticks go on, and no answer leaves before what it tells of is stored."""
-    monkeypatch.setattr(time, "perf_counter", lambda: 0.0)  # a tick has time to send all, however busy we are
+    """With a slow disk, ticks continue, and no answer is sent before what it reports is stored."""
+    monkeypatch.setattr(time, "perf_counter", lambda: 0.0)  # a tick has time to send all, on any machine
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(LISTENER)
         listener.setblocking(False)

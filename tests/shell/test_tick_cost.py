@@ -17,7 +17,7 @@ def test_the_whole_run_in_a_line() -> None:
 def test_only_work_between_two_ticks_counts() -> None:
     cost = TickCost()
     cost.tick(0)
-    cost.tick(0)  # how long a tick lasts is not known yet
+    cost.tick(0)  # the length of a tick is not known yet
     cost.pause()
     cost.tick(4000)
     assert cost.summary() == ""

@@ -1,4 +1,4 @@
-"""Ticks of the autopilot without Python: the same bytes as with it, and what they end at."""
+"""Ticks of the autopilot without Python: the same bytes as with it, and what ends them."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ pytestmark = pytest.mark.skipif(
 )
 TICK_US = 4000
 GROUND = "ground"
-IN_FLIGHT = 2503  # ticks, when the vehicle hovers, and the next says nothing out of the way
-ALWAYS = Questions(NEVER_US, NEVER_US, 4, (b"",))  # may be asked
+IN_FLIGHT = 2503  # ticks, after which the vehicle hovers, and the next tick sends nothing special
+ALWAYS = Questions(NEVER_US, NEVER_US, 4, (b"",))  # questions are allowed
 
 
 class Said(NamedTuple):
-    """What came and went at a tick."""
+    """What was received and sent at a tick."""
 
     sensors: bytes
     answer: bytes
@@ -97,7 +97,7 @@ class Rig:
         self.flight = flight[IN_FLIGHT:]
 
     def heard(self) -> list[bytes]:
-        """What has come to the ground station, datagram by datagram."""
+        """What has arrived at the ground station, datagram by datagram."""
         return drain(self.ground)
 
     def close(self) -> None:
@@ -156,7 +156,7 @@ def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
 
 
 def told_in_python(onboard: Onboard, said: Said, before: bytes) -> list[bytes]:
-    """The window that is open, of which `before` was said already, and the next if this tick ends it."""
+    """The open window, which so far holds `before`, and the next one if this tick ends it."""
     told = [datagram for _, datagram in onboard.ground_datagrams()]
     question = onboard.question(GROUND)
     assert b"".join([*told, question or b""]) == said.told
@@ -164,7 +164,7 @@ def told_in_python(onboard: Onboard, said: Said, before: bytes) -> list[bytes]:
 
 
 def drain(sock: socket.socket) -> list[bytes]:
-    """What has come and was not looked at."""
+    """The datagrams that have arrived and were not read."""
     come = []
     with suppress(BlockingIOError):
         while True:

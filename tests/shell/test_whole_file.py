@@ -154,7 +154,7 @@ def test_a_process_killed_at_any_system_call_leaves_the_old_or_the_new(tmp_path:
     assert not list(tmp_path.glob("*.corrupt*"))
 
 
-# what is stored, and read and replaced; and what a start finds of a damaged one, for as long as it is there
+# stored files, and how each is read and replaced; a start finds a damaged one for as long as it is there
 REPLACED = {
     "mission.bin": lambda storage: storage.load_mission(HOME),
     "fence.bin": lambda storage: (storage.load_areas(HOME), storage.keep_areas(FENCE, fence(30.0))),

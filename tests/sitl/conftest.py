@@ -30,7 +30,8 @@ class Measurement(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What leaves the sensors at one tick, in the order of the world's rows; nothing new: an empty tuple."""
+    """The readings that leave the sensors at one tick, in the order of the world's rows; an empty tuple where
+    none does."""
 
     imu: tuple[Measurement, ...]
     mocap: tuple[Measurement, ...]
@@ -99,7 +100,7 @@ def core_in_the_air() -> Callable[..., SimCore]:
 
 
 class Answerer:
-    """The autopilot's end of the link, with the same forces for ever."""
+    """The autopilot's end of the link, which always commands the same forces."""
 
     def __init__(self, forces: Forces = (1.0, 1.0, 1.0, 1.0), system: int = 1) -> None:
         self.forces = forces
@@ -110,7 +111,7 @@ class Answerer:
         return self.writer.frame(message)
 
     def fly(self, simulator: HilSimulator, ticks: int) -> list[bytes]:
-        """All datagrams of so many ticks, truth before sensors."""
+        """All datagrams of this number of ticks, truth before sensors."""
         sent = []
         for _ in range(ticks):
             truth = simulator.truth_datagram()
@@ -129,7 +130,7 @@ def answerer() -> type[Answerer]:
 
 @pytest.fixture
 def messages() -> Callable[[bytes], list[Any]]:
-    """The messages of a datagram that holds nothing but whole frames."""
+    """The messages of a datagram that holds only whole frames."""
 
     def read(datagram: bytes) -> list[Any]:
         received, junk = decode(datagram)

@@ -1,4 +1,4 @@
-"""When readings come: late by a time of their own, past each other, dated by a clock that is off."""
+"""When readings arrive: each with its own delay, out of order, dated by a clock that is off."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_a_rebooted_parameter_of_lateness_reaches_all_that_carries_a_time(core) 
     assert times["cable_sensor"] != sorted(times["cable_sensor"])
     assert max(late["gnss"]) > 130_000 > min(late["gnss"])
     assert times["barometer"] == sorted(times["barometer"])
-    assert max(late["barometer"]) < 14_000  # latency and a tick: it hangs on the autopilot's own wires
+    assert max(late["barometer"]) < 14_000  # latency and a tick: it is wired to the autopilot itself
 
 
 def test_the_autopilots_inbox_takes_them_all_as_they_come(answerer) -> None:
@@ -116,7 +116,7 @@ def test_the_autopilots_inbox_takes_them_all_as_they_come(answerer) -> None:
         assert tick is not None
         rows = inbox.rows[: tick.readings]
         poses = rows[rows[:, KIND] == POSE]
-        # refused is what is of the future, or older than the estimator's memory
+        # a reading is refused if it is of the future, or older than the estimator's memory
         assert all(np.isfinite(age_of(row, simulator.now_us, 0.0)) for row in poses)
         taken += poses[:, SHOWS].astype(int).tolist()
         answerer().fly(simulator, 1)

@@ -1,4 +1,4 @@
-"""The simulator's end of the link: bytes in, bytes out, the same every time, and nothing harms it."""
+"""The simulator's end of the link: bytes in, bytes out, the same every time, and no input harms it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     assert pose.position == pytest.approx(state.x_quad, abs=FLOAT32_M)
     assert pose.velocity == pytest.approx(state.v_quad, abs=FLOAT32_M)
     assert pose.omega_body == pytest.approx(state.omega_body, abs=FLOAT32_M)
-    assert pose.position_std == pytest.approx(1e-4)  # stated although there is none
+    assert pose.position_std == pytest.approx(1e-4)  # stated although there is no noise
     tracked = read_load_sensor(load)
     assert tracked.position == pytest.approx(state.x_load, abs=FLOAT32_M)
     assert tracked.velocity == pytest.approx(state.v_load, abs=FLOAT32_M)
@@ -268,7 +268,7 @@ def test_real_time_counts_missed_commands_and_uses_late_ones(answerer) -> None:
     simulator.advance()
     assert simulator.missed == 3
     assert simulator.core.command == pytest.approx((0.6,) * 4)
-    assert not simulator.receive(pilot.answer(late - 4000, (0.9,) * 4))  # older than what is known
+    assert not simulator.receive(pilot.answer(late - 4000, (0.9,) * 4))  # older than the last answer
     assert not simulator.receive(pilot.answer(simulator.now_us + 4000, (0.9,) * 4))
     simulator.advance()
     assert simulator.core.command == pytest.approx((0.6,) * 4)
@@ -285,7 +285,7 @@ def test_real_time_rotors_stop_when_commands_stay_away(answerer) -> None:
 
 
 def told_winds(simulator: HilSimulator, answerer, messages, ticks: int) -> list[tuple]:
-    """Time (us), mean and pulse (ENU) of every WIND_STATE of so many ticks."""
+    """Time (us), mean and pulse (ENU) of every WIND_STATE of this number of ticks."""
     winds = []
     for datagram in answerer().fly(simulator, ticks):
         for message in messages(datagram):
@@ -300,7 +300,7 @@ def test_a_gust_is_told_with_the_ticks_of_its_edges(answerer, messages) -> None:
     calm, blown = (0.0, 0.0, 0.0), (0.0, 5.0, 0.0)
     assert {wind for _, wind, _ in winds} == {(3.0, 0.0, 0.0)}
     expected = {0: calm, 500: blown, 752: calm}
-    # 750 ms is no tick: the first that is not before it is at 752 ms
+    # 750 ms is no tick: the next one is at 752 ms
     assert [(time_us // 1000, gust) for time_us, _, gust in winds] == list(expected.items())
 
 
@@ -313,7 +313,7 @@ def test_another_mean_wind_is_told_at_once(answerer, messages) -> None:
 
 
 def set_parameter(simulator: HilSimulator, answerer, name: str, value: float) -> None:
-    """PARAM_SET beside the answer to the present tick."""
+    """Send PARAM_SET together with the answer to the present tick."""
     pilot = answerer()
     message = mavlink.MAVLink_param_set_message(1, 26, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32)
     assert simulator.receive(pilot.answer(simulator.now_us) + pilot.writer.frame(message))
@@ -341,7 +341,7 @@ def test_a_gust_of_the_past_does_nothing(answerer, messages) -> None:
     winds = told_winds(simulator, answerer, messages, 200)
     assert winds
     assert {gust for _, _, gust in winds} == {(0.0, 0.0, 0.0)}
-    set_parameter(simulator, answerer, "SIM_GUST_AT_S", 1.4)  # the future is not the past
+    set_parameter(simulator, answerer, "SIM_GUST_AT_S", 1.4)  # a time in the future takes effect
     assert (4.0, 0.0, 0.0) in {gust for _, _, gust in told_winds(simulator, answerer, messages, 100)}
 
 
@@ -371,7 +371,7 @@ def test_a_reboot_begins_anew_with_the_parameters_in_force(answerer, messages) -
     assert simulator.now_us == 0
 
     def told(datagrams: list[bytes]) -> tuple[list[str], set[int]]:
-        """All without sequence numbers but the number of the run, and that."""
+        """All messages without sequence numbers, except the number of the run; and that number."""
         found = [message for datagram in datagrams for message in messages(datagram)]
         rest = [str(message) for message in found if message.get_type() != "SIM_BOOT"]
         return rest, {message.boot_id for message in found if message.get_type() == "SIM_BOOT"}
@@ -460,7 +460,7 @@ def test_who_comes_is_told_what_the_rotors_do(answerer, messages) -> None:
 
 
 def test_a_battery_is_told_five_times_a_second(answerer, messages) -> None:
-    """Beside the sensors, as a power module does; a vehicle without one says nothing."""
+    """It comes with the sensors, as from a power module; a vehicle without a battery reports nothing."""
     settings_ = {"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 50.0}
     simulator = HilSimulator.build(settings=settings_)
     told = []
@@ -492,7 +492,8 @@ def test_a_sagging_battery_takes_thrust(answerer) -> None:
 
 
 def test_a_snap_beside_the_centre_turns_the_vehicle_and_tells_its_own_impulse(answerer, messages) -> None:
-    """CABLE_SNAP has the mass that the cable feels, less than that of the pair."""
+    """The impulse in CABLE_SNAP follows from the mass that the cable feels, which is less than the reduced
+    mass of vehicle and load."""
     simulator = HilSimulator.build(settings={"SIM_ATT_X": 0.05})
     core, L = simulator.core, simulator.core.truth.cable_length
     core.state = core.state._replace(

@@ -1,4 +1,4 @@
-"""What `sitl` makes of its options: the clock that it keeps to."""
+"""The options of `sitl`: the clock that it keeps to."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOCKSTEP, REAL_TIME = "lockstep", "real time"
 
 @pytest.fixture
 def kept() -> Iterator[None]:
-    """What the program does about signals ends with the test."""
+    """Restore the handlers of signals after the test."""
     before = {number: signal.getsignal(number) for number in stop_signals()}
     yield
     for number, handler in before.items():

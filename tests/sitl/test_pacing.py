@@ -73,13 +73,13 @@ def test_waiting_for_somebody_else_is_not_counted() -> None:
 
 
 class Paced:
-    """A simulator that keeps to a clock, on a machine whose time is told here."""
+    """A simulator that keeps to a clock, on a machine whose time is set here."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, speed: float) -> None:
         self.now_ns = 100 * SECOND
-        self.stopped_s = 0.0  # by which the next sleep lasts longer
+        self.stopped_s = 0.0  # time by which the next sleep lasts longer
         self.said: list[str] = []
-        self.told: list[tuple[str, int]] = []  # to the operators, and how grave it is
+        self.told: list[tuple[str, int]] = []  # texts to the operators, with their severity
         time = SimpleNamespace(sleep=self._sleep, perf_counter_ns=self._perf_counter_ns)
         monkeypatch.setattr(loops, "time", time)
         parameters = SimpleNamespace(say=lambda text, severity: self.told.append((text, severity)))
@@ -96,7 +96,7 @@ class Paced:
         return self.now_ns
 
     def run(self, ticks: int, work_ms: float = 0.0) -> None:
-        """So many ticks, each of which is so much work."""
+        """Run this number of ticks, each with this amount of work."""
         for _ in range(ticks):
             self.now_ns += round(work_ms * 1e6)
             self._clock.wait()

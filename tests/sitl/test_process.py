@@ -1,4 +1,5 @@
-"""The `sitl` program as a process: served, resent, taken over, stopped. Sockets, but no sleeps."""
+"""The `sitl` program as a process: it serves, sends again, changes the autopilot, stops. Sockets, but no
+sleeps."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ class Pilot:
         self.socket.send(self.writer.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)))
 
     def sensors(self, after_us: int = -1) -> tuple[bytes, int]:
-        """The next sensor datagram of a time after `after_us`: on a busy machine one may have come again."""
+        """The next sensor datagram with a time after `after_us`: on a busy machine one may have been sent
+        again."""
         while True:
             datagram = self.socket.recv(65535)
             time_us = decode(datagram)[0][-1].message.time_usec
@@ -87,18 +89,18 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
         if tick == 10:
             Pilot(port).greet()  # another autopilot, started by accident: not while the first one answers
     unanswered, time_us = first.sensors(after_us=time_us)
-    assert first.sensors() == (unanswered, time_us)  # silence: it comes again
+    assert first.sensors() == (unanswered, time_us)  # without an answer it is sent again
 
     first.socket.send(b"\xfd\x00rubbish")
     stranger = Pilot(port)
-    stranger.answer(time_us)  # no heartbeat: not taken for the autopilot
+    stranger.answer(time_us)  # without a heartbeat it is not taken for the autopilot
     assert first.sensors() == (unanswered, time_us)
 
     for _ in range(2):  # sent again after 50, 100, 200 and 400 ms: the first one counts as gone
         assert first.sensors() == (unanswered, time_us)
     second = Pilot(port)  # the autopilot was restarted: served from the present tick
     second.greet()
-    told, again_us = second.sensors()  # and who greets is told which run of the simulator it is
+    told, again_us = second.sensors()  # and it is told which run of the simulator this is
     assert told.endswith(unanswered) and len(told) > len(unanswered) and again_us == time_us
     second.answer(time_us)
     assert second.sensors(after_us=time_us)[1] == time_us + 4000

@@ -8,8 +8,8 @@ import pytest
 from autopilot.wire.parameter_table import ParameterError
 
 G = 9.81
-# Free flight of a point mass is a polynomial of degree two in time, which the integrator gets exactly: what
-# is left are some hundred roundings of numbers of order 50 m.
+# Free flight of a point mass is a polynomial of degree two in time, which the integrator computes exactly:
+# what remains are some hundred roundings of numbers of order 50 m.
 ROUNDING = 1e-11
 FORCES = (2.0, 2.0, 2.0, 2.0)
 
@@ -56,7 +56,7 @@ def test_commands_on_their_way_keep_their_order(core_in_the_air) -> None:
 def test_commands_keep_their_order_where_the_delay_changes_in_flight(
     core_in_the_air, delays_ms: tuple[int, ...]
 ) -> None:
-    """Those on their way get the new delay; none that is in force gives way to an older one."""
+    """Commands on their way get the new delay; a command in force is never replaced by an older one."""
     core = core_in_the_air(SIM_ACT_DELAY_MS=delays_ms[0])
     sent, in_force, expected = [], [], []
     newest = -1
@@ -213,7 +213,7 @@ def test_a_gust_pulse_is_added_from_tick_to_tick(core) -> None:
     for _ in range(10):
         blown.tick(FORCES)
         winds.append(blown.wind)
-    # 10 ms and 30 ms lie between ticks of 4 ms: it blows in those that begin at 12 ... 28 ms
+    # 10 ms and 30 ms lie between ticks of 4 ms: the gust blows in those that begin at 12 ... 28 ms
     assert winds == [(1.0, 0.0, 0.0)] * 3 + [(6.0, 0.0, -2.0)] * 5 + [(1.0, 0.0, 0.0)] * 2
 
 
@@ -238,7 +238,8 @@ def test_rates_that_do_not_divide_are_refused(core, rate: int) -> None:
 
 
 def test_the_gripper_opens_at_its_tick_and_closes_on_a_load_within_reach(core) -> None:
-    """Let go on the ground the load stays there; from afar it is not taken, from near it is."""
+    """A load that is released on the ground stays there; the gripper does not take it from afar, but from
+    near."""
     flown = core(SIM_ACT_DELAY_MS=20.0)
     assert not flown.released
     flown.tick((0.0,) * 4, gripper_open=True)
@@ -256,7 +257,8 @@ def test_the_gripper_opens_at_its_tick_and_closes_on_a_load_within_reach(core) -
 
 
 def test_the_winch_reaches_the_rate_it_is_told_by_the_next_tick(core) -> None:
-    """The length is the integral of a rate that is linear between ticks, whatever sensors cut them."""
+    """The length is the integral of a rate that is linear between ticks, whatever instants of sensors divide
+    them."""
     flown = core(SIM_ACT_DELAY_MS=20.0)
     rates = [0.3 * np.sin(0.02 * k) ** 2 for k in range(150)]
     for rate in rates:

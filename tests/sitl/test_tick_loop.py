@@ -1,4 +1,4 @@
-"""Ticks of the simulator without Python: the same bytes as with it, and what they end at."""
+"""Ticks of the simulator without Python: the same bytes as with it, and where they end."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ LIFTING = (2.0, 2.0, 2.0, 2.0)
 WAIT_S = 0.05  # for a datagram that does not come
 
 
-GUST_US = 200_000  # when a gust begins, which is told
+GUST_US = 200_000  # when a gust begins, which is reported
 GUST = {"SIM_GUST_E": 1.0, "SIM_GUST_AT_S": 1e-6 * GUST_US}
 
 
 class Rig:
-    """A simulator on a socket at tick 1, an autopilot, who hears the truth; and the same world in Python."""
+    """A simulator on a socket at tick 1, an autopilot, a receiver of the truth; and the same world in
+    Python."""
 
     def __init__(self) -> None:
         self.truth, self.autopilot, self.stranger = (self.listener() for _ in range(3))
@@ -43,7 +44,7 @@ class Rig:
         )
         self.loop = TickLoop(self.link, self.simulator)
         self.writer = FrameWriter(1, 1)
-        self.told: list[bytes] = []  # by the twin
+        self.told: list[bytes] = []  # the truth that the twin sent
         for world in (self.simulator, self.twin):
             world.receive(self.answer(0))
             world.advance()
@@ -57,7 +58,7 @@ class Rig:
         return made
 
     def tell(self) -> None:
-        """What the simulator says at this tick before its loop begins."""
+        """Send what the simulator sends at this tick before its loop begins."""
         self.link.gather_truth(self.simulator)
         self.link.send(self.simulator.sensor_datagram())
 
@@ -70,7 +71,7 @@ class Rig:
             self.autopilot.sendto(datagram, self.link.address)
 
     def step_twin(self) -> bytes:
-        """The twin's next tick: its truth is noted, its sensors come back."""
+        """The twin's next tick: its truth is stored, its sensors are returned."""
         self.twin.receive(self.answer(self.twin.now_us))
         self.twin.advance()
         self.told.append(self.twin.truth_datagram() or b"")

@@ -1,4 +1,4 @@
-"""The world in its rows: nothing is carried beside them; winch and gripper as their rows have them."""
+"""The world in its rows: no state is kept beside them; winch and gripper act as their rows say."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ G = 9.81
 GREATEST_ACCEL = 5.0  # m/s^2, of the drum
 FORCES = (2.0, 2.0, 2.0, 2.0)
 TICK_S = 0.004
-# free fall is a polynomial of degree two, which the integrator gets exactly but for roundings of 50 m
+# free fall is a polynomial of degree two, which the integrator computes exactly except for roundings of 50 m
 ROUNDING = 1e-11
 ROUGH = {
     "SIM_ACT_DELAY_MS": 13.0,
@@ -28,7 +28,7 @@ def world_of(rows: WorldRows) -> World:
 
 
 def tick(rows: WorldRows, forces: tuple[float, ...], gripper_open: bool, reel_rate: float) -> None:
-    """As the simulator calls it, which then need not be compiled anew for other types."""
+    """Call it as the simulator does, so that it need not be compiled again for other types."""
     world_tick(rows, np.array(forces), gripper_open, reel_rate, None)
 
 
@@ -69,7 +69,7 @@ def test_a_load_hangs_on_the_cable_as_the_winch_has_it_and_falls_free_of_the_gri
     for _ in range(reeled):
         tick(rows, FORCES, False, 0.2)
     world = world_of(rows)
-    # while the drum gathers way, the time counts half
+    # while the drum accelerates, its time counts half
     length = 0.7 + 0.2 * (reeled * TICK_S - 0.5 * 0.2 / GREATEST_ACCEL)
     assert world.cable_length == pytest.approx(length, abs=1e-13)
     assert world.reel_rate == pytest.approx(0.2, abs=1e-15)
@@ -83,7 +83,7 @@ def test_a_load_hangs_on_the_cable_as_the_winch_has_it_and_falls_free_of_the_gri
     after, t = world_of(rows), fallen * TICK_S
     assert after.released
     assert after.plant.tension == 0.0
-    # nothing hangs on the cable: the drum stops, as fast as it gathered way
+    # nothing hangs on the cable: the drum stops, as fast as it accelerated
     assert after.cable_length == pytest.approx(length + 0.5 * 0.2**2 / GREATEST_ACCEL, abs=1e-13)
     assert after.reel_rate == 0.0
     expected = np.add(plant.x_load, np.multiply(plant.v_load, t)) - (0.0, 0.0, 0.5 * G * t * t)

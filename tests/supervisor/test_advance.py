@@ -247,7 +247,7 @@ def test_holding_low_over_the_ground_rises_clear_of_it() -> None:
     assert sky.view.x_load[2] == pytest.approx(0.3)
 
 
-# ---- jumping about in a mission
+# ---- jumping within a mission
 
 
 def test_setting_the_current_item_in_flight_goes_there_at_once() -> None:
@@ -415,7 +415,7 @@ def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
 
 
 def test_a_load_that_hangs_on_a_shorter_cable_than_is_believed_ends_the_climb() -> None:
-    """It swings from under the vehicle, which would go on moving over it."""
+    """The load swings out from under the vehicle, which would keep moving to stay above it."""
     sky = Sky()
     sky.ask(Arm(True, False))
     assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED

@@ -1,4 +1,4 @@
-"""The fence in flight: what is refused before, what is done at it."""
+"""The fence in flight: what is refused beforehand, and what happens at the fence."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def fenced(*steps: Any, **changes: Any) -> Sky:
 
 
 def eastward(sky: Sky, seconds: float) -> float:
-    """Lead the load east by a stream; how far it came."""
+    """Lead the load east by a stream of setpoints; return how far it came."""
     for _ in range(5):
         sky.ask(EAST)
         sky.tick()
@@ -61,7 +61,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     farthest = eastward(sky, 12.0)
     assert sky.flight.phase == Phase.HOLD
     assert sky.texts[-1] == "Fence: outside the fence"
-    # stopped before it, though not much: measured 4.89 m
+    # stopped shortly before the fence: measured 4.89 m
     assert 3.5 < farthest < 5.0
     assert sky.flight.area.breaches == 1
 

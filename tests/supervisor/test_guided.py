@@ -1,4 +1,4 @@
-"""Setpoints, sticks and circles: what is asked, and how the load follows it."""
+"""Setpoints, sticks and circles: what is requested, and how the load follows it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def moving(*velocity: float) -> FollowSetpoint:
 
 
 def stream(sky: Sky, request: Any, seconds: float) -> None:
-    """The request at every tick, 50 Hz."""
+    """Make the request at every tick, 50 Hz."""
     for _ in range(round(seconds * 1e6 / STEP_US)):
         assert sky.ask(request).result == ACCEPTED
         sky.tick()
@@ -77,7 +77,7 @@ def test_offboard_needs_a_stream() -> None:
     assert sky.flight == before
     assert sky.ask(at(1.0, 0.0, 2.0)).result == ACCEPTED
     sky.wait(0.6)
-    assert sky.ask(OFFBOARD).result == LATER  # that was too long ago
+    assert sky.ask(OFFBOARD).result == LATER  # the setpoint is too old
     assert sky.ask(at(1.0, 0.0, 2.0)).result == ACCEPTED
     assert sky.ask(OFFBOARD).result == ACCEPTED
     assert mode_of(sky.flight) == (identity.OFFBOARD, 0)
@@ -194,7 +194,7 @@ def test_a_circle_of_so_many_turns_ends_in_a_hold() -> None:
     begun_us = sky.now_us
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0, turns=1.5)).result == ACCEPTED
     sky.run(lambda sky: sky.flight.phase == Phase.HOLD, 40.0)
-    # 1.5 turns of 2 m at 1 m/s, and half of the ramp, 4 v / a, in which the speed is reached
+    # 1.5 turns of radius 2 m at 1 m/s, and half of the ramp, 4 v / a, in which the speed is reached
     lasted = 1.5 * 2.0 * math.pi * 2.0 + 0.5 * 4.0 / SETTINGS.motion.accel_m_s2
     assert (sky.now_us - begun_us) * 1e-6 == pytest.approx(lasted, abs=0.05)
     assert sky.texts[-1] == "Circle flown: holding"
@@ -244,7 +244,7 @@ LOITER = SetMode(identity.AUTO, identity.AUTO_LOITER, number=5)
 
 
 def guided() -> Sky:
-    """GUIDED, armed, taken off, as ArduPilot's clients do it; GUIDED is asked for again on the way."""
+    """Set GUIDED, arm and take off as ArduPilot's clients do, which request GUIDED again on the way."""
     sky = Sky(settings=ARDUPILOT)
     for request in (GUIDED, Arm(True, False), Takeoff(2.0)):
         assert sky.ask(request).result == ACCEPTED
@@ -305,7 +305,7 @@ def test_with_other_identities_holding_heeds_no_setpoint() -> None:
     assert sky.flight.phase == Phase.HOLD
 
 
-# ---- whatever is asked, in any order
+# ---- any requests, in any order
 
 number = st.floats(-30.0, 30.0) | st.just(math.nan)
 triple = st.tuples(number, number, number)

@@ -1,4 +1,4 @@
-"""Where the nose is to point: by request, by the setpoint that is followed, and what ends it."""
+"""The commanded heading: set by a request or by the setpoint that is followed, and what ends it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def place(heading: float = math.nan, turning: float = math.nan, **more: Any) -> 
 
 
 def stream(sky: Sky, request: Any, seconds: float) -> None:
-    """The request at every tick, 50 Hz."""
+    """Make the request at every tick, 50 Hz."""
     for _ in range(round(seconds * 1e6 / STEP_US)):
         assert sky.ask(request).result == ACCEPTED
         sky.tick()
@@ -82,7 +82,7 @@ def test_by_an_angle_more_than_once_round(sky: Sky) -> None:
     assert turned(sky, TurnNose(-math.pi, relative=True)) == pytest.approx(-math.pi)
     assert sky.ask(TurnNose(-math.pi, relative=True)).result == ACCEPTED
     sky.wait(0.5)
-    # from where it is on its way to
+    # counted from the heading that it is turning to
     assert turned(sky, TurnNose(-math.pi, relative=True), 20.0) == pytest.approx(-3.0 * math.pi)
 
 
@@ -136,9 +136,9 @@ def test_a_place_to_go_to_has_a_heading(sky: Sky) -> None:
 def test_the_heading_of_a_setpoint_is_taken_once(sky: Sky) -> None:
     offboard(sky, place(NORTH), 6.0)
     assert sky.flight.heading.angle == pytest.approx(NORTH, abs=1e-3)
-    stream(sky, place(), 1.0)  # says nothing of it
+    stream(sky, place(), 1.0)  # states no heading
     assert sky.flight.heading.aim == Towards(NORTH, since_us=sky.flight.heading.aim.since_us)  # type: ignore[union-attr]
-    # another word in between holds until the next setpoint has one
+    # a heading requested in between holds until a setpoint states one
     assert sky.ask(TurnNose(0.0)).result == ACCEPTED
     stream(sky, place(), 6.0)
     assert sky.flight.heading.angle == pytest.approx(0.0, abs=1e-3)
@@ -193,7 +193,7 @@ def test_axes_of_the_nose(sky: Sky) -> None:
 
 @pytest.mark.parametrize(("settings", "angle"), [(SETTINGS, NORTH), (ARDUPILOT, SOUTH)])
 def test_yaw_in_axes_of_the_nose_is_from_north_or_from_the_nose(settings: Any, angle: float) -> None:
-    """Of a nose that points south: yaw 0 is north to PX4, and as it is to ArduPilot."""
+    """The nose points south: yaw 0 means north to PX4, and no turn to ArduPilot."""
     sky = Sky(settings=settings).airborne()
     turned(sky, TurnNose(SOUTH))
     forward = FollowSetpoint(NOWHERE, (0.0, 0.0, 0.0), NOWHERE, True, body=True, heading_rad=NORTH)
@@ -222,7 +222,7 @@ def test_body_rates_turn_the_attitude_from_where_it_is(sky: Sky) -> None:
     assert isinstance(leg, Posture) and leg.attitude is not None
     begun = sky.view.attitude
     nose = column(leg.attitude, 0)
-    # the sky shows an attitude of its own from the first tick on
+    # from the first tick on, `Sky` shows its own attitude
     angle = math.atan2(nose[1], nose[0]) - math.atan2(begun[1][0], begun[0][0])
     assert angle == pytest.approx(1.0, abs=0.03)
     assert sky.flight.heading.angle == pytest.approx(math.atan2(nose[1], nose[0]), abs=0.03)
@@ -230,7 +230,7 @@ def test_body_rates_turn_the_attitude_from_where_it_is(sky: Sky) -> None:
     leg = sky.flight.legs[0]
     assert isinstance(leg, Posture) and leg.attitude is not None
     assert math.acos(leg.upward(0.0)[2]) == pytest.approx(0.4, abs=0.01)
-    # an attitude again: the heading goes on from where the rates have left it
+    # an attitude again: the heading continues from where the rates left it
     stream(sky, FollowAttitude((0.0, 0.0, 1.0), None), 0.1)
     leg = sky.flight.legs[0]
     assert isinstance(leg, Posture) and leg.attitude is None

@@ -1,4 +1,4 @@
-"""The timeline of a mission is what is flown, and a mission is refused for it before flight."""
+"""The timeline of a mission agrees with the flight; by it, missions are refused before flight."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STOOD_AT = (0.5, 0.25, LOAD_RADIUS)
 AWAY = Signals(5.0, (Term("x", -1.5, 0.0, 4.0, None, 0.0),))
 RUN = AttitudeRun("load", 0.1, 0.0, 1.5)
 
-# ---- the timeline is what is flown
+# ---- the timeline agrees with the flight
 
 FLOWN: dict[str, tuple[Step, ...]] = {
     "waypoints and a return": (
@@ -88,7 +88,7 @@ FLOWN: dict[str, tuple[Step, ...]] = {
 
 
 def flown(sky: Sky) -> list[Vec3]:
-    """Where each step of a mission ends, by the legs of the flight."""
+    """Where each step of a mission ends, according to the legs of the flight."""
     plan = sky.flight.mission.plan
     found: list[Vec3] = []
     assert sky.ask(StartMission(None)).result == ACCEPTED
@@ -102,7 +102,7 @@ def flown(sky: Sky) -> list[Vec3]:
         here = sky.view.x_quad if before.cable.released else sky.view.x_load
         last = before.legs[-1] if before.legs else None
         ended = here if last is None or last.duration_s > 1e6 else last.jet(last.duration_s)[0]
-        # all but the first of several that end in one tick take no time
+        # of several steps that end in one tick, all but the first take no time
         found += [ended] * (len(sky.reached) - len(found))
         assert sky.now_us < 400e6, (sky.flight.phase, sky.flight.mission.step)
     return found
@@ -149,7 +149,7 @@ def fenced(*steps: Step, home: Vec3 = ZERO, fence: Fence = FENCE, **changes: Any
 
 
 def uploaded(sky: Sky, *steps: Step) -> str | None:
-    """What an upload of the steps is answered."""
+    """The text that answers an upload of the steps."""
     located = tuple(LocatedStep(i, i, step) for i, step in enumerate(steps))
     return sky.ask(ReplaceMission(len(steps), located)).text
 
@@ -174,7 +174,7 @@ def test_a_return_over_the_fence_is_refused_at_upload_and_at_start(home: Vec3, w
 
 
 def test_a_return_among_the_steps_leads_home_past_a_nearer_rally_point() -> None:
-    """As it is flown: rally points are where a return by mode leads."""
+    """As in flight: only a return by mode leads to a rally point."""
     sky = fenced(*AROUND, ReturnHome())
     sky.flight = replace(sky.flight, area=replace(sky.flight.area, rally=((1.0, 4.5, 0.0),)))
     assert uploaded(sky, *AROUND, ReturnHome()) == f"Mission denied: item 4 leads {ZONE}"
@@ -192,7 +192,7 @@ def test_the_way_begins_where_the_load_stands() -> None:
     sky.view = sky.view._replace(x_load=(3.0, 3.0, LOAD_RADIUS), x_quad=(3.1, 3.0, 0.06))
     assert uploaded(sky, *steps) == f"Mission denied: item 1 leads {ZONE}"
     assert sky.ask(StartMission(None)).text == f"Mission denied: item 1 leads {ZONE}"
-    # an estimate that is not there yet says nothing
+    # an estimate that is not available yet is not used
     sky.view = sky.view._replace(complaints=("position not settled",))
     assert not uploaded(sky, *steps)
 
@@ -210,7 +210,7 @@ BEYOND = "Mission denied: item 2 leads beyond the fence, GF_MAX_VER_DIST 3 m abo
 
 
 def test_a_longer_cable_needs_more_height_and_a_released_load_less() -> None:
-    """A fence of 3 m is one for the vehicle, 0.7 m above the load."""
+    """A fence height of 3 m applies to the vehicle, which is 0.7 m above the load."""
     high = Waypoint(1.0, 0.0, 2.2)
     low = {"height_m": 3.0, "fence": Fence()}
     assert not uploaded(fenced(**low), Takeoff(2.0), high, Land())
@@ -271,7 +271,7 @@ def test_a_winch_that_would_leave_the_load_too_low_from_here_is_refused() -> Non
 
 
 def test_a_winch_that_is_taken_up_again_counts_with_what_is_left_of_it() -> None:
-    """Paused on the way from 0.7 m to 2.2 m; once more 1.5 m would be too long."""
+    """Paused on the way from 0.7 m to 2.2 m; another 1.5 m from there would be too long."""
     sky = Sky(Takeoff(3.0), Winch(1.5), Land())
     sky.ask(StartMission(None))
     assert sky.ask(Arm(True, False)).result == ACCEPTED
@@ -303,7 +303,7 @@ def test_what_swings_a_load_that_a_step_before_it_releases_is_refused() -> None:
 
 
 def test_a_leg_asks_the_timeline_where_it_leads() -> None:
-    """Not the origin: the home in force."""
+    """It leads to the home in force, not to the origin."""
     sky = Sky(Takeoff(2.0), ReturnHome())
     sky.flight = replace(sky.flight, area=replace(sky.flight.area, home=HOME))
     sky.ask(StartMission(None))

@@ -28,7 +28,7 @@ ROUND = (
     Waypoint(3.0, 3.0, 2.5),
     Waypoint(0.0, 3.0, 2.0, hold_s=1.0),
 )
-# of the trapezoid rule over a tick, by a jerk of some m/s^3
+# error of the trapezoid rule over a tick, at a jerk of a few m/s^3
 TRAPEZOID_M = 1e-5
 LIMITS = SETTINGS.limits._replace(shaped=True)
 prepared_once = cache(prepare)
@@ -50,7 +50,7 @@ def started(*steps: Step, limits: object = LIMITS) -> Sky:
 
 
 def worst_jump(sky: Sky, order: int) -> float:
-    """Of the setpoint's derivative from tick to tick, beyond what the next derivative explains."""
+    """Greatest jump of a setpoint derivative from tick to tick, beyond what the next derivative explains."""
     step_s = STEP_US * 1e-6
     found = 0.0
     for (_, mode, jet), (_, mode_after, after) in pairwise(sky.setpoints):
@@ -75,7 +75,7 @@ def test_getting_ready_is_taken_from_the_delay_before() -> None:
 
 
 def test_the_clock_of_a_mission_loses_nothing_from_step_to_step() -> None:
-    """A hold from which the signals after it borrow ends between two ticks, and they begin then."""
+    """Signals take time from the hold before them; it ends, and they begin, between two ticks."""
     sky = started(Takeoff(2.0), Delay(3.0), EDGE, Delay(1.2345), EDGE, model.Land())
     sky.run(lambda s: s.flight.phase == Phase.MISSION)
     asked_us, expected_us = [], sky.flight.leg_start_us
@@ -98,7 +98,7 @@ def test_the_setpoint_looks_ahead_into_the_step_that_follows() -> None:
     assert isinstance(run, Run)
     for ahead in (0.0, 0.1, 0.3):
         found, wanted = np.array(jet_ahead(sky.flight, hold.duration_s + ahead)), np.array(run.jet(ahead))
-        # 2.55 s and back lose the last digits of the time
+        # adding and subtracting 2.55 s loses the last digits of the time
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
@@ -115,7 +115,7 @@ def test_waypoints_in_a_row_are_passed_without_a_stop_and_reported() -> None:
             if sky.reached[-1] in (1, 2):
                 point = ROUND[sky.reached[-1] - 1]
                 there = (point.east_m, point.north_m, point.altitude_m)
-                # a tick late at most, at the speed of passing
+                # at most a tick late, at the speed of passing
                 assert norm(sub(sky.setpoints[-1][2][0], there)) <= 1e-6 * STEP_US * passed[-1][1] * 1.01
     assert [item for item, _ in passed] == [0, 1, 2, 3]
     assert passed[1][1] > 0.5

@@ -1,8 +1,8 @@
-"""The ticks that pass without the supervisor: at each of them it would have let the time go by and no more.
+"""The ticks that pass without the supervisor: at each of them it would have changed nothing.
 
-Flights are advanced at every tick, and beside them it is asked whether that was needed: in a sky that does
-as it is told, with each view disturbed in every way that the supervisor heeds, and in the simulated world,
-where the core itself asks.
+The tests advance flights at every tick and check whether the supervisor was needed there: in a `Sky` that
+does as it is told, with each view disturbed in every way to which the supervisor reacts, and in the
+simulated world, where the core itself determines when to call the supervisor.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
 WEIGHT = SETTINGS.load_weight_n
-EVERY = 9  # ticks between those at which all disturbances are tried
+EVERY = 9  # all disturbances are tried once in this many ticks
 OFFBOARD, POSCTL = SetMode(identity.OFFBOARD, 0), SetMode(identity.POSCTL, 0)
 
 
 def asks(flight: Flight, stretch: Stretch, seen: View) -> bool:
-    """Whether the supervisor is asked at a tick of the stretch."""
+    """Whether the supervisor is called at a tick of the stretch."""
     jet = None if stretch.mode == RESTING else setpoint(flight, seen.now_us)
     state = State(seen.x_load, seen.v_load, (0.0, 0.0, -1.0), ZERO, seen.x_quad, seen.v_quad, IDENTITY, ZERO)
     target = ZERO if jet is None else jet[0]
@@ -106,7 +106,7 @@ DISTURBANCES: dict[str, Callable[[View], View]] = {
 
 
 class Watched(Sky):
-    """A sky that is advanced at every tick, and notes at which of them nobody would have asked for that."""
+    """A sky that is advanced at every tick, and counts the ticks at which the supervisor was not needed."""
 
     def __init__(self, *steps: Step, rough: int | None = None, tied: bool = True) -> None:
         super().__init__(*steps)
@@ -114,7 +114,7 @@ class Watched(Sky):
         self.stretch: Stretch | None = None
         self.passed: Counter[Phase] = Counter()
         self.decided: Counter[Phase] = Counter()
-        self.heeded: Counter[str] = Counter()  # disturbances from which something follows
+        self.heeded: Counter[str] = Counter()  # disturbances to which the supervisor reacts
         self._rough = None if rough is None else random.Random(rough)
 
     def ask(self, request: object) -> Verdict:
@@ -150,7 +150,7 @@ class Watched(Sky):
         self.stretch = next_stretch(self.flight, self.settings, self.now_us, STEP_US, 0.0)
 
     def _reel(self) -> None:
-        """The cable as the winch has it at the tick that comes."""
+        """Set the cable to the length that the winch gives it at the next tick."""
         self.flight = with_cable_now(self.flight, self.now_us + STEP_US)
         length = self.flight.cable.length_m
         if length is not None and length != self.settings.cable_length_m:
@@ -158,7 +158,7 @@ class Watched(Sky):
             self.settings = replace(self.settings, cable_length_m=length, least_move_s=least_s)
 
     def _disturb(self, stretch: Stretch) -> None:
-        """Whatever the view had been: if nobody asks, nothing follows from it."""
+        """Whatever the view: where the supervisor is not called, it would have changed nothing."""
         for name, disturbed in DISTURBANCES.items():
             seen = disturbed(self.view)
             same = advance(self.flight, seen, self.settings) == (self.flight, Report())
@@ -167,14 +167,14 @@ class Watched(Sky):
 
 
 def ended(sky: Watched) -> Watched:
-    """Flown until the rotors stop, and looked at for a little longer."""
+    """Fly until the rotors stop, and watch for a little longer."""
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     sky.wait(0.5)
     return sky
 
 
 def flown(sky: Watched) -> Watched:
-    """From the ground to the ground on the mission."""
+    """Fly the mission from the ground to the ground."""
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     return ended(sky)
@@ -187,7 +187,7 @@ def led(sky: Watched, request: object, seconds: float) -> None:
 
 
 def after(sky: Watched, *requests: object, wait_s: float = 3.0) -> Watched:
-    """Taken off; then one request after the other."""
+    """Take off, then make one request after the other."""
     sky.airborne()
     for request in requests:
         verdict = sky.ask(request)
@@ -271,14 +271,14 @@ def attitudes() -> Watched:
 
 
 def turns() -> Watched:
-    """Ticks pass while the nose rests, and all are decided upon while it turns."""
+    """Ticks pass while the nose rests; while it turns, the supervisor decides at every tick."""
     sky = after(Watched(), TurnNose(1.5), wait_s=10.0)
     passed = sky.passed[Phase.HOLD]
     assert passed > 0
     sky.wait(1.0)
     assert sky.passed[Phase.HOLD] > passed
     assert sky.ask(LookAt(3.0, 3.0)).result == ACCEPTED
-    sky.tick()  # the last stretch is over with what was asked
+    sky.tick()  # the request has ended the last stretch
     passed = sky.passed[Phase.HOLD]
     sky.wait(1.0)
     assert sky.passed[Phase.HOLD] == passed
@@ -337,7 +337,7 @@ def left_armed() -> Watched:
     return sky
 
 
-# what is flown, and phases in which it passes ticks without the supervisor
+# the flights, and the phases in which each passes ticks without the supervisor
 SKIES: dict[Callable[[], Watched], set[Phase]] = {
     every_step: WHOLE,
     delivery: WHOLE - {Phase.SET_DOWN},
@@ -357,7 +357,7 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
 
 
 def test_the_flights_pass_ticks_in_every_phase() -> None:
-    """But in GUIDED, where each tick follows a setpoint."""
+    """Except in GUIDED, where each tick follows a setpoint."""
     assert set().union(*SKIES.values()) == set(Phase) - {Phase.GUIDED}
     assert set().union(*WORLDS.values()) == set(Phase) - {Phase.GUIDED}
 
@@ -373,7 +373,7 @@ def test_what_passes_would_not_have_been_decided(fly: Callable[[], Watched]) -> 
 
 
 def test_a_tick_between_those_that_are_laid_out_is_decided_upon() -> None:
-    """There is no setpoint for it."""
+    """No setpoint is laid out for it."""
     sky = Watched().airborne()
     stretch = next_stretch(sky.flight, sky.settings, sky.now_us, STEP_US, 0.0)
     for late_us, asked in (
@@ -394,7 +394,7 @@ def test_every_disturbance_is_one_that_the_supervisor_heeds() -> None:
 
 @pytest.mark.parametrize("name", shipped())
 def test_of_a_shipped_mission_nearly_every_tick_passes(name: str) -> None:
-    """But while an attitude is flown: then each is decided upon."""
+    """Except while an attitude is flown: then the supervisor decides at every tick."""
     steps = steps_of(name)
     sky = flown(Watched(*steps))
     least = 0.8 if any(isinstance(step, AttitudeRun) for step in steps) else 0.95
@@ -403,7 +403,7 @@ def test_of_a_shipped_mission_nearly_every_tick_passes(name: str) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_in_rough_air_too(seed: int) -> None:
-    """Cables that seem slack for a tick or two, places that are seen badly."""
+    """The cable seems slack for a tick or two, and positions are noisy."""
     sky = Watched(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0, hold_s=1.0), SWING, model.Land(), rough=seed)
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
@@ -413,13 +413,13 @@ def test_in_rough_air_too(seed: int) -> None:
     assert sky.passed.total() > 0.5 * (sky.passed + sky.decided).total()
 
 
-# ---- in the simulated world, where the core asks
+# ---- in the simulated world, where the core calls the supervisor
 
 WORLD_OFFBOARD = (1.0, 6.0)  # of DO_SET_MODE
 
 
 class Witness:
-    """A craft whose supervisor is asked at every tick, beside the core that asks it where it must."""
+    """A craft; where its core passes a tick without the supervisor, the supervisor is called to check."""
 
     def __init__(self, craft: Craft) -> None:
         self.craft = craft
@@ -454,7 +454,7 @@ class Witness:
 
     @property
     def share(self) -> float:
-        """Of the ticks, that passed without the supervisor."""
+        """Share of the ticks that passed without the supervisor."""
         return self.passed.total() / (self.passed + self.decided).total()
 
 
@@ -463,7 +463,7 @@ def witnessed(*steps: Step, **settings: float) -> Witness:
 
 
 def held(height: float = 2.0, **settings: float) -> Witness:
-    """Taken off by command, holding."""
+    """Take off by command, and hold."""
     witness = witnessed(**settings)
     craft = witness.craft
     craft.wait(1.0)
@@ -475,7 +475,7 @@ def held(height: float = 2.0, **settings: float) -> Witness:
 
 
 def mission(*steps: Step, **settings: float) -> Witness:
-    """From the ground to the ground on the mission."""
+    """Fly the mission from the ground to the ground."""
     witness = witnessed(*steps, **settings)
     witness.craft.begin()
     witness.craft.run(at_phase(Phase.DISARMED), 120.0)
@@ -591,7 +591,7 @@ def test_what_the_core_lets_pass_would_not_have_been_decided(fly: Callable[[], W
 
 
 def test_of_case_b_nearly_every_tick_passes() -> None:
-    """With rotors and sensors as they are; measured: 441 of 21,580 ticks are decided upon."""
+    """With the default rotors and sensors; measured: the supervisor decides at 441 of 21,580 ticks."""
     witness = mission(*steps_of("case-b"))
     assert witness.craft.flight.mission.done
     assert witness.share > 0.9

@@ -1,4 +1,4 @@
-"""The load released: what the supervisor does with every phase, and what it refuses without a load."""
+"""The load released: what the supervisor does in every phase, and what it refuses without a load."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_what_swings_the_load_is_refused_without_it(step: Signals | AttitudeRun)
 
 @pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.DISARMED, Phase.ARMED)])
 def test_a_release_is_never_refused(phase: Phase) -> None:
-    """Whatever is flown, the vehicle goes on alone; what it asks for begins where it is."""
+    """Whatever is flown, the vehicle continues alone, and its setpoint begins at its present position."""
     sky = Sky(Takeoff(1.0), Waypoint(3.0, 0.0, 1.0, 9.0), Land()).airborne()
     if phase == Phase.MISSION:
         sky.ask(StartMission(1))

@@ -1,4 +1,4 @@
-"""What the supervisor answers: a verdict to every request in every phase; what it refuses changes nothing."""
+"""What the supervisor answers: a verdict to every request in every phase; a refusal changes nothing."""
 
 from __future__ import annotations
 
@@ -114,7 +114,6 @@ REQUESTS: list[Any] = [
     R.SetMessageInterval(1, 1),
     R.GetMessageInterval(1),
     R.RequestCapabilities(),
-    R.ChangeSigningKey(),
 ]
 
 
@@ -161,7 +160,7 @@ def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothi
             unsupported = verdict.result == mavlink.MAV_RESULT_UNSUPPORTED
             assert unsupported or verdict.text, f"{request}: a refusal says why"
         assert (after.phase in IN_AIR) == bool(after.legs) or after.phase == Phase.MISSION, request
-        for k in range(2, 30):  # whatever was decided can be flown on
+        for k in range(2, 30):  # after every decision the flight can continue
             after, _ = advance(after, seen._replace(now_us=k * 100_000), SETTINGS)
 
 
@@ -209,7 +208,7 @@ def test_in_the_air_rotors_stop_by_force_only(phase: Phase) -> None:
     assert (after.phase, after.legs, verdict.result) == (Phase.DISARMED, (), ACCEPTED)
 
 
-# ---- what arming begins, and in which order one may ask
+# ---- what arming begins, and in which order requests may come
 
 
 @pytest.mark.parametrize("ask_first", [True, False])
@@ -227,7 +226,7 @@ def test_arming_and_choosing_what_to_fly_come_in_either_order(what: Any, ask_fir
 
 @pytest.mark.parametrize("first", [None, 0, 3])
 def test_where_no_mission_is_its_item_is_not_what_is_missing(first: int | None) -> None:
-    """A start is refused in the words in which the mode is, whichever item it names."""
+    """A start is refused in the same words as the mode, whichever item it names."""
     flight = Flight(phase=Phase.ARMED)
     start = decide(flight, R.StartMission(first), view(), SETTINGS)
     assert start == decide(flight, R.SetMode(identity.AUTO, identity.AUTO_MISSION), view(), SETTINGS)

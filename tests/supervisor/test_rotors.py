@@ -1,4 +1,4 @@
-"""Rotors that are lost: noted once, told, and landed with where the others can fly the vehicle."""
+"""Lost rotors: noted once, reported, and followed by a landing where the others can fly the vehicle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HOLDING = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),))
 
 
 def settings_for(name: str) -> Settings:
-    """Those of the sky, with the rotors of a shipped vehicle and the weight that they carry."""
+    """The settings of `Sky`, with the rotors of a shipped vehicle and the weight that they carry."""
     vehicle = load_vehicle(name)
     weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
     rotors = replace(
@@ -51,9 +51,9 @@ def test_of_four_none_can_be_missed() -> None:
 
 
 def test_which_rotors_the_hexarotor_can_miss_and_keep_its_heading() -> None:
-    """As Du, Quan and others have it for this order of spins."""
+    """As Du, Quan and others found for this order of spins."""
     rotors = settings_for("hexarotor").rotors
     assert all(rotors.can_fly_without(1 << i) for i in range(6))
     kept = [rotors.can_hold_heading_without(1 << i) for i in range(6)]
     assert kept == [True, True, True, True, False, False]
-    assert not rotors.can_fly_without(0b000111)  # three beside each other
+    assert not rotors.can_fly_without(0b000111)  # three adjacent rotors

@@ -11,7 +11,7 @@ from tests.doubles.sky import SETTINGS, hanging
 
 
 def test_noise_alone_starts_no_catch() -> None:
-    """No pull for a moment, and the length that it had: what a gust or a jolt of thrust feigns."""
+    """No pull for a moment, at an unchanged length: a gust or a jolt of thrust looks like this."""
     flight = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),), cable=CableState(taut_length_m=0.7))
     for k in range(50):
         seen = hanging(k * 4000)._replace(pull_n=-1.0)

@@ -1,4 +1,4 @@
-"""The table of transitions: shown as it is, obeyed as it is shown, and nothing enters a phase around it."""
+"""The table of transitions: documented as it is, obeyed as documented, and bypassed by nothing."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ HERE = (1.0, 0.0, 2.0)
 SECOND = 1_000_000
 Entry = tuple[Phase, Event]
 
-# ---- shown as it is
+# ---- documented as it is
 
 
 def documented() -> str:
@@ -54,7 +54,7 @@ def documented() -> str:
 
 
 def table() -> dict[Entry, Phase]:
-    """The table as the document has it."""
+    """The table as documented."""
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in documented().splitlines()]
     phases = [Phase[name.replace(" ", "_").upper()] for name in rows[0][1:]]
     written = {}
@@ -97,13 +97,13 @@ def test_who_disarms_selects_nothing_and_rewinds_the_mission() -> None:
     assert after.mission.plan == flight.mission.plan
 
 
-# ---- every entry of it happens: by what is asked of the vehicle, and by what the world brings
+# ---- every entry happens: by requests to the vehicle, and by events in the world
 
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), Land())
 
 
 class Recording(dict[Entry, Phase]):
-    """The table that knows which of its entries were followed."""
+    """The table, which records the entries that were followed."""
 
     def __init__(self) -> None:
         super().__init__(TRANSITIONS)
@@ -116,7 +116,7 @@ class Recording(dict[Entry, Phase]):
 
 
 def on_mission(*steps: Step, step: int = 0) -> Flight:
-    """A flight that flies these steps, holding; a setpoint has come in."""
+    """A flight in HOLD on a mission of these steps; a setpoint has arrived."""
     plan = MissionPlan(steps, tuple(range(len(steps))), len(steps))
     return Flight(
         Phase.HOLD,
@@ -141,20 +141,20 @@ def asked(flight: Flight, request: Any, seen: View | None = None) -> Flight:
 
 
 def flown(flight: Flight) -> Flight:
-    """At the end of the last leg, where that wants the load."""
+    """The flight after a tick at the end of its last leg, with the load where the leg ends."""
     leg = flight.legs[-1]
     flight = replace(flight, legs=(leg,), leg_start_us=0)
     return advance(flight, hanging(ceil(leg.duration_s * 1e6), leg.jet(leg.duration_s)[0]), SETTINGS)[0]
 
 
 def landed(flight: Flight) -> Flight:
-    """In the last leg, long after what sinks has come to rest."""
+    """The flight after a tick in its last leg, long after the sinking load or vehicle has come to rest."""
     flight = replace(flight, legs=flight.legs[-1:], leg_start_us=0, still_since_us=0)
     return advance(flight, view(20 * SECOND), SETTINGS)[0]
 
 
 def catching(flight: Flight) -> Flight:
-    """The same while its load is caught, the cable pulling for a second already."""
+    """The flight while its load is caught; when it is advanced, the cable has been taut for a second."""
     catch = Catch((1.0, 0.0, 2.7), 0.7, 0.3)
     return replace(flight, legs=(catch,), cable=replace(flight.cable, slack_since_us=0))
 
@@ -177,7 +177,7 @@ def tautened(phase: Phase) -> Flight:
 
 
 def legs_done(phase: Phase) -> Flight:
-    """A mission is done with its last step, another phase with its last leg."""
+    """A mission ends with its last step, another phase with its last leg."""
     return flown(under_way(phase, Waypoint(3.0, 0.0, 2.0)))
 
 
@@ -209,7 +209,7 @@ def caught(phase: Phase) -> Flight:
 
 
 def load_down(phase: Phase) -> Flight:
-    """By its own while lowering; where nothing lowers it, fallen."""
+    """The load is set down by LOWER; in other phases, where nothing lowers it, it has fallen."""
     if phase == Phase.LOWER:
         return landed(under_way(phase))
     return advance(catching(under_way(phase)), hanging(SECOND, (1.0, 0.0, 0.02)), SETTINGS)[0]
@@ -267,14 +267,14 @@ def test_a_mission_at_its_landing_is_begun_only_where_the_table_has_a_landing(ph
     assert after.phase == (phase if expected is None else expected)
 
 
-# ---- nothing enters a phase around it
+# ---- nothing enters a phase without it
 
 
 def entries(tree: ast.AST) -> list[int]:
     """Lines at which a phase is entered: a record gets one, or a private function of the machine is used."""
     found = []
     told = {
-        id(inner)  # what a decorator names is read, or said to come of a function
+        id(inner)  # a name in a decorator states what the function reads or returns
         for function in ast.walk(tree)
         if isinstance(function, ast.FunctionDef)
         for decorator in function.decorator_list
@@ -294,7 +294,7 @@ def entries(tree: ast.AST) -> list[int]:
             case ast.Attribute(value=ast.Name(id="machine"), attr=attr) if attr.startswith("_"):
                 found.append(node.lineno)
             case ast.Constant(value="phase") if isinstance(node.value, str):
-                found.append(node.lineno)  # for setattr, or as a key of what is spread into a record
+                found.append(node.lineno)  # for setattr, or as a key of a dict that is unpacked into a record
     return found
 
 

@@ -1,4 +1,4 @@
-"""The winch: what is refused, with the limit, and what of a leg is the cable's length."""
+"""The winch: what is refused, with the limit, and the cable length that follows from a leg."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DENIED, LATER = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECT
 
 
 def over(sky: Sky, usable: bool) -> Sky:
-    """The same in which the law can, or cannot, fly another length of the cable."""
+    """The same sky; its law can, or cannot, fly with another cable length."""
     sky.settings = replace(sky.settings, winch=replace(sky.settings.winch, usable=usable))
     return sky
 

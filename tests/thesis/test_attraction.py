@@ -7,8 +7,8 @@ are sufficient. The motion is (2-30)-(2-35) without rotors, its cable a rod, at 
 fly, with the gains of Table 4-3.
 
 In the two attitude modes the feed-forward is exact: that of R_c, which depends on the state, by differences
-along the motion itself. In the load position mode it comes from the filters: exact derivatives of q_c are not
-to be had there, for the second one holds the thrust, which holds the second one.
+along the motion itself. In the load position mode it comes from the filters: exact derivatives of q_c cannot
+be computed there, because the second one contains the thrust, which contains the second one.
 """
 
 from __future__ import annotations
@@ -192,7 +192,8 @@ def position_flight(
     vehicle: Vehicle,
     out: NDArray[np.float64],
 ) -> None:
-    """|e_x| of each step, the load sent to the origin by the cascade as it flies, filters and all."""
+    """|e_x| of each step, with the load sent to the origin by the cascade that flies, including its
+    filters."""
     L = vehicle.cable_length
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), HEADING)
     for k in range(out.shape[0]):
@@ -252,8 +253,8 @@ def cable_rate(
 
 
 def cable_start(rng: np.random.Generator) -> tuple[Motion, Vec3, float, float, float]:
-    """A start inside (3-24), (3-25), (3-37), (3-38) as printed: motion, direction to follow, its turn, Psi_q,
-    Psi_R."""
+    """A start inside (3-24), (3-25), (3-37), (3-38) as printed: motion, direction to follow, its rate of
+    turn, Psi_q, Psi_R."""
     q, q_0, turn = random_direction(rng), random_direction(rng), float(rng.uniform(-1.0, 1.0))
     command = direction_at(vec(q_0), turn, 0.0)
     psi_q = float(1.0 - q @ q_0)
@@ -268,7 +269,7 @@ def cable_start(rng: np.random.Generator) -> tuple[Motion, Vec3, float, float, f
 
     R_c = np.array(exact_attitude(still, vec(q_0), turn, 0.0, BEBOP).R_c)
     psi_R = psi_attitude(R, R_c)
-    # F' holds no Omega, so Omega = e_Omega + R^T R_c Omega_c needs no iteration
+    # F' does not contain Omega, so Omega = e_Omega + R^T R_c Omega_c needs no iteration
     Omega = rate_within_3_25(rng, psi_R) + Omega_c_body(np.zeros(3))
     np.testing.assert_allclose(Omega_c_body(Omega), Omega_c_body(np.zeros(3)), atol=OMEGA_C)
     return still._replace(Omega=vec(Omega)), vec(q_0), turn, psi_q, psi_R
@@ -280,9 +281,9 @@ OMEGA_C = 1e-4  # rad/s: differences of F over 0.1 ms
 # of Psi: 172 deg. Of the starts nearer to the opposite pole one in ten is lost: the vehicle is upside down
 # for so long that F may vanish on the way, and with it R_c (3-30)
 ALMOST = 1.99
-# The constants of (3-45), (3-46) depend on the design, says the thesis. Here are those of the cascade with
-# its filters, whose derivatives come 80 ms late: 8 deg of cable, 0.1 m, and for the vehicle, which does not
-# turn, 60 deg. At twice this Psi_q one flight in ten is lost, at 20 deg of cable nearly all.
+# The constants of (3-45), (3-46) depend on the design, according to the thesis. These are those of the
+# cascade with its filters, whose derivatives come 80 ms late: 8 deg of cable, 0.1 m, and for the vehicle,
+# which does not turn, 60 deg. At twice this Psi_q one flight in ten is lost, at 20 deg of cable nearly all.
 PSI_1, E_X_MAX, ATTITUDE_MAX = 0.01, 0.1, np.radians(60.0)
 NEAR_HOME = 1e-4  # m, after 6 s at 2 /s
 
@@ -300,7 +301,7 @@ def test_vehicle_attitude_converges_within_3_24_and_3_25(seed: int) -> None:
         upside_down += int(R[2, 2] < 0.0)
         assert psi.max() < 2.0
         assert psi[-1] < ARRIVED
-    # the set is what it is said to be
+    # the starts cover the stated set
     assert upside_down > 10
     assert min(psi_first) < 0.8
     assert max(psi_first) > 1.9

@@ -1,4 +1,4 @@
-"""What four rotors cannot fly is said so, with limit, excess, time and remedy; what they can fly passes."""
+"""What four rotors cannot fly is reported with limit, excess, time and remedy; what they can fly passes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Paths of a planner of one's own: what they are made of, and what is wrong with them."""
+"""Paths of a custom planner: what they are made of, and how their faults are reported."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def with_table(at: tuple[int, int], value: float) -> Callable[[Path], Path]:
 
 
 def jumping(path: Path) -> Path:
-    """Two halves, the second 1 cm beside."""
+    """The path in two halves, the second displaced by 1 cm."""
     table = np.vstack([path.table, path.table])
     table[1] = 0.0
     jets = passage_jets(path.table, np.array([2.0]))

@@ -32,8 +32,8 @@ from missions.model import Signals, Sine, Term
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
 BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)
 LIMITS = Limits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
-# samples of an optimisation are 10 ms apart, those here 1 ms: in between a bound may be passed by so much;
-# the worst that was found, steps of 0.734375 m: 0.053
+# samples of an optimisation are 10 ms apart, those here 1 ms: in between a bound may be exceeded by this; the
+# worst that was found, with steps of 0.734375 m: 0.053
 BETWEEN_N = 0.06
 
 
@@ -41,7 +41,7 @@ HASTY = 1.0, 0.7  # m, s: a step that no vehicle flies
 
 
 def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
-    """Shaped once, whoever asks for it (`shaped_once`)."""
+    """The shaped step, computed once for all tests (`shaped_once`)."""
     return preparation.shape(step, body, bounds)
 
 
@@ -83,7 +83,7 @@ def test_shipped_signals_keep_within_the_bounds_near_the_asked_path(name: str) -
     shaped = shape(signals_of(name), BODY, BOUNDS)
     assert trouble_of(shaped, LIMITS) == ""
     assert_within(shaped)
-    # measured: 11.1 mm where Case A is asked to be early, 0.2 mm elsewhere
+    # measured: 11.1 mm where Case A is required to be early, 0.2 mm elsewhere
     assert shaped.distance_m < (0.013 if name == "case-a" else 0.001)
 
 
@@ -108,7 +108,7 @@ def test_case_a_arrives_as_it_is_asked_and_waits_until_it_begins() -> None:
     assert y.max() <= 1.03 * 0.25
     free = shape(replace(step, terms=(replace(step.terms[0], rise_90_by_s=None),)), BODY, BOUNDS)
     times, jets, _ = along(free)
-    # of the half-sine itself, to the width of the window
+    # the instant of the half-cosine itself, to the width of the window
     assert times[np.argmax(jets[0][:, 1] >= 0.225)] == pytest.approx(0.79 * acos(-0.8) / pi, abs=3e-3)
     assert free.distance_m < 0.003
 
@@ -141,7 +141,7 @@ def test_any_step_is_within_the_bounds_or_said_not_to_be(
         assert_within(shaped)
         assert np.abs(jets[0][times <= 0.0]).max() <= HELD_M + 1e-4
         assert jets[0][-1] == pytest.approx(path_jets(shaped, times[-1:] + 1.0)[0, 0], abs=1e-3)
-    # what takes a second for a quarter of a metre is gentle: it must not be refused
+    # a step that takes a second for a quarter of a metre is gentle: it must not be refused
     if height <= 0.25 * rise**2:
         assert trouble_of(shaped, LIMITS) == ""
 

@@ -30,7 +30,7 @@ t = sp.Symbol("t")
 
 
 def symbolic(term: Term, at: float) -> sp.Expr:
-    """The term's formula in the stretch that holds `at`, written as the definition says: a product."""
+    """The term's formula in the stretch that contains `at`, written as in the definition: a product."""
     top = term.start_s + term.rise_s
     edge = inf if term.hold_s is None else top + term.hold_s
     if at < term.start_s or at >= edge + term.fall_s:

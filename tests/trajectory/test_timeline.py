@@ -1,4 +1,5 @@
-"""Where the load is after each step of a mission, where nobody can say, and how long it should take."""
+"""Where the load is after each step of a mission, where that is unknown, and how long the mission should
+take."""
 
 from __future__ import annotations
 

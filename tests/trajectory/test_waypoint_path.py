@@ -1,4 +1,4 @@
-"""Paths through waypoints: past every point, smooth, least in snap, and within what was asked."""
+"""Paths through waypoints: through every point, smooth, of least snap, and within the requested limits."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def replace_rotor(high: float) -> Bounds:
 
 
 def test_drag_binds_at_speed() -> None:
-    """At 14 m/s the air takes half the weight: a vehicle without drag is far quicker."""
+    """At 14 m/s the drag is half the weight: a vehicle without drag is far quicker."""
     far = ((0.0, 0.0, 5.0), (80.0, 0.0, 5.0), (160.0, 0.0, 5.0))
     _, in_air = passage(far, 14.0, 10.0, BODY, BOUNDS, True)
     _, in_vacuum = passage(far, 14.0, 10.0, BODY._replace(drag_linear=0.0, drag_quadratic=0.0), BOUNDS, True)

@@ -1,4 +1,4 @@
-"""Vehicle files: what is read, what is refused and in which words, the same for every program."""
+"""Vehicle files: what is read, what is refused and with which message, the same for every program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import AIR_KEYS, CHAIN_KEYS, DRIVE_KEYS, truth_of
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
-# a file of which the autopilot alone needs something: what it may leave out has a default
+# a file with only the keys that the autopilot needs: all that it leaves out has a default
 LEAST = """
 quad_mass_kg = 1.0
 load_mass_kg = 0.2
@@ -77,7 +77,8 @@ def shipped(name):
 
 @pytest.mark.parametrize("name", VEHICLES.names())
 def test_a_shipped_file_states_every_key_and_is_read_as_written(name):
-    """Of a shipped vehicle the number of rotors and what nobody looks at is left to a default, no more."""
+    """A shipped file leaves the arrangement of the rotors and effects that it lacks to their defaults, no
+    more."""
     table = shipped(name)
     if "believed" in table:
         table = {**shipped(table["believed"]), **table}
@@ -132,12 +133,12 @@ def test_what_must_be_there_is_missed(key, tmp_path):
     assert problem.startswith(f"{tmp_path / 'foo.toml'}: {key} is missing (")
 
 
-# (what stands in the file, what is put in its place, what is said)
+# (text in the file, its replacement, the message)
 AT_LAST = "slip_rate_1_s = 500.0\n"
 
 
 def rotors(*places):
-    """Tables of rotors at these places, turning in turn."""
+    """Tables of rotors at these positions, with alternating spins."""
     return "".join(
         f'[[rotor]]\nx_m = {x}\ny_m = {y}\nspin = "{"+-"[i % 2]}"\n' for i, (x, y) in enumerate(places)
     )
@@ -328,7 +329,7 @@ def test_a_hook_below_the_middle_of_the_cable_is_refused(tmp_path):
 
 
 def test_rotors_at_any_places_are_flown_as_they_are_given(tmp_path):
-    """The same vehicle as by its frame; and each number of a rotor reaches its layout."""
+    """The vehicle is the same as with its named frame; and each number of a rotor reaches its layout."""
     a = 0.126 * 0.5**0.5
     listed = loaded(tmp_path, BEBOP + rotors((-a, a), (-a, -a), (a, -a), (a, a)))
     named = loaded(tmp_path, 'frame = "x"\nspin = "+-+-"\n' + BEBOP)
@@ -344,7 +345,8 @@ def test_a_plus_quadrotor_is_that_of_2_13():
 
 
 def test_a_truth_beside_a_belief_is_flown_and_not_believed(tmp_path):
-    """What it leaves out is as in the other, which the autopilot goes by: a name, or a file beside it."""
+    """What the truth leaves out is as in the belief, which the autopilot uses: a name, or a file beside
+    it."""
     (tmp_path / "believed.toml").write_text(BEBOP.replace("quad_mass_kg = 0.4", "quad_mass_kg = 0.5"))
     truth = loaded(tmp_path, 'believed = "believed.toml"\nrotor_drag_1_s = 0.3\n')
     assert (truth.quad_mass_kg, truth.rotor_drag_1_s, truth.name) == (0.5, 0.3, "foo")
@@ -358,7 +360,7 @@ def test_a_truth_beside_a_belief_is_flown_and_not_believed(tmp_path):
 
 
 def test_a_vehicle_is_delivered_with_parameters(tmp_path):
-    """Its own, before those of what it is believed to be; all else is as anywhere."""
+    """Its own parameters come before those of its belief; all others have their usual values."""
     (tmp_path / "believed.toml").write_text(BEBOP + "[parameters]\nMIS_SPEED = 2.0\nMIS_ACCEL = 0.5\n")
     truth = loaded(tmp_path, 'believed = "believed.toml"\n[parameters]\nMIS_SPEED = 1\n')
     assert truth.parameters == {"MIS_SPEED": 1.0}

@@ -57,7 +57,7 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
 
 
-# keys of a vehicle file of which the autopilot makes nothing: names, and what only the plant knows
+# keys of a vehicle file that the autopilot does not use: names, and what only the plant knows
 OF_THE_ROTORS = {
     "name",
     "believed",
@@ -66,7 +66,7 @@ OF_THE_ROTORS = {
     "frame",
     "spin",
     "rotor",
-}  # not numbers, or told by `layout`
+}  # not numbers, or given by `layout`
 OF_THE_WORLD_ALONE = {
     *OF_THE_ROTORS,
     *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),
@@ -83,7 +83,7 @@ BELIEVED = tuple(key for key in Vehicle.model_fields if key not in OF_THE_WORLD_
 
 @pytest.mark.parametrize("key", BELIEVED)
 def test_every_number_of_the_vehicle_has_a_parameter(key):
-    """Each number that is believed, moved, moves a default; of three numbers each does."""
+    """A change of any assumed number changes a default; of three numbers, each does."""
     vehicle = load_vehicle("heavy")
     before = autopilot_parameters(vehicle).values()
     value = getattr(vehicle, key)
@@ -120,7 +120,7 @@ def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():
 
 
 def test_naming_the_laws_costs_no_heavy_import():
-    """The options of the command line name the laws: its help has to come at once."""
+    """The options of the command line name the laws: its help has to appear immediately."""
     heavy = ("numpy", "numba", "pydantic", "autopilot.wire.dialect.plumbline")
     check = f"import sys, autopilot.vehicle.parameters; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)

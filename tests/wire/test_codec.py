@@ -1,4 +1,4 @@
-"""The codec is pymavlink's, byte for byte, and nothing that arrives can upset it."""
+"""The codec equals pymavlink's, byte for byte, and nothing that arrives can make it fail."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames in machine code are those of pymavlink, byte for byte, and no bytes that come in harm them."""
+"""Frames in machine code are those of pymavlink, byte for byte, and no received bytes harm them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames and units of the messages: against explicit axes and SciPy, and there and back again."""
+"""Frames and units of the messages: compared with explicit axes and SciPy, and converted there and back."""
 
 from __future__ import annotations
 
@@ -132,12 +132,12 @@ def named(message: Any) -> Any:
 
 
 def name_of(message: Any) -> str:
-    """What a test of it is called."""
+    """The name of the test of a message."""
     return getattr(message[0].type if isinstance(message, tuple) else message, "msgname", "")
 
 
 def assert_close(got: Any, sent: Any, absolute: float = 1e-6, relative: float = FLOAT32) -> None:
-    """Field by field; float32 rounding unless said otherwise."""
+    """Compare field by field; with float32 rounding unless stated otherwise."""
     assert type(got) is type(sent)
     for name, one, other in zip(sent._fields, got, sent, strict=True):
         if other is None or isinstance(other, bool | int):

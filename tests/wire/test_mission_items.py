@@ -189,7 +189,7 @@ def test_each_step_knows_its_items() -> None:
 
 
 REFUSALS = [
-    # items, item that is refused, MAV_MISSION_RESULT, what the text speaks of
+    # items, item that is refused, MAV_MISSION_RESULT, part of the text
     ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
     ([item(84, frame=6)], 0, "UNSUPPORTED", "command 84"),
     ([item(211, 2.0, 0.0)], 0, "INVALID_PARAM1", "gripper = 2"),
@@ -364,7 +364,7 @@ def test_a_landing_elsewhere_is_a_transfer_first() -> None:
 
 
 def test_places_that_other_items_lead_to_are_known() -> None:
-    """Where the flight will be: the end of signals, straight above where it is, the home that is set."""
+    """Where the load will be: the end of signals, straight above where it is, the home that is set."""
     latitude, longitude, _ = geodetic_from_enu((30.0, 40.0, 0.0), HOME)
     there = {"frame": 6, "x": latitude, "y": longitude}
     up, low = item(22, frame=6, z=4.0), item(186, 2.0, 3.0)

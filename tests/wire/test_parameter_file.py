@@ -1,4 +1,4 @@
-"""Definitions of parameters in TOML: what they may say, and what is told of those that are wrong."""
+"""Definitions of parameters in TOML: what they may contain, and what is reported of wrong ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signatures: pymavlink is the reference both ways; what is wrong, old or unsigned is not heard."""
+"""Signatures: pymavlink is the reference both ways; wrong, old or unsigned frames are not accepted."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What the accelerometer tells of the load's mass and of the wind, rotors believed to be known.
+"""The load's mass and the wind, estimated from the accelerometer; the rotors' output is assumed to be known.
 
 | symbol | code name | frame | unit | equation |
 |---|---|---|---|---|
 | x_Q'' | a_quad | I | m/s^2 | accelerometer |
 | f | thrust | B | N | `actuation` |
-| D | air | I | N | drag of the vehicle, by belief |
+| D | air | I | N | assumed drag of the vehicle |
 | r | rest | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
 | w | pull | | m/s^2 | L q'.q' - q . (x_Q'' + g e_3) |
 | b | axis | I | | R e_3, axis of the rotors |
@@ -12,21 +12,22 @@
 | m_L | load_mass | | kg | T / w |
 | P | push | I | N | p + k s |
 | p | steady | I | N | r - T q - k s |
-| s | shaped | I | N | drag as `shape` has it |
-| k | factor | | | of that, beyond the believed drag |
+| s | shaped | I | N | drag of the shape `shape` |
+| k | factor | | | of s, beyond the assumed drag |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
-and the wind's push. Wind drags at rotors and frame across the rotors' axis b, and along b the push is taken
-for none, so that r . b = T q . b. (Across the cable it is not: leaning into a wind whose push is a third of
-the weight, the vehicle would be thought to carry half its load.) The load, on a cable that turns as a
-pendulum whose pivot moves with x_Q'', has x_L'' + g e_3 = -w q whatever its mass, hence T = m_L w. The mass
-is the least-squares fit of T to w with exponential forgetting. It is learned while the load hangs free:
-cable taut, load higher than where it lay while the cable was slack. The push is learned while the vehicle
-is off the ground. What of it follows the speed while the load hangs free is drag: k is the least-squares
-fit of the push to drag of the believed shape, of both what differs from their means of some seconds, and is
-known without the delay in which the rest is learned.
+and the wind's push. Wind drag on rotors and frame acts across the rotors' axis b; the push along b is assumed
+to be zero, so that r . b = T q . b. (It would be wrong to assume instead that the push acts across the cable:
+a vehicle that leans into a wind whose push is a third of the weight would then seem to carry half its load.)
+The cable turns as a pendulum whose pivot moves with x_Q'', so that x_L'' + g e_3 = -w q whatever the mass of
+the load, hence T = m_L w. The mass is the least-squares fit of T to w with exponential forgetting. It is
+learned while the load hangs free: cable taut, load higher than where it lay while the cable was slack. The
+push is learned while the vehicle is off the ground. The part of the push that follows the speed while the
+load hangs free is drag: k is the least-squares fit of the push to drag of the assumed shape, both taken as
+differences from their means over some seconds. This part is known without the delay with which the rest is
+learned.
 
-What turns the vehicle besides is `torque_observer`'s.
+`torque_observer` estimates the torque on the vehicle besides that of rotors and cable.
 """
 
 from __future__ import annotations
@@ -49,21 +50,22 @@ from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import pull_of
 
-# m: so much higher than where it stood or lay is in the air
+# m: a load this much higher than where it lay is in the air
 _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _STANDING = 0.2
-_CONTACT_TIME = 0.02  # s, in which the ground's force is believed
-# s, in which the estimator's word of the wind on the load is believed: the direction of the cable that is
-# asked for leaps with it, and a reading corrects more of it than the wind has changed
+_CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
+# s, time constant that smooths the estimator's wind on the load: the commanded direction of the cable jumps
+# with this wind, and a reading corrects it by more than the wind has changed
 _AIR_TIME = 0.15
-# drag is learned by motion faster than this, m/s, and is at most so many times its shape
+# drag is learned from motion faster than this, m/s; the greatest factor on its shape
 _DRAG_SPEED, _GREATEST_FACTOR = 0.2, 50.0
-# 1/s, by the mass: linear drag, the shape where none is believed
+# 1/s, linear drag divided by the mass: the shape where no drag is assumed
 _ASSUMED_SHAPE = 0.05
-# m/s^2, deviation of a sample of the accelerometer up to which the push is learned as told, in still air
+# m/s^2, standard deviation of an accelerometer sample up to which, in still air, the push is learned as
+# fast as configured
 _QUIET = 0.06
-# of the weight, a push that may as well be what noise makes of none
+# of the weight: a smaller push may be nothing but noise
 _BREEZE = 0.03
 # of the nominal mass of the load
 _LEAST_MASS = 0.25
@@ -71,15 +73,15 @@ _GREATEST_MASS = 4.0
 
 
 class ObserverConstants(NamedTuple):
-    """Shares of a period in the memory of mass, push and drag, and the most the push is believed to be."""
+    """Shares of one period in the fading averages of mass, push and drag, and bounds of the estimates."""
 
     mass: float
     push: float
     drag: float
     contact: float
     air: float
-    gusty: float  # m/s^2 / N, of noise that the gusts of a wind of this push outweigh
-    breeze: float  # N, of push
+    gusty: float  # m/s^2 / N: noise that the gusts of a wind outweigh, for each newton of its push
+    breeze: float  # N, push that may be nothing but noise
     greatest_push: float  # N
     shape: Drag
     least_factor: float
@@ -87,27 +89,27 @@ class ObserverConstants(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """What is believed of the load and of the air."""
+    """What is estimated of the load and of the air."""
 
     load_mass: float  # kg
     push: Vec3  # N, world, on the vehicle
     correlation: float  # of T and w, N m/s^2
     square: float  # of w, m^2/s^4
-    support: float  # N, what holds the vehicle up besides its rotors while the cable is slack
+    support: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
     load_ground: float  # m, height at which the load lay
-    steady: Vec3  # N, of the push what does not follow the speed
-    drag: Drag  # what was learned of it, beyond the believed
+    steady: Vec3  # N, the part of the push that does not follow the speed
+    drag: Drag  # learned drag, beyond the assumed drag
     mean_shaped: Vec3  # N
     mean_rest: Vec3  # N
     drag_correlation: float  # of s and r, N^2
     drag_square: float  # of s, N^2
-    load_air: Vec3  # m/s^2, world, by which the air moves the load beside its drag
-    load_drag: float  # 1/s, by the load's mass
+    load_air: Vec3  # m/s^2, world, acceleration of the load by the air besides its drag
+    load_drag: float  # 1/s, divided by the load's mass
     torque: Torque  # on the vehicle besides that of rotors and cable
 
 
 def share_of(period: float, time: float) -> float:
-    """Share of what is new in a memory that fades with this time constant (s); 0 learns nothing."""
+    """Share of a new value in an average that fades with this time constant (s); 0 learns nothing."""
     return min(1.0, period / time) if time > 0.0 else 0.0
 
 
@@ -121,7 +123,7 @@ def observer_constants(
     drag: Drag,
     vehicle: Vehicle,
 ) -> ObserverConstants:
-    """For memories that fade with these time constants (s); 0 learns nothing. Drag is the believed one."""
+    """For averages that fade with these time constants (s); 0 learns nothing. `drag` is the assumed drag."""
 
     def share(time: float) -> float:
         return share_of(period, time)
@@ -144,10 +146,10 @@ def observer_constants(
 
 @kernel
 def rested(constants: ObserverConstants, observed: Observed, accel_var: float) -> ObserverConstants:
-    """The push learned the slower, the noisier the accelerometer is against the gusts of the wind.
+    """The constants by which the push is learned more slowly if the accelerometer is noisy against the gusts.
 
-    `accel_var`, (m/s^2)^2, is that of a sample. A filter of a push that wanders by w sqrt(t), seen in noise
-    of the deviation s every T seconds, has the time constant s sqrt(T) / w.
+    `accel_var`, (m/s^2)^2, is the variance of a sample. The filter of a push that wanders by w sqrt(t) and is
+    measured every T seconds with noise of standard deviation s has the time constant s sqrt(T) / w.
     """
     quiet = _QUIET + constants.gusty * max(0.0, norm(observed.steady) - constants.breeze)
     return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / quiet))
@@ -155,14 +157,14 @@ def rested(constants: ObserverConstants, observed: Observed, accel_var: float) -
 
 @kernel
 def blown(observed: Observed, gust: Vec3, drag: float, constants: ObserverConstants) -> Observed:
-    """After a word of the estimator: `gust` (m/s^2) moves the load beside its drag, `drag` is in 1/s."""
+    """With the estimator's `gust`, acceleration of the load besides its drag (m/s^2), and `drag` (1/s)."""
     slowly = axpy(constants.air, sub(gust, observed.load_air), observed.load_air)
     return with_field(with_field(observed, "load_air", slowly), "load_drag", drag)
 
 
 @kernel
 def nominal(vehicle: Vehicle) -> Observed:
-    """Nothing observed: the load's mass as told, still air, standing on the ground, the load at home."""
+    """Nothing observed: the configured mass of the load, still air, vehicle on the ground, load at home."""
     g = vehicle.gravity
     return Observed(
         vehicle.load_mass,
@@ -208,7 +210,7 @@ def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
 
 @kernel
 def pulled(force: Vec3, q: Vec3, axis: Vec3) -> float:
-    """What of a force on the vehicle is the cable's, N along q; the rest acts across the rotors' axis."""
+    """The cable's part of a force on the vehicle, N along q; the rest acts across the rotors' axis."""
     return pull_of(dot(force, axis), q, axis)
 
 
@@ -223,8 +225,8 @@ def observe(
     drag: Drag,
     vehicle: Vehicle,
 ) -> Observed:
-    """The belief a period later; `thrust`, N, is what the rotors give now, `moment`, N m, that of rotors and
-    cable, `vehicle` the nominal one."""
+    """The estimates a period later. `thrust`, N, is what the rotors give now, `moment`, N m, that of rotors
+    and cable; `vehicle` is the nominal one."""
     q, a = state.q_cable, state.a_quad
     load_mass, steady, learned = observed.load_mass, observed.steady, observed.drag
     mean_shaped, mean_rest = observed.mean_shaped, observed.mean_rest
@@ -252,10 +254,10 @@ def observe(
             found = correlation / square
             load_mass = min(_GREATEST_MASS * vehicle.load_mass, max(_LEAST_MASS * vehicle.load_mass, found))
     else:
-        # up and down it cannot be told from the ground
+        # the vertical part cannot be distinguished from the ground's force
         rest, shaped = (rest[0], rest[1], 0.0), (shaped[0], shaped[1], 0.0)
     factor = learned.linear / shape.linear if shape.linear > 0.0 else learned.quadratic / shape.quadratic
-    # where neither vehicle nor load can touch the ground, whose forces are no drag
+    # only where neither vehicle nor load can touch the ground: its forces are no drag
     hangs = taut > 0.0 and not lying(observed, state)
     if hangs:
         mean_shaped = axpy(constants.drag, sub(shaped, mean_shaped), mean_shaped)

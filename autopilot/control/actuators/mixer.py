@@ -1,5 +1,5 @@
-"""Rotor forces from thrust and moment: the inverse of (2-13) within true limits, by stated priority, for any
-number of rotors at any places.
+"""Rotor forces from thrust and moment: the inverse of (2-13) within the rotors' limits, by fixed priorities,
+for any number of rotors at any positions.
 
 | symbol         | code name       | frame | unit | equation |
 |----------------|-----------------|-------|------|----------|
@@ -9,25 +9,25 @@ number of rotors at any places.
 | M              | moment          | B     | N m  | (2-13)   |
 | l              | vehicle.arm     |       | m    | (2-13)   |
 | c = d/b        | torque_ratio    |       | m    | (2-13)   |
-| x_i, y_i, c_i  | table           |       | l, l, c | place and drag torque of a rotor |
+| x_i, y_i, c_i  | table           |       | l, l, c | position and drag torque of a rotor |
 
     f = sum F_i     M_x = l sum y_i F_i     M_y = -l sum x_i F_i     M_z = c sum c_i F_i
 
-`vehicle.rotors.allocate` prepares, outside of the loop, four columns over the rotors that can be used: three
-for thrust, roll and pitch, each of which leaves the other two alone and asks for as little as possible (the
-pseudo-inverse of these three rows; what it does to yaw is counted), and one for yaw, the part of the row c_i
-that the other three do not see. Unlimited, the sum of the four is the least-squares inverse of all four rows.
-For the plus quadrotor of (2-13) they are 1/4, -+1/2, +-1/2 and -+1/4.
+`vehicle.rotors.allocate` prepares, outside the loop, four columns over the usable rotors. The columns for
+thrust, roll and pitch each leave the other two unchanged and need the smallest forces (the pseudo-inverse of
+these three rows; their effect on yaw is accounted for). The column for yaw is the part of the row c_i that
+the other three do not affect. Without limits, the sum of the four is the least-squares inverse of all four
+rows. For the plus quadrotor of (2-13) they are 1/4, -+1/2, +-1/2 and -+1/4.
 
 Within limits low <= u_i <= high the priorities are met one after the other, by moving along these columns,
 each as far as the rotors allow (`_room`):
 
-1. roll and pitch, together: shortened as far as no thrust makes room for both; then each by itself up to what
-   is asked, as far as that still goes;
-2. thrust: cut to what is left beside them, yaw moved to make room;
-3. yaw: cut to what is left.
+1. roll and pitch, first together: shortened to what is possible with some thrust; then each by itself towards
+   its demand, as far as the rotors still allow;
+2. thrust: limited to what is possible beside them; yaw is moved to make room;
+3. yaw: limited to what is left.
 
-A demand that is no number counts as zero and sets the bit of every rotor in `saturated`.
+A demand that is not a number counts as zero and sets the bit of every rotor in `saturated`.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ from autopilot.vehicle.rotors import LIFT_BY, PITCH, PITCH_BY, ROLL, ROLL_BY, ST
 
 Array = NDArray[np.float64]
 
-# rows of the rotors' memory, one column a rotor
+# rows of the rotors' memory, one column per rotor
 FORCE, EFFORT, ALONG, EXPECTED, MISSED, GIVES, TOLD = range(7)
 _LEAST = 1e-9  # N: a bound on less than this is rounding
 
 
 class MixerResult(NamedTuple):
-    """What of a demand the rotors carry out; their forces are in the row FORCE."""
+    """The part of a demand that the rotors carry out; their forces are in the row FORCE."""
 
     saturated: int  # bit i: the plain inverse of (2-13) asked rotor i+1 for more or less than it can give
     thrust_done: float  # N
@@ -111,7 +111,7 @@ def _room(rotors: Array, table: Array, beside: int, low: float, high: float) -> 
 def _blend(
     rotors: Array, table: Array, row: int, thrust: float, roll: float, pitch: float, yaw: float
 ) -> None:
-    """So much of each column, added up into a row."""
+    """Write the sum of the columns, each times its amount, into a row."""
     for i in range(table.shape[0] - 1):
         level = thrust * table[i, LIFT_BY] + yaw * table[i, YAW_BY]
         rotors[row, i] = level + roll * table[i, ROLL_BY] + pitch * table[i, PITCH_BY]
@@ -119,7 +119,7 @@ def _blend(
 
 @kernel
 def _turns(table: Array, thrust: float, roll: float, pitch: float) -> float:
-    """What the columns for thrust, roll and pitch do to yaw."""
+    """The effect on yaw of these amounts of the columns for thrust, roll and pitch."""
     last = table.shape[0] - 1
     lift, roll_by, pitch_by = table[last, LIFT_BY], table[last, ROLL_BY], table[last, PITCH_BY]
     turns: float = thrust * lift + roll * roll_by + pitch * pitch_by
@@ -130,7 +130,7 @@ def _turns(table: Array, thrust: float, roll: float, pitch: float) -> float:
 def _fit(
     rotors: Array, table: Array, thrust: float, roll: float, pitch: float, yaw: float, low: float, high: float
 ) -> None:
-    """The efforts within their limits, by priority."""
+    """Write the efforts within their limits, by priority, into the row EFFORT."""
     _blend(rotors, table, EFFORT, 0.0, 0.0, 0.0, 0.0)
     _blend(rotors, table, ALONG, 0.0, roll, pitch, 0.0)
     share = clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
@@ -153,7 +153,7 @@ def _fit(
     yaw = clamp(yaw - _turns(table, thrust, roll, pitch), least, greatest)
     _blend(rotors, table, EFFORT, thrust, roll, pitch, yaw)
     for i in range(table.shape[0] - 1):
-        # it takes off no more than rounding
+        # removes rounding only
         rotors[EFFORT, i] = clamp(rotors[EFFORT, i], low, high)
 
 
@@ -161,8 +161,8 @@ def _fit(
 def mix(
     thrust: float, moment: Vec3, vehicle: Vehicle, limited: float, table: Array, rotors: Array
 ) -> MixerResult:
-    """Put the forces for the demanded thrust (N) and moment (N m, body) into the row FORCE. limited = 0.0
-    lets any demand through."""
+    """Put the forces for the demanded thrust (N) and moment (N m, body) into the row FORCE. With
+    limited = 0.0 no limits apply."""
     valid = isfinite(thrust) and isfinite(moment[0]) and isfinite(moment[1]) and isfinite(moment[2])
     if not valid:
         thrust = 0.0
@@ -188,7 +188,7 @@ def mix(
 
 @kernel
 def thrust_and_moment(rotors: Array, vehicle: Vehicle, table: Array) -> tuple[float, Vec3]:
-    """(2-13): what the forces in the row FORCE do to the body: thrust in N, moment in N m, body frame."""
+    """(2-13): thrust (N) and moment (N m, body frame) of the forces in the row FORCE."""
     f = x = y = z = 0.0
     for i in range(table.shape[0] - 1):
         force = rotors[FORCE, i]
@@ -201,7 +201,7 @@ def thrust_and_moment(rotors: Array, vehicle: Vehicle, table: Array) -> tuple[fl
 
 @kernel
 def spread(force: float, table: Array, rotors: Array) -> MixerResult:
-    """The same force (N) from every rotor that can be used, without regard to their places."""
+    """The same force (N) from every usable rotor, whatever their positions."""
     total = 0.0
     for i in range(table.shape[0] - 1):
         rotors[FORCE, i] = force if table[i, STRENGTH] > 0.0 else 0.0

@@ -1,16 +1,16 @@
-"""Where vehicle and load will be when the command of this tick comes into force.
+"""The predicted state of vehicle and load when the command of this tick takes effect.
 
 | symbol | code name | frame | unit | equation |
 |---|---|---|---|---|
 | x_L, v_L, q, q' | x_load .. q_cable_dot | I | | (2-30)-(2-33) |
 | R, Omega | quat, omega | B->I, B | , rad/s | (2-34), (2-35) |
 | f, M | thrust, moment | B | N, N m | `actuation` |
-| D | air | I | N | drag of the vehicle and a push that stays |
+| D | air | I | N | drag of the vehicle and a constant push |
 
-The model of the taut cable, (2-31) with (2-36), or of the vehicle alone where the cable is slack, is
-integrated by the midpoint rule over the commands that are on their way, each for the time in which it is in
-force; the rotors' lag is exact at the ends and the middle of a piece. A cable that would have to push
-leaves both to fall. Not in the model: the ground, drag of the load.
+The model of the taut cable, (2-31) with (2-36), or of the vehicle alone if the cable is slack, is integrated
+by the midpoint rule over the commands on their way, each for the time in which it is in force. The rotors'
+lag is exact at both ends and in the middle of each piece. Where the cable would have to push, the load falls
+freely. Not in the model: the ground, drag of the load.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from autopilot.geometry.so3 import (
 
 
 class Ahead(NamedTuple):
-    """The state at the instant at which a command comes into force, and what the rotors give then."""
+    """The state at the instant at which a command takes effect, and what the rotors give then."""
 
     state: State
     thrust: float  # N
@@ -75,7 +75,7 @@ def _rates(
     drag: Drag,
     vehicle: Vehicle,
 ) -> _Motion:
-    """Time derivative; the motion of `load_motion`, but the cable does not push."""
+    """Time derivative of the motion, as in `load_motion`; the cable does not push."""
     J, q = vehicle.inertia, m.q
     v_quad = axpy(-vehicle.cable_length, m.q_dot, m.v) if taut > 0.0 else m.v
     b3 = column(rotation_from_quat(m.quat), 2)
@@ -116,7 +116,7 @@ def _glide(
     drag: Drag,
     vehicle: Vehicle,
 ) -> _Motion:
-    """h seconds under command `row`, of whose approach `half` is left after h/2."""
+    """The motion after h seconds under command `row`; after h/2 the share `half` of the lag remains."""
     begin = _rates(m, actuation.thrust, actuation.moment, taut, push, torque, drag, vehicle)
     thrust, moment = lagged(actuation.thrust, actuation.moment, actuation.queue, row, half)
     middle = _shifted(m, 0.5 * h, begin)
@@ -143,9 +143,9 @@ def predict(
     vehicle: Vehicle,
 ) -> Ahead:
     """The state after the delay of `constants`, under the commands on their way, a steady `push` (N) and
-    a steady `torque` (N m, body) besides.
+    a steady `torque` (N m, body).
 
-    taut = 0.0: of the vehicle alone; load and cable stay as they are.
+    With taut = 0.0 only the vehicle is predicted; load and cable stay as they are.
     """
     if not (constants.late > 0.0 or constants.whole > 0):
         return Ahead(state, actuation.thrust, actuation.moment)
@@ -170,7 +170,7 @@ def predict(
     if taut > 0.0:
         L = vehicle.cable_length
         x_load, v_load, q, q_dot = m.x, m.v, m.q, m.q_dot
-        # what the estimate says the cable's ends are apart stays
+        # the distance between the cable's ends in the estimate is kept
         x_quad = add(state.x_quad, sub(sub(m.x, state.x_load), scale(L, sub(m.q, state.q_cable))))
         v_quad = add(state.v_quad, sub(sub(m.v, state.v_load), scale(L, sub(m.q_dot, state.q_cable_dot))))
     ahead = State(

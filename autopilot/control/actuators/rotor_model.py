@@ -1,18 +1,18 @@
-"""What the rotors give now by belief, and the commands that are still on their way to them.
+"""The assumed present output of the rotors, and the commands that are still on their way to them.
 
 | symbol  | code name      | frame | unit   | meaning                                              |
 |---------|----------------|-------|--------|------------------------------------------------------|
 | u_k     | queue          | B     | N, N m | thrust and moment that the mixer gave at tick k      |
 | r       | thrust, moment | B     | N, N m | what the rotors give at the present tick             |
-| d       | delay          |       | s      | from a command to the instant at which it is in force |
-|         |                |       |        | by the clock of the estimate                         |
+| d       | delay          |       | s      | from a command to the instant at which it takes      |
+|         |                |       |        | effect, on the clock of the estimate                 |
 | tau     | lag            |       | s      | r' = (u - r) / tau                                   |
 | T       | period         |       | s      | of the control law                                   |
 
-The estimate is of the instant that the inertial unit shows: tick k is that instant, and d counts the unit's
-delay in. With d = n T + c, 0 <= c < T, the command in force is u_{k-n-1} for c seconds after tick k, then
-u_{k-n} until the next tick. (2-13) is linear and the rotors are alike, so that thrust and moment lag as each
-rotor does.
+The estimate applies to the instant of the inertial unit's samples: tick k is that instant, and d includes
+the unit's delay. With d = n T + c, 0 <= c < T, the command in force is u_{k-n-1} for c seconds after tick k,
+then u_{k-n} until the next tick. (2-13) is linear and the rotors are alike, so that thrust and moment lag as
+each rotor does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ActuationConstants(NamedTuple):
     whole: int  # n, whole periods in the delay
     late: float  # c, s
     lag: float  # tau, s
-    kept_late: float  # share of the way left after c: exp(-c / tau)
+    kept_late: float  # share of the difference left after c: exp(-c / tau)
     kept_rest: float  # after T - c
     kept: float  # after T
     kept_half_late: float  # after c / 2
@@ -47,7 +47,7 @@ class ActuationConstants(NamedTuple):
 
 
 class Actuation(NamedTuple):
-    """Belief at a tick, before the command of that tick is given. `queue[i]` is (f, M) of u_{k-1-i}."""
+    """Assumed output at a tick, before the command of that tick. `queue[i]` is (f, M) of u_{k-1-i}."""
 
     queue: Queue
     thrust: float  # N
@@ -56,7 +56,7 @@ class Actuation(NamedTuple):
 
 def actuation_constants(delay: float, lag: float, period: float) -> ActuationConstants:
     """Constants for a transport delay and a first-order lag of the rotors, all in seconds."""
-    # a delay that rounding left a little short of a whole number of periods is that number
+    # a delay that is a whole number of periods except for rounding counts as that number
     whole = floor(delay / period + 1e-9)
     late = max(0.0, delay - whole * period)
 
@@ -76,7 +76,7 @@ def actuation_constants(delay: float, lag: float, period: float) -> ActuationCon
 
 
 def rows_of(constants: ActuationConstants) -> int:
-    """How many commands the delay makes one remember."""
+    """Number of commands that must be stored for this delay."""
     return constants.whole + 2
 
 
@@ -86,7 +86,7 @@ def resting(rows: int = ROWS) -> Actuation:
 
 
 def steady(thrust: float, rows: int = ROWS) -> Actuation:
-    """Rotors that have been asked for this thrust (N) for long."""
+    """Rotors that have been commanded this thrust (N) for a long time."""
     queue = np.zeros((rows, 4))
     queue[:, 0] = thrust
     return Actuation(queue, thrust, ZERO)
@@ -94,7 +94,7 @@ def steady(thrust: float, rows: int = ROWS) -> Actuation:
 
 @kernel
 def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> tuple[float, Vec3]:
-    """Thrust and moment of the rotors when `kept` of their way to command `row` is left."""
+    """Thrust and moment of the rotors when the share `kept` of the difference to command `row` is left."""
     f, x = float(queue[row, 0]), float(queue[row, 1])
     y, z = float(queue[row, 2]), float(queue[row, 3])
     return f + kept * (thrust - f), (
@@ -106,7 +106,7 @@ def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> 
 
 @kernel
 def after_delay(actuation: Actuation, constants: ActuationConstants) -> tuple[float, Vec3]:
-    """What the rotors will give when the command of this tick comes into force: thrust N, moment N m."""
+    """What the rotors will give when the command of this tick takes effect: thrust N, moment N m."""
     thrust, moment = actuation.thrust, actuation.moment
     if constants.late > 0.0:
         thrust, moment = lagged(thrust, moment, actuation.queue, constants.whole, constants.kept_late)
@@ -118,8 +118,8 @@ def after_delay(actuation: Actuation, constants: ActuationConstants) -> tuple[fl
 
 @kernel
 def advance(actuation: Actuation, thrust: float, moment: Vec3, constants: ActuationConstants) -> Actuation:
-    """The belief a period later, `thrust` (N) and `moment` (N m, body) being the command of this tick, which
-    is put into the queue in place."""
+    """The assumed output a period later. `thrust` (N) and `moment` (N m, body) are the command of this tick;
+    the queue is changed in place."""
     queue = actuation.queue
     for row in range(queue.shape[0] - 1, 0, -1):
         for i in range(4):
@@ -129,7 +129,7 @@ def advance(actuation: Actuation, thrust: float, moment: Vec3, constants: Actuat
     queue[0, 2] = moment[1]
     queue[0, 3] = moment[2]
     now, turning = actuation.thrust, actuation.moment
-    # in the queue that has the command of this tick, u_{k-n-1} is row n + 1
+    # now that the queue contains the command of this tick, u_{k-n-1} is row n + 1
     if constants.late > 0.0:
         now, turning = lagged(now, turning, queue, constants.whole + 1, constants.kept_late)
     now, turning = lagged(now, turning, queue, constants.whole, constants.kept_rest)

@@ -1,17 +1,17 @@
-"""How much of what they are believed to give the rotors give, as their speeds tell.
+"""The share of the assumed thrust that the rotors give, estimated from their speeds.
 
 | symbol | code | unit | |
 |---|---|---|---|
-| F | told | N | thrust by the rotor speeds that were told last: F_max (speed / full speed)^2 each |
-| f | thrust | N | thrust by belief, `rotor_model`, with the factor that was known |
-| k | factor | | what a rotor gives, of what it is asked for |
+| F | told | N | thrust from the last reported rotor speeds: F_max (speed / full speed)^2 each |
+| f | thrust | N | assumed thrust, `rotor_model`, with the present factor |
+| k | factor | | share of its command that a rotor gives |
 | T | | s | time constant |
 
     k' = k (1 + (dt / T) (F - f) / f)
 
-A battery that sags, and a thrust curve that is not the believed one, take the same share of every rotor.
-Commands are then for F / k, limits k times as large, and all that reckons with thrust reckons with what there
-is. The speeds tell no force to more than `UNTOLD`: a factor nearer to one than that counts as one.
+A sagging battery, or a thrust curve that differs from the assumed one, weakens all rotors by the same
+factor. The commands are then F / k, the limits are k times as large, and everything that uses the thrust uses
+the actual thrust. The speeds show a force only to within `UNTOLD`: a factor closer to one counts as one.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ Array = NDArray[np.float64]
 
 LEAST, GREATEST = 0.4, 1.3
 UNTOLD = 0.02
-_FLYING = 0.25  # of the vehicle's weight: less thrust than that tells nothing
+_FLYING = 0.25  # of the vehicle's weight: less thrust than that is not used
 
 
 @kernel
 def learned_factor(
     factor: float, thrust: float, vehicle: Vehicle, table: Array, rotors: Array, share: float
 ) -> float:
-    """The factor a period later, `share` of the time constant; `thrust` (N) is believed now. Rotors that have
-    told nothing, or miss what they are asked for, tell nothing of it."""
+    """The factor after a period that is `share` of the time constant; `thrust` (N) is the assumed thrust now.
+    The factor is kept while no speeds have been reported or a rotor gives less than it must."""
     told = missed = 0.0
     for i in range(table.shape[0] - 1):
         told = told + force_at(rotors[TOLD, i], table[i, STRENGTH] * vehicle.rotor_max)
@@ -54,7 +54,7 @@ def learned_factor(
 
 @kernel
 def counted(factor: float) -> float:
-    """The factor that is reckoned with."""
+    """The factor that is applied."""
     return factor - clamp(factor - 1.0, -UNTOLD, UNTOLD)
 
 
@@ -68,8 +68,8 @@ def mix_with(
     table: Array,
     rotors: Array,
 ) -> MixerResult:
-    """As `mix`, but the forces in the row FORCE are asked for by rotors that give `factor` of them; the
-    result is what they give."""
+    """As `mix`, for rotors that give `factor` of what is commanded: the row FORCE contains the commands, the
+    result what the rotors give."""
     weaker = with_field(vehicle, "rotor_min", factor * vehicle.rotor_min)
     weaker = with_field(weaker, "rotor_max", factor * vehicle.rotor_max)
     mixed = mix(thrust, moment, weaker, limited, table, rotors)

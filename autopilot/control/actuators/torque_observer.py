@@ -1,5 +1,5 @@
-"""What turns the vehicle besides its rotors and the cable: discs that tilt in the air, a cable that does not
-pull where it is thought to, rotors that are not alike.
+"""The torque on the vehicle besides that of rotors and cable: from rotor discs that tilt in the air, a cable
+that is attached elsewhere than assumed, rotors that are not alike.
 
 | symbol | code name | frame | unit | equation |
 |---|---|---|---|---|
@@ -7,13 +7,14 @@ pull where it is thought to, rotors that are not alike.
 | d | felt | B | N m | J Omega' + Omega x J Omega - M |
 | u | | B | m/s | R^T x_Q' |
 | s | swept | B | m/s | (u_y, -u_x, 0) |
-| k | factor | | N s | of d, what follows s |
+| k | factor | | N s | k s is the part of d that follows s |
 | p | steady | B | N m | d - k s |
 
-A disc that tilts backward turns the vehicle by its stiff blades, and its drag by the lever to the centre of
-mass, both about the level axis across the flow: k is the least-squares fit of d to s, of both what differs
-from their means of some seconds, and is known without delay. The rest, p, is learned with a delay. All this
-while the load hangs free: the ground turns a vehicle that touches it, and would be taken for the air.
+A rotor disc that tilts backward turns the vehicle through its stiff blades, and its drag through the lever
+to the centre of mass, both about the level axis across the flow. k is the least-squares fit of d to s, both
+taken as differences from their means over some seconds; this part is known without delay. The rest, p, is
+learned with a delay. Both are learned only while the load hangs free: the ground turns a vehicle that touches
+it, and the estimate would attribute this to the air.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, axpy, cross, dot, scale, sub, times
 from autopilot.geometry.packed import with_field
 
-# of the moment that the rotors can exert: more is not believed
+# of the moment that the rotors can exert: bound of the estimate
 GREATEST_TORQUE = 0.3
-# k is learned by motion faster than this, m/s
+# k is learned from motion faster than this, m/s
 _SWEPT_SPEED = 0.2
 
 
 class TorqueConstants(NamedTuple):
-    """Shares of a period in the memory of p and k, and bounds."""
+    """Shares of one period in the fading averages for p and k, and bounds."""
 
     steady: float
     factor: float
@@ -41,7 +42,7 @@ class TorqueConstants(NamedTuple):
 
 
 class Torque(NamedTuple):
-    """What is believed of d."""
+    """The estimate of d."""
 
     now: Vec3  # k s + p, N m
     steady: Vec3
@@ -58,7 +59,7 @@ NO_TORQUE = Torque(ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ZERO)
 def torque_constants(
     steady_share: float, factor_share: float, period: float, vehicle: Vehicle
 ) -> TorqueConstants:
-    """For a vehicle whose rotors bound what is believed; `period` in s. A steady share of 0: nothing."""
+    """With bounds from the vehicle's rotors; `period` in s. A steady share of 0 learns nothing."""
     force = vehicle.rotor_max - vehicle.rotor_min
     level = GREATEST_TORQUE * 0.5 * vehicle.level * vehicle.arm * force
     yaw = GREATEST_TORQUE * 0.5 * vehicle.lift * vehicle.torque_ratio * force
@@ -68,7 +69,7 @@ def torque_constants(
 
 @kernel
 def unheeded(torque: Torque, state: State) -> Torque:
-    """The belief a period later, while the load does not hang free: kept, and nothing is flown against."""
+    """The estimate a period later, while the load does not hang free: kept, but not compensated."""
     return with_field(with_field(torque, "now", ZERO), "omega_body", state.omega_body)
 
 
@@ -81,7 +82,7 @@ def _within(value: float, greatest: float) -> float:
 def observe_torque(
     torque: Torque, state: State, moment: Vec3, constants: TorqueConstants, vehicle: Vehicle
 ) -> Torque:
-    """The belief a period later, while the load hangs free; `moment`, N m: of rotors and cable now."""
+    """The estimate a period later, while the load hangs free; `moment`, N m: of rotors and cable now."""
     J, W = vehicle.inertia, state.omega_body
     turning = scale(1.0 / constants.period, times(J, sub(W, torque.omega_body)))
     felt = sub(add(turning, cross(W, times(J, W))), moment)

@@ -1,19 +1,20 @@
-"""Rotors of different lag are made alike, so that thrust and moment lag as one.
+"""Makes rotors of different lag alike, so that thrust and moment have one lag.
 
 | symbol | code | unit | |
 |---|---|---|---|
-| tau | | s | the lag that all are to have, VEH_ROTOR_TAU |
-| k_i | Rotor.lag | | lag of a rotor, of tau (`lag_factor` of its file) |
-| p_i | rotors[FORCE], before | N | what the mixer wants of it |
-| y_i | rotors[GIVES] | N | what it gives by belief |
-| u_i | rotors[FORCE], after | N | what it is asked for |
+| tau | | s | the lag that all rotors get, VEH_ROTOR_TAU |
+| k_i | Rotor.lag | | lag of a rotor divided by tau (`lag_factor` of its file) |
+| p_i | rotors[FORCE], before | N | the mixer's force for it |
+| y_i | rotors[GIVES] | N | what it is assumed to give |
+| u_i | rotors[FORCE], after | N | its command |
 
     a = 1 - exp(-T / tau)     b_i = 1 - exp(-T / (k_i tau))
     u_i = y_i + (a / b_i) (p_i - y_i), within its limits
     y_i <- y_i + b_i (u_i - y_i)
 
-Without limits y_i <- y_i + a (p_i - y_i): that of a rotor of lag tau, exactly. What a limit cuts is made up
-for as y_i tells. A delay only shifts u_i and y_i together. Where all rotors are alike nothing is done.
+Without limits y_i <- y_i + a (p_i - y_i), exactly that of a rotor of lag tau. What a limit cuts off is made
+up for later, because y_i contains it. A delay only shifts u_i and y_i together. If all rotors are alike,
+nothing is changed.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from autopilot.vehicle.rotors import STRENGTH
 
 Array = NDArray[np.float64]
 
-# columns behind those of the mixer's table: a / b_i, and b_i; its last row has 1 where any rotor is unlike
+# columns behind those of the mixer's table: a / b_i, and b_i; GAIN of its last row is 1 if any rotor differs
 GAIN, MOVED = 8, 9
 
 
@@ -48,7 +49,7 @@ def with_lags(table: Array, layout: Layout, actuation: ActuationConstants) -> Ar
 
 @kernel
 def make_alike(rotors: Array, table: Array, vehicle: Vehicle, limited: float) -> None:
-    """Ask each rotor for what makes it lag as the others do."""
+    """Replace each rotor's force by the command that makes it lag as the others do."""
     last = table.shape[0] - 1
     if table[last, GAIN] == 0.0:
         return

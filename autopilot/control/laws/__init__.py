@@ -1,4 +1,4 @@
-"""The control laws, one file each: whatever file of this folder has a `LAW` is found."""
+"""The control laws, one file each: every file of this folder that defines a `LAW` is found."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def build_law(table: AutopilotParameters) -> Any:
 
 
 def is_own(constants: Any) -> bool:
-    """Whether these are the constants of a law that somebody has brought."""
+    """Whether these are the constants of a custom law."""
     return isinstance(constants, OWN.constants)
 
 
 def link_own(rows: Any, link: Link) -> None:
-    """Let the rows of a law that somebody has brought call its functions."""
+    """Let the rows of a custom law call its functions."""
     pack(link, rows.constants, place_of(OWN.constants, "link"))

@@ -1,21 +1,20 @@
 """What a control law is: a record of constants, a record of memory, and five kernels over them.
 
-A law is one file of this folder that says `LAW = Law(name="...", number=..., ...)`; it is found by that. Its
-own parameters, if it has any, are a text `PARAMETERS` in the format of `parameters.toml`. The kernels are the
-flight modes of 3-2 and the position law of the vehicle alone:
+A law is one file of this folder that contains `LAW = Law(name="...", number=..., ...)`, by which it is found.
+Its own parameters, if it has any, are a text `PARAMETERS` in the format of `parameters.toml`. The kernels are
+the flight modes of 3-2 and the position law of the vehicle alone:
 
-| kernel | follows | arguments behind (constants, memory, state) |
+| kernel | follows | arguments after (constants, memory, state) |
 |---|---|---|
 | start | | (constants, state, x_d, v_d): the memory of a law that begins now, without a jump of its command |
 | load_position | load position | reference, actuation, observed, cable |
-| quad_position | vehicle position, nothing hanging on it | reference, actuation, observed, cable |
+| quad_position | vehicle position, without a load | reference, actuation, observed, cable |
 | load_attitude | cable direction q_d under a pull (N) | q_d, b1_d, pull, actuation, observed, cable |
 | quad_attitude | attitude R_d under a thrust (N) | R_d, thrust, actuation, observed, cable |
 
-All but `start` return (memory, Command). World ENU, body FLU, SI. `reference` is that of `preview_s` from
-now;
-`actuation` and `observed` are what is believed of rotors and disturbances at this tick, `cable` is its
-length, rate and acceleration now.
+All but `start` return (memory, Command). World ENU, body FLU, SI. `reference` is the reference `preview_s`
+later than now; `actuation` and `observed` are the estimates of rotors and disturbances at this tick; `cable`
+is the cable's present length, rate and acceleration.
 """
 
 from __future__ import annotations
@@ -45,20 +44,20 @@ class Kernels(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """A law as the rest of the autopilot knows it."""
+    """A law as the rest of the autopilot sees it."""
 
     name: str  # as users write it
     number: int  # of CTL_LAW
     constants: type  # NamedTuple of numbers
     memory: type  # NamedTuple of numbers
-    rows: type  # NamedTuple (constants, memory) of two rows; by its type the compiler tells the law
+    rows: type  # NamedTuple (constants, memory) of two rows; its type shows the compiler which law it is
     build: Callable[[ParameterTable, Vehicle], Any]  # the constants, from the parameters
     kernels: Kernels
-    preview_s: Callable[[Any], float] = lambda constants: 0.0  # how much later than now its reference is
-    # by how much time the load keeps behind a reference that rises or sinks steadily
+    preview_s: Callable[[Any], float] = lambda constants: 0.0  # how much later than now its reference applies
+    # time by which the load lags behind a reference that rises or sinks steadily
     ramp_lag_s: Callable[[Any], float] = lambda constants: 0.0
-    reels: bool = True  # it can fly another length of the cable than the one it was built for
-    follows_shaped: bool = False  # it follows a path so exactly that shaping the path beforehand pays
+    reels: bool = True  # it can fly with a cable length other than the one it was built for
+    follows_shaped: bool = False  # it follows a path accurately enough for shaping to be worthwhile
 
 
 _BY_RECORD: dict[Any, Law] = {}  # by the types of constants and of rows
@@ -82,7 +81,7 @@ def new_rows(constants: Any) -> Any:
     return law.rows(packed(constants), np.zeros(width(law.memory)))
 
 
-# ---- in kernels: which law it is, the compiler sees by the type of its record
+# ---- in kernels: the compiler sees from the type of the record which law it is
 
 
 def kernels_of(record: Any) -> Kernels:

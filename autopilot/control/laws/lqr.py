@@ -1,8 +1,8 @@
-"""The law `lqr`: the linear regulator of A-2, which knows one mode, load position.
+"""The law `lqr`: the linear regulator of A-2, which has one mode, load position.
 
 The other modes have no linear counterpart in the thesis. Take-off and set-down with a slack cable, and the
-two attitude modes, are flown by the law `thesis` with its parameters. The gains are those of one length of
-the cable.
+two attitude modes, are flown by the law `thesis` with its parameters. The gains are valid for one cable
+length.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class LqrRows(NamedTuple):
 
 
 def build(table: ParameterTable, vehicle: Vehicle) -> LqrLaw:
-    """Weights from the LQR_ parameters, the other modes from NGC_ and QP_."""
+    """Weights from the LQR_ parameters; the other modes from NGC_ and QP_."""
     weights = regulator_of.LqrWeights(
         position=table["LQR_Q_POS"],
         tilt=table["LQR_Q_TILT"],
@@ -66,7 +66,7 @@ def load_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
-    """The vehicle is steered to a cable length above the reference of the load."""
+    """The vehicle is steered to a point one cable length above the load's reference."""
     return memory, regulator_of.load_position(state, reference, law.regulator)
 
 

@@ -1,8 +1,9 @@
-"""The custom law: it asks a function at an address what to do (`autopilot.control.law_desk`).
+"""The custom law: it calls a function at an address for its command (`autopilot.control.law_desk`).
 
-The modes that the function's owner does not define, and all modes once what it asks for was no number, are
-flown by the law `plumbline`. Who asks for a force, an attitude or body rates gets them by the innermost loop
-of `plumbline`, which reckons with delay and lag of the rotors.
+The law `plumbline` flies the modes that the custom law does not define, and all modes after a command of the
+custom law was not a number. If the custom law commands a force or an attitude, the innermost loop of
+`plumbline` flies it and takes delay and lag of the rotors into account. Body rates become a moment by the
+gain k_Omega of `plumbline`, without prediction and lag compensation.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from autopilot.wire.parameter_table import ParameterTable
 
 
 class OwnLaw(NamedTuple):
-    """Where its functions are, and what flies in their stead."""
+    """The addresses of its functions, and the built-in law that replaces missing ones."""
 
     link: Link
     period: float  # s
@@ -47,8 +48,8 @@ class OwnLaw(NamedTuple):
 
 
 class OwnMemory(NamedTuple):
-    """What the built-in law remembers, and for how long this mode was flown; its own memory lies with its
-    owner."""
+    """The memory of the built-in law, and the number of ticks that this mode has been flown; the custom law
+    stores its own memory."""
 
     ticks: int
     built_in: plumbline.PlumblineMemory
@@ -62,7 +63,7 @@ class OwnRows(NamedTuple):
 
 
 def build(table: ParameterTable, vehicle: Vehicle) -> OwnLaw:
-    """The built-in law; its functions are linked where it is flown."""
+    """The law without links; its functions are linked where it is flown."""
     return OwnLaw(UNLINKED, 1.0 / table["CTL_RATE_HZ"], vehicle, plumbline.build(table, vehicle))
 
 
@@ -74,7 +75,7 @@ def start(law: OwnLaw, state: State, x_d: Vec3, v_d: Vec3) -> OwnMemory:
 
 @kernel
 def _staying(x: Vec3, b1_d: Vec3) -> Reference:
-    """A reference that rests."""
+    """A reference at rest."""
     return Reference((x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), b1_d, ZERO, ZERO)
 
 
@@ -96,7 +97,7 @@ def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Observe
 
 @kernel
 def _asked(law: OwnLaw, function: int, now: Now) -> Asked:
-    """What the function asks for; where that is no number, the alarm has been raised."""
+    """The command of the function; if it is not a number, the alarm is raised."""
     asked = ask(function, law.link.desk, now)
     if not is_sound(asked):
         call_at(law.link.alarm, law.link.desk)
@@ -107,7 +108,7 @@ def _asked(law: OwnLaw, function: int, now: Now) -> Asked:
 def _obeyed(
     law: OwnLaw, memory: OwnMemory, now: Now, asked: Asked, actuation: Actuation, observed: Observed
 ) -> tuple[OwnMemory, Command]:
-    """The command that does what was asked for."""
+    """The rotor command that carries out what the custom law commands."""
     state, built_in = now.state, memory.built_in
     thrust, moment = asked.thrust, asked.vector
     if asked.kind in (WRENCH, RATES):
@@ -141,7 +142,7 @@ def _tried(
     observed: Observed,
     cable: Cable,
 ) -> tuple[bool, OwnMemory, Command]:
-    """Whether the function has asked for something that can be done, and the command for it."""
+    """Whether the function's command is sound, and the memory and rotor command that follow from it."""
     now = Now(
         memory.ticks == 0,
         memory.ticks * law.period,
@@ -194,7 +195,7 @@ def quad_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[OwnMemory, Command]:
-    """The vehicle follows a reference, nothing hanging on it."""
+    """The vehicle follows a reference, without a load."""
     function, x_d, v_d = law.link.quad_position, reference.jet[0], reference.jet[1]
     if function != 0:
         held = Held(state.q_cable, 0.0, state.R, 0.0)
@@ -268,7 +269,7 @@ def quad_attitude(
 
 OWN = Law(
     name="own",
-    number=len(law_files()),  # no law of the list: CTL_LAW has it where one was brought
+    number=len(law_files()),  # after the built-in laws: the value of CTL_LAW if a custom law is flown
     constants=OwnLaw,
     memory=OwnMemory,
     rows=OwnRows,

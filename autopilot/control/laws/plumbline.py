@@ -1,11 +1,11 @@
-"""The law `plumbline`: every mode at the state at which its command will find the vehicle, with rotors
-hastened by their lag.
+"""The law `plumbline`: every mode is evaluated at the state at which its command will take effect, and the
+rotors' lag is compensated.
 
-state, commands on their way -> state at the instant the command is in force -> law -> lag inverted -> command
+state, commands on their way -> state when the command takes effect -> law -> lag inverted -> command
 
 Load position is flown with exact derivatives (`autopilot.control.plumbline_cascade`). The other modes,
-which are flown for moments only, are the loops of the thesis's cascade with its filters and the gains of
-the design.
+which are flown only briefly, are the loops of the thesis's cascade with its filters and the gains of the
+design.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, scale, sub
 from autopilot.geometry.packed import Row, with_field
 from autopilot.wire.parameter_table import ParameterTable
 
-# pace at which load and cable are followed where the load leaves the ground; m, above which it is in full
+# pace at which load and cable are followed when the load leaves the ground; height (m) of the full pace
 LIFTING_PACE, LIFTED = 0.5, 0.7
 
 
 class PlumblineConstants(NamedTuple):
-    """Everything derived from parameters that load position uses."""
+    """Everything that load position uses and that is derived from parameters."""
 
     gains: cascade.PlumblineGains
     drag: Drag
@@ -54,7 +54,7 @@ class PlumblineLaw(NamedTuple):
 
 
 class PlumblineMemory(NamedTuple):
-    """What the law remembers: of load position, and of the other modes."""
+    """The memory of load position and that of the other modes."""
 
     position: cascade.PlumblineMemory
     other_modes: ThesisMemory
@@ -68,7 +68,7 @@ class PlumblineRows(NamedTuple):
 
 
 def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
-    """From the PLB_ and VEH_ parameters; the other modes from NGC_ and QP_."""
+    """From PLB_ and VEH_ parameters; filters and position gains of the other modes from NGC_ and QP_."""
     period = 1.0 / table["CTL_RATE_HZ"]
     lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
     gains = believed_design(table, vehicle).gains
@@ -91,7 +91,7 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
 
 @kernel
 def with_cable(law: PlumblineLaw, cable: Cable) -> PlumblineLaw:
-    """The law for the present cable: the loops about it as fast as they were."""
+    """The law for the present cable; gains scaled so that the cable's loop keeps its bandwidth."""
     c = law.constants
     longer = cable.length / c.vehicle.cable_length
     gains = with_field(c.gains, "k_q", longer * c.gains.k_q)
@@ -102,10 +102,11 @@ def with_cable(law: PlumblineLaw, cable: Cable) -> PlumblineLaw:
 
 @kernel
 def air_of(state: State, taut: float, observed: Observed, constants: PlumblineConstants) -> tuple[Drag, Vec3]:
-    """Drag of the vehicle, with what was learned of it, and the push (N) besides.
+    """Drag of the vehicle, including the learned part, and the push (N) besides.
 
-    The motion of load and vehicle is told as seen from a frame that falls with what the air does to the load:
-    there nothing but the cable holds the load, and the push on the vehicle is less by its mass times that.
+    While the cable is taut, the law works in a frame that falls with the load's acceleration by the air: in
+    this frame nothing but the cable holds the load, and the push on the vehicle is reduced by the vehicle's
+    mass times this acceleration.
     """
     linear = constants.drag.linear + observed.drag.linear
     push = sub(observed.push, air_force(state.v_quad, observed.drag))
@@ -119,7 +120,7 @@ def air_of(state: State, taut: float, observed: Observed, constants: PlumblineCo
 
 @kernel
 def falling(jet: Jet, observed: Observed) -> Jet:
-    """The reference as it is seen from that frame, in which the load's drag moves with the load."""
+    """The reference in the falling frame of `air_of`, with the load's drag added in all derivatives."""
     x, v, a, j, s, p, o = jet
     c = observed.load_drag
     drift = axpy(c, v, scale(-1.0, observed.load_air))
@@ -142,7 +143,7 @@ def ahead_of(
     observed: Observed,
     constants: PlumblineConstants,
 ) -> Ahead:
-    """State and rotors at the instant at which the command of this tick comes into force."""
+    """State and rotors at the instant at which the command of this tick takes effect."""
     if standing(observed, constants.vehicle):
         return stay(state, actuation, constants.actuation)
     drag, push = air_of(state, taut, observed, constants)
@@ -161,8 +162,9 @@ def ahead_of(
 
 @kernel
 def hastened(wanted: Command, ahead: Ahead, observed: Observed, constants: PlumblineConstants) -> Command:
-    """The command that makes the rotors give, as fast as they shall, what is wanted and what the air does not
-    give. The ground holds the attitude of a vehicle that stands: what is felt of it late would only rock it.
+    """The command that makes the rotors give, with the configured lag, what is wanted, less the torque of the
+    air. A vehicle that stands gets no moment: the ground holds its attitude, and a delayed reaction to it
+    would only rock the vehicle.
     """
     if standing(observed, constants.vehicle):
         return with_field(wanted, "moment", ZERO)
@@ -173,14 +175,14 @@ def hastened(wanted: Command, ahead: Ahead, observed: Observed, constants: Plumb
 
 @kernel
 def start(law: PlumblineLaw, state: State, x_d: Vec3, v_d: Vec3) -> PlumblineMemory:
-    """Memory of a law that begins now: the thrust is taken for steady."""
+    """Memory of a law that begins now: the thrust is assumed to be steady."""
     return PlumblineMemory(cascade.start(), thesis.start(law.other_modes, state, x_d, v_d))
 
 
 @kernel
 def greatest_pace(state: State, reference: Reference, observed: Observed) -> float:
-    """The pace at which a load may be followed that is being lifted: how it lay, the wind in it and what it
-    weighs show only by and by."""
+    """The greatest pace at which a load is followed while it is lifted: how it lay, the wind on it and its
+    mass become apparent only gradually."""
     height = max(0.0, state.x_load[2] - observed.load_ground)
     rising = LIFTING_PACE + (1.0 - LIFTING_PACE) * height / LIFTED
     return if_above(reference.jet[1][2], 0.0, min(1.0, rising), 1.0)
@@ -196,13 +198,13 @@ def load_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[PlumblineMemory, Command]:
-    """The load follows a reference, which is that of the instant at which the command comes into force."""
+    """The load follows a reference, given for the instant at which the command takes effect."""
     constants = with_cable(law, cable).constants
     position = memory.position
     ahead = ahead_of(state, 1.0, actuation, observed, constants)
     then, thrust = ahead.state, ahead.thrust
     if lying(observed, state):
-        # the ground gives what the rotors do not yet; where it is lifted, how it hangs shows only afterwards
+        # the ground carries what the rotors do not yet; how the load hangs shows only after it is lifted
         vehicle = constants.vehicle
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
         position = cascade.PlumblineMemory(0.0, position.integral, position.pace)
@@ -234,7 +236,7 @@ def quad_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[PlumblineMemory, Command]:
-    """The vehicle follows a reference, nothing hanging on it."""
+    """The vehicle follows a reference, without a load."""
     now = with_cable(law, cable)
     constants, others = now.constants, now.other_modes
     ahead = ahead_of(state, 0.0, actuation, observed, constants)

@@ -63,7 +63,7 @@ def build(table: ParameterTable, vehicle: Vehicle) -> ThesisLaw:
 
 @kernel
 def with_cable(law: ThesisLaw, cable: Cable) -> ThesisLaw:
-    """The law for the present cable: the loops about it as fast as they were."""
+    """The law for the present cable; gains scaled so that the cable's loop keeps its bandwidth."""
     longer = cable.length / law.vehicle.cable_length
     gains = with_field(law.gains, "k_q", longer * law.gains.k_q)
     gains = with_field(gains, "k_omega", longer * law.gains.k_omega)
@@ -72,8 +72,8 @@ def with_cable(law: ThesisLaw, cable: Cable) -> ThesisLaw:
 
 @kernel
 def start(law: ThesisLaw, state: State, x_d: Vec3, v_d: Vec3) -> ThesisMemory:
-    """On the steady motion of the reference filter, which lags behind what moves; else x_d'' would begin
-    with -2 zeta omega_n v_d."""
+    """Memory of a law that begins now: the reference filter starts on its steady motion, which lags behind a
+    moving reference; otherwise x_d'' would begin with -2 zeta omega_n v_d."""
     lag = law.filters.reference.ramp_lag
     return cascade.start(state, axpy(-lag, v_d, x_d), v_d)
 
@@ -88,7 +88,7 @@ def load_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
-    """The load follows a reference, of which the position alone is used."""
+    """The load follows a reference; only its position is used."""
     now = with_cable(law, cable)
     return cascade.load_position(memory, state, reference, now.gains, now.filters, now.vehicle)
 
@@ -103,7 +103,7 @@ def quad_position(
     observed: Observed,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
-    """The vehicle follows a reference, nothing hanging on it."""
+    """The vehicle follows a reference, without a load."""
     now = with_cable(law, cable)
     return position_law.quad_position(
         memory, state, reference, 0.0, ZERO, now.position_gains, now.gains, now.filters, now.vehicle

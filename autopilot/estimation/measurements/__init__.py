@@ -1,1 +1,1 @@
-"""What each sensor's reading does to the estimate, one file a sensor."""
+"""Corrections of the estimate by the sensors' readings, one file per sensor."""

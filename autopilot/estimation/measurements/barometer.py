@@ -1,4 +1,4 @@
-"""Correction by a barometer: height plus an offset that wanders."""
+"""Correction by a barometer, which measures height plus an offset that drifts."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 
-ANY_OFFSET_STD = 100.0  # m: the first reading is the zero
+ANY_OFFSET_STD = 100.0  # m: the first reading defines the zero
 
 
 @kernel
 def correct_barometer(
     state: EstimatorState, history: History, height: float, age: float, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The state after a reading of the height (m). No use is made of it beside a tracker."""
+    """The state after a reading of the height (m), which is used only with a satellite receiver."""
     if state.vehicle.source != RECEIVER:
         return state
     state = heard(state, age, SIZE)

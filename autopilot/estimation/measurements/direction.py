@@ -1,8 +1,8 @@
 """Correction by the direction to the load as a camera or an encoder sees it, in body axes.
 
-With m = exp(c) R^T q, c the mounting error about the body's forward and left axes, the direction R exp(-c) m
-differs from q by its own error, by attitude x q and by (R c) x q. While the cable is slack the load lies on
-the ground: it is where the line of sight meets its height.
+With m = exp(c) R^T q, where c is the mounting error about the body's forward and left axes, R exp(-c) m
+differs from the direction q by its own error, by attitude x q and by (R c) x q. While the cable is slack, the
+load lies on the ground, where the line of sight meets the load's height.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from autopilot.geometry.so3 import exp, rotation_from_quat
 
 REJECTIONS_BEFORE_RESET = 10.0
 LEAST_SLOPE = 0.3  # of a line of sight that is to meet the ground
-LEAST_HEIGHT = 0.1  # m over the load, the same
+LEAST_HEIGHT = 0.1  # m above the load, for the same
 
 
 @kernel
 def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> LoadEstimate:
-    """A lying load found elsewhere."""
+    """A lying load moved to `x_load`."""
     return LoadEstimate(
         x_load,
         load.v_load,
@@ -83,7 +83,7 @@ def see_lying(
     tilt = state.doubt.tilt
     down = sight[2] * sight[2]
     slow = far * far * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / down
-    # a height that is wrong shows aside
+    # an error of the height moves this point sideways
     slow += P[POSITION + 2, POSITION + 2] * (1.0 - down) / down
     own = far * reading.direction_std / sight[2]
     variance = own * own + slow
@@ -96,7 +96,7 @@ def see_lying(
         var = 1.0
     k = var / (var + variance)
     x_load = (load.x_load[0] + k * off[0], load.x_load[1] + k * off[1], load.x_load[2])
-    # what is slow is alike in all sights, and not averaged away
+    # slow errors are the same in all sights and do not average out
     return with_load(state, put(load, x_load, max((1.0 - k) * var, slow), reading.age_s), state.resets)
 
 
@@ -121,7 +121,7 @@ def correct_direction(
         return see_lying(state, history, past, sight, reading, tuning)
     q = past.q_cable
     off = sub(sight, q)
-    # the stated deviation counts the mounting in
+    # the stated deviation includes the mounting
     stated = reading.direction_std * reading.direction_std
     variance = max(stated - tuning.mounting_std * tuning.mounting_std, 0.25 * stated)
     innovation = (dot(past.across, off), dot(past.along, off))
@@ -147,7 +147,7 @@ def correct_direction(
 
 @kernel
 def widen(history: History) -> None:
-    """The cable may point anywhere and turn fast: the sights decide."""
+    """Make direction and rate of the cable unknown, so that the sights decide them."""
     P = history.covariance
     for i in range(DIRECTION, DIRECTION + 4):
         P[i, i] += 1.0
@@ -155,7 +155,7 @@ def widen(history: History) -> None:
 
 @kernel
 def enter_sight(history: History, i: int, past: Past, R: tuple[Vec3, Vec3, Vec3]) -> None:
-    """Component i of the seen direction in the cable's axes, as scalar i."""
+    """Enter component i of the seen direction in the cable's axes, as scalar i."""
     axis = past.across if i == 0 else past.along
     turn = cross(past.q_cable, axis)
     enter_attitude(history, i, past, scale(-1.0, turn))

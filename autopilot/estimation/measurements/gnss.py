@@ -1,8 +1,9 @@
 """Correction by a satellite navigation receiver: position, with an error that is partly slow, and velocity.
 
-The first fix starts the vehicle, levelled by the accelerometer and headed by the magnetometer. It stands on
-the ground then, at the height of its gear, with the load where the crew laid it; or, if its rotors carry it,
-it is somewhere in the air with the load below it, and the fixes that follow tell more.
+The first fix starts the estimate of the vehicle, levelled by the accelerometer, with its heading from the
+magnetometer. The vehicle then stands on the ground, at the height of its gear, with the load where the crew
+laid it; or, if its rotors carry it, it is in the air with the load below it, and later fixes refine the
+estimate.
 """
 
 from __future__ import annotations
@@ -59,27 +60,29 @@ from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
 
 FIXES_BEFORE_RESET = 8.0
 LEAST_PERIOD_S = 0.02  # between two fixes
-SETTLED = 2.0  # times the deviation of a slow error that is another one
-CLIMB_WORSE = 1.7  # deviation of the climb over that of the level speed
+SETTLED = 2.0  # a slow error is a new one where its deviation was so many times as large before
+CLIMB_WORSE = 1.7  # deviation of the climb over that of the horizontal speed
 STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
 # of a vehicle that is found in the air
-CARRIED_SHARE = 0.5  # of its weight, from which the rotors carry it
+CARRIED_SHARE = 0.5  # of its weight: above this thrust, the rotors carry it
 LOADED_SHARE = 0.5  # of the load's weight that must pull at the vehicle for the load to hang from it
-FLYING_SPEED_STD, FLYING_TILT_STD = 1.0, 0.15  # m/s; rad, by which its acceleration tilts the vertical
-HANGING_STD, SWINGING_STD = 0.3, 1.0  # of the cable's length, level; m/s
-ANYWHERE_STD = 100.0  # m: the first fix says where
+FLYING_SPEED_STD, FLYING_TILT_STD = 1.0, 0.15  # m/s; rad, by which acceleration tilts the measured vertical
+HANGING_STD, SWINGING_STD = 0.3, 1.0  # of the cable's length, horizontal; m/s
+ANYWHERE_STD = 100.0  # m: the first fix decides the position
 MAGNETIC_FRESH_S = 0.2
 LEAST_SLANT = 0.01  # sine of the angle between specific force and magnetic field
-# A slow error that returns to zero makes the best estimate of the place half of the first and half of the
-# last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was,
-# be carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
+# With a slow error that returns to zero, the best estimate of the position is half of the first and half of
+# the last fix: the position then follows each metre of a plain receiver's drift by half. It should stay where
+# it was and be carried by the velocities, so the drift is assumed to return to zero ten times as slowly as it
+# wanders.
 PLAIN_REVERSION = 0.1
 
 
 @kernel
 def tells_attitude(accel: Vec3, field: Vec3) -> bool:
-    """Whether specific force and magnetic field (body) differ enough in direction to level and to head by."""
+    """Whether the directions of specific force and magnetic field (body) differ enough to give tilt and
+    heading."""
     return norm(cross(accel, field)) > LEAST_SLANT * norm(accel) * norm(field)
 
 
@@ -184,8 +187,9 @@ def below(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
 def found_load(
     state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
 ) -> LoadEstimate:
-    """The load of a vehicle that is found with its rotors giving `thrust` (N): it was laid before a standing
-    vehicle, hangs from one that accelerates by less than its rotors would make it, and else lies below it."""
+    """The load when a vehicle starts with its rotors giving `thrust` (N): it was laid ahead of a standing
+    vehicle, hangs from one that accelerates less than its rotors would make it, and otherwise lies below
+    it."""
     if not thrust > CARRIED_SHARE * tuning.quad_mass * tuning.gravity:
         return laid(state, tuning)
     pull = thrust - tuning.quad_mass * state.last_imu.accel[2]
@@ -198,7 +202,8 @@ def found_load(
 def start_by_fix(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The vehicle, all but placed by the fix: that the ordinary correction does. `thrust` in N."""
+    """The state with the vehicle started by the fix, except for its exact position, which the ordinary
+    correction gives. `thrust` in N."""
     old, accel, g = state.vehicle, state.last_imu.accel, tuning.gravity
     flies = thrust > CARRIED_SHARE * tuning.quad_mass * g
     speed_var = FLYING_SPEED_STD * FLYING_SPEED_STD if flies else STARTING_SPEED_STD * STARTING_SPEED_STD
@@ -213,7 +218,7 @@ def start_by_fix(
     if not flies:
         P[POSITION + 2, POSITION + 2] = STANDING_STD * STANDING_STD
     P[ATTITUDE + 2, ATTITUDE + 2] = 1.0
-    # a bias of the accelerometer tilts what it levels
+    # a bias of the accelerometer tilts the attitude that it levels
     for j in range(3):
         about_x, about_y = -R[1][j] * bias_var / g, R[0][j] * bias_var / g
         P[ATTITUDE, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE] = about_x, about_x
@@ -246,7 +251,7 @@ def start_by_fix(
 
 @kernel
 def settled(state: EstimatorState, history: History) -> EstimatorState:
-    """The receiver's slow error drawn anew, of the deviation that is stated now."""
+    """Start the receiver's slow error anew: zero, with the deviation stated now."""
     P, aids = history.covariance, state.aids
     forget(P, GNSS, 3)
     for i in range(3):
@@ -256,10 +261,8 @@ def settled(state: EstimatorState, history: History) -> EstimatorState:
 
 
 @kernel
-def restart_by_fix(
-    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
-) -> EstimatorState:
-    """Position and velocity as widely known as after a long silence, so that the fix decides them."""
+def doubt_place(state: EstimatorState, history: History) -> EstimatorState:
+    """Make position and velocity as uncertain as after a long silence, so that the next fix decides them."""
     P = history.covariance
     for i in range(3):
         P[POSITION + i, POSITION + i] += ANYWHERE_STD * ANYWHERE_STD
@@ -272,9 +275,9 @@ def restart_by_fix(
 def correct_gnss(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The state after the fix; `history` is corrected along with it. `thrust` (N): believed of the rotors.
+    """The state after the fix; `history` is corrected along with it. `thrust` (N): assumed of the rotors.
 
-    Ignored where a tracker places the vehicle.
+    Ignored where a tracker measures the position of the vehicle.
     """
     if state.vehicle.source == TRACKER:
         return state
@@ -282,8 +285,8 @@ def correct_gnss(
     n = state.size
     share = tuning.rtk_white if fix.rtk > PLAIN else tuning.gnss_white
     starting = state.vehicle.source == NOBODY
-    # what a fix floats by is no error of the fixes before, and the same until the carrier is fixed again: all
-    # readings of EST_GPS_TAU together count as one
+    # the error of a float fix is not that of the fixes before, and stays the same until the carrier is fixed
+    # again: all readings within EST_GPS_TAU together count as one
     floats = fix.rtk == RTK_FLOAT and not starting
     white, slow = share, sqrt(1.0 - share * share)
     if floats:
@@ -297,7 +300,7 @@ def correct_gnss(
         1.0 if fix.rtk > PLAIN else PLAIN_REVERSION,
     )
     state = with_aids(state, aids)
-    # once the carrier's waves are counted, what was left of the error before is over
+    # once the carrier's waves are counted, the earlier error no longer exists
     if fix.rtk == RTK_FIXED and not starting and before > SETTLED * aids.horizontal_slow:
         state = settled(state, history)
     if starting:
@@ -325,7 +328,7 @@ def correct_gnss(
         if vehicle.rejected + 1.0 < FIXES_BEFORE_RESET:
             refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
             return with_vehicle(state, refused, state.resets)
-        return restart_by_fix(state, history, fix, tuning)
+        return doubt_place(state, history)
     begin(history)
     nis = absorb(history, 6, n)
     history.consistency[FIX, 0] += 1.0

@@ -41,11 +41,12 @@ from autopilot.geometry.linear import Vec3, add, axpy, dot, norm, scale, sub
 
 SLACK_FROM = 0.8  # share of the cable length below which a short distance is an outlier, not a slack cable
 REFUSED_BELOW = 0.98  # share below which readings that the pendulum does not explain show a slack cable
-SLACK_READINGS = 3.0  # that in a row must show a short distance
-# After so many refusals in a row this share of the length that was learned shows it as well: a vehicle that
-# holds still above a load on the ground leaves the cable millimetres loose, and quiet trackers are refused.
+SLACK_READINGS = 3.0  # readings in a row that must show a short distance
+# After REFUSED_LONG rejections in a row, a distance below this share of the estimated length also shows a
+# slack cable: a vehicle that holds still above a load on the ground leaves the cable millimetres loose, and
+# the readings of quiet trackers are rejected.
 REFUSED_LONG, REFUSED_LONG_BELOW = 12.0, 0.995
-REACH = 1.5  # cable lengths from the vehicle beyond which no load is believed
+REACH = 1.5  # cable lengths from the vehicle: no restart from a reading of the load farther away
 
 
 @kernel
@@ -63,7 +64,7 @@ def update2(
 
 @kernel
 def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age_s: float) -> LoadEstimate:
-    """A tracked load where its own filter has it; the direction follows with the next prediction."""
+    """A tracked load where its separate filter places it; the direction follows with the next prediction."""
     return LoadEstimate(
         x_load,
         v_load,
@@ -87,7 +88,7 @@ def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age
 def start_load(
     state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The load by itself where the reading has it; the next prediction finds whether it hangs."""
+    """The load started at the reading, with a slack cable; the next prediction decides whether it is taut."""
     measured = reading.velocity_std >= 0.0
     age = reading.age_s
     was = state.load.v_load if state.load.source == TRACKER else (0.0, 0.0, 0.0)
@@ -102,7 +103,7 @@ def start_load(
 
 @kernel
 def knocked(load: LoadEstimate, history: History) -> LoadEstimate:
-    """The load whose velocity may have jumped."""
+    """The load, less certain because its velocity may have jumped."""
     since, variance = load.age_s, KNOCK_STD * KNOCK_STD
     if load.taut > 0.0:
         for i in range(2):
@@ -118,7 +119,8 @@ def knocked(load: LoadEstimate, history: History) -> LoadEstimate:
 def refuse_load(
     state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """One more reading refused; after many the load starts anew, but never far beyond its cable's end."""
+    """Count one more rejected reading; after many in a row the load is restarted, but never far beyond its
+    cable's end."""
     load = state.load
     distance = norm(sub(reading.x_load, state.vehicle.x_quad))
     if load.rejected + 1.0 >= REJECTIONS_BEFORE_RESET and distance < REACH * tuning.cable_length:
@@ -132,7 +134,8 @@ def refuse_load(
 def correct_slack(
     state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The slack load's own filter: the axes alike, a reading of then is position - age velocity of now."""
+    """The separate filter of a load on a slack cable: the same on each axis; a past reading is compared with
+    position - age velocity of now."""
     load, age = state.load, reading.age_s
     position_var = reading.position_std * reading.position_std
     innovation = sub(reading.x_load, axpy(-age, load.v_load, load.x_load))
@@ -154,7 +157,7 @@ def correct_slack(
 
 @kernel
 def enter_load_position(history: History, k: int, past: Past, length: float, i: int) -> None:
-    """Component i of x_Q + L q then."""
+    """Enter component i of x_Q + L q then."""
     enter_position(history, k, past, i)
     enter_direction(history, k, past, length * past.across[i], length * past.along[i])
     enter(history, k, LENGTH, past.q_cable[i])
@@ -162,7 +165,7 @@ def enter_load_position(history: History, k: int, past: Past, length: float, i: 
 
 @kernel
 def enter_load_velocity(history: History, k: int, past: Past, length: float, i: int) -> None:
-    """Component i of v_Q + L q' then: turning the direction by (a, b) leans q' by -(q' . turn) q."""
+    """Enter component i of v_Q + L q' then: a turn (a, b) of the direction adds -(q' . turn) q to q'."""
     enter_velocity(history, k, past, i)
     q = past.q_cable
     enter(history, k, RATE, length * past.across[i])
@@ -178,8 +181,8 @@ def correct_load(
 ) -> EstimatorState:
     """The state after the reading; `history` is corrected along with it.
 
-    The first reading starts the load; readings refused many times in a row start it anew, and a few that lie
-    nearer than the cable is long end a taut cable.
+    The first reading starts the load; many rejected readings in a row restart it, and a few that are nearer
+    than the cable is long make a taut cable slack.
     """
     state = heard(state, reading.age_s, TRACKED_SIZE)
     load, n = state.load, state.size
@@ -198,7 +201,8 @@ def correct_load(
     short = SLACK_FROM < distance < SLACK_BELOW
     refused = not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
     if refused or short:
-        # nearer the threshold the pendulum tells: it no longer is one; and the longer that lasts, the nearer
+        # closer to the threshold, rejections show that the load is no pendulum any more; the longer they
+        # last, the closer
         short = short or SLACK_FROM < distance < REFUSED_BELOW
         if load.rejected >= REFUSED_LONG and load.held_s > LIFTING_S:
             length = load.length / tuning.cable_length

@@ -1,7 +1,8 @@
 """Correction by a magnetometer: the heading alone; strength and dip of the field need not be known.
 
-With u = R m the measured field in the world and e magnetic north, a small attitude error phi shows as the
-angle from e to u's level part, phi . (e3 - (u_z / |u_level|) e): a tilt feigns heading in a steep field.
+With u = R m the measured field in the world and e magnetic north, a small attitude error phi appears as the
+angle from e to the horizontal part of u, phi . (e3 - (u_z / |u_level|) e): in a steep field, a tilt looks
+like a heading error.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, dot
 from autopilot.geometry.so3 import rotation_from_quat
 
-LEAST_LEVEL = 0.05  # share of the field that must be level to tell a heading
+LEAST_LEVEL = 0.05  # share of the field that must be horizontal to give a heading
 
 
 @kernel
 def magnetic_north(declination: float) -> Vec3:
-    """Unit vector, ENU."""
+    """Magnetic north: unit vector, ENU."""
     return (sin(declination), cos(declination), 0.0)
 
 
 @kernel
 def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState:
-    """The state that has heard the magnetometer."""
+    """The state with the magnetometer's last reading."""
     a = state.aids
     return with_aids(
         state,
@@ -60,7 +61,8 @@ def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState
 def correct_magnetic(
     state: EstimatorState, history: History, field: Vec3, age: float, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The state after a reading of the field (body axes, any unit). No use is made of it beside a tracker."""
+    """The state after a reading of the field (body axes, any unit), which corrects the estimate only with a
+    satellite receiver."""
     state = with_field(state, field, age)
     if state.vehicle.source != RECEIVER:
         return state

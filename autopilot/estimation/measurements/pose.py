@@ -47,11 +47,11 @@ from autopilot.geometry.linear import ZERO, sub
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 
 REJECTIONS_BEFORE_RESET = 50.0
-# An impact (the ground, a cable that comes taut) is over between two samples of the accelerometer: after
-# so many refusals the velocity may have changed by about so much, m/s, soon after the last reading that was
-# believed. The place is off by what came of it since.
+# An impact (the ground, a cable that comes taut) falls between two samples of the accelerometer: after
+# REFUSED_BY_KNOCK rejections the velocity may have changed by about KNOCK_STD, m/s, soon after the last
+# accepted reading, and the position is off by the resulting drift.
 REFUSED_BY_KNOCK, KNOCK_STD = 4.0, 0.3
-KNOCK_WHEN = 0.25  # of the time since then: how little is known of when it was
+KNOCK_WHEN = 0.25  # of the time since then: how uncertain the instant of the impact is
 STARTING_SPEED_STD = 1.0  # m/s, where no velocity is measured
 UNKNOWN_HEIGHT_STD = 1.0  # m, of the barometer's zero
 
@@ -60,7 +60,7 @@ UNKNOWN_HEIGHT_STD = 1.0  # m, of the barometer's zero
 def spread_out(
     history: History, position_var: float, velocity_var: float, attitude_var: float, tuning: EstimatorTuning
 ) -> None:
-    """The covariance of a vehicle that starts: what is stated, and nothing in common with anything else."""
+    """Set the covariance of a vehicle that starts: these variances, and no correlation with anything else."""
     P = history.covariance
     forget(P, POSITION, 15)
     for i in range(3):
@@ -85,10 +85,11 @@ def spread_out(
 def start_by_pose(
     state: EstimatorState, history: History, pose: PoseReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The vehicle set to the reading, with the reading's own uncertainty and that of its age."""
+    """The vehicle set to the reading, with the reading's own uncertainty and that due to its age."""
     old, age = state.vehicle, pose.age_s
     measured = pose.velocity_std >= 0.0
-    velocity_var = pose.velocity_std * pose.velocity_std if measured else STARTING_SPEED_STD
+    speed_std = pose.velocity_std if measured else STARTING_SPEED_STD
+    velocity_var = speed_std * speed_std
     spread_out(
         history,
         pose.position_std * pose.position_std + age * age * velocity_var,
@@ -123,7 +124,7 @@ def start_by_pose(
 
 @kernel
 def knock(P: Array, value: int, rate: int, std: float, since: float) -> None:
-    """A value whose rate has changed by `std` some `since` seconds ago."""
+    """Make a value and its rate less certain: the rate has changed by `std` some `since` seconds ago."""
     variance = std * std
     P[value, value] += (1.0 + KNOCK_WHEN * KNOCK_WHEN) * since * since * variance
     P[value, rate] += since * variance
@@ -137,7 +138,7 @@ def correct_pose(
 ) -> EstimatorState:
     """The state after the reading; `history` is corrected along with it.
 
-    The first reading starts the vehicle; readings refused many times in a row start it anew.
+    The first reading starts the vehicle; many rejected readings in a row restart it.
     """
     state = heard(state, pose.age_s, TRACKED_SIZE)
     n = state.size
@@ -172,8 +173,9 @@ def correct_pose(
         scalar(history, 6 + i, difference[i], velocity_var)
         enter_velocity(history, 6 + i, past, i)
     gather(history, 3, count, n)
-    # the reading tells nothing of the gyroscope's noise since then, which the attitude of now has: what the
-    # filter takes for told of its variance Q by a gain K is Q (1 - (1 - K)^2)
+    # the reading contains nothing of the gyroscope's noise since then, which is in the attitude of now; with
+    # a gain K, the filter nevertheless removes Q (1 - (1 - K)^2) of its variance Q, which is added again
+    # below
     P, since = history.covariance, state.vibration.turning * pose.age_s
     turned = (P[ATTITUDE, ATTITUDE], P[ATTITUDE + 1, ATTITUDE + 1], P[ATTITUDE + 2, ATTITUDE + 2])
     nis = absorb(history, count, n)

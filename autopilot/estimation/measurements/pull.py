@@ -1,12 +1,13 @@
-"""Correction by what the load does to the vehicle, where no sensor ever saw the load.
+"""Correction by the effect of the load on the vehicle, where no sensor ever saw the load.
 
-What moves the vehicle besides weight, rotors and air is the pull of the cable,
+The force on the vehicle besides weight, rotors and air is the pull of the cable,
 
     m_Q (R (a - bias) - D/m_Q - p) - f R e_3 = T q,
 
-with D the believed drag and p, which is estimated, what the air does beyond it. It points along the cable,
-its size T is taken as it is. A wind on the vehicle feigns a slant of the cable; it is told from one by the
-pendulum, which knows how the cable must swing, and by what it was while nothing pulled.
+where D is the assumed drag and p, which is estimated, the acceleration by the air beyond it. The pull points
+along the cable; its size T is taken as it is. A wind on the vehicle looks like a slant of the cable. Two
+things distinguish them: the pendulum, which predicts how the cable must swing, and the wind that was
+estimated while nothing pulled.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ from autopilot.geometry.so3 import rotation_from_quat
 FIRM, LOOSE = (
     0.3,
     0.05,
-)  # of the load's weight: a cable that pulls so much tells its direction; so little, none
-HIGH = 0.2  # of the cable's length over the load: the vehicle is off the ground
-SLANT_STD = 0.005  # rad, of the rotors' force from the body's axis
+)  # of the load's weight: a stronger pull shows the cable's direction; a weaker one is none
+HIGH = 0.2  # of the cable's length above the load: higher up, the vehicle is off the ground
+SLANT_STD = 0.005  # rad, between the rotors' force and the body's axis
 
 
 @kernel
@@ -47,7 +48,7 @@ def unseen(load: LoadEstimate) -> bool:
 
 @kernel
 def pulling(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Vec3:
-    """What the cable does to the vehicle, N, world, by the last sample of the accelerometer."""
+    """Force of the cable on the vehicle, N, world, by the last sample of the accelerometer."""
     vehicle, push = state.vehicle, state.air.vehicle
     R = rotation_from_quat(vehicle.quat_wxyz)
     a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
@@ -59,9 +60,10 @@ def pulling(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Ve
 def correct_pull(
     state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The state after a prediction; `thrust` (N) is what the rotors are believed to give.
+    """The state after a prediction; `thrust` (N) is that which the rotors are assumed to give.
 
-    While the cable is slack what is left is the wind alone; while it comes taut or slack, neither is told.
+    While the cable is slack, the remaining force is the wind alone; while it comes taut or slack, nothing is
+    measured.
     """
     load = state.load
     if state.vehicle.source == NOBODY or not unseen(load):
@@ -79,7 +81,7 @@ def correct_pull(
     n = state.size
     past = look_back(state, history, tuning, 0.0)
     r = pulling(state, tuning, thrust)
-    # slack: what is left as an acceleration along east and north; taut: the direction of the pull
+    # slack: the remaining acceleration, east and north; taut: the direction of the pull
     by = 1.0 / dot(r, past.q_cable) if taut else 1.0 / tuning.quad_mass
     if not by > 0.0:
         return state

@@ -1,4 +1,4 @@
-"""Correction by standing on the ground: no velocity, no rate. It levels and finds the gyro's bias."""
+"""Correction by standing on the ground: no velocity, no rate. It gives tilt and the gyroscope's bias."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm
 
 IDLE_SHARE = 0.3  # of the vehicle's weight: with less thrust it stands, unless it falls
-STILL_RATE, STILL_FORCE = 0.1, 1.0  # rad/s, m/s^2 about gravity: more is no standing
+STILL_RATE, STILL_FORCE = 0.1, 1.0  # rad/s, m/s^2 about gravity: above these, the vehicle does not stand
 STILL_SPEED = 0.5  # m/s, estimated
 SPEED_STD = 0.02  # m/s
 
@@ -39,7 +39,7 @@ def stands(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> boo
 def correct_standing(
     state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The state of a vehicle that rests on the ground; any other is returned as it is."""
+    """The state of a vehicle that rests on the ground, corrected; otherwise the state unchanged."""
     if not stands(state, tuning, thrust):
         return state
     n, vehicle, imu = state.size, state.vehicle, state.last_imu

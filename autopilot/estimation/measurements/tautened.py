@@ -1,7 +1,7 @@
-"""Correction by a cable that comes taut: the load lies, so the vehicle is a cable's length over the ground.
+"""Correction by a cable that comes taut: the load lies, so the vehicle is one cable length above the ground.
 
-A plain receiver and a barometer know the height to decimetres; here it is measured once, and that the vehicle
-does not climb.
+A plain receiver and a barometer know the height to decimetres; here the height is measured once, and the
+climb rate, which is zero.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from autopilot.geometry.linear import Vec3
 
 LYING_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
 RESTING_STD = 0.05  # m/s, of its climb
-RESTING_S = 0.3  # in which a lying load's climb is told anew: the samples of its pull are not independent
+RESTING_S = 0.3  # in which measurements of a lying load's climb count as one: samples are not independent
 
 
 @kernel
@@ -49,10 +49,11 @@ def _owing(a: AidEstimate, debt: Vec3) -> AidEstimate:
 def correct_tautened(
     state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning, dt: float
 ) -> EstimatorState:
-    """The state after a prediction over dt seconds; `before` is the load as it was.
+    """The state after a prediction over dt seconds; `before` is the load before this prediction.
 
-    The cable that comes taut tells height and climb; climb is told on while it pulls and the load still lies.
-    The laws are told at once: they are about to lift the load off this ground.
+    A cable that comes taut measures height and climb rate; the climb rate is also measured while the cable
+    pulls and the load still lies. The laws receive the correction of the height at once: they are about to
+    lift the load off this ground.
     """
     load = state.load
     if state.vehicle.source != RECEIVER or load.source != CAMERA or load.taut == 0.0:

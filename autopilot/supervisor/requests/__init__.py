@@ -1,1 +1,1 @@
-"""What is asked of the vehicle, one file a subject: the verdict on a request, and the flight after it."""
+"""Requests to the vehicle, one file per subject: the verdict on a request, and the flight after it."""

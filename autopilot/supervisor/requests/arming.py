@@ -28,7 +28,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.wire.dialect import plumbline as mavlink
 
-GROUND_SPEED_M_S = 0.3  # an arming vehicle moves no faster
+GROUND_SPEED_M_S = 0.3  # a vehicle that moves faster is not armed
 TILT_TO_ARM_RAD = math.radians(20.0)
 
 
@@ -57,7 +57,7 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
         after = happen(flight, Event.DISARM, view, settings)
         return (after, ACCEPTED) if after else (flight, denied("Disarming denied"))
     if flight.phase != Phase.DISARMED:
-        return flight, ACCEPTED  # it is armed, as PX4 and ArduPilot answer who asks again
+        return flight, ACCEPTED  # already armed: answered as PX4 and ArduPilot do
     complaints = arming_complaints(flight, view, settings)
     if complaints and not request.force:
         return flight, denied(f"Arming denied: {complaints[0]}")
@@ -71,7 +71,7 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
 
 
 def run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:
-    """Tell what keeps the vehicle from being armed: as a warning, by which clients know what is a reason."""
+    """Report what keeps the vehicle from being armed, as a warning, by which clients recognise a reason."""
     complaints = arming_complaints(flight, view, settings)
     text = "; ".join(complaints) or "Ready to arm"
     return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, text, warns=bool(complaints))

@@ -1,4 +1,4 @@
-"""What becomes of the flight by a request: the table from requests to their handlers."""
+"""How a request changes the flight: the table from requests to their handlers."""
 
 from __future__ import annotations
 

@@ -28,14 +28,14 @@ from autopilot.supervisor.state import (
 )
 
 _BY_POSITION = denied("Attitude setpoint refused: the load is released, fly by position")
-STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
+STREAM_US = 500_000  # a stream counts as present while its last setpoint is no older: two a second
 
 
 def offboard(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """OFFBOARD: follow the stream of setpoints; on the ground, take off when one asks for it."""
+    """OFFBOARD: follow the stream of setpoints; on the ground, take off when a setpoint is above it."""
     if flight.phase == Phase.GUIDED and flight.setpoints.guide == Guide.OFFBOARD:
         return flight, ACCEPTED
-    # one is enough: MAVSDK asks for the mode right behind its first
+    # one setpoint is enough: MAVSDK requests the mode right after its first
     if not flight.setpoints.offboard.alive(view.now_us, STREAM_US):
         return flight, later("OFFBOARD denied: send setpoints first, more than two a second")
     if flight.phase in ON_GROUND:
@@ -53,7 +53,7 @@ def position_control(flight: Flight, request: Any, view: View, settings: Setting
 
 
 def begin_guided(flight: Flight, guide: Guide, what: str, view: View, settings: Settings) -> Decision:
-    """Follow the setpoints of another source; `what` names the request where that is refused."""
+    """Follow the setpoints of another source; `what` names the request in a refusal."""
     if flight.legs and top_of(flight.legs[0]) is not None:
         return flight, later(f"{what} denied while the winch works")
     guided = replace(off_mission(flight), setpoints=replace(flight.setpoints, guide=guide))
@@ -62,8 +62,8 @@ def begin_guided(flight: Flight, guide: Guide, what: str, view: View, settings: 
 
 
 def _yaw_origin(flight: Flight, request: FollowSetpoint, settings: Settings) -> float:
-    """Angle (rad) by which the heading of a setpoint is to be turned: ArduPilot counts it from the nose where
-    the axes are those of the nose, PX4 from north in any frame."""
+    """Angle (rad) to add to the heading of a setpoint: ArduPilot measures it from the nose if the axes are
+    those of the nose, PX4 from north in any frame."""
     from_nose = request.body and settings.setpoints.guided_mode
     return flight.heading.angle - 0.5 * pi if from_nose else 0.0
 
@@ -73,8 +73,8 @@ def _as_it_is(v: Vec3) -> Vec3:
 
 
 def _body_turned(heading: float) -> Callable[[Vec3], Vec3]:
-    """What turns a vector of the nose's axes into ENU; of its level parts one that is NaN counts as nothing,
-    where the other is a number."""
+    """The function that turns a vector from the axes of the nose into ENU. If one of its level components is
+    NaN and the other a number, NaN counts as zero."""
     c, s = cos(heading), sin(heading)
 
     def turned(v: Vec3) -> Vec3:
@@ -139,7 +139,7 @@ def follow_rates(flight: Flight, request: FollowRates, view: View, settings: Set
 
 
 def _thrust_n(share: float | None, settings: Settings) -> float | None:
-    """Thrust in newtons of a share of it; None stays None."""
+    """Thrust in newtons of the share that a setpoint gives; None stays None."""
     return None if share is None else share / settings.setpoints.hover_share * settings.weight_n
 
 

@@ -1,4 +1,4 @@
-"""Where the nose is to point, by request: to a heading, or to a place that is looked at."""
+"""Where the nose is to point, by request: to a heading, or to a place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def turn_nose(flight: Flight, request: TurnNose, view: View, settings: Settings)
 
 
 def look_at(flight: Flight, request: LookAt, view: View, settings: Settings) -> Decision:
-    """Keep the nose turned to a place, or leave it as it points now."""
+    """Keep the nose turned to a place, or let it stop where it points now."""
     if flight.phase not in IN_AIR:
         return flight, wrong_phase(flight, "ROI")
     place = (request.east_m, request.north_m)

@@ -1,4 +1,4 @@
-"""Limits of what can be asked for, which no parameter changes."""
+"""Limits of what can be requested, which no parameter changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests about the mission: begin it, go on with it, another item, another mission."""
+"""Requests about the mission: begin it, continue it, another item, another mission."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         altitude = lift_altitude_m(plan, settings)
         flight = replace(flight, mission=replace(flight.mission, takeoff_altitude_m=altitude))
         return take_off(flight, view, settings), ACCEPTED
-    if flight.mission.step_anchor is None:  # it is begun, not taken up again
+    if flight.mission.step_anchor is None:  # the step is begun, not resumed
         flight = heading_of_step(flight, view, settings)
     return begin_step(flight, event, view, settings), ACCEPTED
 
@@ -53,8 +53,8 @@ def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
 def _waiting(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight that holds, or stands armed, until the paths of its mission are prepared.
 
-    That the mission will begin is said at once and once: clients (MAVSDK) do not know what to do with an
-    answer that comes in two parts.
+    The request is accepted immediately and answered only once: clients (MAVSDK) cannot handle an answer in
+    two parts.
     """
     if flight.phase != Phase.ARMED:
         flight = must_happen(off_mission(flight), Event.HOLD, view, settings)
@@ -64,7 +64,7 @@ def _waiting(flight: Flight, view: View, settings: Settings) -> Flight:
 def start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:
     """Fly the mission, from an item on or from the present one."""
     before = flight
-    if request.first is not None and flight.mission.plan.items:  # else the mission is missed, not the item
+    if request.first is not None and flight.mission.plan.items:  # else the refusal is about the mission
         flight, verdict = set_current(flight, SetCurrent(request.first), view, settings)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             return before, verdict
@@ -75,12 +75,12 @@ def start_mission(flight: Flight, request: StartMission, view: View, settings: S
 
 
 def continue_mission(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """Fly the mission on from its present item."""
+    """Continue the mission at its present item."""
     return start_mission(flight, StartMission(None), view, settings)
 
 
 def set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
-    """Make another item the present one; in flight, go there at once."""
+    """Make another item the present one; while the mission is flown, fly there immediately."""
     plan = flight.mission.plan
     if not plan.items:
         return flight, denied(f"Mission item {request.seq} denied: no mission is stored")

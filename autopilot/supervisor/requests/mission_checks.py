@@ -1,6 +1,6 @@
-"""What a mission is refused for before it is flown: the fence, a load that is gone, the winch.
+"""Why a mission is refused before it is flown: the fence, a released load, the winch.
 
-Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) from where the flight stands.
+Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) from the present state.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from autopilot.trajectory.timeline import (
 )
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
-WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is looked at, and how many at most
+WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is checked, and their greatest number
 
 Ahead = list[tuple[int, TimelineEntry]]  # each with its mission item
 
 
 def mission_trouble(flight: Flight, view: View, settings: Settings) -> str:
-    """Which item that is still to be flown must not be flown from here, and why; an empty string: none."""
+    """Which remaining item must not be flown from here, and why; an empty string if there is none."""
     ahead = steps_ahead(flight, view, settings)
     return leaves_fence(flight, ahead, settings) or needs_load(ahead) or reels_too_far(ahead, settings)
 
@@ -38,9 +38,9 @@ def mission_trouble(flight: Flight, view: View, settings: Settings) -> str:
 def upload_trouble(
     flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
 ) -> str:
-    """Which item of a mission that is uploaded leads over the fence, and why; an empty string: none.
+    """Which item of an uploaded mission leads beyond the fence, and why; an empty string if none does.
 
-    On the ground it begins where the load stands; in the air it may be begun anywhere.
+    On the ground the mission begins where the load stands; in the air it may begin anywhere.
     """
     start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
     if flight.phase in ON_GROUND:
@@ -50,7 +50,7 @@ def upload_trouble(
 
 
 def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
-    """The steps that are left of the mission, flown from where the load is or comes to rest."""
+    """The remaining steps of the mission, flown from where the load is or comes to rest."""
     mission, cable = flight.mission, flight.cable
     steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
     if flight.phase in ON_GROUND:
@@ -58,27 +58,30 @@ def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
         lift = Takeoff(lift_altitude_m(mission.plan, settings))
         if isinstance(steps[0], Takeoff):
             steps = (lift, *steps[1:])
-        else:  # lifted unasked
+        else:  # lifted although no step requests it
             steps, sequence = (lift, *steps), (sequence[0], *sequence)
     else:
         here = stop(flight, view, settings)[1]
         length = length_at(flight, here, settings)
         if mission.step_anchor is not None and isinstance(steps[0], Signals | AttitudeRun):
-            here = mission.step_anchor  # begun anew, from where it began
-        if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # taken up again
+            here = mission.step_anchor  # flown again from where it began
+        if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # resumed
             steps = (replace(steps[0], length_m=cable.reel_to_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
 def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
-    """Height to which a mission that begins on the ground is lifted, whichever step it begins with."""
+    """Height to which a mission that begins on the ground lifts the load, whatever its first step is."""
     first = next((step for step in plan.steps if isinstance(step, Takeoff)), None)
     return settings.motion.takeoff_altitude_m if first is None else first.altitude_m
 
 
 def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
-    """Where the load stands, or the vehicle without it; anywhere while the estimate is not fit for flight."""
+    """The state in which the load, or the vehicle without a load, stands on the ground.
+
+    The position is unknown (`ANYWHERE`) while the estimate is not fit for flight.
+    """
     released = flight.cable.released
     here = view.x_quad if released else view.x_load
     start = ANYWHERE if view.complaints else MissionState(here)
@@ -86,9 +89,9 @@ def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
 
 
 def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
-    """Which item leads over the fence, and why; an empty string if none does.
+    """Which item leads beyond the fence, and why; an empty string if none does.
 
-    Looked at are the straight ways to take-off height, to waypoints and home, and the places at which signals
+    This checks the straight ways to take-off height, to waypoints and home, and the places at which signals
     and the winch leave the load; signals and curves between waypoints are watched in flight.
     """
     if not fenced(flight, settings):
@@ -112,7 +115,7 @@ def _why_forbidden(flight: Flight, entry: TimelineEntry, settings: Settings) -> 
         return forbidden(flight.area.fence, load, settings)
 
     straight = not isinstance(entry.step, Signals | Winch)
-    # a way that begins over the fence leads back: only its end counts
+    # a way that begins beyond the fence leads back: only its end counts
     if begin is None or not straight or why(begin):
         return why(end)
     return next(filter(None, map(why, _along(begin, end))), "")
@@ -126,7 +129,7 @@ def _along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
 
 
 def needs_load(ahead: Ahead) -> str:
-    """Which item swings a load that is released by then; an empty string: none."""
+    """Which item requires a load that is released by then, and why; an empty string if none does."""
     for seq, entry in ahead:
         if entry.before.released and isinstance(entry.step, Signals | AttitudeRun):
             return f"item {seq} needs the load, which is released"
@@ -134,7 +137,7 @@ def needs_load(ahead: Ahead) -> str:
 
 
 def reels_too_far(ahead: Ahead, settings: Settings) -> str:
-    """Which item asks too much of the winch; an empty string: none."""
+    """Which item demands too much of the winch, and why; an empty string if none does."""
     for seq, entry in ahead:
         step, left = entry.step, entry.after
         if not isinstance(step, Winch):
@@ -154,7 +157,7 @@ def reels_too_far(ahead: Ahead, settings: Settings) -> str:
 
 
 def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
-    """Why the cable may not get so long (m) with the load at that height; an empty string if it may."""
+    """Why the cable may not become `wanted` m long with the load at `height`; an empty string if it may."""
     beyond = cable_trouble(wanted, settings.winch.shortest_m, settings.winch.longest_m)
     if beyond:
         return beyond

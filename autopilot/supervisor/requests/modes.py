@@ -1,4 +1,4 @@
-"""Modes by request: hold, land and return home, and the table of PX4's modes that are flown."""
+"""Modes by request: hold, land and return home, and the table of PX4's modes that the vehicle supports."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def return_home(flight: Flight, request: Any, view: View, settings: Settings) ->
 
 
 def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -> Decision:
-    """Make this place, or another, the one to which a return leads."""
+    """Set the place to which a return leads: this one, or the requested one."""
     place = view.x_quad if request.position is None else request.position
     if not math.hypot(place[0], place[1]) <= FARTHEST_M:
         return flight, denied(f"Home denied: more than {FARTHEST_M:g} m from the origin")
@@ -66,7 +66,7 @@ def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -
 
 
 def enable_fence(flight: Flight, request: EnableFence, view: View, settings: Settings) -> Decision:
-    """Heed the fence, or do not; a breach there was is forgotten."""
+    """Enable or disable the fence; a previous breach is forgotten."""
     area = replace(flight.area, guarded=request.on, breach="")
     return replace(flight, area=area), Verdict(ACCEPTED.result, f"Fence {'on' if request.on else 'off'}")
 
@@ -87,7 +87,7 @@ MODES: dict[tuple[int, int], Handler] = {
 
 
 def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
-    """Fly in another of PX4's modes."""
+    """Change to another of PX4's modes."""
     main, sub_mode = request.main, request.sub
     if (main, sub_mode) == (identity.AUTO, 0):
         sub_mode = identity.AUTO_MISSION
@@ -102,7 +102,7 @@ def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -
 
 
 def _in_guided_mode(flight: Flight) -> bool:
-    """Whether what is flown is a part of ArduPilot's GUIDED: a take-off, the way to a place, setpoints."""
+    """Whether the present flight is part of ArduPilot's GUIDED: take-off, transfer to a place, setpoints."""
     if flight.mission.active:
         return False
     rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)

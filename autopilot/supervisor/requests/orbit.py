@@ -17,7 +17,7 @@ from autopilot.supervisor.state import CARRYING, Flight, Guide, View, below, fen
 
 LEAST_RADIUS_M = 0.2
 LEAST_SPEED_M_S = 0.05
-RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along it
+RAMP_SHARE = 4.0  # a circle begins with a quarter of MIS_ACCEL along it
 CIRCLE_POINTS = 72
 LONGEST_CIRCLE_S = 1e9
 

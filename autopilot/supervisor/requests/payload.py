@@ -57,7 +57,7 @@ def grab(flight: Flight, request: Grab, view: View, settings: Settings) -> Decis
 
 
 def release(flight: Flight, view: View, settings: Settings) -> Flight:
-    """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
+    """The flight after a commanded release: the vehicle continues alone; instead of a mission it holds."""
     alone = replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1), still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (Phase.SET_DOWN, Phase.FAILSAFE):
         return alone
@@ -73,7 +73,7 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
 
 
 def winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Decision:
-    """Let the cable out or take it in, by a length or as far as it goes."""
+    """Let the cable out or take it in, by a length or as far as possible."""
     if flight.cable.released:
         return flight, denied("Winch denied: the load is released, nothing hangs on the cable")
     if not settings.winch.usable:

@@ -1,4 +1,4 @@
-"""Going to a place by request, and at which speed."""
+"""Flying to a place by request, and the speed of transfers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
         return flight, later("Reposition denied: not holding")
     speed = flight.mission.speed_m_s if request.speed_m_s is None else request.speed_m_s
     if not SLOWEST_M_S <= speed <= FASTEST_M_S:
-        return flight, denied(f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S} ... {FASTEST_M_S}")
+        return flight, denied(
+            f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S:g} ... {FASTEST_M_S:g}"
+        )
     held, verdict = hold(flight, request, view, settings)
     asked = (request.east_m, request.north_m, request.altitude_m)
     if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
@@ -71,5 +73,7 @@ def change_altitude(flight: Flight, request: ChangeAltitude, view: View, setting
 def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
     """Fly transfers at another speed from now on."""
     if not SLOWEST_M_S <= request.speed_m_s <= FASTEST_M_S:
-        return flight, denied(f"Speed {request.speed_m_s:.2f} m/s denied; must be 0.05 ... 15")
+        return flight, denied(
+            f"Speed {request.speed_m_s:.2f} m/s denied; must be {SLOWEST_M_S:g} ... {FASTEST_M_S:g}"
+        )
     return replace(flight, mission=replace(flight.mission, speed_m_s=request.speed_m_s)), ACCEPTED

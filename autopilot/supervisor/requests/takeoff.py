@@ -19,7 +19,7 @@ def take_off(flight: Flight, view: View, settings: Settings) -> Flight:
 
 
 def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -> Decision:
-    """Take off to a height of the load; on the ground and disarmed, when the vehicle is armed."""
+    """Take off to a height of the load; if the vehicle is disarmed, as soon as it is armed."""
     altitude = settings.motion.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
     if not altitude >= LEAST_ALTITUDE_M:
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {LEAST_ALTITUDE_M} m")

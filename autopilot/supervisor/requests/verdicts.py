@@ -39,5 +39,5 @@ def later(text: str) -> Verdict:
 
 
 def wrong_phase(flight: Flight, what: str) -> Verdict:
-    """The request cannot be followed in the present phase."""
+    """The request is refused because it cannot be carried out in the present phase."""
     return later(f"{what} denied while {_MEANWHILE[flight.phase]}")

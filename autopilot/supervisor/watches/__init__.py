@@ -1,1 +1,1 @@
-"""What the supervisor watches from tick to tick, one file a subject; `advance` runs the watches in order."""
+"""The checks of each tick, one file per subject; `advance` runs the watches in order."""

@@ -1,4 +1,4 @@
-"""The pull of the cable as it is felt, and what counts as one."""
+"""The pull of the cable as measured by the accelerometer, and its thresholds."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from math import isfinite
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import View
 
-SLACK, PULLED = 0.1, 0.3  # weights of the load: less is no pull of the cable, more is one
-PULL_US = 100_000  # for which a cable must pull to be taut
+SLACK, PULLED = 0.1, 0.3  # weights of the load: less than the first is no pull, more than the second is one
+PULL_US = 100_000  # time for which a cable must pull to count as taut
 
 
 def share_pulled(view: View, settings: Settings) -> float:
-    """Pull of the cable in weights of the load; by its length alone where no accelerometer tells."""
+    """Pull of the cable in weights of the load; without an accelerometer, one if it is taut by its length."""
     if isfinite(view.pull_n):
         return view.pull_n / settings.load_weight_n
     return 1.0 if view.taut else 0.0

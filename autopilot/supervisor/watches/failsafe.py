@@ -1,5 +1,5 @@
-"""Failsafe: what makes it impossible to fly on. By what is left of the estimate the vehicle lands, as long as
-that tells up from down and roughly where it is; else the rotors stop."""
+"""Failsafe: the conditions under which the flight cannot continue. The vehicle lands by what remains of the
+estimate, as long as this gives the vertical and roughly the position; otherwise the rotors stop."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
 
 
 def watch_failsafe(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Give the flight up when it cannot go on."""
+    """Give the flight up when it cannot continue."""
     why = trouble(flight, view, settings) if flight.phase in IN_AIR else ""
     return given_up(flight, why) if why else Watched(flight)
 
 
 def watch_blind(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Land while readings to fly by are missing; whatever else is flown ends."""
+    """Land when readings that the flight requires are missing, whatever is being flown."""
     aloft = flight.phase in IN_AIR and flight.phase not in LANDING
     if not view.complaints or not aloft or isinstance(flight.legs[0], Steady):
         return Watched(flight)
@@ -45,7 +45,7 @@ def given_up(flight: Flight, why: str) -> Watched:
 
 
 def trouble(flight: Flight, view: View, settings: Settings) -> str:
-    """Why the flight cannot go on, or an empty string."""
+    """Why the flight cannot continue, or an empty string."""
     limits = settings.failsafe
     if view.lost and not (flight.legs and isinstance(flight.legs[0], Steady)):
         return view.lost

@@ -25,17 +25,17 @@ from autopilot.supervisor.watches.watched import Watched
 
 NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
 FENCE_EVENTS = {2: Event.HOLD, 3: Event.RETURN, 5: Event.LAND}
-STOP_MARGIN = 0.05  # of the way to where the load would stop: while it speeds up, that moves on
+STOP_MARGIN = 0.05  # share by which the stopping distance is extended: while the load speeds up, it grows
 
 
 def limited(flight: Flight, settings: Settings) -> bool:
-    """Whether there is a fence, heeded or not: zones that were uploaded, or limits by parameters."""
+    """Whether there is a fence, in force or not: zones that were uploaded, or limits by parameters."""
     limits = settings.fence
     return bool(flight.area.fence.zones) or limits.radius_m > 0.0 or limits.height_m > 0.0
 
 
 def watch_fence(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Do what GF_ACTION says when the fence is breached, or the load could not stop before it."""
+    """React as GF_ACTION requires when the fence is breached, or the load can no longer stop before it."""
     limits, area = settings.fence, flight.area
     if flight.phase not in CARRYING or not fenced(flight, settings) or not limited(flight, settings):
         return Watched(flight)

@@ -1,4 +1,4 @@
-"""Disarming by time: of a vehicle that stands armed for nothing, and of one that a failsafe brought down."""
+"""Disarming by time: of a vehicle that stands armed without a command, and of a vehicle after a failsafe."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ FAILSAFE_DISARM_US = 3_000_000
 
 
 def watch_idle(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Disarm when nothing has been asked of the armed vehicle, or some time after a failsafe. A vehicle whose
-    mission waits for its paths was asked for something, however long these take."""
+    """Disarm an armed vehicle that receives no command, and any vehicle some time after a failsafe. A mission
+    that waits for its paths counts as a command, however long these take."""
     lasted_us = view.now_us - flight.phase_start_us
     if flight.phase == Phase.ARMED and not flight.mission.waiting and lasted_us > IDLE_DISARM_US:
         return Watched(flight, Event.DISARM, ((INFO, "Disarmed: no command received"),))

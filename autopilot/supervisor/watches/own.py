@@ -1,5 +1,5 @@
-"""A control law or an estimator that somebody has brought, and that has failed: the built-in one, which has
-taken over, lands."""
+"""A custom control law or estimator that has failed: the built-in one, which has taken over, lands the
+vehicle."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from autopilot.supervisor.watches.watched import Watched
 
 
 def watch_law(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Where the law has failed."""
+    """Land after the custom law has failed."""
     return _watch(flight, "law", view.law_fault, "landing by law plumbline")
 
 
 def watch_estimator(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Where the estimator has failed."""
+    """Land after the custom estimator has failed."""
     return _watch(flight, "estimator", view.estimator_fault, "landing by the built-in filter")
 
 
 def _watch(flight: Flight, source: str, fault: str, instead: str) -> Watched:
-    """Land, tell why, and do not arm again; `source` is that of the hindrance."""
+    """Land, report why, and do not arm again; `source` is the key of the hindrance."""
     if not fault or source in flight.hindrances:
         return Watched(flight)
     flight = replace(flight, hindrances={**flight.hindrances, source: (fault,)})

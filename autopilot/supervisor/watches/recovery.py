@@ -1,5 +1,5 @@
-"""The flight that was found under way: once the sensors have told where all is, the load is held, or the
-vehicle landed beside one that lies."""
+"""A flight that was found in progress: once the sensors determine all positions, the load is held, or the
+vehicle lands beside a load that lies on the ground."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from autopilot.supervisor.state import WARNING, Event, Flight, View, leg_time_s
 from autopilot.supervisor.watches.failsafe import given_up
 from autopilot.supervisor.watches.watched import Watched
 
-TRACKED_S = 0.2  # until velocities are known by a tracker
-RECEIVED_S = 2.0  # until attitude and heading are known by a receiver
-MOST_S = 4.0  # in which the sensors must have told all that
+TRACKED_S = 0.2  # until the velocities are known from a tracker
+RECEIVED_S = 2.0  # until attitude and heading are known from a receiver
+MOST_S = 4.0  # time within which the sensors must determine all that
 SLACK_SHARE = 0.965  # of the cable's length: a load that is nearer does not hang on it
-HANGING_SHARE = 0.5  # of the load's weight: with so much less than all weighs the load was not carried
-STOP_GAIN = 4.0  # 1/s: deceleration over the speed at which a level vehicle climbs or sinks
-STOP_ACCEL = 2.0  # m/s^2, of that at most
-LEAST_UPRIGHT = 0.7  # cosine of the tilt for which the thrust makes up
+HANGING_SHARE = 0.5  # of the load's weight: with a thrust this far below the total weight no load was carried
+STOP_GAIN = 4.0  # 1/s: deceleration per vertical speed of the level vehicle
+STOP_ACCEL = 2.0  # m/s^2, limit of that deceleration
+LEAST_UPRIGHT = 0.7  # cosine of the greatest tilt for which the thrust compensates
 HOLDING_TEXT = "Restarted in flight: holding"
 LANDING_TEXT = "Restarted in flight: landing"
 
 
 def watch_recovery(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Hold the load, or land, when the sensors have told enough; give up when they do not."""
+    """Hold the load, or land, once the sensors determine the state; give up if they do not."""
     if not flight.legs or not isinstance(flight.legs[0], Steady):
         return Watched(flight)
     t = leg_time_s(flight, view.now_us)
@@ -40,23 +40,24 @@ def watch_recovery(flight: Flight, view: View, settings: Settings) -> Watched:
     distance = norm(sub(view.x_quad, view.x_load))
     hangs = view.taut or flight.cable.released
     if not hangs and distance > SLACK_SHARE * settings.cable_length_m and t < MOST_S:
-        return Watched(flight)  # whether it hangs is found out when its speed is known
+        return Watched(flight)  # whether the load hangs can be decided when its speed is known
     if not hangs and view.x_load[2] < TOUCH_HEIGHT:
         return Watched(flight, Event.LOAD_DOWN, ((WARNING, LANDING_TEXT),))
     length = distance if view.taut else settings.cable_length_m
     flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
     if not view.taut or flight.cable.released:
         return Watched(flight, Event.HOLD, ((WARNING, HOLDING_TEXT),))
-    # beneath a vehicle that was kept level the load swings: a hold that begins at rest would ask for more
-    # than the rotors give to stop that at once
+    # beneath a vehicle that was kept level the load swings: a hold that begins at rest would stop the swing
+    # abruptly, which requires more force than the rotors have
     calming = calm(flight.legs[0], view, settings, ends_step=False)
     flight = replace(flight, legs=(calming,), leg_start_us=view.now_us)
     return Watched(flight, None, ((WARNING, HOLDING_TEXT),))
 
 
 def _stopping(flight: Flight, leg: Steady, view: View, settings: Settings) -> Flight:
-    """The flight with a thrust that stops climbing or sinking: what was asked for last may have been for a
-    climb that begins. With less than carries the load, that lies, and what is believed of it may be wrong."""
+    """The flight with a thrust that stops climbing or sinking, because the last commanded thrust may have
+    been for the beginning of a climb. A thrust that cannot have carried the load stays as it is: the load
+    then lies on the ground, and what is assumed about it may be wrong."""
     weight = least = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
     least -= HANGING_SHARE * settings.load_weight_n
     if leg.thrust_n < least:

@@ -1,4 +1,4 @@
-"""Rotors that are lost: the vehicle lands on the others, where these can hold it level."""
+"""Rotors that are lost: the vehicle lands on the others if these can keep it level."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERIT
 
 
 def watch_rotors(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Note the rotors that are lost, and land; of those that are switched off nothing is known."""
+    """Note the rotors that are lost, and land; while disarmed nothing is known about the rotors."""
     if flight.phase == Phase.DISARMED:
         return Watched(flight)
     lost = flight.rotors_lost | view.rotors_lost

@@ -1,4 +1,4 @@
-"""Setpoints: one above the ground takes the load up, and while GUIDED the load is led towards the last."""
+"""Setpoints: one above the ground begins the take-off; while GUIDED the load is led towards the latest."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def watch_takeoff_setpoint(flight: Flight, view: View, settings: Settings) -> Wa
 
 
 def watch_setpoints(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Lead the load on towards what is asked at this moment; hold it if the source falls silent."""
+    """Lead the load towards the setpoint of this moment; hold it if the source falls silent."""
     if flight.phase != Phase.GUIDED:
         return Watched(flight)
     guide, circle = flight.setpoints.guide, flight.setpoints.circle

@@ -1,4 +1,4 @@
-"""The cable that goes slack in the air: a load that falls is caught, and then the phase goes on."""
+"""A cable that goes slack in the air: the falling load is caught, and then the phase continues."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from autopilot.supervisor.state import (
 from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK, share_pulled
 from autopilot.supervisor.watches.watched import Watched
 
-LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
-LYING_SPEED = 0.3  # m/s, less of a fallen load is noise or creep
-LEAST_GAP = 0.005  # m by which a cable must be too short for its ends to be believed slack
-SLACK_US = 20_000  # for which it must be so
+LIFT_OFF_US = 1_000_000  # time after which a load that is being lifted is off the ground
+LYING_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
+LEAST_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
+SLACK_US = 20_000  # time for which this must be the case
 
 
 def watch_slack(flight: Flight, view: View, settings: Settings) -> Watched:
@@ -53,7 +53,7 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> Watched:
 
 
 def _caught(flight: Flight) -> Watched:
-    """The load hangs on the cable again; a mission step that slackens it twice is not flown on."""
+    """The load hangs on the cable again; a mission step that slackens the cable twice is not continued."""
     mission = flight.mission
     again = mission.active and flight.cable.slack_step == mission.step
     cable = replace(flight.cable, slack_since_us=-1, slack_step=mission.step if mission.active else -1)
@@ -65,9 +65,11 @@ def _caught(flight: Flight) -> Watched:
 
 
 def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
-    """Note since when the cable is slack although the load should hang on it; while it is caught: taut.
+    """Note since when the cable is slack although the load should hang on it; while the load is being caught,
+    note since when the cable is taut.
 
-    A gust can hide or feign a pull, a tracker's noise a few millimetres: both must tell of a small gap.
+    A gust can hide or imitate a pull, and noise of a tracker a gap of a few millimetres: a small gap counts
+    only if the pull confirms it.
     """
     if isinstance(flight.legs[0], Catch):
         noted = view.taut

@@ -21,15 +21,15 @@ from autopilot.supervisor.state import (
 from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, share_pulled
 from autopilot.supervisor.watches.watched import Watched
 
-ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
+ASTRAY = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
 LIFTING = "Cable taut, lifting the load"
 LIFTING_UNSEEN = "Cable taut, lifting the load; no load sensor"
-LONG_AFTER = 2.0  # times as long as rising from the ground until then takes
-TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
+LONG_AFTER = 2.0  # factor of the time in which the vehicle would rise from the ground to TAUT_LATEST
+TAUT_LATEST = 1.3  # cable lengths over the load at which the cable must have come taut
 
 
 def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Lift when the cable pulls; land when the vehicle rises and it never does."""
+    """Lift when the cable pulls; land if it never does although the vehicle rises."""
     if flight.phase != Phase.TAUTEN or len(flight.legs) != 1:
         return Watched(flight)
     flight = _note_pull(flight, view, settings)
@@ -39,7 +39,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
         return Watched(flight, Event.TAUT, ((INFO, LIFTING_UNSEEN if view.unseen else LIFTING),))
     at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
     over = (view.x_load[0], view.x_load[1], at[2])
-    if not norm(sub(over, at)) <= ASTRAY:  # as a load that was not seen well from the ground
+    if not norm(sub(over, at)) <= ASTRAY:  # for example because the load was not seen well from the ground
         if _hangs(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
@@ -54,7 +54,8 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
 def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the cable that is being tautened pulls.
 
-    It counts as taut a little before it is: if lifting began then, it would come taut in the middle of it.
+    The estimate counts the cable as taut a little before it is: if lifting began then, the cable would come
+    taut in the middle of the lift.
     """
     pulls = share_pulled(view, settings) > PULLED and view.taut
     if pulls == (flight.still_since_us >= 0):
@@ -63,15 +64,15 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
 
 
 def _hangs(flight: Flight, view: View, settings: Settings) -> bool:
-    """Whether the load is astray because it swings, on a cable shorter than it is believed to be: it pulls,
-    long after it should have come taut, and is not as long as one that is."""
+    """Whether the load is beside the vehicle because it swings on a cable that is shorter than assumed: the
+    cable pulls, long after it should have come taut, and is not as long as a taut cable would be."""
     latest_s = LONG_AFTER * TAUT_LATEST * settings.cable_length_m / settings.motion.taut_speed_m_s
     late = view.now_us - flight.phase_start_us > latest_s * 1e6
     return late and not view.taut and share_pulled(view, settings) > PULLED
 
 
 def _moved(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
-    """The rising vehicle, moved from where it is over the load."""
+    """The flight whose rising vehicle is moved from `at` to `over`, above the load."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
     legs = (
@@ -82,7 +83,7 @@ def _moved(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
 
 
 def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
-    """Height over home that the vehicle need not climb beyond to pull the cable taut."""
+    """Height over home (m) at which the rising vehicle must have pulled the cable taut."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
     unsure = HEIGHT_SIGMAS * view.height_std

@@ -11,13 +11,13 @@ from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_tim
 from autopilot.supervisor.watches.cable_pull import SLACK, share_pulled
 from autopilot.supervisor.watches.watched import Watched
 
-LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
-STANDS = 2.0  # m, ten seconds of sinking: then nothing but the ground holds it up, however it trembles
+LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below a load or vehicle that stopped
+STANDS = 2.0  # m, ten seconds of sinking: then only the ground can hold the vehicle up, however it trembles
 STILL_SPEED, STILL_US = 0.05, 200_000
 
 
 def watch_touchdown(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Go on to set the vehicle down when the load lies; disarm when the vehicle stands."""
+    """Set the vehicle down when the load lies on the ground; disarm when the vehicle stands."""
     if flight.phase not in (Phase.LOWER, Phase.SET_DOWN):
         return Watched(flight)
     flight = _note_stop(flight, view, settings)
@@ -29,7 +29,7 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> Watched:
 
 
 def _landed(flight: Flight) -> Watched:
-    """The vehicle stands on the ground: a mission that landed it has reached that item."""
+    """The vehicle stands on the ground: a mission in progress has reached its landing item."""
     mission = flight.mission
     reached: tuple[int, ...] = ()
     if mission.active:
@@ -40,19 +40,19 @@ def _landed(flight: Flight) -> Watched:
 
 
 def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
-    """Note since when the thing that is set down no longer follows its sinking setpoint.
+    """Note since when the load or vehicle that is set down no longer follows its sinking setpoint.
 
-    A load that still sinks keeps behind the setpoint by what it sinks in the lag of the law.
-    The vehicle must stand still as well: a gust may hold it up. But a loop with a long delay may never come
-    to rest on the ground: a setpoint far below says enough. The load's velocity says nothing once the cable
-    is slack.
+    A load that still sinks lags behind the setpoint by the distance that it sinks in the lag of the law.
+    The vehicle must stand still as well, because a gust may hold it up. But a loop with a long delay may
+    never come to rest on the ground: then a setpoint far below suffices. Once the cable is slack, the
+    velocity of the load is no evidence.
     """
     leg = flight.legs[0]
     if isinstance(leg, Creep):
         target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
         if leg.control_mode == LOAD_POSITION:
             down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
-            # of a load that is not seen the pull tells
+            # while readings are missing, the pull shows that the load is down
             down = down or (bool(view.complaints) and share_pulled(view, settings) < SLACK)
         else:
             sunk = view.x_quad[2] - target

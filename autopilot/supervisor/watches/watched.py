@@ -1,4 +1,4 @@
-"""The one signature of all watches, and what they return."""
+"""The common signature of all watches, and what they return."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from autopilot.supervisor.state import Event, Flight, Text, View
 
 
 class Watched(NamedTuple):
-    """What a watch found: the flight with what it noted in it, and an event with texts, or nothing.
+    """What a watch found: the flight with its notes, and an event with texts, or nothing.
 
-    Texts without an event are told, and the phase goes on. A watch that found something ends the tick: those
-    behind it look again at the next.
+    Texts without an event are sent, and the phase continues. A watch that found something ends the tick: the
+    watches after it run again at the next tick.
     """
 
     flight: Flight

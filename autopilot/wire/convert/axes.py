@@ -1,7 +1,7 @@
-"""The changes of axes of `autopilot.geometry.frames` for messages, which are made in Python.
+"""The changes of axes of `autopilot.geometry.frames` for messages that are built in Python.
 
-They are the same functions without their machine code, to enter which costs more than to turn three numbers.
-Kernels may call them as well.
+They are the same functions as plain Python, because calling machine code costs more than converting three
+numbers. Kernels may call them as well.
 """
 
 from __future__ import annotations

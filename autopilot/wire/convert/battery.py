@@ -1,4 +1,4 @@
-"""BATTERY_STATUS, from the simulator and from the vehicle; what of it SYS_STATUS repeats."""
+"""BATTERY_STATUS, from the simulator and from the vehicle; the parts of it that SYS_STATUS repeats."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _CELLS = 10  # entries of BATTERY_STATUS.voltages
 
 
 class BatteryReading(NamedTuple):
-    """What is known of a battery; NaN what is not."""
+    """What is known of a battery; NaN for what is unknown."""
 
     voltage: float = nan  # V
     current: float = nan  # A
@@ -22,23 +22,23 @@ class BatteryReading(NamedTuple):
 
 
 def battery_mv(reading: BatteryReading) -> int:
-    """The voltage as SYS_STATUS has it; the greatest number: unknown."""
+    """The voltage in mV, as in SYS_STATUS; the greatest number: unknown."""
     return _UINT16 if isnan(reading.voltage) else saturated(reading.voltage * 1e3, 0, _UINT16 - 1)
 
 
 def battery_ca(reading: BatteryReading) -> int:
-    """The current in 10 mA; -1: unknown."""
+    """The current in units of 10 mA; -1: unknown."""
     return -1 if isnan(reading.current) else saturated(reading.current * 100.0, 0, _INT16)
 
 
 def battery_percent(reading: BatteryReading) -> int:
-    """What remains; -1: unknown."""
+    """The remaining charge in per cent; -1: unknown."""
     return -1 if isnan(reading.remaining) else saturated(reading.remaining * 100.0, 0, 100)
 
 
 def battery_status_message(reading: BatteryReading) -> Any:
-    """BATTERY_STATUS of a pack whose cells are not measured one by one: its voltage is the first entry, and
-    what does not fit there the second."""
+    """BATTERY_STATUS of a pack whose cells are not measured singly: the first entry is its voltage, the
+    second what exceeds the range of the first."""
     first = battery_mv(reading)
     voltages = [first, *[_UINT16] * (_CELLS - 1)]
     if first == _UINT16 - 1:
@@ -57,7 +57,7 @@ def battery_status_message(reading: BatteryReading) -> Any:
 
 
 def read_battery_status(m: Any) -> BatteryReading:
-    """Inverse of `battery_status_message`; also of a message that has the cells one by one."""
+    """Inverse of `battery_status_message`; also reads a message that contains the cells singly."""
     told = [entry for entry in m.voltages if entry != _UINT16]
     return BatteryReading(
         sum(told) * 1e-3 if told else nan,

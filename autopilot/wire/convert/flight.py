@@ -1,6 +1,6 @@
-"""The dialect's telemetry: load, setpoint, errors of the cascade, rotors.
+"""The dialect's telemetry: load, setpoint, errors of the cascade, rotors, wind.
 
-Builders give fields as they are sent.
+Builders return the fields as they are sent.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def load_state_message(*record: Any) -> Fields:
 
 
 def filter_state_message(time_us: int, x_load: Vec3, v_load: Vec3, x_quad: Vec3) -> Fields:
-    """FILTER_STATE: what the built-in filter estimates beside an estimator of somebody's own."""
+    """FILTER_STATE: the estimate of the built-in filter while a custom estimator flies."""
     places = (*ned_from_enu(x_load), *ned_from_enu(v_load), *ned_from_enu(x_quad))
     return _FILTER_STATE, (time_us, *places)
 
@@ -109,7 +109,7 @@ class LoadSetpoint(NamedTuple):
     q_cable_c: Vec3  # commanded direction of the cable
     elapsed: float  # s since the item or phase began
     duration: float  # s, NaN if open
-    asked_position: Vec3  # what the mission asks for; `position` is as near to it as can be flown
+    asked_position: Vec3  # what the mission specifies; `position` is as near to it as can be flown
     asked_velocity: Vec3
 
 
@@ -169,7 +169,7 @@ def read_load_setpoint(m: Any) -> LoadSetpoint:
 
 
 class CascadeErrors(NamedTuple):
-    """CASCADE_ERRORS: (3-1) ... (3-25) as the autopilot computes them, and what it asks of the mixer."""
+    """CASCADE_ERRORS: (3-1) ... (3-25) as the autopilot computes them, and its commands to the mixer."""
 
     time_us: int
     control_mode: int
@@ -259,7 +259,7 @@ def read_wind_state(m: Any) -> WindState:
 
 
 class RotorState(NamedTuple):
-    """ROTOR_STATE: commanded (estimated source) or true forces; bit i of `saturated`: rotor i+1 was cut."""
+    """ROTOR_STATE: commanded (source estimate) or true forces; bit i of `saturated`: rotor i+1 is limited."""
 
     time_us: int
     source: int
@@ -282,7 +282,7 @@ def rotor_state_values(
 ) -> tuple[float, ...]:
     """ROTOR_STATE, see `RotorState`: the numbers in the order of the wire."""
     first, more = saturated & 255, saturated >> 8
-    # as it was when there were quadrotors only, so that their logs stay as they are
+    # zero for a quadrotor, as when there were only quadrotors, so that their logs do not change
     count = 0 if rotors == 4 else rotors
     return (time_us, *forces[:4], force_min, force_max, first, source, *forces[4:], more, count)
 

@@ -1,8 +1,8 @@
-"""Where home is, and positions about it as MAVLink's scaled degrees.
+"""Where home is, and positions around it in MAVLink's scaled degrees.
 
-The earth is flat about home: a sphere of the equatorial radius, touched at home. Each function is the exact
-inverse of the other on the lattice of 1e-7 degrees and millimetres that the wire carries; off the lattice
-they differ by its half step (5.6 mm northwards, less eastwards, 0.5 mm in height).
+The earth is flat around home: the tangent plane, at home, of a sphere of the equatorial radius. Each function
+is the exact inverse of the other on the lattice of 1e-7 degrees and millimetres of the messages; off the
+lattice they differ by half a step (5.6 mm northwards, less eastwards, 0.5 mm in height).
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ class Home(NamedTuple):
 
 
 def home_from_text(text: str) -> Home:
-    """Home from `LAT,LON,ALT` in degrees and metres; ValueError says what is wrong."""
+    """Home from `LAT,LON,ALT` in degrees and metres; ValueError states what is wrong."""
     try:
         latitude, longitude, altitude = (float(word) for word in text.split(","))
     except ValueError:
         raise ValueError(f"home {text!r}; must be LAT,LON,ALT in degrees and metres") from None
     for name, value, limit in (
-        ("latitude", latitude, 85.0),  # nearer to a pole east and west have no use
+        ("latitude", latitude, 85.0),  # nearer to a pole, east and west are of no use
         ("longitude", longitude, 180.0),
         ("altitude", altitude, 100000.0),
     ):
@@ -48,7 +48,7 @@ def home_from_text(text: str) -> Home:
 
 @jitable
 def enu_from_geodetic(latitude_degE7: int, longitude_degE7: int, altitude_mm: int, home: Home) -> Vec3:
-    """Position in m (east, north, up) of home, from degrees * 1e7 and mm above mean sea level."""
+    """Position in m (east, north, up) from home, given degrees * 1e7 and mm above mean sea level."""
     around = longitude_degE7 - round(home.longitude_deg / _DEG_E7)
     turns = round(around / _TURN_DEG_E7)
     east_deg = (longitude_degE7 - turns * _TURN_DEG_E7) * _DEG_E7 - home.longitude_deg

@@ -1,4 +1,4 @@
-"""The forces of the rotors that a ROTOR_STATE tells, apart from what needs numba."""
+"""The rotor forces of a ROTOR_STATE, in a module that does not need numba."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ from typing import Any
 
 
 def rotor_forces(m: Any) -> tuple[float, ...]:
-    """The forces of a ROTOR_STATE, N, one of each rotor that there is."""
+    """The forces of a ROTOR_STATE, N, one for each rotor of the vehicle."""
     forces: tuple[float, ...] = (*m.force, *m.more_force)
     return forces[: m.rotors or 4]

@@ -1,4 +1,4 @@
-"""Integers of the wire: rounded, saturated at the ends of their field, never raising."""
+"""Integers on the wire: rounded, saturated at the ends of the field's range; nothing is ever raised."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """The simulator link: HIL_SENSOR, ODOMETRY, LOAD_SENSOR, HIL_GPS down, HIL_ACTUATOR_CONTROLS up.
 
-Both ends of it are machine code: `x_values` gives the numbers of a message in the order of the wire, arrays
-spread out, for `autopilot.wire.compiled` to write; `x_in`, and `read_x` where nothing can be missing, read
-its records as well as pymavlink's objects. There a vector that was not measured is NaN.
+Both ends are machine code: `x_values` returns the numbers of a message in the order of the wire, arrays
+spread out, which `autopilot.wire.compiled` writes; `x_in`, or `read_x` where nothing can be missing, reads
+the records of that module as well as pymavlink's objects. In `x_values` and `x_in` a vector that was not
+measured is NaN.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Forces = tuple[
 ]
 
 NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-FULL_SPEED_RPM = 10_000.0  # of a rotor that gives its greatest force, whatever its size
+FULL_SPEED_RPM = 10_000.0  # of a rotor at its greatest force, whatever its size
 ROTOR_FMAX = 1.96  # N, force of one rotor at full scale of HIL_ACTUATOR_CONTROLS (Table 4-1)
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of HIL_STATE_QUATERNION's accelerations
 
@@ -49,11 +50,11 @@ _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 _NAN3: Vec3 = (math.nan, math.nan, math.nan)
 _GRIPPER, _WINCH = 4, 5  # of HIL_ACTUATOR_CONTROLS: between the first four rotors and the others
-REEL_MAX = 2.0  # m/s, of a winch whose control is 1
+REEL_MAX = 2.0  # m/s, rate of a winch whose control is 1
 
 
 def _message(message_type: Any, values: tuple[float, ...]) -> Any:
-    """pymavlink's object of these numbers, which come in the order of the wire."""
+    """pymavlink's object of these numbers, given in the order of the wire."""
     numbers = iter(values)
     lengths: list[int] = message_type.array_lengths
     fields = [list(islice(numbers, length)) if length else next(numbers) for length in lengths]
@@ -88,17 +89,17 @@ def forces_in(row: Row, at: int) -> Forces:
 
 
 def _or_nan(v: Vec3 | None) -> Vec3:
-    """A vector as it is sent."""
+    """A vector as it is sent: NaN if it was not measured."""
     return _NAN3 if v is None else v
 
 
 def _or_none(v: Vec3 | None) -> Vec3 | None:
-    """A vector as it was measured."""
+    """A received vector: None if it was not measured."""
     return None if v is None or math.isnan(v[0]) else v
 
 
 class HilSensor(NamedTuple):
-    """HIL_SENSOR: what the vehicle's own sensors read at `time_us`; `fields` says which are new."""
+    """HIL_SENSOR: the readings of the onboard sensors at `time_us`; `fields` states which are new."""
 
     time_us: int
     accel_body: Vec3  # specific force, m/s^2
@@ -160,7 +161,7 @@ def read_hil_sensor(m: Any) -> HilSensor:
 
 
 class Odometry(NamedTuple):
-    """ODOMETRY: a tracker's view of the vehicle at `time_us`; one standard deviation for all three axes."""
+    """ODOMETRY: a tracker's reading of the vehicle at `time_us`; one standard deviation for all axes."""
 
     time_us: int
     position: Vec3
@@ -225,7 +226,7 @@ def odometry_message(
 
 @register_jitable
 def odometry_in(m: Any) -> Any:
-    """What an ODOMETRY says."""
+    """The record of an ODOMETRY; vectors that were not measured are NaN."""
     q = m.q
     return Odometry(
         m.time_usec,
@@ -306,7 +307,7 @@ def load_sensor_message(
 
 @register_jitable
 def load_sensor_in(m: Any) -> Any:
-    """What a LOAD_SENSOR says."""
+    """The record of a LOAD_SENSOR; vectors that were not measured are NaN."""
     return LoadSensor(
         m.time_usec,
         enu_from_ned((m.x, m.y, m.z)) if m.fields & mavlink.PLUMBLINE_LOAD_POSITION else _NAN3,
@@ -330,7 +331,7 @@ def read_load_sensor(m: Any) -> LoadSensor:
 
 
 class HilGps(NamedTuple):
-    """HIL_GPS: the wire keeps 1e-7 degrees (11 mm), 1 mm of height, 1 cm/s, 1 cm of standard deviation."""
+    """HIL_GPS; resolution on the wire: 1e-7 degrees (11 mm), 1 mm height, 1 cm/s, 1 cm standard deviation."""
 
     time_us: int
     fix_type: int  # GPS_FIX_TYPE
@@ -394,7 +395,7 @@ def read_hil_gps(m: Any, home: Home) -> HilGps:
 
 
 class HilStateQuaternion(NamedTuple):
-    """HIL_STATE_QUATERNION: the true vehicle; coarse in position (11 mm), velocity (1 cm/s), force (1 mg)."""
+    """HIL_STATE_QUATERNION: the true vehicle; resolution: position 11 mm, velocity 1 cm/s, force 1 mg."""
 
     time_us: int
     quat_wxyz: Quat
@@ -547,9 +548,9 @@ def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
 
 @register_jitable
 def speed_rpm(force: float, greatest: float) -> float:
-    """Speed of a rotor that gives this force and can give `greatest` (N; the nominal one if unlimited), as a
-    speed controller tells it: a whole number, negative: backwards. The force grows with the square of the
-    speed."""
+    """Speed (rpm) of a rotor that gives this force and can give `greatest` (N; the nominal one if unlimited),
+    as a speed controller reports it: a whole number, negative for backwards. The force grows with the square
+    of the speed."""
     full = greatest if 0.0 < greatest < math.inf else ROTOR_FMAX
     speed = np.rint(math.sqrt(abs(force) / full) * FULL_SPEED_RPM)
     return if_above(force, 0.0, speed, -speed)

@@ -1,7 +1,7 @@
 """Common telemetry of a vehicle, built from ENU and FLU; any ground station reads it.
 
-Builders give fields as they are sent. `now_us` is the time since boot. Read back is what our own ground
-station reads: attitude and local position.
+Builders return the fields as they are sent. `now_us` is the time since boot. There are inverses for the
+messages that our own ground station reads: attitude and local position.
 """
 
 from __future__ import annotations
@@ -214,8 +214,8 @@ def altitude_message(now_us: int, height: float, home: Home) -> Fields:
 def vfr_hud_values(
     velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home
 ) -> tuple[float, ...]:
-    """VFR_HUD: the numbers in the order of the wire; `throttle` is a fraction, speeds are taken through
-    still air."""
+    """VFR_HUD: the numbers in the order of the wire; `throttle` is a fraction, the airspeed is that in still
+    air."""
     heading = heading_cdeg(quat_wxyz)
     east, north, up = velocity
     level = east * east + north * north
@@ -299,7 +299,7 @@ def attitude_target_values(
 
 
 def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Fields:
-    """ATTITUDE_TARGET: what the inner loop is asked for."""
+    """ATTITUDE_TARGET: the setpoint of the inner loop."""
     return _ATTITUDE_TARGET, attitude_target_values(now_us, quat_wxyz, omega_body, thrust_fraction)
 
 

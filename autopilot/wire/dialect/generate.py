@@ -1,7 +1,7 @@
 """Writes plumbline.py from plumbline.xml: `python -m autopilot.wire.dialect.generate`.
 
-The included common.xml, standard.xml and minimal.xml are those of the installed pymavlink; its version stands
-in the first line of the result. No network is needed.
+The included common.xml, standard.xml and minimal.xml are those of the installed pymavlink; the first line of
+the result states its version. No network is needed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DIALECT = Path(__file__).with_name("plumbline.xml")
 MISSING = Path(__file__).with_name("missing.xml")  # what pymavlink's common.xml lacks
 MODULE = Path(__file__).with_name("plumbline.py")
 _INCLUDED = ("common.xml", "standard.xml", "minimal.xml")
-# Extension fields of MAVLink's common.xml that pymavlink's copy of it lacks, behind those that it has
+# Extension fields of MAVLink's common.xml that pymavlink's copy lacks, added behind those that it has
 _EXTENSIONS = {
     "MISSION_COUNT": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},
     "MISSION_ACK": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},
@@ -73,7 +73,7 @@ def generated() -> bytes:
 
 
 def generated_with() -> str:
-    """The version of pymavlink that made the module on disk; empty if it does not say."""
+    """The version of pymavlink that made the module on disk; empty if the module does not state it."""
     with MODULE.open(encoding="utf-8") as module:
         first = module.readline().strip()
     return first.removeprefix(_STAMP) if first.startswith(_STAMP) else ""

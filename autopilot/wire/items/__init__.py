@@ -1,12 +1,12 @@
 """Missions as mission items and back, by one table of commands (`table`).
 
-`decode_items(encode_mission(mission, home), home)` equals `mission.steps` up to what the fields hold: float32
-(heights, holds, speeds, delays, amplitudes, rises, falls, phases, tilts), milliseconds (starts, durations and
-holds of signals), microseconds (periods) and 1e-7 degrees (the place of a waypoint: 5.6 mm). Items that were
-made here come back unchanged: `encode(decode(items)) == items`.
+`decode_items(encode_mission(mission, home), home)` equals `mission.steps` up to the resolution of the fields:
+float32 (heights, holds, speeds, delays, amplitudes, rises, falls, phases, tilts), milliseconds (starts,
+durations and holds of signals), microseconds (periods) and 1e-7 degrees (the place of a waypoint: 5.6 mm).
+Items that were made here come back unchanged: `encode(decode(items)) == items`.
 
-Positions are positions of the load. Items that turn the nose are no steps: it begins to turn with the step
-behind them. DO_JUMP is flown by flying its items again.
+Positions are positions of the load. Items that turn the nose are not steps: the nose begins to turn with the
+step after them. DO_JUMP is flown by flying its items again.
 """
 
 from autopilot.wire.items.command import Command, Fate

@@ -1,4 +1,4 @@
-"""A row of the table of mission commands, and an item that is read by one."""
+"""A row of the table of mission commands, and an item that is read by such a row."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Fate(Enum):
     """What becomes of an item."""
 
     FLOWN = "flown"
-    KEPT = "kept"  # stored and given back, and not flown
+    KEPT = "kept"  # stored and returned on download, but not flown
     REFUSED = "refused"
 
 
@@ -43,15 +43,15 @@ class Command:
     written: bool = False  # the record is written as this command
     constants: Mapping[str, float] = field(default_factory=dict)  # written beside the fields
     reads: Callable[[Asked], Iterable[Step]] | None = None  # None: one record of all fields
-    aims: Callable[[Asked], NoseAim] | None = None  # of a command that turns the nose: where to
+    aims: Callable[[Asked], NoseAim] | None = None  # for a command that turns the nose: where to
     mission_frame: bool = False  # its frame must be MAV_FRAME_MISSION
-    needs_load: bool = False  # refused behind a release
+    needs_load: bool = False  # refused after a release
     fate: Fate = Fate.FLOWN
 
 
 @dataclass(frozen=True)
 class Asked:
-    """An item, the row of its command, and what the items before it have led to."""
+    """An item, the row of its command, and the state after the items before it."""
 
     seq: int
     item: WireItem
@@ -60,12 +60,12 @@ class Asked:
     command: Command
 
     def __getitem__(self, attribute: str) -> Any:
-        """What its parameters say of an attribute, within limits."""
+        """The value that its parameters give for an attribute, checked against the limits."""
         one = next(one for one in self.command.fields if attribute in one.gives)
         return one.read(self.seq, self.item, self.home)[one.gives.index(attribute)]
 
     def record(self) -> Any:
-        """The record of the command, of all its fields."""
+        """The record that the command makes from all its fields."""
         assert self.command.makes is not None, self.command.number
         values: dict[str, Any] = {}
         for one in self.command.fields:
@@ -73,12 +73,12 @@ class Asked:
         return self.command.makes(**values)
 
     def expect_frame(self) -> None:
-        """MissionItemError where the command asks for MAV_FRAME_MISSION and the item has another."""
+        """MissionItemError if the command requires MAV_FRAME_MISSION and the item has another frame."""
         if self.command.mission_frame and self.item.frame != FRAME_MISSION:
             raise wrong_frame(self.seq, self.item, (FRAME_MISSION,))
 
     def expect_load(self) -> None:
-        """Signals, attitude runs and the winch move a load."""
+        """MissionItemError if the load is released: signals, attitude runs and the winch move a load."""
         if self.state.released:
             raise self.refused("needs the load, which an item before it has released")
 
@@ -87,7 +87,7 @@ class Asked:
         return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
 
     def is_home_row(self) -> bool:
-        """Whether it is home itself as item 0, as MAVProxy and Mission Planner write it, current or not."""
+        """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not."""
         item = self.item
         if self.seq != 0 or item.frame not in ABSOLUTE_FRAMES:
             return False

@@ -27,12 +27,12 @@ ENDLESS = -1  # repetitions of a jump
 
 
 def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
-    """The steps that the items stand for, or MissionItemError for the first item that cannot be flown."""
+    """The steps that the items describe, or MissionItemError for the first item that cannot be flown."""
     return tuple(located.step for located in located_steps(items, home))
 
 
 def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO) -> tuple[LocatedStep, ...]:
-    """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name.
+    """Like `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name.
 
     Places are relative to `home`; a return leads to `return_to` (m, ENU), which DO_SET_HOME moves.
     """
@@ -68,7 +68,7 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
 
 
 def endless_from(items: Sequence[WireItem], steps: Sequence[LocatedStep]) -> int | None:
-    """Which of the items' steps comes after the last one, where a jump without end leads back to it."""
+    """Index of the step that follows the last one if an endless jump leads back to it; None without one."""
     for item in items:
         if item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS:
             return next(i for i, step in enumerate(steps) if step.last >= item.param1)
@@ -81,7 +81,7 @@ def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:
 
 
 class _Reader:
-    """Goes through the items in order: terms gather until their run; the state of the load is followed."""
+    """Reads the items in order: it collects terms until their run, and tracks the state of the load."""
 
     def __init__(self, home: Home, return_to: Vec3) -> None:
         self.steps: list[LocatedStep] = []
@@ -117,18 +117,18 @@ class _Reader:
                 self._add(LocatedStep(seq, seq, step))
 
     def expect_no_terms(self, seq: int) -> None:
-        """Terms without a run would be lost silently."""
+        """MissionItemError if there are terms without a run, which would be lost silently."""
         if self._terms:
             text = f"the load signal begun at item {self._first_term} has no run (31012) behind it"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
     def aim_at_the_end(self, seq: int) -> None:
-        """Where no step follows the load is held as the nose turns, unless it is landed anyway."""
+        """Add a hold in which the nose turns if no step follows, unless the mission lands anyway."""
         if self._aims and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
 
     def _add(self, located: LocatedStep) -> None:
-        if self._aims and not isinstance(located.step, Takeoff):  # on the ground no nose turns
+        if self._aims and not isinstance(located.step, Takeoff):  # the nose does not turn on the ground
             located, self._aims = located._replace(aims=tuple(self._aims)), []
         self.steps.append(located)
         self._state = state_after(located.step, self._state, self._return_to)

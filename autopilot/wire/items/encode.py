@@ -19,7 +19,7 @@ _WRITTEN: dict[type[Any], Command] = {row.makes: row for row in COMMANDS if row.
 
 
 def encode_mission(mission: Mission, home: Home) -> tuple[WireItem, ...]:
-    """The items of a mission; MissionItemError if a number does not fit its field or could not be flown."""
+    """The items of a mission; MissionItemError if a number does not fit its field or cannot be flown."""
     return encode_steps(mission.steps, home)
 
 
@@ -28,18 +28,18 @@ def encode_steps(steps: Sequence[Step], home: Home) -> tuple[WireItem, ...]:
     items: list[WireItem] = []
     for step in steps:
         items.extend([_item(record, home, len(items)) for record in _records(step)])
-    located_steps(items, home)  # the vehicle would refuse what this refuses
+    located_steps(items, home)  # raises if the vehicle would refuse the items
     return tuple(items)
 
 
 def step_of(seq: int, steps: Sequence[Step]) -> int:
-    """Which of the steps the item `seq` belongs to, of those that `encode_steps` makes of them."""
+    """Index of the step to which item `seq` belongs, of the items that `encode_steps` makes of the steps."""
     ends = accumulate(len(tuple(_records(step))) for step in steps)
     return next((index for index, end in enumerate(ends) if seq < end), max(len(steps) - 1, 0))
 
 
 def _records(step: Step) -> Iterator[Any]:
-    """What has an item of its own: a step, or the terms and factors of signals before their run."""
+    """The records that have separate items: the step, for signals after their terms and factors."""
     if isinstance(step, Signals):
         for term in step.terms:
             yield term

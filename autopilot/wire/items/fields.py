@@ -1,6 +1,6 @@
-"""What a parameter of a mission command holds: how it is read, checked, written and described.
+"""The parameters of mission commands: how they are read, checked, written and described.
 
-A field gives one or two attributes of the record that an item stands for. Parameters are numbered as in
+A field gives one or two attributes of the record that an item represents. Parameters are numbered as in
 MAV_CMD: 1 ... 4 are floats, 5 and 6 are x and y (int32), 7 is z (float).
 """
 
@@ -45,7 +45,7 @@ class Field(Protocol):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """The attributes of the record that it holds."""
+        """The attributes of the record that the field holds."""
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any, ...]:
         """Their values; MissionItemError if one is out of its limits."""
@@ -59,7 +59,7 @@ class Field(Protocol):
 
 @dataclass(frozen=True)
 class Number:
-    """A number within limits. x and y hold it as a whole number of 1/`per_unit`."""
+    """A number within limits. x and y hold it as a whole number in units of 1/`per_unit`."""
 
     param: int
     attribute: str
@@ -109,7 +109,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Fall(Number):
-    """The fall of a term, which may be 0 only where the term is held for ever (y -1)."""
+    """The fall of a term, which may be 0 only if the term is held for ever (y -1)."""
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[float | None]:
         low = 0.0 if item.y == -1 else self.low
@@ -118,7 +118,7 @@ class Fall(Number):
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some whole numbers, each of which stands for something."""
+    """One of several whole numbers, each with a meaning."""
 
     param: int
     attribute: str
@@ -151,7 +151,7 @@ _AXIS_OF_CODE: dict[int, tuple[Axis, float]] = {code: (axis, s) for axis, (code,
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Axis and amplitude of a term: NED on the wire, ENU in the record, so that z changes its sign."""
+    """Axis and amplitude of a term: NED on the wire, ENU in the record, so z changes its sign."""
 
     gives: ClassVar[tuple[str, ...]] = ("axis", "amplitude_m")
 
@@ -198,7 +198,7 @@ class Place:
 
 @dataclass(frozen=True)
 class HomePlace:
-    """The place of home, written for ground stations that draw the item; not read."""
+    """The place of home: written for ground stations that draw the item, not read."""
 
     gives: ClassVar[tuple[str, ...]] = ()
 
@@ -215,7 +215,7 @@ class HomePlace:
 
 @dataclass(frozen=True)
 class Height:
-    """Height in m above home; above the ground, for a load hangs there."""
+    """Height of the load in m above home; it must be above the ground."""
 
     gives: ClassVar[tuple[str, ...]] = ("altitude_m",)
 
@@ -237,7 +237,7 @@ class Height:
 
 
 def check(seq: int, param: int, name: str, value: float, unit: str, low: float, high: float) -> float:
-    """`value`, a float32 as the decimal that somebody wrote, if it lies within its limits; NaN does not."""
+    """`value`, a float32, as the decimal that was entered, if it lies within its limits; NaN does not."""
     decimal = decimal_from_float32(value)
     if low <= decimal <= high:
         return decimal

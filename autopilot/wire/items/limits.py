@@ -1,4 +1,4 @@
-"""Limits of mission items. Those that a file has too are in `missions.limits`; a file is never wider."""
+"""Limits of mission items. Those that files share are in `missions.limits`; a file allows no wider ones."""
 
 from missions.limits import (
     FASTEST_REEL_M_S,
@@ -38,10 +38,10 @@ __all__ = [
 
 LONGEST_S = 86400.0
 LARGEST_PHASE_RAD = 100.0
-FARTHEST_M = 100_000.0  # from home, as far as the earth may be taken as flat
+FARTHEST_M = 100_000.0  # from home, as far as the earth may be assumed flat
 FASTEST_M_S = 100.0
 MOST_JUMPS = 1000  # repetitions of one jump
-MOST_FLOWN = 4000  # items, those that jumps repeat counted again
+MOST_FLOWN = 4000  # items, each repetition by a jump counted
 MOST_TURNS, MOST_RADIUS_M = 1000.0, 1000.0
 TURN_ACCEL_M_S2 = 1.0  # centripetal
 HOME_ROW_M = 1.0  # distance from home within which item 0 is home

@@ -1,4 +1,4 @@
-"""Where the nose is to point, as commands and mission items ask for it."""
+"""Where the nose is to point, by commands and mission items."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from missions.model import LookAt, NoseAim, TurnNose
 
 
 def turn_nose(angle_deg: float, rate_deg_s: float, sense: int, relative: bool) -> TurnNose:
-    """What CONDITION_YAW asks for: param1 ... param4, within their limits."""
+    """The turn that CONDITION_YAW requests by param1 ... param4, which are within their limits."""
     rate_rad_s = radians(rate_deg_s) if rate_deg_s > 0.0 else None
     if relative:
-        # counter-clockwise is negative: of an angle without a sign param3 says it
+        # counter-clockwise is negative; param3, if given, determines the sign
         clockwise = copysign(radians(angle_deg), sense) if sense else radians(angle_deg)
         return TurnNose(-clockwise, relative=True, rate_rad_s=rate_rad_s)
     return TurnNose(0.5 * pi - radians(angle_deg), sense=-sense, rate_rad_s=rate_rad_s)
@@ -35,7 +35,7 @@ def look_away(asked: Asked) -> NoseAim:
 
 
 def look_or_not(asked: Asked) -> NoseAim:
-    """DO_SET_ROI as an item: param1 says what is meant; ArduPilot leaves it 0 and gives a place."""
+    """DO_SET_ROI as an item: param1 is the mode; ArduPilot leaves it 0 and gives a place."""
     if asked["mode"] == mavlink.MAV_ROI_NONE and not asked.is_placed():
         return LookAt(None, None)
     return look(asked)

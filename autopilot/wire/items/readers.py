@@ -1,4 +1,4 @@
-"""Steps of the commands that are more, or less, than one record of their parameters."""
+"""Steps of the commands that become more, or less, than one record of their parameters."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from missions.model import Axis, Land, Release, Signals, Sine, Speed, Step, Term
 
 
 def waypoint(asked: Asked) -> Iterator[Step]:
-    """With its hold; home itself as the first row is not flown."""
+    """A waypoint with its hold; home itself as the first item is not flown."""
     if not asked.is_home_row():
         yield asked.record()
 
 
 def waypoint_for_a_day(asked: Asked) -> Iterator[Step]:
-    """Held for LONGEST_S."""
+    """A waypoint that is held for LONGEST_S."""
     if not asked.is_home_row():
         yield Waypoint(asked["east_m"], asked["north_m"], asked["altitude_m"], LONGEST_S)
 
@@ -54,7 +54,7 @@ def turns(asked: Asked) -> Iterator[Step]:
 
 
 def gate(asked: Asked) -> Iterator[Step]:
-    """Where a ground station has a survey begin and end: flown to like a waypoint."""
+    """A gate, with which a ground station begins and ends a survey: flown to like a waypoint."""
     left_at = asked.state.position
     if asked.item.param2 != 0.0:
         height = asked["altitude_m"]
@@ -66,7 +66,7 @@ def gate(asked: Asked) -> Iterator[Step]:
 
 
 def change_altitude(asked: Asked) -> Iterator[Step]:
-    """To another height, straight up or down."""
+    """A transfer to another height, straight up or down."""
     sea_level = asked.home.altitude_m if asked["frame"] in ABSOLUTE_FRAMES else 0.0
     height = asked.item.param1 - sea_level
     height = check(asked.seq, 1, "height above home", height, "m", LOWEST_M, FARTHEST_M)
@@ -76,13 +76,13 @@ def change_altitude(asked: Asked) -> Iterator[Step]:
 
 
 def change_speed(asked: Asked) -> Iterator[Step]:
-    """Of transfers; speeds of climb and descent and "no change" (-1) are passed over."""
+    """The speed of transfers; speeds of climb and descent and "no change" (-1) are ignored."""
     if asked["kind"] in ("airspeed", "ground speed") and asked.item.param2 != -1.0:
         yield Speed(asked["speed_m_s"])
 
 
 def gripper(asked: Asked) -> Iterator[Step]:
-    """Releasing is a step; taking hold of what is held, as some planners have it, is none."""
+    """Releasing the load is a step; grabbing a load that is held, as some planners write it, is not."""
     asked["gripper"]
     action = asked["action"]
     if action == "release":
@@ -110,7 +110,7 @@ def winch(asked: Asked) -> Iterator[Step]:
 
 
 def land(asked: Asked) -> Iterator[Step]:
-    """Down; at a place that is not where the load hangs, there first."""
+    """A landing; to a place other than where the load hangs, the load is carried first."""
     left_at = asked.state.position
     if asked.is_placed() and asked.state.released and left_at is None:
         text = "nothing between it and the release says how high the vehicle flies; put a waypoint there"

@@ -1,4 +1,4 @@
-"""A mission item as it travels, the step it stands for, and the error for one that is refused."""
+"""A mission item as it is transferred, the step it describes, and the error for an item that is refused."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class LocatedStep(NamedTuple):
     first: int
     last: int
     step: Step
-    aims: tuple[NoseAim, ...] = ()  # what the nose is asked, one after the other, as the step begins
+    aims: tuple[NoseAim, ...] = ()  # aims of the nose, taken one after the other as the step begins
 
 
 class MissionItemError(ValueError):
@@ -50,6 +50,6 @@ class MissionItemError(ValueError):
 
 
 def wrong_frame(seq: int, item: WireItem, allowed: tuple[int, ...]) -> MissionItemError:
-    """The error for an item whose frame is none of those allowed."""
+    """The error for an item whose frame is not allowed."""
     text = f"frame {item.frame}; must be {' or '.join(map(str, sorted(allowed)))} for command {item.command}"
     return MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)

@@ -1,7 +1,8 @@
-"""The mission commands: what each asks for, and what becomes of it.
+"""The mission commands: the parameters and the effect of each.
 
 Encoding, decoding and the table in docs/missions.md follow from these rows. A command without a row is
-refused up to MAV_CMD_NAV_LAST, for somebody relies on being taken there, and kept above it.
+refused if its number is at most MAV_CMD_NAV_LAST, because the user relies on being flown somewhere, and kept
+if it is greater.
 """
 
 from __future__ import annotations
@@ -276,7 +277,7 @@ FLOWN_COMMANDS = frozenset(row.number for row in COMMANDS if row.fate is Fate.FL
 
 
 def fate(command: int) -> Fate:
-    """What becomes of an item with this command, if its parameters will do."""
+    """What becomes of an item with this command if its parameters are valid."""
     if command in COMMAND:
         return COMMAND[command].fate
     known = command in m.enums["MAV_CMD"] and command != m.MAV_CMD_ENUM_END

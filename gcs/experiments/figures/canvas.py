@@ -1,4 +1,4 @@
-"""What all figures share: panels over one time axis, the lines of the two controllers, headings."""
+"""The common parts of all figures: panels over one time axis, line styles of both controllers, headings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ AXES = "xyz"
 COMPONENTS = (BLUE, ORANGE, GREEN)  # x, y, z
 DESIRED: Any = {"color": INK, "linewidth": 1.1, "linestyle": (0, (4, 3)), "label": "desired"}
 ACTUAL: Any = {"color": BLUE, "linewidth": 1.8, "label": "actual"}
-# 4-10 and on: solid NGC, dash-dot LQR
+# from figure 4-10 on: solid NGC, dash-dot LQR
 NGC: Any = {"color": BLUE, "linewidth": 1.7, "label": "NGC"}
 LQR: Any = {"color": RED, "linewidth": 1.5, "linestyle": (0, (6, 2, 1.2, 2)), "label": "LQR"}
 TIME = "time (s)"
@@ -33,7 +33,7 @@ class Scene(NamedTuple):
 
     @property
     def pair(self) -> tuple[tuple[Flown, Any], tuple[Flown, Any]]:
-        """Each flight with its line."""
+        """Each flight with its line style."""
         return (self.ngc, NGC), (self.lqr, LQR)
 
 
@@ -48,7 +48,7 @@ def panels(width_in: float, height_in: float, count: int, columns: int, *, wide:
 
 
 def place(figure: Any, *, hspace: float, wspace: float) -> None:
-    """Margins in inches, whatever the size."""
+    """Set the margins, which are fixed in inches, whatever the size of the figure."""
     width, height = figure.get_size_inches()
     figure.subplots_adjust(
         left=0.82 / width,
@@ -61,7 +61,7 @@ def place(figure: Any, *, hspace: float, wspace: float) -> None:
 
 
 def heading(figure: Any, number: str, title: str, case: str, vehicle: str, flights: Sequence[Flown]) -> None:
-    """The thesis's number and title; the vehicle, and which flight was lost when."""
+    """Draw the heading: number and title as in the thesis, case and vehicle, and when a flight was lost."""
     width, height = figure.get_size_inches()
     figure.text(
         0.25 / width, 1.0 - 0.26 / height, f"{number}  {title}", fontsize=12.5, weight="bold", va="center"
@@ -88,7 +88,7 @@ def name(flight: Flown) -> str:
 
 
 def line(ax: Any, flight: Flown, time_s: Floats, values: Floats, **how: Any) -> None:
-    """What was recorded between the beginning of the signals and the end."""
+    """Draw the values recorded between the beginning of the signals and the end."""
     seen = flight.seen(time_s)
     draw(ax, flight.clock(time_s[seen]), values[seen], **how)
 
@@ -96,14 +96,14 @@ def line(ax: Any, flight: Flown, time_s: Floats, values: Floats, **how: Any) -> 
 def components(
     ax: Any, flight: Flown, time_s: Floats, values: Floats, labels: Sequence[str], least: float
 ) -> None:
-    """The x, y and z part of a vector in one panel."""
+    """Draw the x, y and z component of a vector in one panel."""
     for i, label in enumerate(labels):
         line(ax, flight, time_s, values[:, i], color=COMPONENTS[i], linewidth=1.4, label=label)
     least_range(ax, least)
 
 
 def least_range(ax: Any, least: float) -> None:
-    """At least so much from bottom to top: rounding is not blown up to the height of the page."""
+    """Make the vertical axis span at least `least`, so that rounding errors do not fill the panel."""
     low, high = ax.get_ylim()
     if high - low < least:
         middle = 0.5 * (low + high) if abs(low + high) > 0.2 * least else 0.0
@@ -111,14 +111,14 @@ def least_range(ax: Any, least: float) -> None:
 
 
 def span(axes: Any, flights: Sequence[Flown]) -> None:
-    """From the beginning of the signals to the last end."""
+    """Set the time axis from the beginning of the signals to the end of the longest flight."""
     longest = max(flight.length_s for flight in flights)
     for ax in np.ravel(axes):
         ax.set_xlim(0.0, max(longest, 1e-3))
 
 
 def titled(ax: Any, text: str, *, columns: int = 3, legend: bool = True) -> None:
-    """A panel's title, and its legend at the other end of the same line."""
+    """Draw a panel's title, and its legend at the other end of the same line."""
     ax.set_title(text, fontsize=10.5)
     if legend:
         key(ax, columns)

@@ -21,14 +21,14 @@ class Figure(NamedTuple):
     case: str
     draw: Draw
     caption: str
-    flown: bool = True  # one for each vehicle; else a desired path, the same for all
+    flown: bool = True  # one figure for each vehicle; else a desired path, the same for all
 
     @property
     def heading(self) -> str:
         return f"Figure {self.number}"
 
     def file(self, vehicle: str) -> str:
-        """fig-4-07-tracking-case-a.png; the vehicle is named where it is not the thesis's own."""
+        """The file name, fig-4-07-tracking-case-a.png; it names the vehicle if that is not the thesis's."""
         chapter, _, count = self.number.partition("-")
         number = f"{chapter.lower()}-{int(count):02d}" if chapter.isdigit() else f"{chapter.lower()}-{count}"
         ending = "" if vehicle == VEHICLES[0] or not self.flown else f"-{vehicle}"
@@ -36,7 +36,7 @@ class Figure(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A figure that lies in a file."""
+    """A figure that has been drawn into a file."""
 
     figure: Figure
     vehicle: str
@@ -127,7 +127,7 @@ def wanted(case: str, vehicle: str) -> Iterator[Figure]:
 
 
 def draw_figures(scene: Scene, directory: Path, drawn: Callable[[Drawn], None]) -> None:
-    """Draw what shows this scene into `directory`; `drawn` is told of each."""
+    """Draw the figures of this scene into `directory`; `drawn` is called with each."""
     from gcs.report.style import save, style
 
     directory.mkdir(parents=True, exist_ok=True)

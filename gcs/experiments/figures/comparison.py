@@ -28,7 +28,7 @@ _LOAD_ANGLES = (r"\phi_L", r"\theta_L")
 
 
 def position(number: str, scene: Scene) -> Any:
-    """(a) load position with the desired one, (b) load position error."""
+    """(a) load position, actual and desired, (b) load position error."""
     figure, axes = panels(12.0, 6.6, 3, 2)
     for flight, how in scene.pair:
         s = flight.samples
@@ -113,10 +113,10 @@ def angles(number: str, scene: Scene) -> Any:
 
 
 def _step(scene: Scene) -> Step | None:
-    """The step that both were asked for, from a flight that saw the end of it."""
+    """The step that both flights had to fly, taken from one that reached its end; None if none did."""
     for flight in (scene.ngc, scene.lqr):
         s = flight.samples
-        # half a second of rest before it: a step begins there
+        # include half a second of rest before it, because a step must begin at rest
         shown = (s.time_s >= flight.start_s - 0.5) & (s.time_s <= flight.end_s)
         step = find_step(s.time_s[shown], s.desired_m[shown], s.desired_m_s[shown])
         if step is not None:
@@ -125,7 +125,8 @@ def _step(scene: Scene) -> Step | None:
 
 
 def _percentage(flight: Flown, step: Step) -> tuple[Floats, Floats]:
-    """Times from the beginning of the step, and the distance from its end along it, percent of its height."""
+    """Times since the signals began, and the distance from the step's end along its line, percent of its
+    height."""
     s = flight.samples
     seen = flight.seen(s.time_s)
     along = (s.actual_m[seen] - step.origin_m) @ step.direction

@@ -1,4 +1,4 @@
-"""Desired paths (4-1 ... 4-4, 4-18) as the autopilot sent them, and the signals they are made of (A-1)."""
+"""Desired paths (4-1 ... 4-4, 4-18) as sent by the autopilot, and the signals that they consist of (A-1)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def step_path(number: str, scene: Scene) -> Any:
 
 
 def product_path(number: str, scene: Scene) -> Any:
-    """4-2, 4-18: (a) the signals whose product it is, (b) position, velocity and acceleration along y."""
+    """4-2, 4-18: (a) two signals and their product, (b) position, velocity and acceleration along y."""
     figure, axes = panels(12.0, 6.4, 3, 2)
     _along_y(axes[:, 1], scene)
     term = next(t for t in _signals(scene.case).terms if t.axis == "y")
@@ -124,7 +124,7 @@ def velocity_and_acceleration(number: str, scene: Scene) -> Any:
 
 
 def signals(number: str, scene: Scene) -> Any:
-    """A-1: the signals of Case C, of which all trajectories are made."""
+    """A-1: the signals of Case C, from which all trajectories are made."""
     figure, axes = panels(12.0, 5.2, 2, 2)
     terms: dict[str, Term] = {term.axis: term for term in _signals(scene.case).terms}
     x, y, z = (terms[axis] for axis in AXES)
@@ -157,7 +157,7 @@ def _along_y(axes: Sequence[Any], scene: Scene) -> None:
 
 
 def _from_start(position_m: Floats, seen: slice) -> Floats:
-    """Relative to where the load hung when the signals began, as in the thesis."""
+    """Positions relative to the position when the signals began, as in the thesis."""
     shown = position_m[seen]
     return shown - shown[:1]
 

@@ -36,7 +36,7 @@ def error_functions(number: str, scene: Scene) -> Any:
 
 
 def configuration_errors(number: str, scene: Scene) -> Any:
-    """Psi_R and Psi_q; below, on a logarithmic axis, with the bound of (3-26) and (3-39) as fitted."""
+    """Psi_R and Psi_q; below, on a logarithmic axis, with the fitted bound of (3-26) and (3-39)."""
     figure, axes = panels(12.0, 6.2, 2, 2)
     flight = scene.ngc
     found = decays(flight)
@@ -59,7 +59,7 @@ def configuration_errors(number: str, scene: Scene) -> Any:
         if decay.rate_1_s is not None and decay.scale is not None:
             after = time_s >= flight.rest_s
             bound = decay.scale * np.exp(-decay.rate_1_s * (time_s[after] - flight.rest_s))
-            # no further than it is fitted
+            # drawn only in the range in which it is fitted
             bound[bound < ERROR_FUNCTIONS[name][2] * values[after].max()] = np.nan
             label = rf"$\alpha e^{{-\beta t}}$, $\beta$ = {decay.rate_1_s:.2f} 1/s"
             draw(

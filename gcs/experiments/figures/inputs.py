@@ -14,7 +14,7 @@ _MOMENTS = (r"M_\phi", r"M_\theta", r"M_\psi")
 
 
 def control_inputs(number: str, scene: Scene) -> Any:
-    """Left the total force and the force asked of each rotor, right the moments."""
+    """On the left the total force and the commanded force of each rotor, on the right the moments."""
     flight = scene.ngc
     cascade, rotors = flight.telemetry.cascade, flight.telemetry.rotors_commanded
     figure = new_figure(13.0, 6.6)

@@ -1,4 +1,4 @@
-"""Load position tracking (4-7, 4-13, 4-21): desired and actual motion, and what lies between."""
+"""Load position tracking (4-7, 4-13, 4-21): desired and actual motion, and their difference."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def tracking(number: str, scene: Scene) -> Any:
     flight, samples, setpoint = scene.ngc, scene.ngc.samples, scene.ngc.telemetry.setpoint
     origin = samples.desired_m[flight.seen(samples.time_s)][:1]
     t = samples.time_s
-    # the acceleration is not sent; the true velocity has no noise, so that its differences show it
+    # the true acceleration is not sent; the true velocity has no noise, so it can be differentiated
     rate = np.gradient(samples.actual_m_s, t, axis=0)
     compared = (
         ("x_L", "(m)", t, samples.desired_m - origin, samples.actual_m - origin, 0.1),

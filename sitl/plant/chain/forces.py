@@ -1,4 +1,4 @@
-"""What acts on vehicle, cable and load beside the tensions.
+"""Forces on vehicle, cable and load other than the tensions.
 
 | symbol | code | unit | |
 |---|---|---|---|
@@ -6,8 +6,8 @@
 | d, C_d | diameter, drag_coefficient | m | a link is a cylinder across the flow |
 | v_n | across | m/s | air speed of the middle of a link, across it |
 
-The drag of a link is -rho_air d l C_d |v_n| v_n / 2 and acts by halves at its ends (the component of the flow
-across a cylinder alone makes its drag: the cross-flow principle).
+The drag of a link is -rho_air d l C_d |v_n| v_n / 2 and half of it acts at each end (only the component of
+the flow across a cylinder causes drag: the cross-flow principle).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from sitl.plant.rotors import END, RotorRows, Wrench
 
 
 class Bodies(NamedTuple):
-    """Vehicle and load, each with place, velocity, attitude (body to world) and body rate."""
+    """Vehicle and load, each with position, velocity, attitude (body to world) and body rate."""
 
     x_quad: Vec3
     v_quad: Vec3
@@ -49,14 +49,14 @@ class Bodies(NamedTuple):
 
 
 class Drags(NamedTuple):
-    """What the air drags at the half links of vehicle and load, N."""
+    """Drag of the half links at vehicle and load, N."""
 
     on_quad: Vec3
     on_load: Vec3
 
 
 class FreeRates(NamedTuple):
-    """Accelerations of the bodies without the tensions, and the ground under them."""
+    """Accelerations of the bodies without the tensions, and the normal forces of the ground."""
 
     quad: Vec3  # m/s^2, with the half link that it carries
     spin: Vec3  # rad/s^2, of the vehicle
@@ -88,7 +88,7 @@ def _link_drag(rows: ChainRows, i: int, wind: Vec3, factor: float) -> Vec3:
 
 @kernel
 def free_points(rows: ChainRows, model: ChainModel, truth: Truth, wind: Vec3, length: float) -> Drags:
-    """Accelerations of the points between, into `rows.free`; the drag at its ends."""
+    """Write the accelerations of the points between to `rows.free`; return the drag at the ends."""
     n = rows.link.shape[0]
     mass = model.mass * length / n
     area = truth.air.cable_diameter * length / n
@@ -109,8 +109,8 @@ def _load_moment(
 ) -> Vec3:
     """Angular acceleration of the load by air and ground, rad/s^2, body frame.
 
-    Its drag acts `pressure` forward of the centre. The ground, where the load lies on it, brakes its
-    turning as friction brakes a slide, with the lever of its radius.
+    Its drag acts at the distance `pressure` forward of the centre. Where the load lies on the ground,
+    friction brakes its rotation as it brakes a slide, with the load's radius as lever arm.
     """
     omega = at.load.omega
     drag = drag_force(at.v_load, wind, truth.load_drag, truth.load_drag_quadratic)
@@ -138,8 +138,8 @@ def free_bodies(
 ) -> FreeRates:
     """Accelerations of vehicle and load, each with half a link of mass `half` (kg) and its drag.
 
-    Those of the bodies alone are the plant's own, of a slack cable: `sitl.plant.rates`. What each rotor gives
-    is in the row END.
+    The accelerations of the bodies alone are those of the plant with a slack cable (`sitl.plant.rates`). The
+    force of each rotor is in the row END.
     """
     motion = Motion(
         at.x_load,
@@ -155,7 +155,7 @@ def free_bodies(
     a_load = found.motion.v_load
     a_quad = found.accel_quad
     g = (0.0, 0.0, -truth.gravity)
-    # what a half link adds: its weight goes on falling, its mass shares the other forces
+    # a half link falls by its own weight; its mass reduces the effect of the other forces
     quad = axpy(truth.quad_mass / (truth.quad_mass + half), sub(a_quad, g), g)
     load = axpy(truth.load_mass / (truth.load_mass + half), sub(a_load, g), g)
     quad = axpy(1.0 / (truth.quad_mass + half), drags.on_quad, quad)

@@ -1,7 +1,7 @@
-"""What a cable of links is made of, and the flat memory in which it and the turning load lie.
+"""The records of a cable of links, and the flat memory that holds it and the rotating load.
 
 Point 0 is where the cable is attached to the vehicle, point n where it is attached to the load; the points
-between are masses of their own. World ENU, m and m/s; load body FLU with its origin at the centre of mass.
+between are separate masses. World ENU, m and m/s; load body FLU with its origin at the centre of mass.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from sitl.plant.records import ChainModel, PlantState, Truth
 
 Floats = NDArray[np.float64]
 
-# columns of `ChainRows.link`, one row a link: behind its direction its tension (N), whether it pulls and
-# the stretch (m) from which a stage goes on; of the equations for the tensions diagonal, element behind and
-# right-hand side; diagonal and right-hand side as they are solved
+# columns of `ChainRows.link`, one row per link: after its direction, its tension (N), whether it pulls, and
+# the stretch (m) at which a stage begins; diagonal, next element and right-hand side of the equations for the
+# tensions; diagonal and right-hand side after the elimination
 TENSION, PULLS, STRETCH_BASE, DIAGONAL, BEHIND, RIGHT, PIVOT, REDUCED = range(3, 11)
 _COLUMNS = 11
-_SHORTEST = 0.02  # m, of a cable that a winch reels in
+_SHORTEST = 0.02  # m, least length of a cable that a winch reels in
 
 
 class LoadBody(NamedTuple):
-    """How the load is turned."""
+    """Attitude and rotation of the load."""
 
     quat: Quat  # body to world
     omega: Vec3  # rad/s, body
@@ -39,12 +39,12 @@ class ChainRows(NamedTuple):
     """The memory of the cable and of the load's rotation, written in place."""
 
     body: Row  # LoadBody
-    held: Row  # (2,) 1.0 where the vehicle holds the cable; the length (m) of the cable itself
+    held: Row  # (2,) 1.0 while the vehicle holds the cable; the length (m) of the cable itself
     x: Floats  # (n + 1, 3) points
     v: Floats  # (n + 1, 3)
     x_begin: Floats  # at the beginning of a step
     v_begin: Floats
-    x_base: Floats  # from where an implicit stage goes on
+    x_base: Floats  # at which an implicit stage begins
     v_base: Floats
     free: Floats  # (n + 1, 3) m/s^2, without the tensions
     link: Floats  # (n, 11)
@@ -71,33 +71,33 @@ def copy(source: Floats, target: Floats) -> None:
 
 @kernel
 def hook_of(model: ChainModel) -> Vec3:
-    """Where the cable is attached to the load, load body."""
+    """Attachment point of the cable at the load, load body."""
     return (0.0, 0.0, model.hook if model.gyration > 0.0 else 0.0)
 
 
 @kernel
 def length_of(truth: Truth) -> float:
-    """The length of the cable itself, m: `cable_length` is that from the vehicle to the load's centre."""
+    """Length of the cable itself, m; `cable_length` is the length from the vehicle to the load's centre."""
     return max(truth.cable_length - hook_of(truth.chain)[2], _SHORTEST)
 
 
 @kernel
 def reach_of(truth: Truth) -> Truth:
-    """The truth with the distance of the centres at which no posture of the load stretches the cable."""
+    """The truth with `cable_length` short enough that no attitude of the load would stretch the cable."""
     shorter = 2.0 * hook_of(truth.chain)[2]
     return with_field(truth, "cable_length", truth.cable_length - shorter)
 
 
 @kernel
 def end_at_load(x_load: Vec3, v_load: Vec3, body: LoadBody, hook: Vec3) -> tuple[Vec3, Vec3]:
-    """Place and velocity of the cable's end at the load."""
+    """Position and velocity of the cable's end at the load."""
     R = rotation_from_quat(quat_normalise(body.quat))
     return add(x_load, apply(R, hook)), add(v_load, apply(R, cross(body.omega, hook)))
 
 
 @kernel
 def lay(rows: ChainRows, truth: Truth, state: PlantState) -> None:
-    """Lay the cable straight from the vehicle to the load, moving as its ends do."""
+    """Lay the cable straight from vehicle to load; its velocity is interpolated between its ends."""
     body = unpack(LoadBody, rows.body, 0)
     x_end, v_end = end_at_load(state.x_load, state.v_load, body, hook_of(truth.chain))
     R = rotation_from_quat(state.quat_wxyz)
@@ -113,7 +113,7 @@ def lay(rows: ChainRows, truth: Truth, state: PlantState) -> None:
 
 
 def new_chain(truth: Truth, state: PlantState) -> ChainRows | None:
-    """The cable laid straight, the load upright and at rest; None: there is no cable of links."""
+    """The cable laid straight, the load upright and at rest; None if there is no cable of links."""
     n = truth.chain.links
     if n == 0:
         return None

@@ -1,13 +1,13 @@
 """An implicit Euler step of vehicle, cable and load: the stage of which `sitl.plant.chain.step` takes two.
 
-With y the places and attitudes and v the velocities and body rates, and y_b, v_b from where the stage begins,
+With y the positions and attitudes, v the velocities and body rates, and y_b, v_b the base of the stage,
 
     y = y_b + tau y'(y, v)        v = v_b + tau a(y, v, T(y, v))
 
-is solved by iteration. An iterate says where everything is; there the forces and the directions of the links
-are found, then all tensions at once (`sitl.plant.chain.tension`), and with them the next velocities. So all
-that is stiff, stretch, is solved for in each iteration, and what is left to the iteration, the turning of
-the links, converges by about (tau omega)^2, omega the fastest frequency of the cable across.
+is solved by iteration. An iterate gives all positions. From these follow the forces and the directions of the
+links, then all tensions together (`sitl.plant.chain.tension`), and from them the next velocities. The stiff
+part, the stretch, is thus solved for in each iteration; only the rotation of the links is left to iterate. It
+converges by a factor of about (tau omega)^2, omega being the highest transverse frequency of the cable.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from sitl.plant.records import ChainModel, Truth
 from sitl.plant.rotors import RotorRows, Wrench
 
 _MOST_ITERATIONS = 25
-_CONVERGED = 1e-13  # m, that an iteration may still move a point
+_CONVERGED = 1e-13  # m, the most by which the last iteration moves a point
 
 
 class Length(NamedTuple):
-    """The cable's own length at one instant."""
+    """The length of the cable itself at one instant."""
 
     length: float  # m
     rate: float  # m/s
@@ -61,7 +61,7 @@ class Length(NamedTuple):
 
 @kernel
 def later(own: Length, accel: float, t: float) -> Length:
-    """The length t seconds on, reeled with `accel` in m/s^2."""
+    """The length t seconds later, reeled with the acceleration `accel`, m/s^2."""
     return Length(own.length + t * (own.rate + 0.5 * t * accel), own.rate + t * accel)
 
 
@@ -89,7 +89,7 @@ def _turned(base: Quat, omega: Vec3, tau: float) -> Quat:
 
 @kernel
 def placed(base: Bodies, speed: Bodies, tau: float) -> Bodies:
-    """Where the bodies are after the stage if they have the speeds of `speed` then."""
+    """The bodies after the stage if they have the velocities of `speed` then."""
     return Bodies(
         axpy(tau, speed.v_quad, base.x_quad),
         speed.v_quad,
@@ -103,7 +103,7 @@ def placed(base: Bodies, speed: Bodies, tau: float) -> Bodies:
 
 @kernel
 def _place_points(rows: ChainRows, at: Bodies, R: Mat3, hook: Vec3, truth: Truth, tau: float) -> None:
-    """The points after the stage if they have the speeds `rows.v` then; the ends are at the bodies."""
+    """Write the points after the stage if they have the speeds `rows.v` then; the ends are at the bodies."""
     n = rows.link.shape[0]
     for i in range(1, n):
         put(rows.x, i, axpy(tau, vector(rows.v, i), vector(rows.x_base, i)))
@@ -124,7 +124,7 @@ def _direction(rows: ChainRows, i: int) -> Vec3:
 def _equations(
     rows: ChainRows, model: ChainModel, lightness_quad: float, lightness_load: float, own: Length, tau: float
 ) -> None:
-    """The equations for the tensions: `rows.free` holds the velocities after the stage without any."""
+    """Write the equations for the tensions; `rows.free` has the velocities after a stage without them."""
     link, n = rows.link, rows.link.shape[0]
     rest, rest_rate = own.length / n, own.rate / n
     stiffness, damping = model.stiffness / rest, model.damping / rest
@@ -133,7 +133,7 @@ def _equations(
     before = lightness_quad
     for i in range(n):
         q = _direction(rows, i)
-        # the rate of the stretch without tensions, and what it would make of the stretch
+        # the rate of the stretch without tensions, and the pull that would follow from it
         rate = dot(q, sub(vector(rows.free, i + 1), vector(rows.free, i))) - rest_rate
         pull = stiffness * (link[i, STRETCH_BASE] + tau * rate) + damping * rate
         after = light if i + 1 < n else lightness_load
@@ -143,13 +143,13 @@ def _equations(
             link[i, BEHIND] = -after * dot(q, _direction(rows, i + 1))
         before = after
     if rows.held[0] == 0.0:
-        # the cable hangs at the load alone: its first link ties nothing
+        # the cable is attached to the load only: its first link connects nothing
         link[0, RIGHT], link[0, BEHIND] = -1.0, 0.0
 
 
 @kernel
 def _point(rows: ChainRows) -> None:
-    """The directions of the links; one of no length keeps its own."""
+    """Write the directions of the links; a link of zero length keeps its direction."""
     for i in range(rows.link.shape[0]):
         along = sub(vector(rows.x, i + 1), vector(rows.x, i))
         length = norm(along)
@@ -169,10 +169,10 @@ def implicit_euler(
     own: Length,
     tau: float,
 ) -> Solved:
-    """A stage of length tau (s) from `base` and the bases in `rows`; its end is returned and in `rows`.
+    """A stage of length tau (s) from `base` and the bases in `rows`; the result is returned and in `rows`.
 
     `guess` and `rows.v` hold the velocities with which the iteration begins. `own` is the cable's length at
-    the end.
+    the end of the stage.
     """
     model = truth.chain
     n, hook = rows.link.shape[0], hook_of(model)
@@ -207,7 +207,7 @@ def implicit_euler(
         light_quad, light_load = 1.0 / mass_quad + dot(arm, turn), 1.0 / mass_load + dot(lever, answer)
         _equations(rows, model, light_quad, light_load, own, tau)
         decided = find_tensions(rows.link)
-        # the velocities with them
+        # the velocities with the tensions
         first, last = rows.link[0, TENSION], rows.link[n - 1, TENSION]
         omega = axpy(tau * first, turn, omega)
         moved = norm(sub(omega, speed.omega))

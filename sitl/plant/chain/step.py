@@ -1,11 +1,11 @@
 """One fixed step of the plant with a cable of links: two implicit stages of second order.
 
 The method is the singly diagonally implicit Runge-Kutta method of two stages with gamma = 1 - 1/sqrt(2)
-(Alexander 1977), of order 2 and L-stable: a stretch that is too fast for the step dies away in place of
-ringing on. Each stage is an implicit Euler step of length gamma h (`sitl.plant.chain.stage`); the second
+(Alexander 1977), of order 2 and L-stable: an oscillation of the stretch that is too fast for the step is
+damped out. Each stage is an implicit Euler step of length gamma h (`sitl.plant.chain.stage`); the second
 begins from y + (1 - gamma) h y'_1 and ends at the end of the step.
 
-A stage whose iteration does not end halves the step.
+If the iteration of a stage does not converge, the step is halved.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from sitl.plant.step import held, resting, sound, state_of
 
 GAMMA = 1.0 - 1.0 / sqrt(2.0)
 LONGEST_STEP = 5e-4  # s, benchmarks/cable_convergence.py: docs/realism-cable.md has the table
-_SHORTEST_STEP = 1e-6  # s, whose last iterate is taken
-_CONTRACTION = 0.25  # of the iteration in a stage: the step is chosen for it
-# of the load's weight: taut when every link pulls by more, slack when one pulls by less than half of it
+_SHORTEST_STEP = 1e-6  # s, at this length the last iterate is accepted
+_CONTRACTION = 0.25  # of each iteration in a stage: the step is chosen to achieve it
+# share of the load's weight: taut when every link pulls by more, slack when one pulls by less than half of it
 TAUT_SHARE = 0.02
 
 
@@ -65,7 +65,7 @@ def _normalised(at: Bodies) -> Bodies:
 
 @kernel
 def _hold(rows: ChainRows, state: PlantState, truth: Truth) -> None:
-    """Note whether the vehicle holds the cable, and its length; one taken hold of anew is laid straight."""
+    """Record whether the vehicle holds the cable, and its length; a newly held cable is laid straight."""
     if truth.cable_length == inf:
         rows.held[0] = 0.0
         return
@@ -78,8 +78,8 @@ def _hold(rows: ChainRows, state: PlantState, truth: Truth) -> None:
 def step_length(rows: ChainRows, model: ChainModel, length: float, remaining: float, longest: float) -> float:
     """Length of the next step in s; divides `remaining` evenly.
 
-    Short enough for the iteration of the stages: it converges by (gamma h)^2 4 T / (l m) with T the greatest
-    tension and m the mass of a point.
+    Short enough for the iteration of the stages, which converges by the factor (gamma h)^2 4 T / (l m), with
+    T the greatest tension, l the length of a link and m the mass of a point.
     """
     n = rows.link.shape[0]
     if n > 1:
@@ -138,7 +138,7 @@ def _step(
     own: Length,
     h: float,
 ) -> Solved:
-    """A step of length h (s) from `begin` and the points in `rows`, which are at its end then. `own` is the
+    """A step of length h (s) from `begin` and the points in `rows`, which are moved to its end. `own` is the
     cable's length at the beginning."""
     accel = truth.reel_accel
     n = rows.link.shape[0]
@@ -170,7 +170,7 @@ def _step(
 
 @kernel
 def _least_tension(rows: ChainRows) -> float:
-    """Of all links, N."""
+    """The least tension of all links, N."""
     least = inf
     for i in range(rows.link.shape[0]):
         least = min(least, rows.link[i, TENSION])
@@ -179,7 +179,7 @@ def _least_tension(rows: ChainRows) -> float:
 
 @kernel
 def _closing(begin: Bodies, own: Length) -> float:
-    """Speed in m/s at which vehicle and load part faster than the cable is let out."""
+    """Speed in m/s at which vehicle and load separate, minus the rate at which the cable is let out."""
     line = sub(begin.x_load, begin.x_quad)
     return dot(line, sub(begin.v_load, begin.v_quad)) / norm(line) - own.rate
 
@@ -190,8 +190,8 @@ def advance_chain(
 ) -> PlantState:
     """The state h seconds later, and the cable in `rows`; see `sitl.plant.step.advance`.
 
-    Direction and rate are those of the line from vehicle to load, the tension that at the vehicle.
-    `snap_speed` is the speed at which the ends parted as the cable came taut.
+    Direction and rate of the cable are those of the line from the attachment to the load's centre; the
+    tension is that at the vehicle. `snap_speed` is the closing speed with which the cable came taut.
     """
     if state.diverged > 0.0 or not h > 0.0:
         return state

@@ -2,26 +2,26 @@
 
 | symbol | code | unit | |
 |---|---|---|---|
-| q_i | link[DIRECTION] | | unit vector of link i, from point i - 1 to point i |
-| e_i | stretch | m | length of link i beyond its own |
+| q_i | vector(link, i) | | unit vector of link i, from point i - 1 to point i |
+| e_i | stretch | m | length of link i beyond its rest length |
 | u_i | rate | m/s | rate of its length, q_i . (v_i - v_{i-1}) |
 | k, c | stiffness, damping | N/m, N s/m | of one link: EA / l and D / l |
-| w_i | lightness | 1/kg | acceleration of point i along a link by a newton along it |
+| w_i | lightness | 1/kg | acceleration of point i along a link per newton along it |
 | tau | tau | s | length of the implicit step |
 
-A link pulls with T_i = max(0, k e_i + c (u_i - l')), l' the rate of its own length. Its rate after the step
+A link pulls with T_i = max(0, k e_i + c (u_i - l')), l' the rate of its rest length. Its rate after the step
 is u_i = u_i^0 - tau sum_j A_ij T_j, where u_i^0 is the rate without tensions and
 
     A_ii = w_{i-1} + w_i        A_{i,i+1} = A_{i+1,i} = -w_i q_i . q_{i+1}
 
-and to first order in what the iterate still moves, e_i = e_i(x^k) + tau (u_i - u_i^k). With
+and, to first order in the remaining change of the iterate, e_i = e_i(x^k) + tau (u_i - u_i^k). With
 g = tau (k tau + c) the links that pull obey
 
     (A + I / g) T = (k (e^k + tau (u^0 - u^k)) + c (u^0 - l')) / g
 
-A is positive semidefinite, so this has a solution for every stiffness; with k to infinity it is that of links
-of fixed length. Which links pull follows by trial: one that would push is left out, one that is left out and
-would pull is taken in.
+A is positive semidefinite, so this has a solution for every stiffness; for k to infinity it is that of links
+of fixed length. Which links pull is found by trial: a link that would push is removed, and a removed link
+that would pull is added again.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from __future__ import annotations
 from autopilot.geometry.kernel import kernel
 from sitl.plant.chain.records import BEHIND, DIAGONAL, PIVOT, PULLS, REDUCED, RIGHT, TENSION, Floats
 
-_MAX_TRIALS = 20  # of which links pull
+_MAX_TRIALS = 20  # of sets of links that pull
 
 
 @kernel
 def _solve(link: Floats) -> None:
-    """The tensions if those links pull that are marked so; the others have none. Thomas' algorithm."""
+    """Write the tensions if only the marked links pull; the others have none. Thomas' algorithm."""
     n = link.shape[0]
     for i in range(n):
         pivot, right = 1.0, 0.0
@@ -57,7 +57,7 @@ def _solve(link: Floats) -> None:
 
 @kernel
 def _mark(link: Floats) -> int:
-    """Mark anew which links pull; how many marks changed."""
+    """Mark again which links pull; return how many marks changed."""
     n, changed = link.shape[0], 0
     for i in range(n):
         pulls = link[i, TENSION]
@@ -76,7 +76,7 @@ def _mark(link: Floats) -> int:
 
 @kernel
 def find_tensions(link: Floats) -> bool:
-    """Solve for the tensions of `link`; False if it stays open which links pull."""
+    """Solve for the tensions of `link`; False if the links that pull are not found."""
     for _ in range(_MAX_TRIALS):
         _solve(link)
         if _mark(link) == 0:

@@ -1,7 +1,7 @@
-"""DroneKit's own first examples: `python dronekit_flight.py ADDRESS IDENTITY`; what it saw, as JSON.
+"""DroneKit's own first examples: `python dronekit_flight.py ADDRESS IDENTITY`; its observations as JSON.
 
 With IDENTITY `px4` two things are left out: the download of an empty mission, for which DroneKit waits for
-ever, and `vehicle.mode =`, for which it takes PX4's modes for numbers.
+ever, and `vehicle.mode =`, in which it takes PX4's modes for numbers.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ collections.MutableMapping = collections.abc.MutableMapping  # type: ignore[attr
 
 from dronekit import Command, LocationGlobalRelative, VehicleMode, connect  # noqa: E402
 
-LONG_S = 120.0  # of a busy machine
+LONG_S = 120.0  # on a busy machine
 DEGREE_M = 111_319.5
 NAV_WAYPOINT, RELATIVE = 16, 3
 
@@ -36,7 +36,7 @@ def until(what: str, condition: Callable[[], Any]) -> None:
 
 def main(address: str, identity: str) -> None:
     ardupilot = identity == "ardupilot"
-    logging.basicConfig(level=logging.INFO)  # its own words, and those of the vehicle
+    logging.basicConfig(level=logging.INFO)  # its own log, and the texts of the vehicle
     vehicle = connect(address, wait_ready=True, heartbeat_timeout=15)
     until("is_armable", lambda: vehicle.is_armable)
     home = vehicle.location.global_frame

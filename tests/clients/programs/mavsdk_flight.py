@@ -1,6 +1,6 @@
-"""What an application does with MAVSDK: `python mavsdk_flight.py ADDRESS STEP...`; what it saw, as JSON.
+"""What an application does with MAVSDK: `python mavsdk_flight.py ADDRESS STEP...`; its observations as JSON.
 
-Steps are done in their order. MAVSDK's own log goes where it goes by default, to standard output.
+Steps are done in the given order. MAVSDK's own log goes to standard output, as by default.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 from mavsdk.plugins.winch import Winch, WinchError
 
-LONG_S = 120.0  # of a busy machine
+LONG_S = 120.0  # on a busy machine
 LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
 RETURN_M = 3.0
 DEGREE_M = 111_319.5  # of latitude
@@ -59,7 +59,7 @@ class Pilot:
         self._turn = threading.Event()
 
     def until(self, what: str, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
-        """Wait for what telemetry must show."""
+        """Wait until telemetry shows the condition."""
         for _ in range(round(timeout_s / 0.05)):
             if condition():
                 return
@@ -81,7 +81,7 @@ class Pilot:
         return round(home.latitude_deg * 1e7), round(home.longitude_deg * 1e7)
 
     def again(self, act: Callable[[], Any]) -> Any:
-        """What was lost on the way is done again, as a pilot does; how often is told."""
+        """Act, and act again if a message was lost, as a pilot does; `told` counts the repetitions."""
         for _ in range(5):
             try:
                 return act()
@@ -95,7 +95,7 @@ class Pilot:
     # ---- steps
 
     def ready(self) -> None:
-        """What every example of MAVSDK waits for."""
+        """Wait for what every example of MAVSDK waits for."""
         self.until("health_all_ok", self.telemetry.health_all_ok)
         health = self.telemetry.health()
         assert health.is_global_position_ok
@@ -141,12 +141,12 @@ class Pilot:
             for name in streams
         }
         self.until("all streams", lambda: len(seen) == len(streams))
-        for name, handle in heard.items():  # so many callbacks keep a busy machine's Python from the rest
+        for name, handle in heard.items():  # so many callbacks leave Python no time for the rest
             getattr(self.telemetry, f"unsubscribe_{name}")(handle)
         battery = seen["battery"]
         self.told["battery"] = [battery.voltage_v, battery.remaining_percent]
         self.told["satellites"] = seen["gps_info"].num_satellites
-        # it stands: weight, no rotation, rotors off
+        # the vehicle stands: weight, no rotation, rotors off
         for name in ("imu", "scaled_imu"):
             assert abs(seen[name].acceleration_frd.down_m_s2 + 9.81) < 0.5
         assert seen["actuator_output_status"].active == 4
@@ -221,7 +221,7 @@ class Pilot:
         self._go_to(1.0, 2.5)
 
     def go_away(self) -> None:
-        """As far as a return climbs from."""
+        """Go far enough for a return to climb first."""
         self._go_to(1.6, 2.5)
 
     def _go_to(self, north: float, height: float) -> None:
@@ -255,9 +255,9 @@ class Pilot:
             assert ours.relative_altitude_m == theirs.relative_altitude_m
 
     def fly_mission(self) -> None:
-        """Start, pause on the way, go on, to the end."""
+        """Start, pause on the way, continue to the end."""
         done: list[int] = []
-        left: list[int] = []  # of the same: MAVSDK tells it from another thread than it is asked in
+        left: list[int] = []  # in the same reports: MAVSDK calls back in another thread than that of queries
 
         def told(progress: Any, *_: object) -> None:
             done.append(progress.current)
@@ -277,7 +277,7 @@ class Pilot:
         self.told["progress"] = sorted(set(done))
 
     def upload_and_fly(self) -> None:
-        """A mission that is started in the air as soon as it is there, before its paths can be prepared."""
+        """A mission that is started in the air right after its upload, before its paths can be prepared."""
         self.upload()
         self.mission.start_mission()
         self.mode("MISSION")
@@ -285,7 +285,7 @@ class Pilot:
         self.mode("HOLD")
 
     def dated(self) -> None:
-        """In the air: since when."""
+        """In the air: the times since arming and take-off."""
         heard: list[Any] = []
         info = Info(self.system)
         info.subscribe_flight_information(lambda flight, *_: heard.append(flight))
@@ -318,7 +318,7 @@ class Pilot:
         self.until(f"heading {degrees:g}", there)
 
     def yaw(self) -> None:
-        """A place with a yaw, then every setpoint of MAVSDK's that turns."""
+        """A place with a yaw, then every MAVSDK setpoint that turns the nose."""
         home, offboard = self.telemetry.home(), Offboard(self.system)
         self.heading(90.0)
         height = home.absolute_altitude_m + 2.5
@@ -367,7 +367,7 @@ class Pilot:
         self.mode("HOLD")
 
     def winch(self) -> None:
-        """The load lowered and raised by the plug-in that speaks with the component of the winch."""
+        """Lower and raise the load by the plug-in that communicates with the winch component."""
         winch, lengths = Winch(self.system), []
         winch.subscribe_status(lambda status, *_: lengths.append(status.line_length_m))
         self.until("a winch", lambda: bool(lengths))
@@ -400,18 +400,18 @@ class Pilot:
         self.landed(LandedState.ON_GROUND)
 
     def disarm(self) -> None:
-        """On the ground, before anything is asked."""
+        """On the ground, before any other request."""
         self.again(self.action.disarm)
         self.until("disarmed", lambda: not self.telemetry.armed())
 
     def gripper(self) -> None:
-        """The load let go of and taken again, on the ground."""
+        """Release the load and take it again, on the ground."""
         gripper = Gripper(self.system)
         self.again(lambda: gripper.release(1))
         self.again(lambda: gripper.grab(1))
 
     def log(self) -> None:
-        """The log of the flight that is over, by the log protocol; its folder by FTP."""
+        """The log of the finished flight, by the log protocol; its folder by FTP."""
         names = [entry.name for entry in Ftp(self.system).list_directory("/fs/microsd/log").entries]
         logs = LogFiles(self.system)
         sizes = [-1, 0]
@@ -444,7 +444,7 @@ def main(address: str, steps: list[str]) -> None:
                 sys.exit(f"{step}: {type(error).__name__} {error}\n{pilot.texts}")
         told = {**pilot.told, "texts": pilot.texts, "modes": pilot.modes}
         print(json.dumps(told), flush=True)
-        # 4.1.0 at times dies of a segmentation fault while it is taken apart, whatever vehicle there was
+        # MAVSDK 4.1.0 at times dies of a segmentation fault while it is destroyed, whatever the vehicle was
         os._exit(0)
 
 

@@ -1,4 +1,4 @@
-"""What a script does with `mavutil`: `python pymavlink_flight.py ADDRESS`; what it saw, as JSON."""
+"""What a script does with `mavutil`: `python pymavlink_flight.py ADDRESS`; its observations as JSON."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
-LONG_S = 120.0  # of a busy machine
-AGAIN_S = 3.0  # after which a question is asked again: who has no time to read loses answers
+LONG_S = 120.0  # on a busy machine
+AGAIN_S = 3.0  # after which a request is repeated: a script without time to read loses answers
 RELATIVE_INT = mavutil.mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 POSITION_ONLY = 0b110111111000
 MISSION, FENCE, RALLY = 0, 1, 2
@@ -34,7 +34,7 @@ class Script:
         condition: Callable[[Any], Any] = lambda message: True,
         ask: Callable[[], None] = lambda: None,
     ) -> Any:
-        """The next message of a kind that is such; `ask` asks for it, as often as that takes."""
+        """The next message of a kind that meets the condition; `ask` requests it, as often as needed."""
         asked = -math.inf
         until = time.monotonic() + LONG_S
         while time.monotonic() < until:
@@ -47,7 +47,7 @@ class Script:
         sys.exit(f"in vain waited for {kind}")
 
     def command(self, number: int, *params: float) -> int:
-        """COMMAND_LONG; its result."""
+        """Send a COMMAND_LONG; return its result."""
 
         def ask() -> None:
             self.link.mav.command_long_send(*self.to, number, 0, *(*params, *[0.0] * 7)[:7])
@@ -55,13 +55,13 @@ class Script:
         return int(self.await_("COMMAND_ACK", lambda ack: ack.command == number, ask).result)
 
     def mode(self, name: str) -> None:
-        """By its name, as `mavutil` has it."""
+        """Set a mode by the name that `mavutil` gives it."""
         ask = partial(self.link.set_mode, name)
         assert self.await_("COMMAND_ACK", lambda ack: ack.command == 176, ask).result == 0
         self.await_("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and self.link.flightmode == name)
 
     def parameter(self, name: str, value: float) -> float:
-        """Set, then read by its name."""
+        """Set a parameter, then read it by its name."""
         ask = partial(self.link.param_set_send, name, value)
         self.await_(
             "PARAM_VALUE", lambda answer: answer.param_id == name and answer.param_value == value, ask
@@ -70,7 +70,7 @@ class Script:
         return float(self.await_("PARAM_VALUE", lambda answer: answer.param_id == name, ask).param_value)
 
     def send_items(self, kind: int, items: list[Any]) -> int:
-        """Upload; the result."""
+        """Upload items; return the result."""
         self.link.mav.mission_count_send(*self.to, len(items), kind)
         while True:
             asked = self.await_(
@@ -82,7 +82,7 @@ class Script:
             self.link.mav.send(items[asked.seq])
 
     def fetch_items(self, kind: int) -> list[Any]:
-        """Download."""
+        """Download items."""
         ask = partial(self.link.mav.mission_request_list_send, *self.to, kind)
         count = self.await_("MISSION_COUNT", lambda answer: answer.mission_type == kind, ask).count
         items = []

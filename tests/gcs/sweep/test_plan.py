@@ -165,6 +165,10 @@ def test_sweeps_without_a_name_do_not_get_into_each_others_way(
     changed = origin(plan, code="changed")
     assert default_directory(plan, changed, fresh=False) == Path("sweeps") / f"{stem}-3"
     assert default_directory(plan, changed, fresh=True) == Path("sweeps") / stem
+    third, fourth = (Path("sweeps") / f"{stem}-{number}" for number in (3, 4))
+    third.write_text("a file", encoding="utf-8")
+    fourth.mkdir()
+    assert default_directory(plan, changed, fresh=False) == fourth
 
 
 def test_each_mistake_in_a_file_is_a_line(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ LONG_S = 60.0
 
 
 def finished(begin: Callable[[Callable[..., None]], None], next_one: Any) -> str:
-    """Wait for the end of an operation that tells its progress."""
+    """Wait for the end of an operation that reports its progress; return its result."""
     over, results = threading.Event(), []
 
     def hear(result: Any, *_: Any) -> None:

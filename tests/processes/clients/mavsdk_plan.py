@@ -1,4 +1,4 @@
-"""A .plan as MAVSDK reads it: `python mavsdk_plan.py PORT PLAN`; what it and the vehicle have, as JSON."""
+"""A .plan as MAVSDK reads it: `python mavsdk_plan.py PORT PLAN`; its items and the vehicle's as JSON."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ def main(port: str, directory: Path) -> None:
     link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=255, source_component=230)
     link.wait_heartbeat(timeout=LONG_S)
     ftp = MAVFTP(link, link.target_system, link.target_component)
-    # commands without a transfer end by a silence, which need not be long here
+    # commands without a transfer end after a silence, which need not be long here
     ftp.ftp_settings.read_retry_time, ftp.ftp_settings.idle_detection_time = 0.4, 0.5
 
     def done(*words: str) -> int:

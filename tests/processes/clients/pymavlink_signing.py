@@ -30,7 +30,7 @@ def main(port: str, key: str) -> None:
     told["right"] = acknowledged(LONG_S)
     told["signed"] = link.recv_match(type="HEARTBEAT", blocking=True, timeout=LONG_S).get_signed()
     link.mav.setup_signing_send(1, 1, bytes(32), 0)
-    link.disable_signing()  # or the vehicle's word on it is not heard
+    link.disable_signing()  # otherwise the vehicle's text about it is not received
     off = None
     while off is None or "off" not in off.text:
         off = link.recv_match(type="STATUSTEXT", blocking=True, timeout=LONG_S)

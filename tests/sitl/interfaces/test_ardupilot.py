@@ -16,7 +16,8 @@ from sitl.interfaces.ardupilot import RATE_HZ, Exchange, line, read_servo_packet
 FIRST = bytes.fromhex("1a48b00400000000" + "e803" * 16)  # all its outputs off
 LATER = bytes.fromhex("1a48b0049f0f0000" + "e803" * 4 + "0000" * 12)  # four motors, nothing else
 WIDE = bytes.fromhex("8173b0049f0f0000" + "e803" * 4 + "0000" * 28)  # the same with SERVO_32_ENABLE
-# what it says and how its reader looks for it: the key after the section, two characters on, then numbers
+# how many numbers each key has; the firmware's reader looks for the key after the section, skips two
+# characters and reads the numbers
 REQUIRED = {"timestamp": 1, "gyro": 3, "accel_body": 3, "position": 3, "quaternion": 4, "velocity": 3}
 
 
@@ -85,7 +86,7 @@ def test_the_answer_is_in_the_firmwares_axes() -> None:
 
 
 def test_the_firmwares_clock_loses_no_microsecond() -> None:
-    """It cuts each difference of two times to whole microseconds: (uint64)(dt * 1e6)."""
+    """The firmware cuts each difference of two times to whole microseconds: (uint64)(dt * 1e6)."""
     zero = (0.0, 0.0, 0.0)
     at = [
         as_the_firmware_reads(line(n * 1250, zero, zero, zero, zero, (1.0, 0.0, 0.0, 0.0)))["timestamp"][0]

@@ -1,4 +1,4 @@
-"""Betaflight's interface, against what the SITL target of Betaflight 4.6 answered to states of ours."""
+"""Betaflight's interface, against the answers of the SITL target of Betaflight 4.6 to states that we sent."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tests.doubles import betaflight
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "docs" / "examples" / "betaflight_hover.py"
 DISARMED = bytes(16)
-# Armed, throttle in the middle, 0.15 s after a state began that stands still otherwise: what it answered.
-# (rates FLU in rad/s, axis and degrees of a lean about an axis FLU), ANGLE mode, ACRO
+# Its answers when armed with the throttle in the middle, 0.15 s after the beginning of a state that is at
+# rest except for (rates FLU in rad/s, axis and degrees of a lean about an axis FLU): in ANGLE mode, in ACRO
 LEVEL = bytes.fromhex("8941003f8941003f8941003f8941003f")
 ANSWERS = {
     "level": ((0.0, 0.0, 0.0), (0, 0.0), LEVEL, LEVEL),
@@ -50,7 +50,7 @@ ANSWERS = {
         bytes.fromhex("cdcc0c3f9eefe73ecdcc0c3f9eefe73e"),
     ),
 }
-# what it was sent when it was rolled right, the nose to the north
+# the state that it was sent when it was rolled right, with the nose to the north
 ROLLED = bytes.fromhex(
     "00000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000005a3923a"
     "019d23c0a21518b4d3e0ef3f0281c2b8d64fb63f000000000000603c000000000000a03c00000000000000000000000000000000"
@@ -79,7 +79,7 @@ NUMBERS = (
 
 
 def leaning(axis: int, deg: float) -> Quat:
-    """The nose to the north, and then turned about an axis FLU."""
+    """The attitude with the nose to the north, then turned about an axis FLU."""
     half = radians(0.5 * deg)
     lean = [cos(half), 0.0, 0.0, 0.0]
     lean[1 + axis] = sin(half)
@@ -143,9 +143,9 @@ def test_a_state_is_in_the_firmwares_axes() -> None:
         )
     )
     assert [said[axis] for axis in ("p", "q", "r")] == [0.1, -0.2, -0.3]
-    # it takes the negative for its accelerometer, which is FLU
+    # the firmware uses the negative for its accelerometer, which is FLU
     assert [said[axis] for axis in ("ax", "ay", "az")] == [-1.0, -2.0, -9.8]
-    # nose down by 20 degrees, heading north: about the right, backwards
+    # nose down by 20 degrees, heading north: a negative turn about the axis to the right
     assert [said[i] for i in "wxyz"] == pytest.approx(
         [cos(radians(10)), 0.0, -sin(radians(10)), 0.0], abs=1e-12
     )
@@ -154,9 +154,9 @@ def test_a_state_is_in_the_firmwares_axes() -> None:
     assert said["lon"] == pytest.approx(home.longitude_deg, abs=1e-7)
     assert said["lat"] == pytest.approx(home.latitude_deg + 0.001, abs=1e-5)
     assert said["alt"] == pytest.approx(home.altitude_m + 30.0, abs=1e-3)
-    # 12 Pa a metre at the ground
+    # 12 Pa per metre at the ground
     assert said["pa"] == pytest.approx(101_325.0 - 12.0 * (home.altitude_m + 30.0), rel=0.01)
-    # a time that passes makes its clock follow the unevenness of the packets
+    # with a time that advances, its clock would follow the unevenness of the packets
     assert said["time"] == 0.0
 
 
@@ -216,7 +216,7 @@ def test_the_example_hovers_with_the_load_rolls_and_lands(example: ModuleType) -
     armed, hovered, rolled, *rest = pilot.told
     assert armed.startswith("armed after") and rest == ["set the load down", "landed and disarmed"]
     seconds, within_mm, swing_deg, *pull_n = (float(number) for number in re.findall(r"[0-9.]+", hovered))
-    # the truth tells places to 11 mm
+    # the truth gives positions to 11 mm
     assert seconds == 3.0 and within_mm < 80.0 and swing_deg < 1.0
     assert pull_n == pytest.approx([0.3 * 9.81] * 2, abs=0.1)
     asked, rate, least, greatest = (float(number) for number in re.findall(r"[0-9]+", rolled))

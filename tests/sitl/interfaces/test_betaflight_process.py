@@ -1,4 +1,5 @@
-"""`sitl --for betaflight` as a process: goes on by the wall clock, is met, left and met again, refused."""
+"""`sitl --for betaflight` as a process: it runs on the wall clock, firmwares come, go and come back, wrong
+options are refused."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.processes
 
 
 def free_ports() -> tuple[int, int]:
-    """One for the motors, and the next, where the firmware hears."""
+    """A free port for the motors, and the next one, on which the firmware receives."""
     while True:
         with (
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
@@ -43,7 +44,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 
 
 class Firmware:
-    """Sockets as Betaflight's: it hears on a port of its own, and speaks from any."""
+    """Sockets like Betaflight's: it receives on its own port, and sends from any."""
 
     def __init__(self, ports: tuple[int, int]) -> None:
         self._motors = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -53,7 +54,7 @@ class Firmware:
         self._states.settimeout(PATIENCE_S)
 
     def heard(self) -> tuple[float, ...]:
-        """A state that was not yet under way when this was called."""
+        """A state that was sent after this call."""
         self._states.setblocking(False)
         try:
             while True:
@@ -66,7 +67,7 @@ class Firmware:
         self._motors.send(struct.pack("<4f", *(throttle,) * 4))
 
     def climbs(self, metres: float, since: float) -> None:
-        """Throttle up until it is so much higher than it was."""
+        """Send a high throttle until the vehicle is this many metres above `since`."""
         while self.heard()[16] < since + metres:
             self.says(0.9)
 
@@ -91,7 +92,7 @@ def running() -> Iterator[tuple[subprocess.Popen[str], tuple[int, int]]]:
 
 
 def until(process: subprocess.Popen[str], told: str) -> str:
-    """The line that has this in it."""
+    """Wait for a line that contains this text, and return it."""
     assert process.stdout
     while told not in (line := process.stdout.readline()):
         assert line, f"it ended, and did not say {told!r}"
@@ -101,7 +102,7 @@ def until(process: subprocess.Popen[str], told: str) -> str:
 def test_firmwares_are_met_left_and_met_again(running: tuple[subprocess.Popen[str], tuple[int, int]]) -> None:
     process, ports = running
     one = Firmware(ports)
-    on_ground = one.heard()[16]  # it is told before it has said anything
+    on_ground = one.heard()[16]  # it gets states before it has sent anything
     one.send(b"")
     one.send(b"rubbish of sixteen")
     one.send(bytes(17))
@@ -111,13 +112,13 @@ def test_firmwares_are_met_left_and_met_again(running: tuple[subprocess.Popen[st
     other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     other.sendto(bytes(16), ("127.0.0.1", ports[0]))
     one.climbs(0.8, on_ground)
-    # it falls silent, and the world goes on: it falls
+    # the firmware falls silent, and the world continues: the vehicle falls
     until(process, "no answer from the autopilot at")
     assert one.heard()[16] < on_ground + 0.1
     one.says(0.0)
     until(process, "answers again")
     one.end()
-    # it is restarted: the same hearing port, another that it speaks from
+    # the firmware is restarted: it receives on the same port, and sends from another
     two = Firmware(ports)
     before = until_taken(two)
     assert "restarted at t = " in until(process, "and the world restarts")
@@ -132,7 +133,7 @@ def test_firmwares_are_met_left_and_met_again(running: tuple[subprocess.Popen[st
 
 
 def until_taken(firmware: Firmware) -> float:
-    """Says that its motors stand for longer than it takes until another firmware is served; the height."""
+    """Send motors at rest for longer than it takes until another firmware is served; return the height."""
     for _ in range(1000):
         firmware.says(0.0)
         height = firmware.heard()[16]

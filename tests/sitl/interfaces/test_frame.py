@@ -1,4 +1,4 @@
-"""Motors of the firmwares on our vehicles: places and spins, mounting, throttle."""
+"""Motors of the firmwares on our vehicles: positions and spins, mounting, throttle."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from sitl.interfaces.frame import Frame, frame_of
 
-# of motors 1 to 4 as ArduPilot and PX4 document their quadrotor X: forward, left, counterclockwise
+# motors 1 to 4 as ArduPilot and PX4 document their quadrotor X: forward, left, counterclockwise
 DOCUMENTED = ((1, -1, True), (-1, 1, True), (1, 1, False), (-1, -1, False))
-# rotations of the axes by floats
+# rounding of the rotations of axes
 EPS = 1e-12
 
 

@@ -1,6 +1,6 @@
-"""Firmwares and simulators that are killed, stopped and restarted: each is told of, and nothing hangs.
+"""Firmwares and simulators that are killed, stopped and restarted: each event is reported, and nothing hangs.
 
-The firmwares are sockets that speak as they do.
+The firmwares are sockets that send what the real ones send.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def free_port() -> int:
 
 
 class Simulator:
-    """`sitl` for a firmware, and what it has said."""
+    """`sitl` for a firmware, and its output."""
 
     def __init__(self, kind: str, port: int) -> None:
         where = ["--listen", f"127.0.0.1:{port}", "--truth", f"127.0.0.1:{free_port()}"]
@@ -45,7 +45,7 @@ class Simulator:
         self.said = ""
 
     def says(self, pattern: str) -> None:
-        """Wait until it says so, after all that was waited for before."""
+        """Wait until its output matches, after all that was waited for before."""
         assert self.process.stdout
         until_s = time.monotonic() + PATIENCE_S
         while not (found := re.search(pattern, self.said)):
@@ -80,7 +80,7 @@ def start() -> Iterator[Start]:
 
 
 class ArduPilot:
-    """Asks as ArduPilot does, from a port of its own."""
+    """Sends requests as ArduPilot does, from its own port."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -91,7 +91,7 @@ class ArduPilot:
         self.socket.send(struct.pack("<HHI16H", 18458, 800, number, *(1000,) * 16))
 
     def frame(self, number: int) -> bytes:
-        """The answer to a frame, which is asked for again while there is none, as the firmware does."""
+        """The answer to a frame; the request is repeated until there is one, as the firmware does."""
         while True:
             try:
                 self.ask(number)
@@ -103,7 +103,8 @@ class ArduPilot:
 
 
 def connected(port: int, holds: int | None = None) -> socket.socket:
-    """To the simulator, tried until it listens, as PX4 does; `holds`: bytes that it takes unread."""
+    """Connect to the simulator, trying until it listens, as PX4 does; `holds`: bytes of its receive
+    buffer."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
         one = socket.socket()
@@ -128,7 +129,7 @@ class Px4:
         self.stream, self.writer = Stream(), FrameWriter(1, 1)
 
     def tick(self) -> int:
-        """Take the sensors of a tick and answer them; its time, us."""
+        """Receive the sensors of a tick and answer them; return its time, us."""
         while piece := self.socket.recv(65536):
             for frame in self.stream.feed(piece):
                 message = decode(frame)[0][0].message
@@ -140,7 +141,7 @@ class Px4:
         raise EOFError
 
     def gone(self) -> bool:
-        """Whether it is closed by the simulator; waits for it."""
+        """Wait until the simulator closes the connection."""
         try:
             while self.socket.recv(65536):
                 pass
@@ -149,7 +150,7 @@ class Px4:
         return True
 
     def kill(self) -> None:
-        """As the system closes the connections of a process that is killed."""
+        """Close the connection as the system does for a process that is killed."""
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         self.socket.close()
 
@@ -185,7 +186,7 @@ def test_sitl_that_stood_still_answers_each_frame_once(start: Start) -> None:
         one.ask(1)
     sitl.process.send_signal(signal.SIGCONT)
     answer = one.socket.recv(65535)
-    # one more would leave it a frame behind for ever
+    # one answer more would leave the firmware a frame behind for ever
     assert answer != before and one.frame(2) not in (before, answer)
 
 

@@ -1,4 +1,5 @@
-"""`sitl --for ardupilot` as a process: served, turned away, begun anew, refused, stopped."""
+"""`sitl --for ardupilot` as a process: firmwares are served, turned away and restarted; wrong options are
+refused."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 
 
 class Firmware:
-    """A socket that asks as ArduPilot does."""
+    """A socket that sends requests as ArduPilot does."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -1,4 +1,4 @@
-"""PX4's interface: a stream that is cut anywhere, what a tick holds, answers in and out of step."""
+"""PX4's interface: a stream that is cut anywhere, the contents of a tick, answers in and out of step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
 from sitl.interfaces.px4 import RATE_HZ, Exchange, Stream
 
-# before it is armed: its heartbeat, and an answer with all controls 0
+# its heartbeat before it is armed; `answer` then has all controls 0
 HEARTBEAT = FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(0, 12, 0, 0, 0, 3))
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
@@ -34,7 +34,8 @@ def sent(exchange: Exchange) -> list:
 
 @given(st.lists(st.integers(0, 200), max_size=20), st.binary(max_size=30))
 def test_frames_come_out_of_a_stream_however_it_is_cut(cuts: list[int], rubbish: bytes) -> None:
-    # a start byte in the rubbish would make a frame of what follows: its bytes belong to it until they come
+    # a start byte in the rubbish would begin a frame, and the next bytes would belong to it until it is
+    # complete
     whole = rubbish.replace(b"\xfd", b"") + HEARTBEAT + answer(4000) + answer(8000)
     stream, found, before = Stream(), [], 0
     for cut in (*sorted(min(cut, len(whole)) for cut in cuts), len(whole)):

@@ -1,4 +1,4 @@
-"""What the firmwares said while they lifted the load, kept as they said it, on a world of ours.
+"""Recorded answers of the firmwares while they lifted the load, replayed on our world.
 
 Each recording holds the answers of some two seconds, from the ground until the load hangs.
 """
@@ -15,7 +15,7 @@ from sitl.hil import HilSimulator
 from sitl.interfaces import ardupilot, px4
 
 RECORDED = Path(__file__).with_name("recorded")
-PACKET = 40  # bytes of ArduPilot's
+PACKET = 40  # bytes of a packet of ArduPilot
 
 Flown = tuple[list[bytes], HilSimulator]
 

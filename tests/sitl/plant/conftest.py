@@ -1,4 +1,5 @@
-"""States and conserved quantities for the proofs of the plant, written apart from the plant's own code."""
+"""States and conserved quantities for the proofs of the plant, written independently of the plant's own
+code."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def test_rotors_brake_a_turn_as_each_hub_moves(bebop, hovering):
 
 
 def test_a_gliding_vehicle_slows_down_at_the_rate(bebop, aloft, hovering):
-    """Held up by its rotors alone, without its load's pull in the way: v = v_0 exp(-k t)."""
+    """Held up by its rotors alone, without the pull of its load: v = v_0 exp(-k t)."""
     truth = with_air(bebop, rotor_drag=0.5)._replace(
         quad_drag=0.0, quad_drag_quadratic=0.0, rotor_height=0.0, attachment=CALM
     )

@@ -1,4 +1,4 @@
-"""A cable that is attached away from the centre of mass: what must stay, and the impact; see also
+"""A cable that is attached away from the centre of mass: what is conserved, and the impact; see also
 test_second_derivation."""
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def beside(thesis):
 
 @pytest.fixture
 def tumble(beside, aloft):
-    """The pair thrown spinning, rotors off, no drag."""
+    """Vehicle and load thrown spinning, rotors off, no drag."""
     return aloft(
         beside,
         q=(0.4, -0.3, -0.8),
@@ -38,7 +38,7 @@ def tumble(beside, aloft):
 
 
 def test_momenta_and_energy_stay(tumble, beside, energy, momentum, spins):
-    """The pull turns the vehicle and swings the pair: only the sum of their angular momenta stays."""
+    """The pull turns the vehicle and swings the pair: only the sum of their angular momenta is conserved."""
     before, drifts = energy(tumble, beside), {"energy": [], "spin": []}
     pair, vehicle = spins(tumble, beside)
     for h in STEPS:
@@ -65,7 +65,8 @@ def test_the_cable_keeps_its_length_from_where_it_is_attached(tumble, beside, ro
 
 
 def test_the_impact_is_that_of_two_bodies_on_a_rigid_bar(bebop, rotation_of, tumble):
-    """Beside the linear system of impulse and constraint over all nine velocities of load and vehicle."""
+    """Compared with the linear system of impulse and constraint over all nine velocities of load and
+    vehicle."""
     truth = bebop._replace(attachment=RHO)
     R, q = rotation_of(tumble), np.array(tumble.q_cable)
     v_load, v_quad, omega = np.array([1.0, -2.0, -4.0]), np.array([0.5, 0.2, 1.0]), np.array([3.0, -2.0, 1.0])
@@ -90,7 +91,7 @@ def test_the_impact_is_that_of_two_bodies_on_a_rigid_bar(bebop, rotation_of, tum
     assert after.v_load == pytest.approx(solved[:3], abs=EXACT)
     assert after.omega == pytest.approx(solved[6:9], abs=EXACT)
     assert after.apart_dot == pytest.approx(solved[:3] - solved[3:6], abs=EXACT)
-    # the impulse, as it is told of in CABLE_SNAP
+    # the impulse, as reported in CABLE_SNAP
     impulse = effective_mass(tumble.q_cable, tuple(map(tuple, R.tolist())), truth) * (row @ before - 0.3)
     assert impulse == pytest.approx(-solved[9], abs=EXACT)
 
@@ -107,5 +108,5 @@ def test_a_cable_that_snaps_taut_takes_energy_and_leaves_the_momenta(bebop, alof
     fall = np.array([0.0, 0.0, -truth.gravity * 0.04 * (truth.load_mass + truth.quad_mass)])
     assert momentum(end, truth) - momentum(start, truth) == pytest.approx(fall, abs=EXACT)
     spun = np.sum(spins(end, truth), axis=0) - np.sum(spins(start, truth), axis=0)
-    assert spun == pytest.approx(np.zeros(3), abs=1e-8)  # the integrator's own in ten steps
+    assert spun == pytest.approx(np.zeros(3), abs=1e-8)  # the integrator's error in ten steps
     assert energy(end, truth) < energy(start, truth) - 0.1

@@ -1,4 +1,4 @@
-"""The cable of links in the plant, against theory, a second engine and what must stay."""
+"""The cable of links in the plant, against theory, a second engine and conserved quantities."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ ROUNDING = 1e-11  # of places 30 m away, over 2000 steps
 def test_hanging_chain_has_the_frequencies_of_bessel(mass: float, load: float) -> None:
     errors = {n: frequency_errors(n, mass, load) for n in LINKS}
     assert abs(errors[64][0]) < 1e-4
-    # of second order in n: from two of them the limit, up to the step's own error in the fastest, 126 rad/s
+    # of second order in n: two of them give the limit, up to the step's own error in the fastest mode, 126
+    # rad/s
     extrapolated = (4.0 * errors[64] - errors[32]) / 3.0
     assert np.abs(extrapolated[:2]).max() < 1e-4
     assert abs(extrapolated[2]) < 2e-4
@@ -67,7 +68,7 @@ def test_a_massless_stiff_link_is_the_taut_plant() -> None:
     rigid, tension = massless_difference(1e9)
     assert rigid < 2e-7
     assert tension < 1e-4
-    # and that goes with h^2; a tick that is no multiple of the longest step is divided
+    # this error goes with h^2; a tick that is no multiple of the longest step is divided
     assert 3.5 < rigid / massless_difference(1e9, 2.5e-4)[0] < 4.5
 
 
@@ -98,8 +99,8 @@ def test_it_moves_as_in_mujoco(links: int) -> None:
 
 
 def test_energy_stays_without_damping() -> None:
-    """Vehicle and load turn about each other on a cable so soft that the step resolves its stretch;
-    once it has settled it is undamped."""
+    """Vehicle and load turn about each other on a cable so soft that the step resolves its stretch; after
+    settling, the damping is switched off."""
     model = chain_model(2, stiffness=50.0, damping=2.0, hook=0.05, gyration=0.02, gyration_upright=0.02)
     begun = swinging(model)
     settled = ChainPlant(begun.truth._replace(gravity=1e-9), begun.state)
@@ -132,7 +133,8 @@ def test_vehicle_cable_and_load_fall_freely(bebop: Truth) -> None:
 
 
 def snapped(truth: Truth, damping: float, seconds: float) -> tuple[float, float, float]:
-    """Vehicle and load part until the cable snaps: greatest tension, impulse, closing speed that is told."""
+    """Vehicle and load move apart until the cable snaps: greatest tension, impulse, reported closing
+    speed."""
     model = chain_model(1, mass=0.0, stiffness=7e3, damping=damping)
     free = without_drag(truth)._replace(chain=model, gravity=1e-9)
     share = truth.load_mass / (truth.load_mass + truth.quad_mass)
@@ -151,7 +153,8 @@ def snapped(truth: Truth, damping: float, seconds: float) -> tuple[float, float,
 
 
 def test_a_snap_has_the_peak_and_the_impulse_of_a_spring(bebop: Truth) -> None:
-    """v sqrt(k mu), and 2 mu v as the ends near each other as fast as they had parted."""
+    """The peak is v sqrt(k mu), and the impulse 2 mu v, because the ends then approach each other as fast as
+    they had moved apart."""
     mu = bebop.load_mass * bebop.quad_mass / (bebop.load_mass + bebop.quad_mass)
     stiffness = 7e3 / bebop.cable_length
     peak, impulse, told = snapped(bebop, 0.0, 0.04)
@@ -161,7 +164,7 @@ def test_a_snap_has_the_peak_and_the_impulse_of_a_spring(bebop: Truth) -> None:
 
 
 def test_a_snap_of_a_damped_cable_has_the_impulse_of_an_impact(bebop: Truth) -> None:
-    """Overdamped the ends part no more, and the impulse is that of `sitl.plant.impact`: mu v."""
+    """Overdamped, the ends do not rebound, and the impulse is that of `sitl.plant.impact`: mu v."""
     mu = bebop.load_mass * bebop.quad_mass / (bebop.load_mass + bebop.quad_mass)
     stiffness = 7e3 / bebop.cable_length
     critical = 2.0 * np.sqrt(stiffness * mu) * bebop.cable_length
@@ -170,7 +173,7 @@ def test_a_snap_of_a_damped_cable_has_the_impulse_of_an_impact(bebop: Truth) -> 
 
 
 def test_a_cable_in_the_wind_is_dragged(bebop: Truth) -> None:
-    """Across the flow, rho d L C_d v^2 / 2 in all, before it has been blown away."""
+    """The drag of a cable across the flow is rho d L C_d v^2 / 2 in total, before it has been blown aside."""
     links, speed = 8, 8.0
     found = []
     for drag_coefficient in (0.0, 1.2):
@@ -189,7 +192,7 @@ def test_a_cable_in_the_wind_is_dragged(bebop: Truth) -> None:
 
 
 def test_a_load_that_turns_swings_as_a_double_pendulum(bebop: Truth) -> None:
-    """Under a firm vehicle, phi of the cable (length l) and theta of the load (hook h, gyration k) obey
+    """Under a fixed vehicle, phi of the cable (length l) and theta of the load (hook h, gyration k) obey
     l phi'' + h theta'' = -g phi and k^2 theta'' = -g h (theta - phi)."""
     h, k = 0.3, 0.1
     model = chain_model(1, mass=0.0, hook=h, gyration=k, gyration_upright=k, damping=50.0)
@@ -248,7 +251,7 @@ def test_a_cable_let_go_falls_with_its_load(bebop: Truth) -> None:
     assert state.tension == 0.0
     fallen = 0.5 * truth.gravity * 0.4**2
     assert state.x_load[2] == pytest.approx(held.x_load[2] + 0.4 * held.v_load[2] - fallen, abs=2e-3)
-    # the rest of it hangs together, and falls too
+    # the rest of the cable holds together, and falls too
     lengths = np.linalg.norm(np.diff(plant.rows.x[1:], axis=0), axis=1)
     assert (lengths < 1.001 * (truth.cable_length - 0.015) / 6).all()
     assert plant.rows.x[1, 2] < held.x_quad[2] - 0.5 * fallen

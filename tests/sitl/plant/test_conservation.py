@@ -28,7 +28,7 @@ def _slope(steps, drifts):
 
 @pytest.fixture
 def tumble(thesis, aloft):
-    """The pair thrown spinning, the vehicle tumbling, rotors off, no drag."""
+    """Vehicle and load thrown spinning, the vehicle tumbling, rotors off, no drag."""
     return aloft(
         thesis,
         q=(0.4, -0.3, -0.8),

@@ -29,13 +29,14 @@ def test_what_is_known_changes_nothing(share, curve):
 
 
 def test_a_curve_that_is_taken_for_another_gives_another_force():
-    """Half of the greatest force asked for of rotors that are taken for linear and are purely quadratic."""
+    """Half of the greatest force, commanded to rotors that are assumed to be linear and are purely
+    quadratic."""
     assert driven_force(1.0, 2.0, Drive(thrust_curve=1.0), 1.0) == 2.0 * 0.5**2
 
 
 @given(st.floats(0.0, 2.0))
 def test_resolution(force):
-    """Of a linear drive: never more than half a step away, and always on one."""
+    """The force of a linear drive is never more than half a step away, and always on a step."""
     given_force = driven_force(force, 2.0, Drive(esc_steps=100.0), 1.0)
     assert abs(given_force - force) <= 0.5 * 2.0 / 100.0 + 1e-15
     assert given_force * 50.0 == pytest.approx(round(given_force * 50.0), abs=1e-12)

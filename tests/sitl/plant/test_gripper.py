@@ -1,4 +1,5 @@
-"""The load let go: it falls by itself, the vehicle flies by itself, and nothing is tied again in the air."""
+"""The released load falls by itself, the vehicle flies by itself, and nothing is attached again in the
+air."""
 
 from __future__ import annotations
 
@@ -15,13 +16,13 @@ CALM = (0.0, 0.0, 0.0)
 WIND = (3.0, -1.0, 0.5)
 OFF = (0.0, 0.0, 0.0, 0.0)
 HOVER = (1.4, 1.4, 1.4, 1.4)
-# Runge-Kutta of order four at 4 ms beside DOP853 to 1e-12; measured 2e-12 in all
+# Runge-Kutta of order four at 4 ms compared with DOP853 to 1e-12; measured 2e-12 in all
 SAME_PATH = 1e-10
 STEP = 4e-3
 
 
 def test_the_load_falls_as_drag_and_gravity_alone_have_it(bebop, aloft):
-    """Beside SciPy's integration of one point in the wind."""
+    """Compared with SciPy's integration of one point in the wind."""
     start = dropped(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
     state, truth = start, without_cable(bebop)
     for _ in range(500):
@@ -39,7 +40,8 @@ def test_the_load_falls_as_drag_and_gravity_alone_have_it(bebop, aloft):
 
 
 def test_the_vehicle_flies_as_one_that_never_had_a_load(bebop, aloft):
-    """Beside the same vehicle whose load is elsewhere: to the bit, for nothing of the load reaches it."""
+    """Compared with the same vehicle whose load is elsewhere: equal to the bit, because the load has no
+    effect on it."""
     start = dropped(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
     alone = start._replace(x_load=(50.0, 0.0, 90.0), v_load=CALM)
     truth = without_cable(bebop)
@@ -48,7 +50,7 @@ def test_the_vehicle_flies_as_one_that_never_had_a_load(bebop, aloft):
         start, alone = (advance(s, truth, command, WIND, STEP) for s in (start, alone))
     for field in ("quat_wxyz", "omega_body", "rotor_force"):
         assert getattr(start, field) == getattr(alone, field)
-    # what is integrated is the load and the vector between the two: rounding of some 50 m, 250 times
+    # the plant integrates the load and the vector between the two: rounding of some 50 m, 250 times
     assert start.x_quad == pytest.approx(alone.x_quad, abs=1e-11)
     assert start.v_quad == pytest.approx(alone.v_quad, abs=1e-12)
 
@@ -69,7 +71,7 @@ def test_the_dropped_load_comes_to_rest_on_the_ground(bebop, aloft):
         state = advance(state, truth, HOVER, CALM, STEP)
         fastest = max(fastest, -state.v_load[2])
     fall = math.sqrt(2.0 * bebop.gravity * (2.0 - bebop.load_radius))
-    # drag takes a little off it
+    # drag takes a little off this speed
     assert 0.97 * fall < fastest < fall
     assert state.load_on_ground == 1.0
     assert state.x_load[2] == pytest.approx(bebop.load_radius, abs=1e-6)

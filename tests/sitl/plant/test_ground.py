@@ -130,7 +130,7 @@ def test_hovering_with_part_of_a_load_that_stays_on_the_ground(thesis, share):
         x_quad=(0.0, 0.0, height), q_cable=(0.0, 0.0, -1.0), taut=1.0, vehicle_on_ground=0.0
     )
     carried = share * thesis.load_mass * thesis.gravity
-    # a breath more, so that the cable stays taut where the load carries itself
+    # slightly more, so that the cable stays taut where the load carries itself
     lift = thesis.quad_mass * thesis.gravity + carried + 1e-3
     state = advance_many(state, thesis, (0.25 * lift,) * 4, CALM, 4e-3, 750)
     assert (state.taut, state.load_on_ground, state.vehicle_on_ground) == (1.0, 1.0, 0.0)

@@ -62,7 +62,7 @@ def test_no_lag_is_at_once(thesis, aloft):
 
 
 def followed(command, truth, share=(1.0,) * 4):
-    """What whole rotors, or failing ones, go to."""
+    """The forces that whole rotors, or failing ones, go to."""
     rotors = rotors_of((0.0,) * 4, command)
     rotors.rows[SHARE, :4] = share
     limit(rotors, truth)
@@ -97,7 +97,7 @@ def test_failing_rotors_are_named_by_the_bits_of_a_parameter(bebop):
 
 
 def test_each_rotor_has_a_place_a_lag_and_a_strength_of_its_own(bebop, aloft):
-    """Beside the sums of (2-13) over places, and the exponential of each rotor's own lag."""
+    """Compared with the sums of (2-13) over positions, and the exponential of each rotor's own lag."""
     layout = (
         Rotor(-1.0, 0.2, -1.0, 1.0, 1.0),
         Rotor(0.1, -1.0, 1.0, 1.5, 2.0),

@@ -19,7 +19,7 @@ from sitl.plant.by_value import advance_many
 
 # What DOP853 at rtol 1e-13 and the plant at 0.25 ms leave after ten seconds is 2e-9 (m, m/s, rad): the flight
 # is replayed without feedback, so an error in attitude grows with the square of time into position.
-# At the working step of 4 ms the plant's own error has its say, 256^2 times larger: measured 1e-4.
+# At the working step of 4 ms the plant's own error dominates, 256^2 times larger: measured 1e-4.
 AGREEMENT = {0.25e-3: 1e-8, 4e-3: 3e-4}
 HOLD = 20e-3  # s a command is held
 DURATIONS = {"plain": 10.0, "attached beside": 5.0, "in the air": 3.0}  # s
@@ -87,7 +87,7 @@ def lagrangian():
 
 
 def truth_of_flight(name, truth):
-    """The vehicle with what is looked at in this flight."""
+    """The vehicle with the effects that this flight tests."""
     if name == "plain":
         return truth
     truth = truth._replace(attachment=(0.02, -0.015, -0.04))
@@ -189,6 +189,6 @@ def test_random_flight(flight, lagrangian):
             states[h], worst[h] = state, max(worst[h], *map(float, errors))
         tilt, swing = max(tilt, abs(y[5]), abs(y[6])), max(swing, math.acos(-direction[2]))
     assert {h: error for h, error in worst.items() if error > AGREEMENT[h]} == {}
-    # the flight is no hover: nothing may agree because nothing happened
+    # the flight is no hover: agreement must not come from a lack of motion
     assert tilt > 0.2
     assert swing > 0.3

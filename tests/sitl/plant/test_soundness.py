@@ -1,4 +1,4 @@
-"""Whatever is commanded, the plant answers with numbers; jitted or not, with the same ones."""
+"""For any command the plant gives finite numbers, the same ones compiled and in plain Python."""
 
 from __future__ import annotations
 

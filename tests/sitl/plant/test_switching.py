@@ -17,7 +17,7 @@ from sitl.plant.records import Motion
 CALM = (0.0, 0.0, 0.0)
 OFF = (0.0, 0.0, 0.0, 0.0)
 
-# required: 1e-6. The motion before is a parabola, which a fourth-order step has without error
+# required: 1e-6. The motion before is a parabola, which a fourth-order step integrates without error
 IMPACT = 1e-10
 # momentum and energy across an impact: rounding of sums of about 100
 ROUNDING = 1e-11
@@ -216,7 +216,8 @@ def test_impact_keeps_momentum_and_never_gains_energy(
     command=st.tuples(*[st.floats(0.0, 2.0)] * 4),
 )
 def test_no_step_without_rotors_gains_energy(bebop, energy, offset, slackness, v_load, v_quad, command):
-    """Whatever impacts and releases there are; with rotors the cable is never longer than it is."""
+    """With any impacts and releases; with rotors, the ends are never farther apart than the length of the
+    cable."""
     u = np.array(offset) / math.hypot(*offset)
     x_quad = np.array([0.0, 0.0, 100.0])
     x_load = x_quad + (1.0 - slackness) * bebop.cable_length * u

@@ -70,7 +70,7 @@ def test_there_is_no_wake_above_nor_of_rotors_at_rest(blowing):
 
 
 def test_a_vehicle_that_flies_leaves_its_wake_behind(blowing):
-    """The axis leans back by the flight speed over the induced velocity; so does that of a wind."""
+    """The axis leans back by the flight speed over the induced velocity; a wind has the same effect."""
     air = blowing.air
     induced = math.sqrt(1.2 / (2.0 * air.density * 4 * math.pi * air.rotor_radius**2))
     flown = wake_of_one(blowing, 1.2, 0.5, 0.0, v=(3.0, 0.0, 0.0))

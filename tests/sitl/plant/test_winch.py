@@ -1,4 +1,4 @@
-"""The cable reeled in and out, beside derivations that share nothing with the plant."""
+"""The cable reeled in and out, compared with derivations that share nothing with the plant."""
 
 from __future__ import annotations
 
@@ -102,14 +102,13 @@ def test_a_swing_while_reeling(bebop, aloft, lagrangian, reel_rate, reel_accel):
         assert after.cable_length == pytest.approx(length, abs=1e-13)
         assert math.dist(state.x_load, state.x_quad) == pytest.approx(length, abs=1e-13)
         error = np.abs([*(np.array(state.x_quad) - end[:3]), *(np.array(state.q_cable) - direction)]).max()
-        print("AGREE", h, error)
         assert error < allowed
-    # the swing is no rest
+    # the cable does swing
     assert np.abs(np.array(direction) - q).max() > 0.1
 
 
 def test_what_the_winch_does_is_the_work_of_the_tension(thesis, aloft):
-    """E' = f R e3 . v_Q - T L', and the momentum knows nothing of a winch."""
+    """E' = f R e3 . v_Q - T L', and the winch does not change the momentum."""
     truth = thesis._replace(reel_rate=-0.4, reel_accel=0.5, rotor_tau=0.0)
     state = aloft(thesis, q=(0.3, -0.2, -1.0), q_dot=(0.6, 1.0, 0.0), rotor_force=(FORCE,) * 4)
     v_quad = np.array(state.v_quad) - truth.reel_rate * np.array(state.q_cable)
@@ -160,7 +159,7 @@ def test_a_slack_cable_is_reeled_in_until_it_pulls(thesis, aloft):
 
 
 def test_out_faster_than_the_load_falls_the_cable_is_slack(bebop, aloft):
-    """13 m/s^2 outwards leave a hanging load to its fall."""
+    """At 13 m/s^2 outwards, a hanging load falls freely."""
     truth = bebop._replace(reel_accel=13.0)
     hover = 0.25 * (bebop.quad_mass + bebop.load_mass) * bebop.gravity
     state = advance(aloft(bebop, rotor_force=(hover,) * 4), truth, (hover,) * 4, CALM, STEP)

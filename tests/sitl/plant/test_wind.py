@@ -43,7 +43,7 @@ def test_falling_in_still_air_reaches_terminal_speed(bebop, aloft):
 
 
 def test_wind_carries_the_pair_along(bebop, aloft):
-    """Hovering level in wind it ends with the wind's own speed."""
+    """Hovering level in wind, vehicle and load end with the speed of the wind."""
     hover = 0.25 * (bebop.quad_mass + bebop.load_mass) * bebop.gravity
     start = aloft(bebop, rotor_force=(hover,) * 4)
     state = advance_many(start, bebop, (hover,) * 4, (3.0, -1.0, 0.0), 4e-3, 50_000)

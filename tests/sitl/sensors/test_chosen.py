@@ -1,4 +1,4 @@
-"""What parameters put in the place of the profile's numbers."""
+"""The numbers of a profile that parameters replace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors that last: of motion capture, by time and by place, and of multipath; against their statistics."""
+"""Correlated errors: of motion capture, in time and in space, and of multipath; against their statistics."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ vertical_velocity_noise_m_s = 0.0
 
 
 def errors(flown, sensor: str, place, seconds: float) -> np.ndarray:
-    """(readings, 3) of a vehicle that stands; its place is known."""
+    """(readings, 3) errors of position of a vehicle at rest in a known place."""
     found = []
     for _ in range(round(seconds * 1e6 / flown.settings.tick_us)):
         found += [np.subtract(m.reading.position, place) for m in getattr(flown.tick(LYING), sensor)]
@@ -51,7 +51,7 @@ def errors(flown, sensor: str, place, seconds: float) -> np.ndarray:
 
 
 def assert_markov(samples: np.ndarray, std, per_sample: float) -> None:
-    """Gauss-Markov of first order: each sample is `per_sample` of the one before plus a fresh part."""
+    """Gauss-Markov of first order: each sample is `per_sample` times the one before plus a fresh part."""
     std = np.broadcast_to(std, 3)
     fresh = samples[1:] - per_sample * samples[:-1]
     drive = std * sqrt(1.0 - per_sample**2)
@@ -67,7 +67,7 @@ def test_trackers_wander(core, sensor: str, body: str) -> None:
     flown = core(TRACKED, SIM_TRK_ERR_M=0.002, SIM_TRK_ERR_S=0.5, SIM_RATE_HZ=100)
     samples = errors(flown, sensor, getattr(flown.state, body), 80.0)
     assert_markov(samples, 0.002, exp(-0.02 / 0.5))
-    # at switch-on it has its deviation already
+    # the error has its full deviation from the beginning
     first = [
         errors(core(TRACKED, seed=k, SIM_TRK_ERR_M=0.002), sensor, getattr(flown.state, body), 0.02)[0]
         for k in range(100)
@@ -76,7 +76,7 @@ def test_trackers_wander(core, sensor: str, body: str) -> None:
 
 
 def newest_errors(flown) -> tuple[np.ndarray, np.ndarray]:
-    """Of vehicle and load, after a few readings."""
+    """Errors of the positions of vehicle and load, after a few readings."""
     vehicle, load = flown.state.x_quad, flown.state.x_load
     for _ in range(25):
         readings = flown.tick(LYING)
@@ -88,7 +88,7 @@ def newest_errors(flown) -> tuple[np.ndarray, np.ndarray]:
 def test_trackers_err_apart_in_time_and_alike_in_place(core) -> None:
     vehicle, load = newest_errors(core(TRACKED, SIM_TRK_ERR_M=0.002))
     assert not np.allclose(vehicle, load, rtol=0, atol=1e-5)
-    # in a room whose error hardly varies, what stands beside the vehicle is seen beside it
+    # in a room whose error hardly varies, the load beside the vehicle has the same error
     vehicle, load = newest_errors(core(TRACKED, SIM_TRK_CAL_M=0.002, SIM_TRK_CAL_LEN=1000.0))
     assert np.allclose(vehicle, load, rtol=0, atol=1e-5)
     assert np.linalg.norm(vehicle) > 1e-4
@@ -100,7 +100,7 @@ def test_a_distorted_room_errs_by_place_alone() -> None:
     for seed in (1, 2):
         noise = Noise(seed, 2, 17, 1.0)
         found = np.array([distortion(tuple(place), room, noise) for place in places])
-        # a wave has its deviation over places that have nothing to do with its length
+        # a wave has its stated deviation over places that are unrelated to its length
         assert np.all(np.abs(found.std(0) / 0.003 - 1.0) < 0.05)
         assert np.all(np.abs(found.mean(0)) < SIGMAS * 0.003 / sqrt(len(places)))
         assert np.abs(found).max() <= sqrt(2.0) * 0.003 * (1.0 + 1e-12)
@@ -139,10 +139,10 @@ def test_hidden_markers_come_in_bursts(core) -> None:
         poses += len(readings.mocap)
     gaps = np.diff(seen) * 1e-6
     hidden = gaps[gaps > 0.021]
-    # once a second while it is seen, for 0.2 s and what is left of a period on average
+    # hidden once a second while it is seen, on average for 0.2 s and the rest of a period
     assert len(hidden) == pytest.approx(200.0 / 1.2, abs=SIGMAS * sqrt(170.0))
     assert hidden.mean() == pytest.approx(0.23, abs=SIGMAS * 0.2 / sqrt(len(hidden)))
-    assert poses == 10_000  # the vehicle's markers are others
+    assert poses == 10_000  # the vehicle has other markers
 
 
 def test_the_real_profiles_have_every_effect() -> None:

@@ -35,7 +35,7 @@ def test_logarithm_of_one_is_zero_and_of_the_least_word_finite() -> None:
 @given(WORD)
 def test_cosine_and_sine(word: int) -> None:
     cosine, sine = cosine_sine(word)
-    # the library is told an angle of an eighth of a turn at most, which is exact but for one rounding
+    # the library gets an angle of an eighth of a turn at most, which is exact except for one rounding
     quarter = (word + 2**29) >> 30
     angle = (word - (quarter << 30)) * TURN
     c, s = math.cos(angle), math.sin(angle)

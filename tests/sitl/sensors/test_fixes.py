@@ -1,4 +1,4 @@
-"""Fixes that float and fixes that are lost: how often, how long, how wrong, and what HIL_GPS says of them."""
+"""Fixes that float and fixes that are lost: how often, how long, how wrong, and how HIL_GPS reports them."""
 
 from __future__ import annotations
 

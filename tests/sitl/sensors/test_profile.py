@@ -1,4 +1,4 @@
-"""Profiles: the shipped ones are sound, and a wrong one is told what is wrong in one line."""
+"""Profiles: the shipped ones are sound, and a wrong one gets one line that says what is wrong."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_shipped_profiles() -> None:
     for name in PROFILES.names():
         profile = load_profile(name)
         assert profile.description
-        # something must tell where the vehicle is and where the load is
+        # a sensor must locate the vehicle and one the load, except in the blind profiles
         assert profile.mocap or profile.gnss
         sees = profile.load_tracker or profile.cable_sensor
         assert bool(sees) == (not name.endswith("-blind"))

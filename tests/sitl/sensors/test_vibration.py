@@ -1,4 +1,4 @@
-"""Vibration: lines where the rotors turn, as large as stated, aliased and filtered as a sampled one is."""
+"""Vibration: lines at the speeds of the rotors, as large as stated, aliased and filtered as by sampling."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ SAMPLES = 4096
 HOVER = hover_force(TRUTH, 4)
 STEADY = VibrationConfig(2.0, 0.1, 0.0, 0.0, TICK_S)
 SIGMAS = 4.0  # suspicious distance of a statistic from its expectation, in its own standard errors
-# the speed is a whole number of rpm, 1/60 Hz: over the 16 s of a test a line stays within a bin of its place
+# the speed is a whole number of rpm, 1/60 Hz: over the 16 s of a test a line stays within a bin of its
+# frequency
 BIN_HZ = 1.0 / (SAMPLES * TICK_S)
 
 
@@ -70,7 +71,7 @@ def test_at_hover_it_is_as_large_as_stated_on_every_axis() -> None:
     expected = 2.0 * sqrt(np.mean((forces / HOVER) ** 2))
     assert rms(accel) == pytest.approx(expected, rel=0.02)
     assert rms(gyro) == pytest.approx(0.1 * sqrt(np.mean(forces / HOVER)), rel=0.02)
-    assert np.abs(accel.mean(0)).max() < 0.05 * expected  # it pushes nowhere on average
+    assert np.abs(accel.mean(0)).max() < 0.05 * expected  # its mean is about zero
 
 
 def test_lines_stand_at_the_speed_of_the_rotor_and_fold_at_half_of_the_tick_rate() -> None:

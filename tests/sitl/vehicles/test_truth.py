@@ -127,7 +127,7 @@ def test_each_effect_is_reached_by_one_parameter(bebop, name):
 
 @pytest.mark.parametrize("name", ["bebop-real", "heavy-real"])
 def test_parameters_start_from_what_a_real_vehicle_has(name):
-    """But for the rounding of capacity and charge."""
+    """Except for the rounding of capacity and charge."""
     truth = load_truth(name)
     table = sim_parameters(truth)
     assert all(table[effect] == pytest.approx(read(truth)) for effect, (_, read) in EFFECTS.items())
