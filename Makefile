@@ -1,18 +1,18 @@
-# Plumbline: `make fly` and `make test`, each from nothing.
+# Plumbline: `make fly` and `make test` each work from a fresh copy of the sources.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
-# uv installs in seconds what takes pip a minute; where it is not to be had, or not told of an index that pip is told of,
-# pip does it. Nobody compiles the bytecode of whole packages: Python does it for what is imported, and keeps it
+# uv installs in seconds what takes pip a minute; pip does it where uv is not available, or not configured for an index
+# that pip is configured for. Bytecode is not compiled for whole packages: Python compiles what is imported, and keeps it
 comma := ,
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet
 install = @{ $(PIP) 'uv>=0.4' && $(UV) --editable '.$(1)'; } || $(PIP) --editable '.$(1)'
 export PYTHONDONTWRITEBYTECODE :=
-# where colorama is installed numba colours each text of a candidate that it tries, which nobody reads: a twentieth
+# if colorama is installed, numba colours the error text of each candidate it tries, never shown: a twentieth of the time
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
 .PHONY: help install fly test lint types docs oldest thesis figures pictures robustness renew bench clean
@@ -43,8 +43,8 @@ $(DOCS_STAMP): $(STAMP)
 fly: $(STAMP) ## fly Case B through three real processes and show the report
 	$(BIN)/gcs fly case-b --sensors lab
 
-# those of processes keep to the wall clock and mostly wait: they run beside the others, which leave them the processor
-# when they need it (at nice 19 all of it), and are told after them
+# tests marked `processes` run on the wall clock and mostly wait: they run beside the others, which leave the processor to
+# them when they need it (all of it, at nice 19), and their output is printed after that of the others
 test: $(DEV_STAMP) ## run the tests: a quarter of an hour on two idle cores
 	@told=$$(mktemp); trap 'rm -f $$told' EXIT; \
 	$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes $$(grep -rl --include="*.py" mark.processes tests) >$$told 2>&1 & clocked=$$!; \

@@ -81,7 +81,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_from, located_steps, unflown
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
-from missions.model import ReturnHome, Signals, Step, Term, Waypoint
+from missions.model import Land, ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
 SIMULATOR_SYSTEM = 1  # our system id on the simulator link, whatever MAV_SYS_ID ground stations see
@@ -729,6 +729,12 @@ class Onboard:
         if kept:
             numbers = ", ".join(map(str, kept[:MOST_NAMED])) + (" ..." if len(kept) > MOST_NAMED else "")
             self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
+        landings = [
+            item for step, item in zip(plan.steps[:-1], plan.sequence, strict=False) if isinstance(step, Land)
+        ]
+        if landings:
+            text = f"Mission ends with the landing of item {landings[0]}; no later item is flown"
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, text)
 
     def _prepare(self) -> None:
         """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""

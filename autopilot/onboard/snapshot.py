@@ -466,6 +466,12 @@ def _gps(m: Moment) -> tuple[Any, ...]:
     return (None,)
 
 
+@_makes("cable_length")
+def _cable_length(m: Moment) -> tuple[Any, ...]:
+    length = m.flight.cable.length_m
+    return (m.core.setup.vehicle.cable_length if length is None else length,)
+
+
 @_makes("built_in")
 def _built_in(m: Moment) -> tuple[Any, ...]:
     return (m.core.built_in,)

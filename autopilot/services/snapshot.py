@@ -34,6 +34,9 @@ GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is a fence
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
 
 
+HEIGHT_LIMIT = "GF_MAX_VER_DIST"  # the parameter that `breach` names if the flight is too high
+
+
 class GpsFix(NamedTuple):
     """The last fix as the receiver reported it (not the estimate)."""
 
@@ -113,6 +116,7 @@ class Snapshot:
     q_cable: Vec3 = _DOWN
     q_cable_dot: Vec3 = ZERO
     distance: float = 0.0
+    cable_length: float = 0.0  # as set by the winch
     tension: float = 0.0
     taut: bool = False
     slack_events: int = 0

@@ -58,7 +58,7 @@ from autopilot.services.sensor_streams import (
     scaled_imu,
     scaled_pressure,
 )
-from autopilot.services.snapshot import GEOFENCE, PREARM, Snapshot
+from autopilot.services.snapshot import GEOFENCE, HEIGHT_LIMIT, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert.axes import ned_from_enu
@@ -189,9 +189,8 @@ def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    kind = mavlink.FENCE_BREACH_BOUNDARY
-    if s.breach.startswith("higher"):
-        kind = mavlink.FENCE_BREACH_MAXALT
+    too_high = HEIGHT_LIMIT in s.breach
+    kind = mavlink.FENCE_BREACH_MAXALT if too_high else mavlink.FENCE_BREACH_BOUNDARY
     return (
         mavlink.MAVLink_fence_status_message(
             breach_status=1 if s.breach else 0,
@@ -289,7 +288,8 @@ def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (winch_status_message(s.now_us, s.distance, s.tension, s.reel_rate),)
+    length = s.distance if s.taut else s.cable_length  # a slack cable is longer than its ends are apart
+    return (winch_status_message(s.now_us, length, s.tension, s.reel_rate),)
 
 
 def _autopilot_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

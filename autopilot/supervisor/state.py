@@ -13,6 +13,7 @@ from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
 from autopilot.guidance.heading import EASTWARD, Heading
 from autopilot.guidance.legs import Leg
 from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, FollowLimits, Stream
+from autopilot.services.snapshot import HEIGHT_LIMIT
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, Prepared
 from autopilot.wire.dialect import plumbline as mavlink
@@ -233,7 +234,7 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
         return f"beyond the fence, GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
     height_m = x_load[2] + settings.cable_length_m
     if settings.fence.height_m > 0.0 and height_m > settings.fence.height_m:
-        limit = f"GF_MAX_VER_DIST {settings.fence.height_m:g} m above home"
+        limit = f"{HEIGHT_LIMIT} {settings.fence.height_m:g} m above home"
         return f"beyond the fence, {limit} (vehicle at {height_m:.2f} m)"
     return fence.complaint(x_load[0], x_load[1])
 

@@ -1,26 +1,26 @@
 /* Plots over time for the live page and the report: a thin wrapper of uPlot (global `uPlot`, see vendor/).
 
    group = new Plumbline.ChartGroup({live: false})
-       What several plots share: the zoom, the cursor of the pointer, the time that the scene shows.
+       Shared by several plots: the zoom, the cursor of the pointer, the time that the scene shows.
        group.setTime(t)            a line at time t in all plots (null: none); the values beside the names are those at t
-       group.zoom(from, to)        what all plots show; group.reset(): everything (also by a double click)
+       group.zoom(from, to)        the span that all plots show; group.reset(): everything (also by a double click)
        group.onHover(callback)     callback(t) while the pointer is over a plot, callback(null) when it leaves
        group.onPick(callback)      callback(t) when a plot is clicked
-       group.onZoom(callback)      callback(from, to) when what is shown changes
+       group.onZoom(callback)      callback(from, to) when the shown span changes
        group.setBands(bands)       [{from, to, name, kind}]: phases, drawn behind the lines of all plots
        group.setMarks(marks)       [{time, level}]: text messages; level "bad", "warn" or anything else
 
    chart = new Plumbline.Chart(element, {title, unit, series, time, bands, marks, sync, height, digits, least, zero})
-       series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width, quiet}], values as `time`;
-                quiet: without a name and a value beside the title; about: more than the name, where it is pointed at
+       series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width, quiet}], values at `time`;
+                quiet: without a name and a value beside the title; about: a longer text, shown as the tooltip of the name
        time     array of seconds, rising; NaN or null in values: a gap
        sync     a ChartGroup; without it the plot stands alone and bands and marks are its own
-       digits   decimals of the values beside the names; null: three digits, wherever the point is
-       least    the vertical axis spans at least so much, so that rounding noise does not fill it
+       digits   decimals of the values beside the names; null: three significant digits
+       least    least span of the vertical axis, so that rounding noise does not fill it
        zero     the vertical axis always shows zero
    chart.setData(time, [values, ...])   replaces everything
-   chart.setCursor(t)                   as group.setTime, of its group
-   chart.onCursor(callback)             as group.onHover, of its group
+   chart.setCursor(t)                   as group.setTime of its group
+   chart.onCursor(callback)             as group.onHover of its group
    chart.shown                          {from, to} of the horizontal axis
    chart.destroy()
 
@@ -65,16 +65,16 @@
   window.addEventListener("afterprint", preferred);
 
   const colour = (key) => (typeof key === "number" ? Theme.palette.lines[key % 7] : Theme.palette[key]);
-  // uPlot knows gaps as null
+  // uPlot expects null in gaps
   const gapped = (values) => Array.from(values, (v) => (v === null || Number.isNaN(v) ? null : v));
 
   const plain = (value, digits) => (
     digits === null ? String(Number(value.toPrecision(3))) : (Number(value.toFixed(digits)) + 0).toFixed(digits)); // no -0.00
 
   const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
-  const LONGEST_LABEL = 6; // characters that the space beside a plot surely holds
+  const LONGEST_LABEL = 6; // characters that always fit into the space beside a plot
 
-  /** Labels of the vertical axis; of numbers too long for the space beside it with the power of ten of the greatest. */
+  /** Labels of the vertical axis; numbers too long for the space beside it share the power of ten of the greatest. */
   Plumbline.tickLabels = function (ticks) {
     const labels = ticks.map((v) => String(Number(v.toPrecision(6))));
     const most = Math.max(...ticks.map(Math.abs));
@@ -92,7 +92,7 @@
     return made;
   }
 
-  /** Index of the last of the rising `times` that is not behind t; 0 before the first. */
+  /** Index of the last of the rising `times` that is not later than t; 0 before the first. */
   Plumbline.indexAt = function (times, t) {
     let low = 0, high = times.length - 1;
     while (low < high) {
@@ -122,7 +122,7 @@
     }
     zoom(from, to) {
       if (this._busy || !(to > from)) return;
-      this._busy = true; // a plot that is set tells of its new scale in turn
+      this._busy = true; // a plot whose scale is set reports the new scale in turn
       this.shown = [from, to];
       for (const chart of this.charts) chart._setShown(from, to);
       this._busy = false;
@@ -270,7 +270,7 @@
       let down = 0;
       u.over.addEventListener("mousedown", (event) => { down = event.clientX; });
       u.over.addEventListener("click", (event) => {
-        if (Math.abs(event.clientX - down) > 4) return; // the end of a drag
+        if (Math.abs(event.clientX - down) > 4) return; // the pointer was dragged
         const t = u.posToVal(event.clientX - u.over.getBoundingClientRect().left, "x");
         if (Number.isFinite(t)) this.group._picked(t);
       });

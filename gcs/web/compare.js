@@ -1,4 +1,4 @@
-/* The page of gcs compare: the flights over each other, in the scene and in plots. Time is counted from the `begin` of each. */
+/* The page of gcs compare: the flights together in the scene and in plots. Time is counted from the `begin` of each. */
 (function () {
   "use strict";
   const byId = (id) => document.getElementById(id);
@@ -6,7 +6,7 @@
 
   const colourOf = (i) => Plumbline.Theme.palette.lines[(i + 1) % 7];
 
-  /** Values at the times of a grid, straight lines between; NaN next to what is not known. */
+  /** Values at the times of a grid, linearly interpolated; NaN next to unknown values. */
   function resampled(flight, values, grid) {
     const time = flight.time, found = new Float64Array(grid.length).fill(NaN);
     if (!values) return found;
@@ -78,7 +78,7 @@
     try {
       stage = new Plumbline.Stage(byId("stage"), flights[0].layout);
     } catch (error) {
-      byId("stage").hidden = true; // no WebGL: the plots and the tables stay
+      byId("stage").hidden = true; // no WebGL: only the plots and the tables are shown
       byId("no-scene").hidden = false;
     }
     byId("explore").hidden = false;
@@ -87,7 +87,7 @@
     const phasesOf = (flight) => flight.phases.map(
       (phase) => ({ ...phase, from: phase.from - flight.begin, to: phase.to - flight.begin }));
     const bands = phasesOf(first);
-    // of all flights, by the clock that begins with the mission
+    // the worst of all flights, at the time since its `begin`
     const farthest = flights.filter((flight) => flight.worst).sort((a, b) => b.worst.error_m - a.worst.error_m)[0];
     const worst = farthest && { time: farthest.worst.time - farthest.begin };
     const transport = new Plumbline.Transport(byId("transport"), {

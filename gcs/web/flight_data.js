@@ -1,8 +1,8 @@
-/* A flight that lies within the page (made by gcs/report/replay.py and packing.py): its samples as columns, and what the
-   scene is to show at any time.
+/* A flight stored in its page (made by gcs/report/replay.py and packing.py): its samples as columns, and what the
+   scene shows at any time.
 
    flight = await Plumbline.Flight.load(values)
-   flight.time, flight.column(name)      Float64Array, NaN where nothing is known; column: null where there is none
+   flight.time, flight.column(name)      Float64Array, NaN where nothing is known; column: null if there is none
    flight.vector(name)                   its columns name_x, name_y, name_z, or null
    flight.difference(a, b)               vector a - vector b, or null
    flight.at(t)                          {known, index, vehicle, readings}: for Scene.show, and numbers beside it
@@ -10,7 +10,7 @@
 (function () {
   "use strict";
   const Plumbline = (window.Plumbline = window.Plumbline || {});
-  const MOST_POINTS = 4000; // of a path
+  const MOST_POINTS = 4000; // of a drawn path
 
   const norm = (v) => Math.hypot(v[0], v[1], v[2]);
   const DEGREES = 180 / Math.PI;
@@ -68,7 +68,7 @@
       return vector && vector[0].map((_, i) => norm([vector[0][i], vector[1][i], vector[2][i]]));
     }
 
-    /** True load position minus the asked one; m. Not where the path leads into the ground, to find it: NaN. */
+    /** True minus requested load position; m. NaN where the path leads into the ground to find it. */
     get error() {
       if (this._error !== undefined) return this._error;
       this._error = this.difference("load", "asked");
@@ -77,12 +77,12 @@
       return this._error;
     }
 
-    /** How far the load is from where the mission asks it to be; m. */
+    /** Distance of the load from its requested position; m. */
     get distance() {
       return this._distance === undefined ? (this._distance = Flight.norms(this.error)) : this._distance;
     }
 
-    /** A column at the time between two samples; NaN next to a gap. */
+    /** A column interpolated between samples i and i + 1; NaN next to a gap. */
     _between(name, i, share) {
       const values = this.column(name);
       if (!values) return NaN;
@@ -122,7 +122,7 @@
       const known = Number.isFinite(this.column("load_x")[i]);
       const next = i + 1 < n && Number.isFinite(this.column("load_x")[i + 1]) ? i + 1 : i;
       const share = next === i ? 0 : Math.min(Math.max((t - times[i]) / (times[next] - times[i]), 0), 1);
-      // in a gap the vehicle stays where it was heard last
+      // in a gap the vehicle is shown at its last known place
       const seen = known ? i : Math.max(i - 1, 0);
       const part = known ? share : 0;
       const load = this._place("load", seen, part), position = this._place("vehicle", seen, part);
@@ -150,7 +150,7 @@
       };
     }
 
-    /** Speed of the vehicle, which flies alone; m/s. */
+    /** Speed of the vehicle, for flight without the load; m/s. */
     _pace(i) {
       const before = Math.max(i - 1, 0), after = Math.min(i + 1, this.time.length - 1);
       const way = ["x", "y", "z"].map((axis) => this.column(`vehicle_${axis}`)[after] - this.column(`vehicle_${axis}`)[before]);
@@ -172,7 +172,7 @@
       return found;
     }
 
-    /** Two places between which the vehicle was all the time, in NED. */
+    /** Two opposite corners of the box in which the vehicle flew, in NED. */
     corners() {
       const found = [[], []];
       for (const [axis, sign] of [["y", 1], ["x", 1], ["z", -1]]) {
@@ -183,7 +183,7 @@
       return found.flat().every(Number.isFinite) ? found : [];
     }
 
-    /** Where the load was carried, and the vehicle's way where it flew without: stretches that a line may join. */
+    /** Paths of the load while it was carried and of the vehicle without it, in stretches without a gap. */
     tracks() {
       const n = this.time.length, every = Math.max(1, Math.ceil(n / MOST_POINTS)), found = [];
       const most = this.worst ? this.worst.error_m : Infinity; // a landing does not set the scale of the colours

@@ -1,4 +1,4 @@
-// The live page: takes records from its server, and brings scene, panels, plots and controls up to them.
+// The live page: takes records from its server and updates scene, panels, plots and controls.
 "use strict";
 (() => {
   const AT = Plumbline.SAMPLE_AT;
@@ -10,7 +10,7 @@
 
   const page = {
     session: {}, vehicles: new Map(), chosen: null, requests: 0, socket: null,
-    frames: 0, // drawn so far
+    frames: 0, // frames drawn so far
   };
   let scene = null;
   let noPicture = ""; // why the scene is not drawn
@@ -104,8 +104,8 @@
   function addSamples(vehicle, samples) {
     for (const sample of samples) {
       const last = vehicle.samples[vehicle.samples.length - 1];
-      if (last && sample[AT.time] <= last[AT.time] && sample[AT.time] > last[AT.time] - 1) continue; // known already
-      if (last && sample[AT.time] < last[AT.time]) { // the vehicle began anew
+      if (last && sample[AT.time] <= last[AT.time] && sample[AT.time] > last[AT.time] - 1) continue; // already known
+      if (last && sample[AT.time] < last[AT.time]) { // the vehicle was restarted
         vehicle.samples = [];
         if (scene) scene.clearTrack(vehicle.id);
       }
@@ -115,18 +115,18 @@
     if (vehicle.samples.length > MOST_SAMPLES) vehicle.samples.splice(0, MOST_SAMPLES / 4);
   }
 
-  /** How many rotors a vehicle has, as far as it has told. */
+  /** The reported number of rotors of a vehicle; 4 until it is known. */
   function rotorsOf(vehicle) {
     return vehicle.state && vehicle.state.rotors ? vehicle.state.rotors.length : 4;
   }
 
-  /** What the scene draws of a vehicle. */
+  /** The layout of a vehicle for the scene. */
   function layoutOf(vehicle) {
     const { arm, cable } = vehicle.record.layout;
     return { armLength: arm, cableLength: cable, rotors: Plumbline.frameOf(arm, rotorsOf(vehicle)) };
   }
 
-  /** Whether the path goes on: a load that stands still adds no points. */
+  /** Whether the path gets another point: a load that does not move adds none. */
   function moved(last, sample) {
     if (!sample[AT.load]) return false;
     if (!last || !last[AT.load]) return true;
@@ -161,7 +161,7 @@
     enable();
   }
 
-  // ---- hands on
+  // ---- commands of the user
 
   function ask(action, words) {
     if (!page.socket || page.socket.readyState !== WebSocket.OPEN || page.chosen === null) return;
@@ -220,7 +220,7 @@
 
   // ---- frames
 
-  /** The state between the last two that came, so that the picture moves evenly. */
+  /** The state interpolated between the last two received, so that the picture moves evenly. */
   function between(vehicle, now) {
     const { state, before } = vehicle;
     if (!before || !before.position || !state.position || !before.load || !state.load) return state;

@@ -1,11 +1,11 @@
-// Hands on: each control is a MAVLink command that another ground station could give. A refusal shows its reason.
+// The controls: each sends a MAVLink command that another ground station could send too. A refusal shows its reason.
 "use strict";
 (() => {
   const BUTTONS = [
     ["start", "Fly the mission", "main"], ["takeoff", "Lift"], ["hold", "Hold"], ["resume", "Continue"],
     ["return", "Return"], ["land", "Land"], ["arm", "Arm"], ["disarm", "Disarm"], ["release", "Release the load", "grave"],
   ];
-  // the wind blows towards that side: [row, column, label, north, east]
+  // the wind blows towards this side: [row, column, label, north, east]
   const PAD = [
     [1, 2, "N", 1, 0], [2, 1, "W", 0, -1], [2, 3, "E", 0, 1], [3, 2, "S", -1, 0],
     [1, 1, "NW", 0.707, -0.707], [1, 3, "NE", 0.707, 0.707], [3, 1, "SW", -0.707, -0.707], [3, 3, "SE", -0.707, 0.707],
@@ -14,7 +14,7 @@
   const byId = (id) => document.getElementById(id);
 
   class Controls {
-    /** @param ask function(action, arguments) that sends a request for the vehicle that is chosen */
+    /** @param ask function(action, arguments) that sends a request for the chosen vehicle */
     constructor(ask) {
       this.ask = ask;
       this.sliders = new Map();
@@ -45,7 +45,7 @@
       }
     }
 
-    /** The sliders that the server offers. */
+    /** Makes the sliders that the server offers. */
     offer(controls) {
       byId("sliders").replaceChildren();
       this.sliders.clear();
@@ -65,7 +65,7 @@
       }
     }
 
-    /** A button for each of so many rotors. */
+    /** Makes a button for each of `count` rotors. */
     offerRotors(count) {
       if (this.rotors && this.rotors.length === count) return;
       const box = byId("failures");
@@ -81,13 +81,13 @@
       });
     }
 
-    /** Puts the sliders where the vehicle says that they are. */
+    /** Sets the sliders to the parameters that the vehicle reports. */
     setParameters(parameters) {
       for (const [name, { input, show }] of this.sliders) {
         const value = parameters[name];
         input.disabled = value === undefined;
         if (value === undefined || document.activeElement === input && input.matches(":active")) continue;
-        if (input.dataset.relative) { // to what the vehicle has at first
+        if (input.dataset.relative) { // relative to the first value of the vehicle
           Object.assign(input, { min: 0.2 * value, max: 2.5 * value, step: value / 20 });
           delete input.dataset.relative;
         }
@@ -108,7 +108,7 @@
       box.classList.toggle("bad", !record.ok);
     }
 
-    /** Whether there is a vehicle to command. */
+    /** Enables the controls if there is some vehicle to command, else disables them. */
     enable(some) {
       for (const button of document.querySelectorAll("#commands button, #world button")) button.disabled = !some;
       if (!some) for (const { input } of this.sliders.values()) input.disabled = true;

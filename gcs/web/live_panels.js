@@ -1,8 +1,8 @@
-// What is known now, in words and numbers. Everything from a link is written as text, never as markup.
+// The present state in words and numbers. Everything from a link is written as text, never as markup.
 "use strict";
 (() => {
-  const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
-  const TOAST_S = 6; // of the vehicle's clock
+  const LEAST_WIND = 0.3; // m/s; an estimate of no wind is never exactly 0
+  const TOAST_S = 6; // by the vehicle's clock
   const MOST_TEXTS = 40;
   const SHOWN_TEXTS = 8;
   const WARNING = 4, ERROR = 3; // MAV_SEVERITY
@@ -79,7 +79,7 @@
       this.showToast(state);
     }
 
-    /** What the vehicle said a moment ago, over the picture. */
+    /** Shows the latest text of the vehicle over the picture for TOAST_S. */
     showToast(state) {
       const box = byId("toast"), last = this.texts[0];
       const age = last && last.time !== null && state.time !== null ? state.time - last.time : Infinity;

@@ -1,4 +1,4 @@
-// Running plots of what the reader picks, one strip a signal, with one cursor.
+// Running plots of the signals that the user picks, one strip per signal, with one cursor.
 "use strict";
 (() => {
   const FIELDS = ["time", "load", "position", "asked", "error", "tension", "swing", "velocity", "use", "estimator", "pace"];
@@ -17,7 +17,7 @@
   const COLOURS = ["#4ea1ff", "#ffb454", "#54c7ac", "#c792ea", "#ff7a5c", "#8fb8de", "#e0c341", "#93a3b3"];
   const SPANS = [[20, "20 s"], [60, "1 min"], [300, "5 min"], [Infinity, "all"]];
   const HEIGHT = 132;
-  const LEAST = 0.1; // what an axis spans at least: less is noise, in every unit of these signals
+  const LEAST = 0.1; // least span of an axis: less is noise, in every unit of these signals
 
   function scaled(value, factor) {
     return value === null || value === undefined ? null : value * factor;
@@ -67,7 +67,7 @@
       box.append(...this.spans);
     }
 
-    /** Shows the last so many seconds. */
+    /** Shows the last `seconds`. */
     show(seconds) {
       this.span = seconds;
       this.spans.forEach((button, index) => button.setAttribute("aria-pressed", SPANS[index][0] === seconds));
@@ -79,7 +79,7 @@
       this.show(Infinity);
     }
 
-    /** Makes the strips of the signals that are picked. */
+    /** Makes the strips of the picked signals. */
     layout() {
       for (const plot of this.plots.values()) plot.destroy();
       this.plots.clear();

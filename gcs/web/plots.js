@@ -1,9 +1,9 @@
-/* Which plots a flight has: Plumbline.plotsOf(flight) gives options of Plumbline.Chart, those without data left out. */
+/* The plots of a flight: Plumbline.plotsOf(flight) gives options of Plumbline.Chart; those without data are left out. */
 (function () {
   "use strict";
   const Plumbline = (window.Plumbline = window.Plumbline || {});
   const AXES = ["x", "y", "z"];
-  const METRE = 1; // errors from here on are shown in metres
+  const METRE = 1; // errors from this size on are shown in metres
 
   const greatest = (vector) => {
     let most = 0;
@@ -17,7 +17,7 @@
   };
   const lines = (names, vector, more) => (vector || []).map((values, i) => Object.assign({ name: names[i], values, color: i }, more));
 
-  /** Options of a plot of lengths that are small in a good flight: millimetres, or metres. */
+  /** Options of a plot of lengths that are small in a good flight: in millimetres, or in metres if they are large. */
   function lengths(title, vector, names, digits, norm) {
     if (!vector) return null;
     const large = greatest(vector) >= METRE, factor = large ? 1 : 1000;

@@ -21,7 +21,7 @@
     });
   }
 
-  /** Marks the last of the rows that has begun. */
+  /** Marks the last row that has begun at time t. */
   function mark(rows, t) {
     const begun = rows.filter((row) => row.time !== null && row.time <= t + 1e-9);
     const now = begun.length ? begun.reduce((a, b) => (b.time >= a.time ? b : a)) : null;
@@ -38,7 +38,7 @@
     stage.fit(flight.corners());
   }
 
-  /** Of a flight that leads far the whole is so small that nothing of the load is seen. */
+  /** Whether a flight leads so far that the load would be too small to see in a picture of the whole. */
   function leadsFar(flight) {
     const [low, high] = flight.corners();
     return Boolean(low) && Math.hypot(...low.map((value, axis) => high[axis] - value)) > FAR_M;
@@ -50,7 +50,7 @@
     try {
       stage = flight.source && new Plumbline.Stage(byId("stage"), flight.layout);
     } catch (error) {
-      byId("no-scene").hidden = false; // no WebGL: the still picture stays, and the plots
+      byId("no-scene").hidden = false; // no WebGL: the still picture and the plots remain
     }
     if (!flight.source && !flight.texts.length) return;
     byId("explore").hidden = false;
@@ -90,7 +90,7 @@
       mark(texts, t);
       mark(steps, t);
     });
-    // over a plot the scene shows the time that is pointed at, unless it plays
+    // while the pointer is over a plot, the scene shows the time under it, unless it plays
     group.onHover((t) => { if (!transport.playing) show(t === null ? transport.time : t); });
     group.onPick((t) => transport.set(t, true));
     byId("whole").addEventListener("click", () => group.reset());

@@ -4,7 +4,7 @@
 (() => {
   const GROUND_D = 0;
   const PROCESSOR_MS = 100;
-  const PROCESSOR_REST = 4; // times as long as a picture took, before the next
+  const PROCESSOR_REST = 4; // pause before the next picture, in multiples of the time that the last one took
   const LONGEST_MS = 1000;
   const CLICK_PX = 4; // a pointer that moved further turns the camera and picks nothing
   // x east, y up, z south are the axes of three.js
@@ -15,7 +15,7 @@
      * @param canvas  the element to draw on; its parent is positioned and also takes the legend
      * @param options rotors: [{position: [x, y, z] in the body frame, spin: +1 or -1}], armLength, cableLength (m),
      *                theme: "dark", "light" or "auto"
-     * @throws Error where the browser offers no WebGL
+     * @throws Error if the browser offers no WebGL
      */
     constructor(canvas, options = {}) {
       this.canvas = canvas;
@@ -27,7 +27,7 @@
       };
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
       this.byProcessor = drawnByProcessor(this.renderer.getContext());
-      /** The least time between two pictures of what moves, ms: the flights run on the processor too. */
+      /** The least time between two pictures, ms: if the processor draws, pictures take time from the flights. */
       this.interval = this.byProcessor ? PROCESSOR_MS : 0;
       this.scene = new THREE.Scene();
       this.world = new THREE.Group();
@@ -42,7 +42,7 @@
       this.controls.maxDistance = 600;
       this.crafts = new Map();
       this.tracks = new Map();
-      this.vehicles = new Map(); // id -> what show() told last
+      this.vehicles = new Map(); // id -> its state in the last show()
       this.followed = null;
       this.lastFollowed = null;
       this.picked = [];
@@ -81,8 +81,8 @@
 
     /**
      * @param state {time (s), vehicles: [{id, position, attitude, rotors: [0 ... 1 of the limit],
-     *              load: {position, attached} or null, taut, asked: place or null, cableLength and layout where they
-     *              are not those of the scene}], wind: [N, E, D] m/s or null}
+     *              load: {position, attached} or null, taut, asked: place or null, cableLength and layout if they
+     *              differ from those of the scene}], wind: [N, E, D] m/s or null}
      */
     show(state) {
       const told = new Set();
@@ -114,9 +114,9 @@
     }
 
     /**
-     * Puts whole paths in place: arrays N, E, D, N, ...; `error` has one number (m) a point of `flown`,
-     * which colours it; with `colour` (of CSS) all of it has that one.
-     * @param id of the vehicle, where there are several
+     * Sets whole paths: arrays N, E, D, N, ...; `error` has one number (m) per point of `flown`, which
+     * determines its colour; with `colour` (of CSS), the whole path has this colour.
+     * @param id of the vehicle, if there are several
      */
     setTrack(track, id = 1) {
       const { flown, asked } = this.trackOf(id);
@@ -133,7 +133,7 @@
       if (Number.isFinite(error) && !this.legend.shown) this.levelScale();
     }
 
-    /** Takes the paths of a vehicle away. */
+    /** Removes the paths of a vehicle. */
     clearTrack(id = 1) {
       const { flown, asked } = this.trackOf(id);
       flown.clear();
@@ -151,7 +151,7 @@
       return this.tracks.get(id);
     }
 
-    /** One scale of errors for all tracks, and its legend. */
+    /** Gives all tracks the same scale of errors, and updates its legend. */
     levelScale() {
       const flown = [...this.tracks.values()].map((track) => track.flown);
       const full = Math.max(0.01, ...flown.map((track) => track.full));
@@ -182,7 +182,7 @@
       this.places.setWaypoints(places);
     }
 
-    /** Marks the place that the load was asked to go to; null: none. */
+    /** Marks the place to which the load was commanded; null: none. */
     setGoal(place) {
       this.places.setGoal(place);
     }
@@ -212,7 +212,7 @@
     // ---- cameras
 
     /**
-     * "orbit" stands where the reader put it, "follow" goes along with the vehicle, "top" looks down, north up.
+     * "orbit" stays where the user put it, "follow" moves with the vehicle, "top" looks down, north up.
      * @param id the vehicle that is followed; the first one by default
      */
     camera(mode, id = null) {
@@ -243,7 +243,7 @@
       return this.layout.cableLength + this.layout.armLength;
     }
 
-    /** Looks at `place` from the south-east and above, from that distance. */
+    /** Looks at `place` from the south-east and above, from `distance`. */
     look(place, distance) {
       const target = toScene(place);
       this.controls.target.copy(target);
@@ -261,7 +261,7 @@
       this.lastFollowed = now;
     }
 
-    /** Brings all paths and vehicles into the picture, and `also`: places that nothing is drawn at yet. */
+    /** Brings all paths and vehicles into the picture, and `also`: places at which nothing is drawn yet. */
     fit(also = []) {
       const box = { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] };
       const take = (place) => place.forEach((value, axis) => {
@@ -292,8 +292,8 @@
     // ---- places and pixels
 
     /**
-     * Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground or null, number of clicks) where
-     * the reader clicks.
+     * Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground or null, number of clicks) when
+     * the user clicks.
      */
     onPick(callback) {
       this.picked.push(callback);
@@ -313,7 +313,7 @@
       for (const callback of this.picked) callback(level, ground, event.detail);
     }
 
-    /** Where a place is seen: [x, y] in CSS pixels of the canvas, or null behind the eye. */
+    /** Where a place appears: [x, y] in CSS pixels of the canvas, or null behind the camera. */
     project(place) {
       this.eye.updateMatrixWorld();
       const seen = toScene(place).project(this.eye);
@@ -333,7 +333,7 @@
       this.eye.updateProjectionMatrix();
     }
 
-    /** Draws what show() told last. */
+    /** Draws the state of the last show(). */
     render() {
       this.resize();
       const distance = this.eye.position.distanceTo(this.controls.target);
@@ -344,7 +344,7 @@
       this.renderer.render(this.scene, this.eye);
       if (!this.byProcessor) return;
       const gl = this.renderer.getContext();
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // back once the picture is drawn
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // returns when the picture is drawn
       const rest = PROCESSOR_REST * (performance.now() - began);
       this.interval = Math.min(Math.max(PROCESSOR_MS, rest), LONGEST_MS);
     }
@@ -366,7 +366,7 @@
   }
 
   /**
-   * The rotors of a vehicle whose arms are that long (m), counterclockwise from the rear: four in a plus, more with the
+   * The rotors of a vehicle with arms of `arm` m, counterclockwise from the rear: four in a plus, more with the
    * gap between two of them ahead.
    */
   Plumbline.frameOf = (arm, count) => Array.from({ length: count }, (_, i) => {
@@ -382,19 +382,19 @@
     return [-vector.z, vector.x, -vector.y];
   }
 
-  /** Between vehicle and load. */
+  /** The point between vehicle and load. */
   function centreOf(vehicle) {
     const load = vehicle.load && vehicle.load.attached !== false ? vehicle.load.position : null;
     return load ? vehicle.position.map((value, axis) => 0.5 * (value + load[axis])) : vehicle.position;
   }
 
-  /** Where a ray meets the level of that height, in NED, or null. */
+  /** Where a ray meets the horizontal plane at `height`, in NED, or null. */
   function meet(ray, height) {
     const found = ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 1, 0), -height), new THREE.Vector3());
     return found ? toNed(found) : null;
   }
 
-  /** Whether there is no graphics card, and pictures take the processor's time. */
+  /** Whether there is no graphics card, so that drawing takes processor time. */
   function drawnByProcessor(gl) {
     const named = gl.getExtension("WEBGL_debug_renderer_info");
     const renderer = gl.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
@@ -435,7 +435,7 @@
   }
 
   Plumbline.Scene = Scene;
-  // what the buttons are called, on every page
+  // the names of the buttons on every page
   Plumbline.CAMERAS = [["orbit", "Orbit"], ["follow", "Follow"], ["top", "From above"]];
-  Plumbline.WHOLE = "Whole path"; // brings all of it into the picture
+  Plumbline.WHOLE = "Whole path"; // brings the whole path into the picture
 })();

@@ -100,7 +100,7 @@
       this.build(theme);
     }
 
-    /** Brings all parts to where `vehicle` (see Scene.show) says; `ground` is D of the ground. */
+    /** Moves all parts to the state `vehicle` (see Scene.show); `ground` is D of the ground. */
     show(vehicle, time, ground) {
       const [n, e, d] = vehicle.position;
       const [w, x, y, z] = vehicle.attitude;
@@ -148,7 +148,7 @@
       shadow.material.opacity = 0.42 / (spread * spread);
     }
 
-    /** A straight line while taut, else a curve of the cable's own length. */
+    /** Draws the cable: a straight line while taut, else a curve as long as the cable. */
     hang(vehicle, ground) {
       const a = vehicle.position, b = vehicle.load.position;
       const slack = vehicle.taut === false;
@@ -176,11 +176,11 @@
     }
   }
 
-  /** How far the middle of a curve of that length hangs from the middle of its ends, as a vector. */
+  /** The vector from the middle between the ends a and b to the middle of a curve of this length. */
   function sagOf(a, b, length) {
     const chord = b.map((value, axis) => value - a[axis]);
     if (!(length > Math.hypot(...chord))) return [0, 0, 0];
-    // downward, and aside along the horizontal normal of the chord, so that a steep one shows a loop
+    // downward and sideways, along the horizontal normal of the chord, so that a steep cable shows a loop
     const flat = Math.hypot(chord[0], chord[1]);
     const side = flat > 1e-3 ? [-chord[1] / flat, chord[0] / flat] : [0, 1];
     const direction = [0.5 * side[0], 0.5 * side[1], 0.87];

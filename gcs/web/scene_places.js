@@ -1,8 +1,8 @@
-// What does not fly: ground, compass, fence, rally points, the place that is asked for, wind.
+// What does not fly: ground, compass, fence, rally points, the commanded place, wind.
 "use strict";
 (() => {
-  const WALL_M = 12; // of a fence that names no height
-  const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
+  const WALL_M = 12; // height of the walls of a fence without a height
+  const LEAST_WIND = 0.3; // m/s; an estimate of no wind is never exactly 0
   const STREAKS = 46;
 
   function segments(points, colour, opacity) {
@@ -12,7 +12,7 @@
     return new THREE.LineSegments(geometry, material);
   }
 
-  /** The ground with its lines, drawn by the pixel: they end in the haze and never flicker. */
+  /** The ground with its lines, computed per pixel: they fade into the haze and never flicker. */
   function groundMaterial(theme) {
     return new THREE.ShaderMaterial({
       uniforms: {
@@ -45,11 +45,11 @@
           gl_FragColor = vec4(colour, 1.0);
           #include <colorspace_fragment>
         }`,
-      depthTest: false, depthWrite: false, // under everything, whatever the depth buffer can resolve
+      depthTest: false, depthWrite: false, // below everything, regardless of the resolution of the depth buffer
     });
   }
 
-  /** A word that always faces the reader; `size` is a share of the height of the picture. */
+  /** A word that always faces the camera; `size` is a share of the height of the picture. */
   function label(text, colour, size = 0.034) {
     const canvas = document.createElement("canvas");
     canvas.width = 256;
@@ -129,17 +129,17 @@
       this.groundGroup = group;
     }
 
-    /** Keeps the ground under what is looked at: `target` in the axes of the scene, `distance` of the eye. */
+    /** Keeps the ground below the target of the camera: `target` in the axes of the scene, `distance` of the camera. */
     spreadGround(target, distance) {
       const reach = 12 * distance + 15;
-      this.arrowSize = Math.min(Math.max(distance / 9, 0.25), 6); // as large to the eye from near and far
+      this.arrowSize = Math.min(Math.max(distance / 9, 0.25), 6); // appears equally large from near and far
       this.ground.position.set(-target.z, target.x, 0);
       this.ground.scale.set(2 * reach, 2 * reach, 1);
       this.ground.material.uniforms.centre.value.set(target.x, target.z);
       this.ground.material.uniforms.reach.value = reach;
     }
 
-    /** Zones with a wall each; see Scene.setFence. */
+    /** Draws each zone as a wall; see Scene.setFence. */
     setFence(fence) {
       this.fence = fence;
       if (this.fenceGroup) remove(this.fenceGroup);
@@ -204,7 +204,7 @@
       }
     }
 
-    /** A ring with a stem where the load was asked to go; null takes it away. */
+    /** A ring with a stem at the place to which the load was commanded; null removes it. */
     setGoal(place) {
       this.goal = place || null;
       if (this.goalGroup) remove(this.goalGroup);
@@ -248,7 +248,7 @@
       for (let axis = 0; axis < 3; axis += 1) this.drift[axis] += (wind[axis] * dt) / size[axis];
       for (let i = 0; i < STREAKS; i += 1) {
         const place = size.map((width, axis) => {
-          // the pattern stands in the world, whoever flies through it
+          // the pattern is fixed to the air, not to the vehicle
           const phase = fraction(this.seeds[3 * i + axis] + this.drift[axis] - at[axis] / width + 0.5);
           return at[axis] + (phase - 0.5) * width;
         });

@@ -1,4 +1,4 @@
-// Colours of the scene and the scale of errors. Blue, amber and vermilion are told apart by every kind of eye.
+// Colours of the scene and the scale of errors. Blue, amber and vermilion differ for colour-blind people too.
 "use strict";
 var Plumbline = globalThis.Plumbline || {};
 globalThis.Plumbline = Plumbline;
@@ -21,13 +21,13 @@ globalThis.Plumbline = Plumbline;
     },
   };
 
-  /** The colours of `name`: "dark", "light", or "auto" as the reader's system prefers. */
+  /** The colours of `name`: "dark", "light", or "auto" as the user's system prefers. */
   function themeOf(name) {
     if (name === "dark" || name === "light") return THEMES[name];
     return THEMES[matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"];
   }
 
-  /** Writes red, green and blue of a share 0 ... 1 of the scale into `out` at `at`. */
+  /** Writes red, green and blue of the scale at `share` (0 ... 1) into `out` from index `at`. */
   function scaleColour(theme, share, out, at) {
     const place = Math.min(Math.max(share, 0), 1) * (theme.scale.length - 1);
     const lower = Math.min(Math.floor(place), theme.scale.length - 2);

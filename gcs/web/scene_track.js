@@ -1,4 +1,4 @@
-// Paths: what was asked for (one colour) and what was flown, coloured by the error.
+// Paths: the requested one (in one colour) and the flown one, coloured by the error.
 "use strict";
 (() => {
   const FIRST_CAPACITY = 512;
@@ -8,7 +8,7 @@
   class Trail {
     constructor(world, width) {
       this.world = world;
-      this.count = 0; // points
+      this.count = 0; // of points
       this.last = new Float32Array(6);
       this.material = new THREE.LineMaterial({ vertexColors: true, linewidth: width });
       this.reserve(FIRST_CAPACITY);
@@ -129,7 +129,7 @@
       for (let index = 0; index < this.errors.length; index += 1) this.append(index);
     }
 
-    /** Puts a whole path in place; `points` is N, E, D, N, ... With a colour, it is that of all points. */
+    /** Sets the whole path; `points` is N, E, D, N, ... A colour, if given, is that of all points. */
     set(points, errors, only = null) {
       this.only = only;
       this.points = Array.from(points);
@@ -160,7 +160,7 @@
     return Array.from(colour, (c) => (c < 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
   }
 
-  /** The path that is asked for: one thin line. */
+  /** The requested path: one thin line. */
   class AskedTrack {
     constructor(world, theme) {
       this.trail = new Trail(world, 1.6);

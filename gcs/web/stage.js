@@ -1,11 +1,11 @@
-/* The scene of a replay with its cameras and what is known at the time shown.
+/* The scene of a replay with its cameras and the readings at the time shown.
 
-   stage = new Plumbline.Stage(element, layout)    throws where the browser offers no WebGL
+   stage = new Plumbline.Stage(element, layout)    throws if the browser offers no WebGL
    stage.show(state)          as Scene.show
    stage.readings([[name, text, colour], ...], phase)    with a colour, its swatch stands before the name
    stage.camera(mode), stage.fit(places)
-   stage.note(text)           a word over the scene; empty: none
-   stage.scene                the Scene; drawn when something has changed */
+   stage.note(text)           a short text over the scene; empty: none
+   stage.scene                the Scene; drawn again when something has changed */
 (function () {
   "use strict";
   const Plumbline = (window.Plumbline = window.Plumbline || {});
@@ -15,7 +15,7 @@
       const canvas = document.createElement("canvas");
       canvas.id = "scene";
       canvas.tabIndex = -1;
-      const picture = document.createElement("div"); // what stands over the picture stays over it where the rest is below
+      const picture = document.createElement("div"); // parts over the picture stay over it where the others move below it
       picture.className = "picture";
       picture.append(canvas);
       element.prepend(picture);
@@ -65,7 +65,7 @@
       fit.type = "button";
       fit.textContent = Plumbline.WHOLE;
       fit.addEventListener("click", () => {
-        if (this.scene.mode === "follow") this.camera("orbit"); // which would go along at once
+        if (this.scene.mode === "follow") this.camera("orbit"); // "follow" would leave the whole path immediately
         this.fit();
       });
     }

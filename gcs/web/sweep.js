@@ -1,9 +1,9 @@
-/* The maps of a sweep: a cell tells its figures, and gives the command that flies one of its flights. */
+/* The maps of a sweep: a cell shows its figures and the command that flies one of its flights. */
 (function () {
   "use strict";
   const SVG = "http://www.w3.org/2000/svg";
-  const MOST_NUMBERS = 144; // cells up to which each has its number written in
-  const NUMBER_PX = 38, CELL_PX = 14, DIGIT_PX = 7; // least widths of a cell with its number, of one without, of a digit
+  const MOST_NUMBERS = 144; // with up to so many cells, each shows its number
+  const NUMBER_PX = 38, CELL_PX = 14, DIGIT_PX = 7; // least widths of a cell with a number, of one without, of a digit
   const KINDS = [
     { key: "completed", name: "flights completed", unit: "%" },
     { key: "median", name: "load error, median", unit: "mm" },
@@ -141,10 +141,10 @@
       choice.append(button);
     });
     document.getElementById("maps").append(host);
-    // where every flight completes there is nothing to see but the errors
+    // if every flight completes, only the errors are worth seeing
     const every = map.completed.every((share) => share === null || share === 100);
     (every ? choice.lastChild : choice.firstChild).click();
-    const fade = () => { // the cells would cover a shadow like that of other cards
+    const fade = () => { // the cells would cover a shadow like that of the other cards
       const { scrollLeft: before, scrollWidth, clientWidth } = frame;
       frame.classList.toggle("before", before > 1);
       frame.classList.toggle("after", scrollWidth - clientWidth - before > 1);
@@ -160,7 +160,7 @@
     }).observe(frame);
   }
 
-  /** Puts a text where it can be pasted from, or marks it so that it can be copied by hand. */
+  /** Copies a text to the clipboard, or selects it so that it can be copied by hand. */
   function copy(button) {
     const code = button.parentElement.querySelector("code");
     const range = document.createRange();

@@ -2,8 +2,8 @@
 
    transport = new Plumbline.Transport(host, {span: [from, to], start, bands, marks, worst})
        bands  [{from, to, name, kind}], marks  [{time, level, text}], worst  {time} or null
-       start  where playing begins if nobody has chosen a time
-   transport.time, transport.set(t, chosen)   where the flight is shown; chosen: by the reader
+       start  where playing begins if the user has not chosen a time
+   transport.time, transport.set(t, chosen)   the time that is shown; chosen: by the user
    transport.toggle(), transport.step(seconds)
    transport.onTime(callback)                 callback(t)
    Keys of the page: space plays, arrows step 0.1 s (with shift 1 s), comma and full stop one sample, Home, End, E.
@@ -116,7 +116,7 @@
       return made;
     }
 
-    /** A name is shown where it fits. */
+    /** Shows the names of bands where they fit. */
     _nameBands(line) {
       for (const name of line.querySelectorAll(".band span")) {
         name.hidden = false;
@@ -127,7 +127,7 @@
     _mark(mark) {
       const made = make("button", `mark ${mark.level || ""}`);
       made.type = "button";
-      made.tabIndex = -1; // the list beside has them all
+      made.tabIndex = -1; // not needed for the keyboard: the list beside has all texts
       made.style.left = this._share(mark.time);
       made.title = `${mark.time.toFixed(2)} s  ${mark.text}`;
       made.addEventListener("click", () => this.set(mark.time, true));
@@ -151,7 +151,7 @@
       };
       const act = acts[event.key];
       if (!act) return;
-      // a button that was reached by the keyboard is pressed by it; one that was clicked leaves the space bar alone
+      // the space bar presses a button that was reached by the keyboard, but not one that was clicked
       if (event.key === " " && where instanceof Element && where.closest("button, a, summary")) {
         if (where.matches(":focus-visible")) return;
         where.blur();

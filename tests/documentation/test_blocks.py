@@ -1,10 +1,10 @@
 """Every code block of README and docs is run, or says why it is not.
 
-The blocks of a page are run one after another in a folder of their own that holds what a reader would have by
-then: a flight, and files that `gcs new` writes. Commands run in this process. What is made small, so that all
-of it takes less than a minute: a flight by `gcs fly` flies a short mission under the options of the command,
-after its own has been checked, and has the report of one flight that is made once; a sweep flies two values
-of what is varied with one seed, of the short mission too. Commands to a running vehicle meet a scripted one.
+The blocks of a page run one after another in a separate folder that holds what a reader would have by then:
+a flight, and files that `gcs new` writes. Commands run in this process. Some are made small, so that all of
+it takes less than a minute: `gcs fly` checks its mission, flies a short one with the options of the command,
+and gives the report of one flight that is made once; a sweep flies the first two values of each varied
+parameter with one seed, also of the short mission. Commands to a running vehicle reach a scripted one.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ from tests.doubles.pages import PAGES, REASONS, ROOT, Block, split
 from tests.gcs.conftest import LiveVehicle, ScriptedVehicle
 
 LANGUAGES = {"sh", "python", "toml", "yaml", "text"}
-# how many blocks are not run, by the reason: one more is a decision
+# how many blocks are not run, by reason: to add one is a decision
 NOT_RUN = {"display": 2, "firmware": 7, "minutes": 16, "network": 15}
 SHORT = Mission("short", [Takeoff(0.4), Waypoint(0.0, 0.0, 0.4, hold_s=0.5), Land()])
 SHARED = ROOT / "tests" / "clients" / "survey.plan"
@@ -97,7 +97,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @cache
 def flies_with(own: Own, law: str, sensors: str, vehicle: str, settings: tuple[str, ...]) -> str:
-    """How the short mission ends under these options: as a sweep flies it, which is the same flight."""
+    """The outcome of the short mission with these options, flown as in a sweep: it is the same flight."""
     given = {"CTL_LAW": float(law_number(law)), **dict(map(setting_of, settings))}
     conditions = Conditions(vehicle, sensors, 1, given, own)
     return fly_swept(SHORT, conditions, boarding(SHORT, conditions)).outcome
@@ -105,7 +105,7 @@ def flies_with(own: Own, law: str, sensors: str, vehicle: str, settings: tuple[s
 
 @pytest.fixture
 def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`gcs fly`, `gcs sweep` and `plumbline.sweep` as the head of this file says."""
+    """Make `gcs fly`, `gcs sweep` and `plumbline.sweep` small as the head of this file says."""
 
     def fly(
         options: FlightOptions, told: Callable[..., None], page: Any = None, processes: Any = None
@@ -131,7 +131,7 @@ def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
     make_plan = plans.make_plan
 
     def made(mission: str, *rest: Any) -> Any:
-        make_plan(mission, *rest)  # what is wrong with the sweep itself
+        make_plan(mission, *rest)  # raises an error if the sweep itself is wrong
         vehicle, sensors, laws, _, varied, settings, sample, own = rest
         few = [replace(one, values=one.values[:2]) for one in varied]
         return make_plan(short, vehicle, sensors, laws, (1,), few, settings, min(sample, 2), own)
@@ -154,7 +154,7 @@ def plumbline_record(folder: Path) -> Any:
 
 @contextmanager
 def in_this_process(_: object) -> Iterator[tuple[Executor, int]]:
-    """What flies the flights of a sweep."""
+    """One thread of this process to fly the flights of a sweep."""
     with ThreadPoolExecutor(1) as executor:
         yield executor, 1
 
@@ -171,7 +171,7 @@ def small_sweep(mission: Any, *, vary: Any = None, kind: str = "pandas", **optio
 
 
 class Telling(ScriptedVehicle):
-    """It also tells where its load is."""
+    """A scripted vehicle that also reports the position of its load."""
 
     def tick(self, now_us: int) -> list[bytes]:
         self.tell_load(0.0, 0.0, 2.0)
@@ -180,7 +180,7 @@ class Telling(ScriptedVehicle):
 
 @pytest.fixture(scope="module")
 def vehicle() -> Iterator[str]:
-    """A vehicle that runs and does what it is told, with the parameters of ours; the port at which it is."""
+    """The port of a running vehicle that obeys commands and has the parameters of our autopilot."""
     port = free_port()
     thread = LiveVehicle(port)
     thread.vehicle = Telling()
@@ -193,7 +193,7 @@ def vehicle() -> Iterator[str]:
 
 @pytest.fixture
 def folder(flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the blocks of a page are run."""
+    """The folder in which the blocks of a page are run."""
     shutil.copytree(flown, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     Path("my").mkdir()
@@ -221,7 +221,7 @@ class Shell:
         self._flown, self._port = flown, port
 
     def run(self, block: Block) -> None:
-        """Each command must end well; `# exit code 3` and the like in its comment says how else it may."""
+        """Run each command of the block; it must end with exit code 0. Comments are ignored."""
         for line in block.text.replace("\\\n", " ").splitlines():
             words = shlex.split(line, comments=True)
             while words:
@@ -240,11 +240,11 @@ class Shell:
             for ending in (".toml", ".py"):
                 Path(arguments[2] + ending).unlink(missing_ok=True)
         if arguments[0] == "sweep":
-            arguments.append("--fresh")  # one line is not the continuation of another
+            arguments.append("--fresh")  # a line must not continue the sweep of an earlier one
         if arguments[0] in ("report", "compare"):
             self._have_flights(arguments[1:])
         if takes_address(arguments):
-            arguments += ["--connect", self._port]  # the last one counts
+            arguments += ["--connect", self._port]  # the last --connect counts
         result = CliRunner().invoke(gcs, arguments, prog_name="gcs")
         assert result.exit_code == 0, (
             f"{block.place}: {shlex.join(words)}\n{result.output}{result.exception!r}"
@@ -266,7 +266,7 @@ class Shell:
 
 
 def takes_address(arguments: list[str]) -> bool:
-    """Whether the command speaks to a running vehicle."""
+    """Whether the command connects to a running vehicle."""
     context, command = click.Context(gcs), gcs.get_command(click.Context(gcs), arguments[0])
     if isinstance(command, click.Group):
         command = command.get_command(context, arguments[1])
@@ -274,7 +274,7 @@ def takes_address(arguments: list[str]) -> bool:
 
 
 def run_toml(block: Block) -> None:
-    """The file is one that is read."""
+    """Check that the block can be read as the kind of file that it is."""
     table = tomllib.loads(block.text)
     if "items" in table:
         parse_mission(block.text, "block", block.place)
@@ -296,7 +296,7 @@ def test_a_block_has_a_language_and_a_mark_that_is_known() -> None:
             if block.mark == "run by":
                 told = (ROOT / block.said).read_text(encoding="utf-8")
                 assert page.name in told, f"{block.place}: {block.said} does not name this page"
-        # four spaces would be a block that nobody sees
+        # four spaces would make a block that is not run
         indented = [
             number
             for (_, before), (number, line) in pairwise(prose)
@@ -344,7 +344,7 @@ def test_a_block_of_python_imports_what_it_uses(page: Path) -> None:
 
 
 def _undefined(code: str) -> set[str]:
-    """Names that are used and come from nowhere, scopes left aside."""
+    """Names that are used but not defined anywhere, regardless of scopes."""
     known, used = set(dir(builtins)), set()
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Import | ast.ImportFrom):

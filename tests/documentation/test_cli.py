@@ -15,7 +15,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "cli.md").read_text(encoding="utf-8
 
 
 def commands(command: click.Command, name: str) -> Iterator[tuple[str, click.Command]]:
-    """Every command below `command` that does something, with the words that call it."""
+    """Every command below `command` that is no group, with the words that call it."""
     if not isinstance(command, click.Group):
         yield name, command
         return

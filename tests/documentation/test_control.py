@@ -1,4 +1,4 @@
-"""docs/control.md and its log name the files and functions of the control room as they are."""
+"""docs/control.md and its log name only files and functions that exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/estimators.md and docs/planners.md: what they show flies, and their tables name all that there is."""
+"""docs/estimators.md and docs/planners.md: their examples fly, and their tables are complete."""
 
 from __future__ import annotations
 

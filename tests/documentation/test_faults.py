@@ -1,4 +1,4 @@
-"""docs/faults.md: each test that it names is there, and each row but those that promise nothing names one."""
+"""docs/faults.md: each test that it names exists, and each row names one, except rows that need none."""
 
 from __future__ import annotations
 

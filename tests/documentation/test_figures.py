@@ -21,12 +21,12 @@ ERROR = "load_error_max_m"
 
 
 def mm(*rows: str) -> str:
-    """The worst load error of these rows in whole millimetres, rounded up: "within" is true then."""
+    """The worst load error of these rows in whole millimetres, rounded up so that "within" is true."""
     return str(math.ceil(1e3 * max(RECORD["rows"][row][ERROR] for row in rows) - 1e-9))
 
 
 def real(*rows: str) -> str:
-    """The same in a lab or outdoors as they are, and how many flights were lost there."""
+    """The same in the realistic world, and how many flights were lost there."""
     found = [RECORD["rows"][f"{row}, real"] for row in rows]
     home = [row[ERROR] for row in found if ERROR in row]
     lost = round(sum(row.get("lost", 0) for row in found))
@@ -35,7 +35,7 @@ def real(*rows: str) -> str:
 
 
 def step_of(row: str) -> str:
-    """Of README."""
+    """The step response of a row, as in README."""
     found = RECORD["rows"][row]
     if "settling_time_5pct_s" not in found:
         return f"{round(found.get('lost', RECORD['seeds']))} of {RECORD['seeds']} lost"
@@ -50,7 +50,7 @@ def figure(row: str, name: str, digits: int) -> str:
 
 
 def readme() -> str:
-    """What README says of the flights."""
+    """What README says about the flights."""
     return f"""In each of {SWEEP["completed"]:,} flights the load stayed within {math.ceil(1e3 * SWEEP["error_100"])} mm of its path at up to 2 m/s, with the noise of motion capture,
 motor lag and rotors that saturate (`gcs fly case-b --sensors lab`). The control law `plumbline` computes the derivatives of
 its commands from model and mission, predicts the state over the known delay, and estimates the mass of the load and the
@@ -115,7 +115,7 @@ def control() -> str:
 
 
 def robustness() -> str:
-    """What docs/robustness.md says of the vehicle as it is delivered."""
+    """What docs/robustness.md says about the vehicle as shipped."""
     median, most, nearly, worst = (
         f"{1e3 * SWEEP[f'error_{share}']:.1f} mm" for share in ("50", "99", "99.9", "100")
     )

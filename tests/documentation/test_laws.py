@@ -1,4 +1,4 @@
-"""docs/laws.md: its laws fly as they stand, and its tables name all that there is."""
+"""docs/laws.md: its laws fly unchanged, and its tables are complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/learning.md runs as it stands, and its tables have all that there is."""
+"""The code of docs/learning.md runs unchanged, and its tables are complete."""
 
 from __future__ import annotations
 

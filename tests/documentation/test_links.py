@@ -1,4 +1,4 @@
-"""Links of README and docs lead to files and headings that there are, and the site has every page."""
+"""Links of README and docs lead to files and headings that exist, and the site has every page."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_docs_lead_to_docs_alone() -> None:
-    """What lies elsewhere is not on the site."""
+    """Files outside docs are not on the site."""
     docs = (ROOT / "docs").resolve()
     out = [
         f"{page.name}: {link}"

@@ -1,4 +1,4 @@
-"""docs/missions.md: its table of mission commands is the one that the autopilot reads items by.
+"""docs/missions.md: its table of mission commands is the one by which the autopilot reads items.
 
 To write the table anew: python tests/documentation/test_mission_commands.py > part, and put it in the page.
 """
@@ -28,7 +28,7 @@ OTHERS = (
 
 
 def rows() -> str:
-    """The table; neighbours that say the same share a row."""
+    """The table; adjacent commands with the same cells share a row."""
     lines = [
         f"| {', '.join(f'{command_name(row.number)} {row.number}' for row in same)} | {cells}\n"
         for cells, same in groupby(COMMANDS, cells_of)

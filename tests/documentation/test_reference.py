@@ -1,4 +1,4 @@
-"""docs/files.md and docs/messages.md are made of what they describe: the schemas of files, and the dialect.
+"""docs/files.md and docs/messages.md are generated from the schemas of files and from the dialect.
 
 To write the pages anew: python tests/documentation/test_reference.py
 """
@@ -40,7 +40,7 @@ The messages, commands and enumerations that Plumbline's dialect adds to MAVLink
 
 """
 TABLES = {"items": "1 ... 1000 tables", "terms": "1 ... 32 tables", "factors": "0 ... 3 tables"}
-# of keys whose schema has no words
+# meanings of keys whose schema has no description
 MEANINGS = {
     "terms": "added to each other",
     "factors": "sines, multiplied with each other and the envelope",
@@ -115,14 +115,14 @@ KEYS = "| key | must be | default | meaning |\n|---|---|---|---|\n"
 
 
 def table_of(annotation: Any) -> type[BaseModel] | None:
-    """The table that a key holds, alone or optionally."""
+    """The table that a key holds, required or optional; None if it holds no table."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((table for table in map(table_of, get_args(annotation)) if table is not None), None)
 
 
 def rules(annotation: Any) -> list[Any]:
-    """Bounds that stand in an annotation, also of an optional value."""
+    """Bounds in an annotation, also of an optional value."""
     found = [rule for rule in getattr(annotation, "__metadata__", ()) if isinstance(rule, FieldInfo)]
     return [rule for field in found for rule in field.metadata] + [
         rule for argument in get_args(annotation) for rule in rules(argument)
@@ -151,7 +151,7 @@ def allowed(key: str, field: FieldInfo) -> str:
 
 
 def default(field: FieldInfo) -> str:
-    """What is taken where the key is left out."""
+    """The value that applies if the key is left out."""
     if field.is_required():
         return ""
     value = field.get_default(call_default_factory=True)
@@ -167,7 +167,7 @@ def rows(spec: type[BaseModel]) -> str:
 
 
 def files_page() -> str:
-    """The page of the keys."""
+    """The page of the keys of files."""
     text = FILES_HEAD + rows(FileSpec)
     for kind, item in ITEMS.items():
         text += f'\n### Item `type = "{kind}"`\n\n'

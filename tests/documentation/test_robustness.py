@@ -1,5 +1,5 @@
 # ruff: noqa: E501 paragraphs of the page stand here as they stand there
-"""docs/robustness.md says of its maps what is in docs/robustness.json, which `make robustness` flies anew.
+"""docs/robustness.md states the figures of docs/robustness.json, which `make robustness` flies anew.
 
 To put it into the page: python tests/documentation/test_robustness.py
 """
@@ -43,13 +43,13 @@ def whole(cell: dict[str, Any]) -> bool:
 
 
 def levels(found: Cells, name: str, when: Callable[[dict[str, Any]], bool]) -> list[float]:
-    """The values of a parameter at which every cell is so."""
+    """The values of a parameter at which `when` holds for every cell."""
     values = sorted({cell[name] for cell in found})
     return [value for value in values if all(when(cell) for cell in found if cell[name] == value)]
 
 
 def error(found: Sequence[dict[str, Any]]) -> float:
-    """The median error of the one cell that is meant, in mm."""
+    """The median error of the only cell in `found`, in mm."""
     (cell,) = found
     return float(cell["median_mm"])
 
@@ -59,7 +59,7 @@ def mm(value: float) -> str:
 
 
 def lost_most(found: Cells) -> str:
-    """In which phase most were lost."""
+    """The phase in which most flights were lost."""
     phases: Counter[str] = Counter()
     for cell in found:
         phases.update(cell["lost"])
@@ -67,7 +67,7 @@ def lost_most(found: Cells) -> str:
 
 
 def home(found: Cells) -> str:
-    """How much of a map comes home."""
+    """How many flights of a map were completed, in words."""
     flown, completed = (sum(cell[key] for cell in found) for key in ("flown", "completed"))
     return "through the whole map" if completed == flown else f"home {completed} of {flown} times"
 

@@ -1,4 +1,4 @@
-"""The site: strict, and nothing of it asks the network for anything."""
+"""The site builds without a warning, and its pages load nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(
 
 
 def _dead(page: Path) -> Iterator[str]:
-    """The links of a page to files that are not there."""
+    """The links of a page to files that do not exist."""
     for link in re.findall(r'<a [^>]*href="([^"#?]+)[^"]*"', page.read_text(encoding="utf-8")):
         elsewhere = re.match(r"[a-z]+:|//", link) or (page.name == "404.html" and link.startswith("/"))
         if not elsewhere and not (page.parent / unquote(link)).exists():

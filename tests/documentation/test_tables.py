@@ -1,4 +1,4 @@
-"""Every row of a table has as many cells as its heading: a row's last cells would not be drawn."""
+"""Every row of a table has as many cells as its heading: cells in excess would not be drawn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BORDER = re.compile(r"(?<!\\)\|")
 
 
 def tables(text: str) -> list[list[tuple[int, int]]]:
-    """Of each table its rows, as (line, number of cells)."""
+    """The rows of each table, as (line, number of cells)."""
     lines = re.sub(r"^```.*?^```", lambda block: "\n" * block[0].count("\n"), text, flags=re.M | re.S)
     rows = [
         (number, len(_BORDER.findall(line)) - 1 if line.startswith("|") else 0)

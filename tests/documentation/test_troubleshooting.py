@@ -1,4 +1,4 @@
-"""docs/troubleshooting.md quotes what the programs say; what it quotes stands in the code."""
+"""docs/troubleshooting.md quotes messages of the programs; each quotation must be a text of the code."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tests.doubles.pages import ROOT
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
 HEADINGS = re.findall(r"^### `(.+)`$", PAGE, re.MULTILINE)
 ROOMS = (autopilot, gcs, missions, plumbline, sitl)
-SHORTEST = 5  # characters of a piece between what differs
+SHORTEST = 5  # fewest characters of a piece of a quotation that is searched for
 
 
 def literals() -> str:
-    """All texts of the code, those of f-strings with `\\0` where something is put in."""
+    """All texts of the code, those of f-strings with `\\0` where a value is inserted."""
     found = []
     for room in ROOMS:
         for path in Path(room.__path__[0]).rglob("*.py"):

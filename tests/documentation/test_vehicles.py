@@ -217,7 +217,7 @@ def test_a_key_ends_in_its_unit() -> None:
 
     for key, field in Vehicle.model_fields.items():
         unit = (field.json_schema_extra or {}).get("unit", "")
-        # a radian is a number: it is named where nothing else would tell a frequency
+        # a radian is a number: a key names it only where it could otherwise be taken for a frequency
         assert plain(key).endswith(plain(unit.replace("/rad^2", ""))), key
 
 
@@ -237,7 +237,7 @@ def test_the_messages_are_those_of_the_reader(tmp_path, monkeypatch) -> None:
 
 
 def message(name: str) -> str:
-    """What is said of a vehicle that cannot be read."""
+    """The error message of a vehicle that cannot be read."""
     try:
         load_vehicle(name)
     except ValueError as error:

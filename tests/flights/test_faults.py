@@ -397,6 +397,16 @@ def test_a_ground_station_that_falls_silent_leads_to_what_was_set(
     assert craft.flight.phase == phase
 
 
+@pytest.mark.parametrize(("action", "phase"), [(2, Phase.SET_DOWN), (3, Phase.SET_DOWN)])
+def test_a_ground_station_that_falls_silent_before_the_load_is_lifted(action: int, phase: Phase) -> None:
+    craft = Craft(*ROUTE, NAV_DLL_ACT=action, COM_DL_LOSS_T=PATIENCE_S)
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.TAUTEN)
+    craft.send(HEARTBEAT)
+    craft.wait(1.1 * PATIENCE_S)
+    assert craft.flight.phase == phase
+
+
 def test_a_ground_station_is_not_missed_unless_that_is_asked_for() -> None:
     craft = under_way(COM_DL_LOSS_T=1.0)
     craft.send(HEARTBEAT)

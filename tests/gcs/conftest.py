@@ -1,4 +1,4 @@
-"""A scripted vehicle without sockets or clock, and links that carry datagrams badly."""
+"""A scripted vehicle without sockets or clock, and links that lose, double and delay datagrams."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ PX4_HOLD = 0x03040000
 
 
 class ScriptedVehicle:
-    """A vehicle as the protocols see it. Tests change its attributes and `script` what it does in flight.
+    """A vehicle as the protocols see it. Tests change its attributes; `script` is what it does in flight.
 
-    The mission protocol is led as the specification says: an item is asked for again after `ASK_US`, an item
-    that was not asked for is passed over, a finished transfer is acknowledged again.
+    The mission protocol follows the specification: an item is requested again after `ASK_US`, an item that
+    was not requested is ignored, a finished transfer is acknowledged again.
     """
 
     ASK_US = 250_000
@@ -47,8 +47,8 @@ class ScriptedVehicle:
         self.silent = False
         self.silent_commands: set[int] = set()
         self.ready = True
-        self.ready_from_us = 0  # whether it is ready or not
-        self.kept_texts: list[tuple[int, str]] = []  # that it tells again
+        self.ready_from_us = 0  # before this time it is not ready, even if `ready`
+        self.kept_texts: list[tuple[int, str]] = []  # sent again on request
         self.armed = False
         self.started_us: int | None = None
         self.script: Callable[[ScriptedVehicle, float], None] | None = None
@@ -100,7 +100,7 @@ class ScriptedVehicle:
         self.heartbeat()
 
     def tick(self, now_us: int) -> list[bytes]:
-        """Let time pass; what the vehicle sends."""
+        """Let time pass; return what the vehicle sends."""
         self.now_us = now_us
         if now_us >= self._next_heartbeat_us:
             self._next_heartbeat_us += self.HEARTBEAT_US
@@ -272,7 +272,7 @@ def _item(m: Any) -> WireItem:
 
 @dataclass
 class BadLink:
-    """Drops, doubles and delays datagrams, each with `chance`; order is lost with the delays."""
+    """Drops, doubles and delays datagrams, each with `chance`; the delays change their order."""
 
     rng: random.Random
     chance: float = 0.0
@@ -293,7 +293,7 @@ class BadLink:
 
 
 class World:
-    """A client and the scripted vehicle, a link each way, one clock."""
+    """The scripted vehicle, a link to it and one from it, and the clock that it shares with a client."""
 
     def __init__(self) -> None:
         self.vehicle = ScriptedVehicle()
@@ -308,7 +308,7 @@ class World:
     def ticks(
         self, receive: Callable[[bytes, int], object], poll: Callable[[int], list[bytes]], seconds: float
     ) -> Iterator[int]:
-        """Run both sides; yields the time after each tick."""
+        """Run client and vehicle; yield the time after each tick."""
         end_us = self.now_us + round(seconds * 1e6)
         while self.now_us < end_us:
             self.now_us += TICK_US
@@ -333,7 +333,7 @@ def world() -> World:
 
 @pytest.fixture
 def items() -> list[WireItem]:
-    """A hundred items that have nothing in common, with the first a take-off and the last a landing."""
+    """A hundred different items; the first is a take-off, the last a landing."""
     rng = random.Random(7)
     middle = [
         WireItem(
@@ -347,7 +347,7 @@ def items() -> list[WireItem]:
 
 
 class LiveVehicle(threading.Thread):
-    """The scripted vehicle on the wall clock behind a socket; it speaks first, to `port`."""
+    """The scripted vehicle on the wall clock behind a socket; it sends first, to `port`."""
 
     def __init__(self, port: int) -> None:
         super().__init__(daemon=True)
@@ -361,7 +361,7 @@ class LiveVehicle(threading.Thread):
             link.settimeout(0.005)
             began_ns = time.monotonic_ns()
             while not self._over.is_set():
-                with suppress(OSError):  # nothing came, or nobody listens yet
+                with suppress(OSError):  # nothing came, or the ground station does not listen yet
                     self.vehicle.receive(link.recv(65535))
                 for datagram in self.vehicle.tick((time.monotonic_ns() - began_ns) // 1000):
                     with suppress(OSError):
@@ -374,7 +374,7 @@ class LiveVehicle(threading.Thread):
 
 @pytest.fixture
 def live() -> Iterator[tuple[ScriptedVehicle, str]]:
-    """A vehicle that runs, and the port at which it is met."""
+    """A running vehicle, and the port to which it sends."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

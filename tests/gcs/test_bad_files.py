@@ -1,5 +1,5 @@
-"""What somebody brings and is wrong: each gives one line that says what, where and what to do, and its exit
-code, before anything flies."""
+"""Wrong files and classes of the user: each gives one line that says what is wrong, where, and what to do,
+and its exit code, before anything flies."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def planner(body: str, parameters: str = "") -> str:
     return PLANNER.format(body=body, parameters=parameters)
 
 
-# by the option: what stands in mine.py, and what is told
+# by option: the content of mine.py, and the expected message
 BAD = {
     "--law": [
         ("class Mine:", r"mine.py: SyntaxError|mine.py: IndentationError"),
@@ -168,7 +168,7 @@ CASES = [(option, text, told) for option, cases in BAD.items() for text, told in
 
 
 def told_of(*arguments: str) -> tuple[int, str]:
-    """Exit code and the one line that is told."""
+    """Exit code and the one line on stderr."""
     result = CliRunner().invoke(gcs, arguments, prog_name="gcs")
     (line,) = result.stderr.splitlines()
     assert line.startswith("gcs: ") and not result.stdout
@@ -209,7 +209,7 @@ def test_one_that_is_not_there_is_told(option: str) -> None:
     assert (code, "'nobody': no " in line) == (EXIT_USAGE, True)
 
 
-# the line of a shipped template that is changed, what it becomes, and what is told
+# kind, option, the line of a shipped template that is changed, what it becomes, and part of the message
 FILES = [
     ("vehicle", "--vehicle", "quad_mass_kg = ", "quad_mass_kg = -1.0", "quad_mass_kg = -1"),
     ("vehicle", "--vehicle", "quad_mass_kg = ", "quad_mas_kg = 1.0", "quad_mas_kg"),

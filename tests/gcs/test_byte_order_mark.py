@@ -1,4 +1,4 @@
-"""Text files as editors of Windows leave them: the mark at their beginning is no part of what they say."""
+"""Text files as editors of Windows write them: the byte order mark is not part of their content."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MAP += "[model]\nmass_ratio = 0.1\n"
 
 
 def written(kind: str, path: Path) -> None:
-    """A file of this kind, as its name says."""
+    """Write a file of this kind."""
     if kind in ("mission", "vehicle", "sensors"):
         new_file(kind, str(path))
     elif kind == "column map":

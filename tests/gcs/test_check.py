@@ -1,4 +1,4 @@
-"""What `gcs check` fears of a mission that can be flown."""
+"""What `gcs check` reports and warns of where a mission can be flown."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gcs.workflows.check_mission import Check, check_mission, flown_alone, reele
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
-CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
+CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # for `heavy`, rotors of 12 N each
 
 
 def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warned_of() -> None:
@@ -53,7 +53,7 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     (found,) = reels_too_far(mission, "bebop")
     assert (found.item, found.quantity, found.limit) == (3, "cable length", limit_m)
     assert found.value == pytest.approx(cable_m)
-    within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 rounds below
+    within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 < limit
     assert list(reels_too_far(within, "bebop")) == []
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
 
@@ -80,7 +80,7 @@ def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:
 def test_how_fast_the_load_becomes_is_told() -> None:
     steps = (Takeoff(2.0), Speed(9.0), Waypoint(1.0, 0.0, 2.0), Land())
     *_, path = feasibility.paths(Mission("quick", "", "", (), steps), load_limits("bebop"))
-    # 1 m is too short for it at the acceleration that is set; sampled at the middle, where the peak is
+    # at the set acceleration 1 m is too short to reach the speed; the peak, in the middle, is sampled
     assert path.speed_m_s == pytest.approx(PEAK_SPEED * 1.0 / path.duration_s, rel=1e-9)
     assert path.speed_m_s < 2.0
     assert f"; load to {path.speed_m_s:.2f} m/s, rotors" in str(path)

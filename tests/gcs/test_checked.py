@@ -1,4 +1,4 @@
-"""A mission that was found flyable is known to be, as long as nothing changes that decides it."""
+"""A mission that was found flyable is known as flyable until something changes on which this depends."""
 
 from __future__ import annotations
 

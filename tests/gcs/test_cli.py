@@ -53,13 +53,13 @@ def commands():
 
 @pytest.fixture(autouse=True)
 def nothing_left_to_compile(monkeypatch):
-    """What is said of compiling is looked at in test_warmup."""
+    """Messages about compiling are tested in test_warmup."""
     monkeypatch.setattr("gcs.workflows.fly.flight_parts", lambda laws: [])
     monkeypatch.setattr("gcs.workflows.flight_here.parts_here", lambda laws: [])
 
 
 def one_line(result, code):
-    """The error's line; it is all there is."""
+    """The error's line, which must be the only output."""
     assert result.exit_code == code, result.output
     assert result.stdout == ""
     lines = result.stderr.splitlines()
@@ -114,7 +114,7 @@ def test_a_shell_can_complete_words(monkeypatch):
 
 
 def test_help_needs_nothing_but_click():
-    """Whatever is loaded before help can be shown, whoever asks for it waits for."""
+    """The user waits for every module that is loaded before help is shown."""
     program = "import sys, gcs.cli\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))"
     told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
     found = {name for name in told.stdout.split() if name not in sys.stdlib_module_names}
@@ -805,7 +805,7 @@ def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
     shutil.copy(out / "flight.tlog", bare)
     assert run("report", str(bare), "--json").exit_code == EXIT_DONE
     assert (tmp_path / "capture-report" / "report.html").is_file()
-    assert record["samples"] == 0  # from the lift it is lowered at once
+    assert record["samples"] == 0  # it is lowered immediately after the lift
     assert f"{out}: holds no moment of a mission with the load in the air" in again.stderr
     sentence = "The figures that need the truth of the simulator are missing: "
     assert record["load_error_max_m"] is None and record["estimator_error_max_m"] is None

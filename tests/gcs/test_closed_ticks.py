@@ -1,4 +1,4 @@
-"""Flights in one process: machine code flies the ticks at which nothing is decided, to the same bytes."""
+"""Flights in one process: machine code flies the ticks without decisions, with the same bytes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ GUSTS = {"SIM_WIND_E": 3.0, "SIM_GUST_STD": 1.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT
 
 
 class Fails(LoadPid):
-    """A law that gives up in flight."""
+    """A law that fails in flight."""
 
     def load_position(self, memory: Any, now: Now) -> Any:
         if now.time_s > 3.0:
@@ -37,7 +37,7 @@ class Fails(LoadPid):
 
 
 class Frames:
-    """A log of what is written, with the times."""
+    """A log that keeps the written frames and their times."""
 
     def __init__(self) -> None:
         self.written: list[tuple[int, bytes]] = []

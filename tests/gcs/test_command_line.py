@@ -1,4 +1,4 @@
-"""The command that a report names flies its flight again, under the same options."""
+"""The command that a report states flies its flight again with the same options."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def test_what_should_be_done_takes_a_while_yet():
 
 
 def test_a_core_is_shared_with_what_else_runs_until_the_pace_is_known():
-    # four want two cores
+    # four processes want two cores
     assert remaining_s([], [(26.0, 6.0), (10.0, 6.0)], [], 2, busy=2.0) == pytest.approx(46.0)
     assert remaining_s([(10.0, 10.0)], [(26.0, 6.0), (10.0, 6.0)], [], 2, busy=2.0) == pytest.approx(20.0)
 

@@ -1,4 +1,4 @@
-"""Folders of flights: each flight has its own, whoever begins at the same time."""
+"""Folders of flights: each flight has its own, even if several begin at the same time."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def test_a_working_folder_that_is_not_writable_is_wrong_input_and_no_option_is_b
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("flights", "sweeps"):
-        (tmp_path / name).touch()  # as root may write everywhere
+        (tmp_path / name).touch()  # a file in place of the folder, because root may write everywhere
     result = CliRunner().invoke(gcs, command.split(), prog_name="gcs")
     assert result.exit_code == EXIT_USAGE
     last = result.stderr.splitlines()[-1]

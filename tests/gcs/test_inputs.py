@@ -1,4 +1,4 @@
-"""What a flight is started with: named wrongly it is refused by gcs itself, and nothing is started."""
+"""Inputs of a flight: gcs itself refuses wrong ones, and starts no process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gcs.workflows.flight_inputs import check_flight_inputs, doubts
 from sitl.sensors.shipped import PROFILES
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
-# what is wrong, the text put for another in bebop.toml, and the beginning of what is said
+# what is wrong, the text of bebop.toml and its replacement, and the beginning of the message
 WRONG_VEHICLES = [
     ("no masses", ("quad_mass_kg = 0.4", "# "), "quad_mass_kg is missing (mass of the vehicle without"),
     ("a negative mass", ("load_mass_kg = 0.1", "load_mass_kg = -5"), "load_mass_kg = -5; must be >= 0.001"),
@@ -26,7 +26,7 @@ WRONG_VEHICLES = [
 
 @pytest.fixture(autouse=True)
 def no_process(monkeypatch):
-    """Whoever starts a process fails; those that are only loaded, to be started, are not there."""
+    """Starting a process fails; loading a program for a later start does nothing."""
 
     def refuse(*_args, **_kwargs):
         raise AssertionError("a process was started")
@@ -119,7 +119,7 @@ def test_settings_of_both_programs_are_taken():
 @pytest.mark.parametrize("command", ["fly", "check", "upload", "sweep"])
 def test_help_names_the_shipped_vehicles(command):
     text = " ".join(CliRunner().invoke(gcs, [command, "--help"]).stdout.split())
-    # a name with a hyphen may end a line at it
+    # a line may break after the hyphen of a name
     assert ", ".join(VEHICLES.names()) in text.replace("- ", "-")
 
 

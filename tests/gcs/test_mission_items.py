@@ -1,4 +1,4 @@
-"""What the vehicle says of uploaded items, in the mission's own terms."""
+"""The vehicle's messages about uploaded items, with the item numbers of the mission file."""
 
 from __future__ import annotations
 

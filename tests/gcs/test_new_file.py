@@ -1,4 +1,4 @@
-"""gcs new: what it writes flies as it is, and tells of every key that there is."""
+"""gcs new: the files it writes fly unchanged and name every key."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def written(kind: str, name: str = "my-own") -> Path:
 
 @pytest.mark.parametrize("kind", kinds())
 def test_what_is_written_flies_as_it_is(kind: str) -> None:
-    """The options are those of the command that it says; a file that is no mission flies a short one."""
+    """The options are those of the command in the file; a file that is no mission flies a short one."""
     path = written(kind)
     mission, *options = shlex.split(written_command(path))[2:]
     given = dict(zip((word.removeprefix("--") for word in options[::2]), options[1::2], strict=True))
@@ -51,7 +51,7 @@ def test_what_is_written_flies_as_it_is(kind: str) -> None:
 
 
 def written_command(path: Path) -> str:
-    """The command that the file itself names."""
+    """The command that is stated in the file."""
     (line,) = re.findall(r"Fly it:\s+(gcs fly .*)", path.read_text(encoding="utf-8"))
     return line
 
@@ -115,7 +115,7 @@ def test_what_cannot_be_is_one_line(words: tuple[str, ...], code: int, part: str
 
 
 def uncommented(kind: str) -> dict[str, object]:
-    """The file with every key that stands in a comment."""
+    """The content of the file if the keys in its comments are made active."""
     text = written(kind).read_text(encoding="utf-8")
     return tomllib.loads(re.sub(r"^# (?=\[|\w+ = )", "", text, flags=re.MULTILINE))
 
@@ -123,7 +123,7 @@ def uncommented(kind: str) -> dict[str, object]:
 def test_every_key_of_a_vehicle_is_named() -> None:
     table = uncommented("vehicle")
     assert Vehicle.model_validate(table)
-    # those of a vehicle that is no quadrotor
+    # keys of vehicles other than quadrotors
     assert set(Vehicle.model_fields) - set(table) <= {"rotors", "frame", "spin", "rotor"}
 
 

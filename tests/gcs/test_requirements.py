@@ -1,4 +1,4 @@
-"""Requirements on a run: read, judged, told, and as a test report."""
+"""Requirements on a run: read, judged, printed, and as a test report."""
 
 from __future__ import annotations
 

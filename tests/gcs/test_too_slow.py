@@ -1,4 +1,4 @@
-"""A flight in real time that came to nothing on a machine that was too slow for it: the outcome says so."""
+"""A flight in real time that failed because the machine was too slow for it: the outcome says so."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OWN_REASON = "the load is lost"
 
 
 def write(log: TlogWriter, missed: int, seconds: int = 40, speed: float = 1.0, slow: float = 1.0) -> None:
-    """What a simulator of 250 ticks a second tells once a second; `slow`: of its first half."""
+    """Write what a simulator of 250 ticks a second reports each second; `slow`: factor of the first half."""
     writer = FrameWriter(1, 27)
     for second in range(1, seconds + 1):
         rate_hz = 250.0 * speed * (slow if second <= seconds // 2 else 1.0)

@@ -1,4 +1,4 @@
-"""The flight software is compiled in parts, by several processes, and what went wrong is told."""
+"""The flight software is compiled in parts, by several processes, and errors are reported."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first
 
 
 def load_of(monkeypatch, others):
-    """So many other processes want a core."""
+    """Pretend that so many other processes want a core."""
     monkeypatch.setattr(os, "getloadavg", lambda: (float(others), 0.0, 0.0), raising=False)
 
 

@@ -23,7 +23,7 @@ from autopilot.wire.convert.simulator import hil_sensor_message, read_hil_actuat
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard
-from missions.model import Delay, Land, ReturnHome, Takeoff, Waypoint
+from missions.model import Delay, Land, ReturnHome, Step, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
 from tests.doubles.motion import TICK_S
 
@@ -422,6 +422,14 @@ def test_an_ardupilot_client_flies_without_any_stream() -> None:
     assert math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)) < 0.015
     assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED))
+
+
+@pytest.mark.parametrize("behind", [(), (Waypoint(1.0, 0.0, 2.0), Land())])
+def test_items_behind_a_landing_are_reported(behind: tuple[Step, ...]) -> None:
+    craft = Craft(Takeoff(2.0), Waypoint(0.0, 1.0, 2.0), Land(), *behind)
+    found = [(text.severity, text.text) for text in craft.onboard.endpoint.kept_texts.texts]
+    told = (mavlink.MAV_SEVERITY_WARNING, "Mission ends with the landing of item 2; no later item is flown")
+    assert (told in found) == bool(behind)
 
 
 def test_it_tells_in_which_run_of_the_simulated_world_it_flies() -> None:

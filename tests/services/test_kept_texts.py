@@ -145,3 +145,16 @@ def test_a_text_is_kept_once_and_in_its_place_whatever_becomes_of_what_was_refus
     kept.settle("mission")
     notice = mavlink.MAV_SEVERITY_NOTICE
     assert kept.texts[1:] == (KeptText(3, notice, "Mission denied"), KeptText(4, WARNING, "last"))
+
+
+def test_texts_that_merge_keep_the_place_of_the_later_one() -> None:
+    kept, notice = KeptTexts(TextWriter()), mavlink.MAV_SEVERITY_NOTICE
+    kept.keep(WARNING, "another", 2)
+    kept.keep(WARNING, "Mission denied", 3, about="mission")
+    kept.inherit([KeptText(8, notice, "Mission denied"), KeptText(9, WARNING, "before")], 10)
+    kept.settle("mission")
+    assert kept.texts == (
+        KeptText(-1, WARNING, "before"),
+        KeptText(2, WARNING, "another"),
+        KeptText(3, notice, "Mission denied"),
+    )

@@ -167,7 +167,35 @@ def test_what_is_unknown_is_said_to_be(snap):
 def test_gps_is_the_receiver_not_the_estimate(snap):
     (gps,) = sent(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, snap(**FLYING))
     assert (gps.time_usec, gps.fix_type, gps.satellites_visible) == (3000, 3, 12)
-    assert (gps.eph, gps.epv, gps.vel, gps.cog) == (150, 250, 200, 0)
+    assert (gps.eph, gps.epv, gps.vel, gps.cog) == (70, 110, 200, 0)
+    assert (gps.h_acc, gps.v_acc, gps.alt_ellipsoid) == (1500, 2500, gps.alt)
+
+
+def test_a_lost_fix_has_no_dilution(snap):
+    lost = GpsFix(3000, mavlink.GPS_FIX_TYPE_NO_FIX, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), math.inf, math.nan, 2)
+    (gps,) = sent(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, snap(gps=lost))
+    assert (gps.fix_type, gps.eph, gps.epv, gps.h_acc, gps.v_acc) == (1, 65535, 65535, 2**32 - 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("breach", "kind"),
+    [
+        ("", mavlink.FENCE_BREACH_NONE),
+        ("beyond the fence, GF_MAX_VER_DIST 5 m above home (vehicle at 5.02 m)", mavlink.FENCE_BREACH_MAXALT),
+        ("beyond the fence, GF_MAX_HOR_DIST 5 m from home", mavlink.FENCE_BREACH_BOUNDARY),
+    ],
+)
+def test_the_kind_of_a_breach_is_stated(snap, breach, kind):
+    (status,) = sent(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, snap(breach=breach))
+    assert (status.breach_status, status.breach_type) == (int(bool(breach)), kind)
+
+
+def test_the_winch_reports_the_length_of_the_cable_and_its_tension_as_a_weight(snap):
+    held = {"distance": 0.71, "cable_length": 0.7, "tension": 0.980665}
+    (winch,) = sent(mavlink.MAVLINK_MSG_ID_WINCH_STATUS, snap(**held, taut=True))
+    assert (winch.line_length, winch.tension) == (pytest.approx(0.71), pytest.approx(0.1))
+    (winch,) = sent(mavlink.MAVLINK_MSG_ID_WINCH_STATUS, snap(**{**held, "distance": 4.2}, taut=False))
+    assert winch.line_length == pytest.approx(0.7)
 
 
 def test_servo_outputs_stay_within_what_a_servo_means(snap):

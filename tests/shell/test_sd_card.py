@@ -14,6 +14,8 @@ import pytest
 
 from autopilot.onboard.flight_log import LogChunk
 from autopilot.services.file_tree import FileTree
+from autopilot.services.files import FileError, Limits
+from autopilot.shell.sd_card import DirectoryCard
 from autopilot.shell.storage import CARD_DIRECTORY, Storage
 from tests.doubles.killed import killed_at
 
@@ -92,3 +94,14 @@ def test_a_process_killed_while_it_writes_to_the_card_loses_nothing_else(tmp_pat
     assert met == sorted(met), "what was written is there"
     assert change.found[met[-1]] == change.found[-1]
     assert len(set(met)) > 1
+
+
+def test_logs_and_their_folders_count_among_the_files_that_the_card_may_hold(tmp_path: Path) -> None:
+    card = DirectoryCard(tmp_path, Limits(files=4))
+    card.append(("log", "today", "1.ulg"), b"")
+    card.append(("log", "today", "1.ulg"), b"it was there already, empty")
+    card.create(("a",))
+    with pytest.raises(FileError):
+        card.create(("b",))
+    card.remove(("log", "today", "1.ulg"))
+    card.create(("b",))

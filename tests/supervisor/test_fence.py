@@ -19,13 +19,15 @@ from autopilot.services.requests import (
     RunPrearmChecks,
     SetMode,
     StartMission,
+    Takeoff,
 )
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
 from autopilot.wire.items import LocatedStep
-from missions.model import Takeoff, Waypoint
+from missions import model
+from missions.model import Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
 
 SQUARE = Polygon(True, ((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)))
@@ -93,6 +95,34 @@ def test_each_action(action: int, phase: Phase, told: bool) -> None:
     assert any("ence" in text for text in sky.texts) == told
 
 
+@pytest.mark.parametrize(("action", "phase"), [(2, Phase.HOLD), (3, Phase.RETURN), (5, Phase.LOWER)])
+def test_each_action_during_the_lift(action: int, phase: Phase) -> None:
+    sky = fenced(action=action)
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert sky.ask(Takeoff(6.0)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.LIFT)
+    sky.settings = replace(sky.settings, fence=replace(sky.settings.fence, height_m=4.0))
+    sky.run(lambda s: s.flight.phase != Phase.LIFT)
+    assert sky.flight.phase == phase
+    assert sky.texts[-1].startswith("Fence: beyond the fence, GF_MAX_VER_DIST 4 m above home")
+    assert sky.view.x_quad[2] < 4.0
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_takeoff_beyond_it_is_refused(armed: bool) -> None:
+    sky = fenced(height_m=4.0)
+    if armed:
+        assert sky.ask(Arm(True, False)).result == ACCEPTED
+    before = sky.flight
+    verdict = sky.ask(Takeoff(6.0))
+    assert (sky.flight, verdict.result) == (before, DENIED)
+    assert verdict.text == (
+        "Take-off denied: beyond the fence, GF_MAX_VER_DIST 4 m above home (vehicle at 6.70 m)"
+    )
+    assert sky.ask(EnableFence(False)).result == ACCEPTED
+    assert sky.ask(Takeoff(6.0)).result == ACCEPTED
+
+
 def test_a_fence_that_is_switched_off_stops_nobody() -> None:
     sky = fenced().airborne()
     assert sky.ask(EnableFence(False)).result == ACCEPTED
@@ -126,7 +156,7 @@ def test_places_beyond_it_are_refused() -> None:
 
 
 def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
-    steps = (Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), Waypoint(6.0, 0.0, 2.0))
+    steps = (model.Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), Waypoint(6.0, 0.0, 2.0))
     located = tuple(LocatedStep(i, i, step) for i, step in enumerate(steps))
     sky = fenced(*steps)
     verdict = sky.ask(ReplaceMission(3, located))
@@ -135,7 +165,7 @@ def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
     verdict = sky.ask(StartMission(None))
     assert (verdict.result, verdict.text) == (DENIED, "Mission denied: item 2 leads outside the fence")
     # the way between two good places leads through the exclusion zone
-    through = (Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
+    through = (model.Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
     verdict = sky.ask(ReplaceMission(3, tuple(LocatedStep(i, i, step) for i, step in enumerate(through))))
     assert verdict.text == "Mission denied: item 2 leads in an exclusion zone of the fence"
     free = fenced(*steps, action=0)

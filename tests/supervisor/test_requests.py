@@ -205,7 +205,19 @@ def test_in_the_air_rotors_stop_by_force_only(phase: Phase) -> None:
     after, verdict = decide(flight, R.Arm(False, False), seen_in(phase), SETTINGS)
     assert (after, verdict.result) == (flight, DENIED)
     after, verdict = decide(flight, R.Arm(False, True), seen_in(phase), SETTINGS)
-    assert (after.phase, after.legs, verdict.result) == (Phase.DISARMED, (), ACCEPTED)
+    assert (after.phase, after.legs) == (Phase.DISARMED, ())
+    assert verdict == Verdict(ACCEPTED, "Disarmed in the air by force", warns=True)
+
+
+def test_a_return_before_the_load_is_lifted_lands_beside_it() -> None:
+    sky = Sky()
+    assert sky.ask(R.Arm(True, False)).result == ACCEPTED
+    assert sky.ask(R.Takeoff(2.0)).result == ACCEPTED
+    sky.wait(1.0)
+    assert sky.flight.phase == Phase.TAUTEN
+    assert sky.ask(R.ReturnHome()).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.phases == [Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED]
 
 
 # ---- what arming begins, and in which order requests may come

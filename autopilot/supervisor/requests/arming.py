@@ -52,10 +52,13 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
     if not request.arm:
         if flight.phase == Phase.DISARMED:
             return flight, ACCEPTED
-        if flight.phase not in ON_GROUND and not request.force:
+        aloft = flight.phase not in ON_GROUND
+        if aloft and not request.force:
             return flight, denied("Disarming denied: in the air")
         after = happen(flight, Event.DISARM, view, settings)
-        return (after, ACCEPTED) if after else (flight, denied("Disarming denied"))
+        if after is None:
+            return flight, denied("Disarming denied")
+        return after, Verdict(ACCEPTED.result, "Disarmed in the air by force", True) if aloft else ACCEPTED
     if flight.phase != Phase.DISARMED:
         return flight, ACCEPTED  # already armed: answered as PX4 and ArduPilot do
     complaints = arming_complaints(flight, view, settings)

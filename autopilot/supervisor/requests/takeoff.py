@@ -9,7 +9,16 @@ from autopilot.supervisor.machine import must_happen
 from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, Phase, Selected, View, takeoff_event
+from autopilot.supervisor.state import (
+    Flight,
+    Phase,
+    Selected,
+    View,
+    below,
+    fenced,
+    forbidden,
+    takeoff_event,
+)
 
 
 def take_off(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -23,6 +32,12 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
     altitude = settings.motion.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
     if not altitude >= LEAST_ALTITUDE_M:
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {LEAST_ALTITUDE_M} m")
+    here = view.x_quad if flight.cable.released else view.x_load
+    top = (here[0], here[1], altitude)
+    place = below(top, settings) if flight.cable.released else top
+    beyond = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
+    if beyond:
+        return flight, denied(f"Take-off denied: {beyond}")
     flight_up = replace(
         flight,
         mission=replace(flight.mission, takeoff_altitude_m=altitude, active=False, waiting=False),

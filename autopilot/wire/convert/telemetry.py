@@ -28,7 +28,11 @@ from autopilot.wire.dialect import plumbline as mavlink
 _UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
 _NO_OFFSET: Quat = (0.0, 0.0, 0.0, 0.0)  # ATTITUDE_QUATERNION.repr_offset_q: none is given
 _NO_HEADING = 0xFFFF
-_NOTHING_MORE = (0,) * 6  # GPS_RAW_INT: its accuracies are in the dilutions, and it has no heading
+_UINT32 = 0xFFFFFFFF
+_STANDARD_GRAVITY = 9.80665  # m/s^2
+# GPS_RAW_INT: the dilutions HDOP and VDOP, which PX4's simulated receiver states: no satellites are modelled
+_DILUTIONS, _NO_DILUTIONS = (70, 110), (0xFFFF, 0xFFFF)
+_NO_ACCURACIES = (0, 0, 0)  # GPS_RAW_INT: of speed and heading, and the heading itself
 _ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
 _ATTITUDE_QUATERNION = layout_of(mavlink.MAVLink_attitude_quaternion_message)
 _LOCAL_POSITION_NED = layout_of(mavlink.MAVLink_local_position_ned_message)
@@ -179,7 +183,7 @@ def gps_raw_int_message(
     satellites: int,
     home: Home,
 ) -> Fields:
-    """GPS_RAW_INT, its dilutions given as standard deviations in cm, as PX4 does."""
+    """GPS_RAW_INT, with the standard deviations in m as its accuracies; the ellipsoid lies at sea level."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, _ = ned_from_enu(velocity)
     return _GPS_RAW_INT, (
@@ -187,13 +191,15 @@ def gps_raw_int_message(
         latitude,
         longitude,
         altitude,
-        saturated(horizontal_std * 100.0, 0, 0xFFFE),
-        saturated(vertical_std * 100.0, 0, 0xFFFE),
+        *(_DILUTIONS if fix_type >= mavlink.GPS_FIX_TYPE_2D_FIX else _NO_DILUTIONS),
         saturated(math.hypot(north, east) * 100.0, 0, 0xFFFE),
         course_cdeg(north, east),
         fix_type,
         saturated(satellites, 0, 255),
-        *_NOTHING_MORE,
+        altitude,
+        saturated(horizontal_std * 1000.0, 0, _UINT32),
+        saturated(vertical_std * 1000.0, 0, _UINT32),
+        *_NO_ACCURACIES,
     )
 
 
@@ -304,13 +310,14 @@ def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thru
 
 
 def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Fields:
-    """WINCH_STATUS: `rate` in m/s at which the cable gets longer; voltage and current are unknown."""
+    """WINCH_STATUS: `tension` in N, sent as the weight of that many kg; `rate` in m/s at which the cable gets
+    longer; voltage and current are unknown."""
     moving = mavlink.MAV_WINCH_STATUS_MOVING if rate != 0.0 else 0
     return _WINCH_STATUS, (
         now_us,
         cable_length,
         rate,
-        tension,
+        tension / _STANDARD_GRAVITY,
         math.nan,
         math.nan,
         mavlink.MAV_WINCH_STATUS_HEALTHY | moving,

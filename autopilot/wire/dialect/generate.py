@@ -22,7 +22,7 @@ DIALECT = Path(__file__).with_name("plumbline.xml")
 MISSING = Path(__file__).with_name("missing.xml")  # what pymavlink's common.xml lacks
 MODULE = Path(__file__).with_name("plumbline.py")
 _INCLUDED = ("common.xml", "standard.xml", "minimal.xml")
-# Extension fields of MAVLink's common.xml that pymavlink's copy lacks, added behind those that it has
+# Extension fields of MAVLink's common.xml that pymavlink's copy lacks, added after its own
 _EXTENSIONS = {
     "MISSION_COUNT": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},
     "MISSION_ACK": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},

@@ -8,7 +8,7 @@ from gcs.analysis.align import as_of, hermite, linear
 from tests.gcs import tolerances
 
 
-@settings(deadline=None)  # a busy machine is no failure
+@settings(deadline=None)  # a busy machine must not fail the test
 @given(st.tuples(*[st.floats(-5.0, 5.0)] * 4), st.integers(2, 20))
 def test_cubics_are_met_exactly_and_lines_by_both(coefficients, n):
     t = np.cumsum(np.linspace(0.1, 0.4, n))

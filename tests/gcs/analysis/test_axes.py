@@ -11,7 +11,7 @@ from gcs.analysis import axes
 from tests.gcs import tolerances
 
 numbers = st.floats(-10.0, 10.0)
-# the first call compiles a kernel, and a busy machine is no failure
+# the first call compiles a kernel, and a busy machine must not fail the test
 patient = settings(deadline=None)
 
 vectors = st.tuples(numbers, numbers, numbers)
@@ -31,7 +31,7 @@ def test_attitudes_change_axes_as_frames_does(q):
     q = tuple(np.array(q) / np.linalg.norm(q))
     ours = axes.quat_enu_flu_from_ned_frd(np.array([q, q]))
     theirs = frames.quat_enu_flu_from_ned_frd(q)
-    # the sign of a half turn (w = 0) is anybody's
+    # the sign of a half turn (w = 0) is arbitrary
     distance = min(np.abs(ours[0] - theirs).max(), np.abs(ours[0] + theirs).max())
     assert distance <= tolerances.ROUNDING
     assert ours.shape == (2, 4)

@@ -12,7 +12,7 @@ COUNT = 7
 
 
 def frames_of(message_id: int, rng: np.random.Generator) -> tuple[list[bytes], list[object]]:
-    """Frames of random payloads, last bytes often zero and cut, and the messages that pymavlink reads."""
+    """Frames of random payloads, often shortened as if they ended in zeros, and what pymavlink reads."""
     kind = mavlink.mavlink_map[message_id]
     link = mavlink.MAVLink(None)
     frames = []

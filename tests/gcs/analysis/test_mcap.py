@@ -1,4 +1,4 @@
-"""flight.mcap as the `mcap` library reads it: what Foxglove, PlotJuggler and Rerun get to see."""
+"""flight.mcap as the `mcap` library reads it: what Foxglove, PlotJuggler and Rerun show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of flights whose numbers are known by hand."""
+"""Figures of synthetic flights, compared with values calculated by hand."""
 
 import numpy as np
 import pytest
@@ -168,7 +168,7 @@ def test_a_setpoint_between_the_stamps_of_the_truth_is_a_cubic():
     flight = flights.flight(4.0, path)
     flight.drop = lambda i, kind: kind == "load_setpoint" and i % 3 != 0
     found = record(flight)
-    # h^4/384 of the fourth derivative is 1e-8 m for h = 24 ms; the rounding of the wire is greater
+    # h^4/384 of the fourth derivative is 1e-8 m for h = 24 ms; the rounding of the messages is greater
     assert found["load_error_max_m"] <= 2.0 * tolerances.WIRE_M
     assert found["matched_fraction"] == 1.0
 
@@ -178,7 +178,7 @@ def test_a_silence_is_not_bridged():
     begin = np.flatnonzero(flight.mission)[100]
     flight.drop = lambda i, kind: kind == "load_setpoint" and begin <= i < begin + 125
     found = record(flight)
-    # as-of phases last half a second, 62 of the 125 samples; none of them has a position
+    # a phase counts for half a second after its message, 62 of the 125 samples; none of these has a position
     assert found["samples"] == 500 - 125 + 62
     assert found["matched_fraction"] == pytest.approx((500 - 125) / (500 - 125 + 62))
 
@@ -215,7 +215,7 @@ def test_slack_counts_while_the_load_is_carried():
     slack_at(np.flatnonzero(flight.mission)[40])
     slack_at(np.flatnonzero(phase == mavlink.PLUMBLINE_PHASE_HOLD)[-3])
     slack_at(np.flatnonzero(phase == mavlink.PLUMBLINE_PHASE_LOWER)[9])
-    flight.slack_events = (65534 + count) % 65536  # wraps while it is carried
+    flight.slack_events = (65534 + count) % 65536  # the counter wraps while the load is carried
     assert record(flight)["slack_events"] == 3
 
 
@@ -223,7 +223,7 @@ BLOW, CALM = (5.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 def gusty(back_s):
-    """Ten seconds of hovering, 0.2 m off from one second to `back_s` after it began."""
+    """Ten seconds of hovering, 0.2 m off between one second and `back_s` after the beginning."""
     begin = flights.BEFORE_S
 
     def error(t):
@@ -239,7 +239,7 @@ def test_a_gust_and_what_came_of_it():
     found = record(gusty(4.5))
     assert found["gusts"] == 1
     assert found["gust_error_max_m"] == pytest.approx(0.2, abs=tolerances.WIRE_M)
-    # 3.0 s to the last sample before 4.5 s
+    # from 3.0 s to the last sample before 4.5 s
     assert found["gust_recovery_50mm_s"] == pytest.approx(1.5 - flights.TICK_S, abs=flights.TICK_S)
 
 

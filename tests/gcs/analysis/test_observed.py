@@ -1,4 +1,4 @@
-"""The path that a third-party autopilot was asked to fly, read from its mission and from the truth."""
+"""The requested path of a third-party autopilot, read from its mission and from the truth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from missions.model import Land, Takeoff, Waypoint
 
 CABLE_M, STANDS_M, RESTS_M = 1.0, 0.13, 0.04
 ITEMS = firmware_items((Takeoff(2.0), Waypoint(4.0, 0.0, 2.0), Land()), Home(), CABLE_M, STANDS_M, True)
-# time, item that is flown, place of the load: home 0, take-off 1, over the load 2, lift 3, waypoint 4, land 5
+# time, current item, place of the load; home 0, take-off 1, over the load 2, lift 3, waypoint 4, land 5
 FLOWN = (
     (0.0, 0, (0.0, 0.0, RESTS_M)),
     (1.0, 2, (0.0, 0.0, RESTS_M)),
@@ -37,7 +37,7 @@ PHASES = [
     P.PLUMBLINE_PHASE_SET_DOWN,
     P.PLUMBLINE_PHASE_DISARMED,
 ]
-LATTICE_M = 0.012  # of the places on the wire
+LATTICE_M = 0.012  # resolution of the positions on the wire
 
 
 def observed(items: tuple[WireItem, ...], flown: tuple = FLOWN) -> SetpointTrack:
@@ -46,7 +46,7 @@ def observed(items: tuple[WireItem, ...], flown: tuple = FLOWN) -> SetpointTrack
     place = np.array([row[2] for row in flown])
     down = np.tile((0.0, 0.0, -1.0), (n, 1))
     distance, taut = np.full(n, CABLE_M), (place[:, 2] > RESTS_M).astype(np.int64)
-    distance[0] = STANDS_M - RESTS_M  # it stands beside the load: here above it
+    distance[0] = STANDS_M - RESTS_M  # it stands beside the load; in these data above it
     load = LoadTrack(time_s, place, 0 * place, down, 0 * place, distance, 3.0 * taut, 0 * taut, taut)
     force = np.zeros((n, 4))
     force[1:-1] = 4.0

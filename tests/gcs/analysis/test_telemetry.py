@@ -50,7 +50,7 @@ def test_what_was_sent_comes_back_in_enu_and_flu(made, telemetry):
 
 
 def test_other_systems_are_left_out(telemetry):
-    # the load, a system of its own, says that it turns with 9 rad/s, and the ground station has a heart too
+    # the load, a separate system, reports a rate of 9 rad/s, and the ground station sends heartbeats too
     assert np.abs(telemetry.attitude_estimated.omega_body).max() == 0.0
     assert (telemetry.heartbeat.custom_mode == 0).all()
     assert (telemetry.heartbeat.base_mode == 128).all()

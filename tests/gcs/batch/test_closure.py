@@ -1,4 +1,4 @@
-"""Which files decide what happens in a flight, and that a change of one of them is noticed."""
+"""The files on which the result of a flight depends; a change of one of them is noticed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("entries", BOTH.values(), ids=BOTH)
 def test_a_copy_of_the_sources_has_the_same_fingerprint(tree: Path, entries: tuple[str, ...]) -> None:
-    # numba keeps machine code there where it cannot be kept elsewhere
+    # numba stores machine code there if it cannot be stored elsewhere
     kept = tree / "sitl" / "__pycache__" / "world.measure.nbi"
     kept.parent.mkdir(exist_ok=True)
     kept.touch()

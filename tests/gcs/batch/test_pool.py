@@ -1,4 +1,4 @@
-"""Who asks a sweep to stop waits for the flights in the air, and for no others."""
+"""A sweep that is asked to stop finishes the flights in the air and begins no others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GROUPS = [tuple(range(first, first + 16)) for first in range(0, 160, 16)]
 
 
 class Threads(ThreadPoolExecutor):
-    """In place of processes."""
+    """One thread in place of processes."""
 
     def __init__(self, recalled: threading.Event) -> None:
         super().__init__(1)

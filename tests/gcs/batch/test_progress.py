@@ -8,7 +8,7 @@ from gcs.batch.progress import BatchDisplay
 from gcs.shell import display as display_module
 from gcs.shell.display import LiveBars, StepDisplay
 
-CURSOR = "\x1b[?25h"  # shown again
+CURSOR = "\x1b[?25h"  # shows the cursor again
 RUNNING = (("Case A", "gcs: lift"), ("Case B", ""))
 
 
@@ -32,7 +32,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(display_module, "is_live", lambda: True)
-    monkeypatch.setenv("FORCE_COLOR", "1")  # by which rich, too, takes what is captured for a terminal
+    monkeypatch.setenv("FORCE_COLOR", "1")  # with it rich, too, treats the captured output as a terminal
     monkeypatch.setenv("COLUMNS", "120")
 
 

@@ -1,4 +1,4 @@
-"""Logs: the order of the records depends on what was said and on nothing else."""
+"""Logs: the order of the records depends on what was sent and on nothing else."""
 
 from __future__ import annotations
 

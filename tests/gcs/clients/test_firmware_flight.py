@@ -1,4 +1,4 @@
-"""The flight machine with a third-party autopilot: a firmware that knows no load, scripted, on fake time."""
+"""The flight machine with a third-party autopilot: a scripted firmware that knows no load, on fake time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GUIDED, AUTO = 4, 3
 
 
 class Scripted:
-    """Answers as ArduCopter: refuses until it is ready, flies an item a second, disarms on the ground."""
+    """Answers like ArduCopter: refuses until it is ready, flies an item per second, disarms on the ground."""
 
     def __init__(self) -> None:
         self._writer = FrameWriter(1, 1)
@@ -81,7 +81,7 @@ class Scripted:
         return ACCEPTED
 
     def tick(self) -> list[bytes]:
-        """What it says at this time."""
+        """What it sends at this time."""
         if self.silent:
             return []
         if self.began_us is not None:
@@ -92,7 +92,7 @@ class Scripted:
             base = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
             self.say(mavlink.MAVLink_heartbeat_message(2, 3, base | 1, self.mode, 3, 3))
             bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-            # it says to be healthy a second before it lets itself be armed, as ArduCopter can
+            # it reports to be healthy a second before it accepts to be armed, as ArduCopter may
             health = bit if self.now_us >= self.ready_us - 1_000_000 else 0
             self.say(mavlink.MAVLink_sys_status_message(bit, bit, health, *(0,) * 10))
             self.say(

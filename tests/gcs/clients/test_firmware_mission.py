@@ -23,7 +23,7 @@ def test_a_place_of_the_load_is_one_of_the_vehicle_a_cable_length_above() -> Non
     east, north, _ = enu_from_geodetic(item.x, item.y, 0, Home())
     assert (item.command, item.param1) == (mavlink.MAV_CMD_NAV_WAYPOINT, 1.5)
     assert (east, north) == pytest.approx((5.0, -3.0), abs=LATTICE_M)
-    # above where it stood: its centre of mass is STANDS_M above the ground then
+    # relative to where it stood, with its centre of mass STANDS_M above the ground
     assert item.z + STANDS_M == pytest.approx(2.0 + CABLE_M)
 
 

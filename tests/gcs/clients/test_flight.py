@@ -39,7 +39,7 @@ def normal_flight(vehicle, t):
 
 
 def then(flight, at, action):
-    """`flight` until `at` s, where `action(vehicle)` happens once and the script stops."""
+    """A script that runs `flight` until `at` s, then `action(vehicle)` once, then nothing."""
     done = []
 
     def script(vehicle, t):
@@ -54,7 +54,7 @@ def then(flight, at, action):
 
 @pytest.fixture
 def fly(world, items):
-    """Fly; the client and the stages it went through."""
+    """Fly; return the client and the stages it went through."""
 
     def fly(seconds=200.0, **options):
         client = FlightClient(items[:3] + items[-1:], EXPECTED_S, **options)
@@ -78,7 +78,7 @@ def test_a_flight_goes_through_its_stages_and_is_completed(world, fly, items):
     client, stages = fly()
     assert client.outcome is not None
     assert (client.outcome.name, client.outcome.reason) == ("completed", "")
-    # this vehicle is ready at once, so that READY lasts no tick
+    # this vehicle is ready immediately, so READY does not last a tick
     assert stages == [s for s in Stage if s not in (Stage.READY, Stage.DISARM)]
     assert [item.command for item in world.vehicle.mission] == [22, 16, 16, 21]
     assert client.progress.fraction == 1.0
@@ -96,7 +96,7 @@ def test_the_messages_of_the_report_are_asked_for(world, fly):
 
 def test_parameters_are_asked_for_while_the_flight_is_prepared_and_never_in_the_air(world, fly):
     vehicle = world.vehicle
-    vehicle.script, vehicle.ready = normal_flight, False  # so that there is time
+    vehicle.script, vehicle.ready = normal_flight, False  # so that there is time for the parameters
     vehicle.lost_list_indices = set(range(3, 119, 7))
     told, value = [], vehicle.on_param_request_read
 
@@ -130,7 +130,7 @@ def test_progress_tells_where_the_flight_is(world, fly):
     assert progress.load_error_m == pytest.approx(0.005)  # 3-4-5, in float32
     assert progress.rotor_use == pytest.approx(0.75)
     assert 0.4 < progress.fraction < 0.6
-    assert progress.sim_time_s == pytest.approx(12.0, abs=0.1)  # last tick's
+    assert progress.sim_time_s == pytest.approx(12.0, abs=0.1)  # of the last tick
 
 
 def test_a_flight_survives_a_bad_link(world, fly):
@@ -155,7 +155,7 @@ def test_arming_refused(world, fly):
 
 
 def test_never_ready(world, fly):
-    """Asked to arm all the same after a while, it says what is wrong."""
+    """After a while the vehicle is asked to arm nevertheless, and its answer says what is wrong."""
     world.vehicle.ready = False
     world.vehicle.command_results[mavlink.MAV_CMD_COMPONENT_ARM_DISARM] = [mavlink.MAV_RESULT_DENIED]
     client, _ = fly()
@@ -270,7 +270,7 @@ def test_interrupted_by_the_user(world, fly, items):
 
 @pytest.mark.parametrize("told_on_the_ground", [0, 1])
 def test_disarmed_by_somebody_else(world, fly, told_on_the_ground):
-    """The item is the last in the air, though on the ground the mission stands at its beginning again."""
+    """The stated item is the last in the air, although the mission begins anew on the ground."""
 
     def disarm(vehicle):
         vehicle.arm(False)

@@ -19,7 +19,7 @@ TARGET = Target(1, 1)
 
 @pytest.fixture
 def run(world):
-    """Bring an operation to its end; its result."""
+    """Run an operation to its end; return its result."""
 
     def run(operation, seconds=60.0):
         connection = Connection()
@@ -231,7 +231,7 @@ def test_an_empty_mission_uploads_downloads_and_clears(world, run, items):
 
 
 def test_an_old_request_too_is_answered_in_whole_numbers(items):
-    """ArduPilot asks by MISSION_REQUEST and takes either; a float32 knows degrees to a metre only."""
+    """ArduPilot asks by MISSION_REQUEST and accepts either; a float32 resolves degrees only to a metre."""
     upload = MissionUpload(TARGET, items)
     upload.poll(0)
     request = mavlink.MAVLink_mission_request_message(255, 190, 0, 0)

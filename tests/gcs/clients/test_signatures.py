@@ -1,4 +1,4 @@
-"""Signing that does not match is named, with what mends it, wherever it keeps something from being done."""
+"""A mismatch of message signing is reported, with its remedy, wherever it prevents something."""
 
 from __future__ import annotations
 

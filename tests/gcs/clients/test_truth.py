@@ -1,4 +1,4 @@
-"""Whose truth is heard: that of the run of the world in which the vehicle flies, and of no other."""
+"""Only the truth of the simulator run in which the vehicle flies is recorded."""
 
 from __future__ import annotations
 

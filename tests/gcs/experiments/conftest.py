@@ -1,4 +1,4 @@
-"""Synthetic flights of the report tests, dressed as experiments."""
+"""Synthetic flights of the report tests as experiments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.doubles import recorded_flights
 
 @pytest.fixture(scope="session")
 def step_flight() -> Callable[..., Flown]:
-    """A step of 0.25 m along y with a swing that dies out behind it, or runs away."""
+    """A step of 0.25 m along y followed by a swing that decays or grows."""
 
     def fly(experiment: Experiment, runs_away: bool = False) -> Flown:
         def error(t: np.ndarray) -> np.ndarray:

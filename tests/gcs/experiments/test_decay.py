@@ -37,7 +37,7 @@ def test_what_grows_before_it_decays_is_fitted_from_its_peak():
 def test_the_tail_of_rounding_does_not_decide():
     noise = 1e-6 * np.random.default_rng(1).random(len(T))
     rate, _ = fit_bound(T, np.exp(-4.0 * T) + noise, 2e-6)
-    assert rate == pytest.approx(4.0, rel=0.02)  # the noise is 1e-3 of the least that is fitted
+    assert rate == pytest.approx(4.0, rel=0.02)  # the noise is 1e-3 of the smallest fitted value
 
 
 def test_nothing_above_the_resolution_has_no_rate():

@@ -1,4 +1,4 @@
-"""docs/thesis.md cannot go stale silently: what it says of Case A is what is flown now."""
+"""docs/thesis.md does not become outdated unnoticed: its figures of Case A are those of the present code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pool of flights with a flight function of our own: cores, reuse, failure, interruption."""
+"""The pool of flights with a flight function of the test: cores, reuse, failure, interruption."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _code_of_the_test(monkeypatch):
 
 
 def written_by(monkeypatch, code):
-    """The flights of now are flown by other code."""
+    """From now on, `code` is the version of the code that flies."""
     monkeypatch.setattr(reuse, "code_of", lambda entries: code)
 
 
@@ -104,7 +104,7 @@ def leave(directory, experiment, outcome="completed", **changes):
 
 
 def fly(sky, directory, plan=None, fresh=False, stop=lambda: False, tell=lambda ended, running: None):
-    """How many were to be flown, and whether all were."""
+    """Fly; return how many flights were missing, and whether all of them were flown."""
     waiting = run.missing(experiments() if plan is None else plan, directory, fresh)
     crew = ProgramCrew(CORES, lambda e, core: sky.start(e, directory / e.name, core), sky.pause)
     return len(waiting), run.fly_missing(waiting, directory, crew, tell, stop)

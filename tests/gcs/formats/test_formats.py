@@ -1,4 +1,4 @@
-"""Mission and parameter files of other ground stations: read, judged, written, and back again."""
+"""Mission and parameter files of other ground stations: read, checked, written, and read again."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def simple(command: int, frame: int = 3, params: Any = None, **more: Any) -> dic
 
 
 def survey(*items: Any, kind: str = "survey") -> dict[str, Any]:
-    """As QGroundControl writes it: the polygon, and the items that it stands for."""
+    """As QGroundControl writes it: the polygon, and the items that were made from it."""
     return {
         "type": "ComplexItem",
         "complexItemType": kind,
@@ -170,7 +170,7 @@ ITEM = st.builds(
 
 
 def bits(items: Any) -> list[bytes]:
-    """The items as they travel; every NaN is the same one."""
+    """The items as bytes on the wire, every NaN with the same bits."""
     plain = [[math.nan if math.isnan(value) else value for value in item] for item in items]
     return [struct.pack("<BHBBffffiif", *item) for item in plain]
 

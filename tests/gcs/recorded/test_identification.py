@@ -1,4 +1,4 @@
-"""What the intervals of identified numbers are worth: few blocks, motion too small to tell, no motion."""
+"""Intervals of identified numbers: few blocks, motion too small to identify anything, no motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEP_S, ROWS, NOISE_M = 0.04, 700, 1e-5
 
 
 def test_intervals_of_few_blocks_hold_what_they_say() -> None:
-    """Four numbers from thirty seconds whose residuals are alike for a second: three blocks."""
+    """Four numbers from thirty seconds whose residuals are correlated over a second: three blocks."""
     rng, inside = np.random.default_rng(3), []
     time = np.arange(0.0, 30.0, 0.1)
     for _ in range(200):
@@ -29,7 +29,7 @@ def test_intervals_of_few_blocks_hold_what_they_say() -> None:
             axis=1,
         )
         noise = np.convolve(rng.normal(size=len(time) + 9), np.ones(10) / 10.0, "valid")
-        found = np.linalg.solve(rows.T @ rows, rows.T @ noise)  # of numbers that are 0
+        found = np.linalg.solve(rows.T @ rows, rows.T @ noise)  # the true numbers are 0
         gradient = rows * (rows @ found - noise)[:, None]
         widths = half_widths(np.einsum("ki,kj->kij", rows, rows), gradient, time)
         inside.append(np.abs(found) <= widths)
@@ -44,7 +44,7 @@ def test_rows_that_tell_nothing_have_no_end_of_an_interval() -> None:
 
 
 def swinging(start: float) -> Motion:
-    """Below a vehicle that stands still a load swings from `start` (rad), measured with `NOISE_M`."""
+    """A load that swings from `start` (rad) below a vehicle at rest, measured with noise `NOISE_M`."""
     still, state = (0.0,) * 8, (math.sin(start), 0.0, 0.0, 0.0, 0.0, 0.0)
     load = np.zeros((ROWS, 3))
     for k in range(ROWS):
@@ -68,7 +68,7 @@ def test_drag_is_told_of_a_load_that_swings_and_not_of_one_that_hangs(start: flo
 
 
 def test_a_number_is_told_if_its_interval_leaves_anything_of_it() -> None:
-    assert Identified("push_x_m_s2", 0.0, 1e-3).is_told  # there is none
+    assert Identified("push_x_m_s2", 0.0, 1e-3).is_told  # identified: there is no push
     assert not Identified("drag_per_m", 0.0035, 0.004).is_told
     assert not Identified("length_m", 0.7, math.nan).is_told
 
@@ -76,7 +76,7 @@ def test_a_number_is_told_if_its_interval_leaves_anything_of_it() -> None:
 @pytest.mark.parametrize(
     ("value", "half_width", "printed"),
     [
-        (-1e-7, 5e-6, ("0.000000", "+- 5.0e-06")),  # no minus before nothing
+        (-1e-7, 5e-6, ("0.000000", "+- 5.0e-06")),  # no minus sign before zero
         (3.07045, 0.0014, ("3.0705", "+- 0.0014")),
         (0.0265, 1.2, ("0.0", "+- 1.2")),
         (0.0265, 312.0, ("0", "+- 312")),

@@ -17,7 +17,7 @@ CALM = load_map("telemetry").load_model(3.0)
 
 
 def swing(model: LoadModel, seconds: float, start: float, step: float = 0.02) -> Floats:
-    """q_x, q_y and their rates of a load that is let go, row by row."""
+    """Rows of q_x, q_y and their rates, of a load that is released at the angle `start`."""
     state = (math.sin(start), 0.0, 0.0, 0.0, 0.0, 0.0)
     found = [state]
     for _ in range(round(seconds / step)):
@@ -63,7 +63,7 @@ def test_the_thrust_leans_towards_a_load_that_pulls_aside() -> None:
 
 
 def test_a_filter_that_sees_the_load_is_consistent() -> None:
-    """Positions with the noise that the model states: innovations have the size that the filter says."""
+    """With the position noise that the model states, innovations are as large as the filter predicts."""
     rng = np.random.default_rng(5)
     model = CALM._replace(seen_m=5e-3, turbulence_m_s2=1e-3, force_density=1e-3)
     truth = swing(model, 40.0, 0.3)

@@ -1,4 +1,4 @@
-"""A flight of our own simulator, of which all is known: identified, replayed, seen from the vehicle alone."""
+"""A flight of our own simulator, with known truth: identified, replayed, estimated from the vehicle alone."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_length_mass_and_drag_of_the_truth_are_identified(flown: Path) -> None:
     found = json.loads(result.stdout)["identified"]
     truth = load_vehicle("bebop")
     assert found["tracked_length_m"]["value"] == pytest.approx(truth.cable_length_m, abs=1e-6)
-    # the telemetry's single precision is worth a micrometre
+    # the single precision of the telemetry amounts to about a micrometre
     assert found["length_m"]["value"] == pytest.approx(truth.cable_length_m, abs=1e-5)
     known = {
         "mass_ratio": truth.load_mass_kg / truth.quad_mass_kg,
@@ -100,7 +100,7 @@ def test_a_load_that_was_never_carried_is_told(tmp_path: Path) -> None:
 
 def test_a_tilt_that_does_not_show_the_acceleration_casts_doubt_on_the_map() -> None:
     assert map_doubt([Identified("tilt_share", 0.95, 0.05)]) == ""
-    assert map_doubt([Identified("tilt_share", 0.1, 0.6)]) == ""  # nobody can say
+    assert map_doubt([Identified("tilt_share", 0.1, 0.6)]) == ""  # too uncertain to say
     assert map_doubt([Identified("tilt_share", 0.001, 0.02)]).startswith("the tilt shows 0.00 of the")
 
 

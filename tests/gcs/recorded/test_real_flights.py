@@ -1,4 +1,4 @@
-"""The recordings that docs/real-flights.md names, where PLUMBLINE_REAL_FLIGHTS says they lie."""
+"""The recordings that docs/real-flights.md names, in the folder that PLUMBLINE_REAL_FLIGHTS names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows without time: their times, the rows that are missing, and where nobody knows."""
+"""Rows without time: their times, the missing rows, and the breaks where their number is unknown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NOISE_M = 6e-5
 
 
 def course(time: Floats) -> Floats:
-    """A vehicle that goes to and fro at up to 2 m/s, as those of the recordings do."""
+    """The course of a vehicle that flies to and fro at up to 2 m/s, as in the recordings."""
     return np.column_stack(
         [2.0 * np.sin(0.9 * time), 1.2 * np.sin(0.6 * time + 1.0), 0.1 * np.cos(0.4 * time)]
     )
@@ -33,7 +33,7 @@ def test_times_of_jittered_rows_are_found_where_the_vehicle_moves() -> None:
     found = infer_times(position, RATE_HZ, jitter_s=JITTER_S, noise_m=4e-4)
     inner = slice(30, -30)
     error = (found.time_s - time)[inner]
-    # what neighbouring rows have in common looks like another course and stays; between rows little does
+    # an error common to neighbouring rows looks like another course and remains; between rows little remains
     assert np.std(error) < 0.6 * JITTER_S
     moving = np.linalg.norm(found.course.velocity[inner], axis=1)[1:] > 1.0
     assert np.std(np.diff(error)[moving]) < 0.2 * np.std(np.diff(time[inner])[moving])
@@ -75,7 +75,7 @@ def test_a_jump_that_no_course_explains_breaks_the_recording() -> None:
 
 
 def test_a_course_is_smoothed_as_its_noise_allows() -> None:
-    """A cubic is what noise of jerk leaves nearly untouched: value, rate and acceleration come back."""
+    """Smoothing with noise of jerk hardly changes a cubic: value, rate and acceleration are recovered."""
     time = np.linspace(0.0, 10.0, 301)
     cubic = np.column_stack([0.1 * time**3 - time, np.ones_like(time)])
     found = smooth(time, cubic, 1e-8, 100.0)

@@ -1,4 +1,4 @@
-"""Flights beside each other: what differed, which is best, and the page."""
+"""Comparison of flights: what differed, which is best, and the page."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_what_was_not_changed_is_the_number_that_was_told_or_that_of_the_default
     assert found["OWN_GAIN"] == ("default", "3", "1.5")
     without = replace(base, telemetry=replace(base.telemetry, parameters={"SIM_WIND_E": 0.0}))
     found = {one.name: one.values for one in differences([changed, without])}
-    assert found["OWN_GAIN"] == ("3", "–")  # it told its parameters, and this is none of them
+    assert found["OWN_GAIN"] == ("3", "–")  # it reported its parameters, without this one
     captured = replace(base, meta=replace(base.meta, command=""))
     assert differences([captured, changed])[0].values == ("–", "3")
 
@@ -130,8 +130,8 @@ def test_what_is_as_good_as_the_best_has_its_star_too(runs: list[Path]) -> None:
         return comparison(found)["best"].get("load_error_rms_m")
 
     assert best(0.1, 0.1009, 0.1011) == [0, 1]
-    assert best(0.1, 0.1009) is None  # a difference that is none
-    assert best(0.0001, 0.00012) is None  # both are read as 0.1 mm
+    assert best(0.1, 0.1009) is None  # too small a difference
+    assert best(0.0001, 0.00012) is None  # both are shown as 0.1 mm
     assert best(None, 0.2, 0.1) == [2]
 
 
@@ -268,7 +268,7 @@ def test_names_and_buttons_do_not_lie_over_each_other(
         shutil.copytree(run, folder)
     meta = json.loads((folders[2] / "meta.json").read_text())
     meta["settings"] = {"SIM_ACT_DELAY_MS": 72.0, "SIM_NOISE_SCALE": 2.0, "SIM_SENS_LAT_MS": 12.5}
-    (folders[2] / "meta.json").write_text(json.dumps(meta))  # a long name
+    (folders[2] / "meta.json").write_text(json.dumps(meta))  # makes the name long
     page = tmp_path / "page.html"
     assert called(*folders, "--quiet", "--out", page)[0] == 0
     browser.open(page.as_uri(), width=width)

@@ -1,4 +1,4 @@
-"""metrics.toml: the keys that others rely on, how values are read, and what is refused."""
+"""metrics.toml: the keys that programs rely on, how values are shown, and what is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures drawn by two processes, of which one alone is asked to stop."""
+"""Pictures drawn by two processes, of which only the first heeds signals to stop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""report.html in a browser, from disk: the scene, the time line, the plots and what may not happen."""
+"""report.html in a browser, from disk: the scene, the time line, the plots and what must not happen."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def report(flight: flights.Flight, folder: Path, meta: FlightMeta | None = None)
 
 @pytest.fixture(scope="module")
 def case_b(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of a Case B of full length whose vehicle and mission have hostile words."""
+    """The report of a Case B of full length with hostile texts from its vehicle and mission."""
     flight = flights.case_b()
     flight.texts.append((20.0, 2, HOSTILE))
     meta = FlightMeta(
@@ -47,7 +47,7 @@ def case_b(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def delivered(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of a flight that lets its load go."""
+    """The report of a flight that releases its load."""
     return report(flights.delivery(), tmp_path_factory.mktemp("delivery"))
 
 
@@ -59,7 +59,7 @@ def page(browser: Browser, case_b: Path) -> Browser:
 
 
 def quiet(page: Browser) -> None:
-    """No error in the console, nothing asked for but the page itself."""
+    """Check that the console has no error and nothing but the page itself was requested."""
     page.listen()
     assert page.errors == []
     assert [url for url in page.requests if not url.startswith(("file:", "data:"))] == []
@@ -113,7 +113,7 @@ def test_it_plays_and_stops_by_the_space_bar(page: Browser) -> None:
 
 def test_the_space_bar_presses_a_button_that_the_keyboard_reached(page: Browser) -> None:
     page.run("replay.transport.set(8, true)")
-    page.find(".controls .speed").send_keys("\t")  # on to the button behind it
+    page.find(".controls .speed").send_keys("\t")  # to the next button
     page.driver.switch_to.active_element.send_keys(" ")
     assert page.run("return replay.transport.playing") is False
     assert page.run("return replay.transport.time === replay.flight.worst.time")
@@ -263,7 +263,7 @@ def test_no_cable_is_drawn_to_a_load_that_was_let_go(browser: Browser, delivered
     assert "load released" in browser.run("return document.querySelector('.note').textContent")
     ways = browser.run("return replay.flight.tracks().map((track) => track.flown.length / 3)")
     assert len(ways) == 2
-    assert min(ways) > 100  # of the load, and of the vehicle that flies home
+    assert min(ways) > 100  # points, of the load and of the vehicle that flies home
     swing = browser.run("return replay.flight.at(arguments[0]).readings.swing", end)
     assert swing is None  # NaN
     quiet(browser)

@@ -1,4 +1,4 @@
-"""What the page carries of a flight: numbers that come back, peaks of long flights, steps in words."""
+"""The data of a flight in its page: numbers after unpacking, peaks of long flights, steps in words."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_numbers_come_back_to_their_step() -> None:
     assert steps["smooth"] == 1e-6
     for name in ("smooth", "holed", "far"):
         np.testing.assert_allclose(found[name], columns[name], rtol=0.0, atol=0.51 * steps[name])
-    assert np.flatnonzero(np.isnan(found["lost"])).tolist() == [7]  # a number that cannot be is none
+    assert np.flatnonzero(np.isnan(found["lost"])).tolist() == [7]  # an impossible number becomes NaN
 
 
 def test_the_page_has_every_sample_and_the_greatest_error_of_the_record() -> None:

@@ -54,7 +54,7 @@ def built(tmp_path_factory):
 
 
 def strict(text):
-    """JSON as the standard has it: no NaN, no Infinity."""
+    """JSON as the standard defines it: no NaN, no Infinity."""
 
     def refuse(constant):
         raise AssertionError(constant)
@@ -90,7 +90,7 @@ def test_the_same_log_gives_the_same_report_without_what_imports_pandas(built, t
     out, record, _ = built
     for name in ("array", "table"):
         monkeypatch.delattr(pyarrow, name)
-    # meta.json lies beside the log: it is read when nothing is passed
+    # meta.json beside the log is read when no meta is passed
     again = build_report(out / "flight.tlog", tmp_path, all_pictures=True)
     assert again == {**record, "report_dir": str(tmp_path)}
     for name in FILES - {"summary.json", "flight.parquet"}:
@@ -110,14 +110,14 @@ def test_pictures_show_something(built, file):
     assert width >= 1000
     assert height >= 400
     assert pixels.std() > 10.0
-    # something in each quarter, so nothing was drawn out of the picture
+    # each quarter shows something, so nothing was drawn outside the picture
     for rows in (slice(0, height // 2), slice(height // 2, None)):
         for columns in (slice(0, width // 2), slice(width // 2, None)):
             assert pixels[rows, columns].std() > 3.0
 
 
 class Page(HTMLParser):
-    """References, policies, texts and unclosed elements of a page; scripts apart."""
+    """References, policies, texts and unclosed elements of a page; scripts separately."""
 
     VOID = frozenset(("meta", "img", "br", "link", "input", "hr"))
 
@@ -162,7 +162,7 @@ def test_no_script_runs_but_those_that_the_policy_names(page):
     (policy,) = page.policies
     allowed = set(re.findall(r"'sha256-([^']+)'", policy))
     ours = {base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in page.scripts[1:]}
-    assert ours == allowed  # the first one is data
+    assert ours == allowed  # the first script is data
     assert "unsafe-inline" not in policy.split("script-src")[1]
     assert "unsafe-eval" not in policy
 
@@ -252,7 +252,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
     flight.phase[lost[5] :] = 9
     flight.tension[lost[0]] = np.inf
     path = flight.write(tmp_path / "flight.tlog")
-    path.write_bytes(path.read_bytes()[:-11])  # and the last record is torn
+    path.write_bytes(path.read_bytes()[:-11])  # and the last record is cut off
     told = FlightMeta(outcome="diverged", reason="no finite state")
     record = build_report(path, tmp_path, told, all_pictures=True)
     assert record["outcome"] == "diverged"

@@ -1,4 +1,4 @@
-"""The pipe between a flight and its page: in order, and never waited for."""
+"""The pipe from a flight to its page: messages arrive in order, and the flight never waits for the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is served: whoever knows the address, from a page of ours, and nobody else."""
+"""Only clients that know the address are served, and only sockets of our own pages are opened."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gcs.shell.page_server import Pages, PageServer, Site
 
 
 class Served:
-    """A server in a loop of its own, and what came of requests."""
+    """A server in a separate event loop; `asked` are the records that it received."""
 
     def __init__(self, report: Path, bind: str = "127.0.0.1") -> None:
         self.asked: list[Any] = []
@@ -46,7 +46,7 @@ class Served:
         return self.loop.run_until_complete(asyncio.to_thread(fetch))
 
     def talk(self, path: str, origin: str | None, text: str = "{}", **headers: str) -> dict[str, Any]:
-        """The first record that a web socket gets, after which it says `text`."""
+        """The first record that a web socket receives; it then sends `text`."""
 
         def speak() -> dict[str, Any]:
             address = f"ws://{self.host}{path}"

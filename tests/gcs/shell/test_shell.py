@@ -35,7 +35,7 @@ from gcs.workflows.flight_loops import STANDING_LIMIT_S, Clock, run_lockstep, ru
 WAIT_S = 10.0  # for what takes milliseconds on an idle machine
 TICK_US = 20_000
 GOODBYE = b"the test is over"
-# a program of the standard library that lasts as long as the statement it is given
+# a program of the standard library that runs as long as the statement it is given
 LASTING = ["-n", "1", "-r", "1", "import signal; signal.pause()"]
 DEAF = [*LASTING[:-1], "import signal; signal.signal(15, signal.SIG_IGN); print(flush=True); signal.pause()"]
 
@@ -52,7 +52,7 @@ def written(write: Callable[[str], None]) -> Callable[[str], None]:
 def test_a_reader_who_has_read_enough_stops_nothing(
     stream: str, write: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As `| head` and `2>&1 | head` do."""
+    """As with `| head` and `2>&1 | head`."""
     reads, writes = os.pipe()
     os.close(reads)
     out = os.fdopen(writes, "w")
@@ -127,9 +127,10 @@ class UdpContext(UdpSocket):
 
 
 class LockstepVehicle(threading.Thread):
-    """The scripted vehicle behind a socket: a turn each 20 ms of its time, no wall clock.
+    """The scripted vehicle behind a socket: a turn every 20 ms of its time, no wall clock.
 
-    Every `repeat`-th question is asked twice, as after a silence, and the truth runs ahead of it by a tick.
+    In every `repeat`-th turn the question is sent twice, as after a silence. In every third turn the truth
+    is a tick ahead of the question.
     """
 
     def __init__(self, scripted, ground: UdpSocket, truth: UdpSocket, repeat: int, turns: int) -> None:
@@ -143,20 +144,20 @@ class LockstepVehicle(threading.Thread):
         self.truth = _where(truth)
         self.writer = FrameWriter(1, 1)
         self.world = FrameWriter(1, 26)
-        self.silent_until_us = 0  # as the ground has promised
+        self.silent_until_us = 0  # as the ground station has promised
 
     def run(self) -> None:
         try:
             for turn in range(1, self.turns + 1):
                 self._turn(turn)
-        except OSError:  # the ground is done
+        except OSError:  # the ground station has ended
             return
         finally:
             self.socket.close()
 
     def _turn(self, turn: int) -> None:
         now_us = turn * TICK_US
-        # truth every 8 ms; every third turn the world is a tick ahead of the question already
+        # truth every 8 ms; in every third turn the world is already a tick ahead of the question
         first = -(-(now_us - TICK_US + 1) // 8_000) * 8_000
         ahead = 8_000 if turn % 3 == 0 else 0
         sent_before = 8_000 if turn % 3 == 1 and turn > 1 else 0
@@ -178,7 +179,7 @@ class LockstepVehicle(threading.Thread):
             (one,) = decode(datagram)[0]
             if one.id != mavlink.MAVLINK_MSG_ID_TIMESYNC:
                 self.scripted.receive(datagram)
-            elif one.message.ts1 == now_us * 1000:  # else it answers one that was asked twice in the silence
+            elif one.message.ts1 == now_us * 1000:  # else it answers an earlier, repeated question
                 answers += 1
                 self.silent_until_us = one.message.tc1 // 1000
 
@@ -255,7 +256,7 @@ def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, t
 
 
 def test_items_are_counted_as_mavlink_counts_them(capsys):
-    """From 0, and behind the stroke stands the last."""
+    """From 0; the number after the slash is that of the last item."""
     progress = Progress(Stage.FLY, "mission", 3, 7, 0.5, None, None, 12.0, "")
     with FlightDisplay("test", quiet=False) as display:
         display.update(progress)
@@ -467,7 +468,7 @@ def test_nothing_outlives_a_killed_gcs(tmp_path):
 
 
 def poll_until(condition, child) -> None:
-    """Wait for a condition on a living child, by waiting on the child with a bound."""
+    """Wait, for a bounded time, until a condition holds; the child must not end meanwhile."""
     for _ in range(int(WAIT_S / 0.05)):
         if condition():
             return

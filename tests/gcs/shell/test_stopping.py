@@ -1,4 +1,4 @@
-"""What asks `gcs` to stop, and what it says to a terminal that is closed."""
+"""Requests to stop `gcs`, and its output to a terminal that is closed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gcs.shell.stopping import StopRequest
 
 @pytest.fixture(autouse=True)
 def _handlers() -> Iterator[None]:
-    """As they were."""
+    """Restore the signal handlers."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
     yield

@@ -24,7 +24,7 @@ def telemetry() -> bytes:
 
 
 class Clock:
-    """Ours, in us."""
+    """The clock of the ground station, in us."""
 
     def __init__(self) -> None:
         self.now_us = 0
@@ -88,7 +88,7 @@ def test_of_two_vehicles_the_first_is_heard_and_answered(
 def test_another_autopilot_is_named_by_any_message_of_it(
     ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its heartbeat may come when what was asked of the first one is done already."""
+    """Its heartbeat may come only after the first vehicle has done what was requested."""
     first, second = two
     heard(ground, second, telemetry())
     heard(ground, first, heartbeat())

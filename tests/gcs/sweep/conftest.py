@@ -65,7 +65,7 @@ speed_m_s = 0.3
 
 @pytest.fixture(scope="session")
 def winched(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The cable made longer and shorter again."""
+    """A mission that lengthens the cable and shortens it again."""
     path: Path = tmp_path_factory.mktemp("missions") / "winched.toml"
     land = '[[items]]\ntype = "land"\n'
     path.write_text(SHORT.replace(land, WINCH.lstrip() + land), encoding="utf-8")
@@ -89,7 +89,7 @@ fall_s = 1.5
 
 @pytest.fixture(scope="session")
 def swung(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """0.4 m to the north and back: a way that no check before the flight looks at."""
+    """0.4 m to the north and back: a path that no check before the flight examines."""
     path: Path = tmp_path_factory.mktemp("missions") / "swung.toml"
     waypoint = SHORT[SHORT.index('[[items]]\ntype = "waypoint"') : SHORT.index('[[items]]\ntype = "land"')]
     path.write_text(SHORT.replace(waypoint, SWING.lstrip()), encoding="utf-8")
@@ -104,7 +104,7 @@ def plan(short: str) -> SweepPlan:
 
 
 class AtOnce(Executor):
-    """Flies where it is called."""
+    """Flies immediately, in the calling thread."""
 
     def submit(self, function: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
         future: Future[Any] = Future()

@@ -1,8 +1,8 @@
-"""The flight without the wire is the flight with it, bit for bit.
+"""The flight without messages is the flight with them, bit for bit.
 
-World and flight software are the same code in both, so little is left to compare: what the sweep puts in the
-wire's place (the rounding of readings and commands), when the supervisor is asked, the order of a tick, and
-the instants at which the ground station acts.
+Both use the same code for world and flight software, so little is left to compare: what the sweep has in
+place of messages (the rounding of readings and commands), the ticks at which the supervisor is called, the
+order within a tick, and the times at which the ground station acts.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class NoLog:
 
 
 def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]]:
-    """Fly both ways and compare every true state; what the sweep found, and the states."""
+    """Fly both ways and compare every true state; return the sweep's result and the states."""
     mission = load_mission(name)
     real = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
 
@@ -47,7 +47,7 @@ def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]
     fused = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
     found = fly(mission, conditions, boarding(mission, conditions), fused)
     assert (found.outcome, found.reason) == (outcome.name, outcome.reason)
-    # the ground station goes on listening for a moment
+    # the ground station continues to listen for a moment
     ticks = int(np.isfinite(fused[:, 0]).sum())
     assert 1000 < ticks <= np.isfinite(real[:, 0]).sum()
     assert np.array_equal(fused[:ticks], real[:ticks])
@@ -73,7 +73,7 @@ def test_same_bits_with_an_estimator_of_ones_own(short: str, law: str) -> None:
 
 
 class Failing:
-    """Fails in flight."""
+    """A law that fails in flight."""
 
     def load_position(self, memory: None, now: Now) -> tuple[None, Asked]:
         b = now.believed
@@ -130,7 +130,7 @@ def test_same_bits_where_the_winch_works_both_ways(winched: str, law: float, sen
     assert found.outcome == "completed"
     length = np.linalg.norm(states[:, 3:6] - states[:, :3], axis=1)
     longest = int(length.argmax())
-    # of 0.7 m, by 0.3 m longer, then by 0.4 m shorter: to the stretch of the moment at which it is slack
+    # of 0.7 m, lengthened by 0.3 m, then shortened by 0.4 m; the tolerance is for a moment of slack
     assert length[longest] == pytest.approx(1.0, abs=1e-6)
     aloft = states[longest:, 2] > 0.2
     assert length[longest:][aloft].min() == pytest.approx(0.6, abs=0.01)

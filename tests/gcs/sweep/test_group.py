@@ -1,4 +1,4 @@
-"""Flights in lanes are the flights of one, figure by figure and bit by bit, whatever becomes of each."""
+"""Flights in lanes equal flights flown alone, figure by figure and bit by bit, however each one ends."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def both_ways(
     sensors: str = "lab",
     vehicle: str = "bebop",
 ) -> tuple[list[Flown], float]:
-    """Fly the seeds alone and together; what the flights found, and the share of ticks flown in lanes."""
+    """Fly the seeds alone and together; return the results and the share of ticks flown in lanes."""
     mission = load_mission(name)
     conditions = Conditions(vehicle, sensors, settings=settings)
     start = boarding(mission, conditions)
@@ -171,7 +171,7 @@ def test_lanes_are_compiled_where_many_flights_differ_by_their_seeds(
     monkeypatch.setattr(work, "LANES_PAY", 20)
     assert work.prepare(plan, warm).in_lanes == {"plumbline"}
     assert compiled.count("lanes-plumbline") == 1
-    # from then on fewer flights suffice, of which there are seeds enough
+    # once they are compiled, fewer flights suffice if there are enough seeds
     monkeypatch.setattr(work, "LANES_PAY", 1000)
     assert work.prepare(plan, warm).in_lanes == {"plumbline"}
     assert work.prepare(replace(plan, seeds=(1, 2)), warm).in_lanes == frozenset()

@@ -1,4 +1,4 @@
-"""The linear limits against the margin tool, which linearises the same law on its own."""
+"""The linear limits against the margin tool, which linearises the same law independently."""
 
 from __future__ import annotations
 

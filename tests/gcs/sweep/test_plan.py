@@ -158,7 +158,7 @@ def test_sweeps_without_a_name_do_not_get_into_each_others_way(
     stem = Path(plan.mission).stem
     other = replace(plan, sensors="rtk" if plan.sensors == "lab" else "lab")
     for number, one in enumerate((plan, other), start=1):
-        for _ in range(2):  # and each goes on where it was
+        for _ in range(2):  # and each continues in its folder
             directory = default_directory(one, origin(one), fresh=False)
             assert directory == Path("sweeps") / (stem if number == 1 else f"{stem}-{number}")
             store_plan(directory, one, "gcs sweep", origin(one))

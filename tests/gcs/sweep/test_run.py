@@ -1,4 +1,4 @@
-"""A sweep from plan to table and report: whole, stopped, killed, gone on with."""
+"""A sweep from plan to table and report: complete, stopped, killed, continued."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.Swep
 
 
 class AfterOne:
-    """False until something was flown."""
+    """False when first asked, then true: the sweep stops after it has flown something."""
 
     def __init__(self) -> None:
         self.asked = 0
@@ -96,7 +96,7 @@ def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept
     store = Store(tmp_path, plan)
     store.add(rows[:2])
     store.merge()
-    # killed after merging, before the parts were taken away; and while a part was being written
+    # killed after merging, before the parts were removed; and while a part was being written
     store.add(rows[1:3])
     (tmp_path / "parts" / "000000005-1.99.unfinished").write_bytes(b"PAR1")
     assert store.done() == {0, 1, 2}
@@ -181,7 +181,7 @@ def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, P
 
 
 def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width: int) -> None:
-    """The page of the sweep, its maps drawn."""
+    """Open the page of the sweep and wait until its maps are drawn."""
     plan, directory, _ = whole
     browser.open(write_report(directory, plan).as_uri(), width, 844)
     browser.wait("document.documentElement.dataset.ready === '1'")
@@ -347,7 +347,7 @@ def test_flights_that_stand_out_are_the_same_when_they_are_flown_again(short: st
     for one in found:
         record = json.loads((Path(one["report"]).parent / "summary.json").read_text())
         assert record["seed"] == one["seed"]
-        # the sweep looks at every tick, the report at 125 samples a second
+        # the sweep evaluates every tick, the report at 125 samples a second
         assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=5e-3)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'href="flights/plumbline-worst/report.html"' in page

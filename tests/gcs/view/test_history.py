@@ -1,4 +1,4 @@
-"""Samples for pages that open later, and how good a link is."""
+"""Samples for pages that open later, and the quality of a link."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcs.view.link_quality import LOST_US, LinkQuality
 
 
 def state(time_s: float) -> dict[str, Any]:
-    """What a vehicle's state says, as far as samples need it."""
+    """The part of a vehicle's state that samples need."""
     nothing = dict.fromkeys(
         ("load", "position", "asked", "error", "tension", "swing", "velocity", "estimator_error")
     )

@@ -1,4 +1,4 @@
-"""The ground station behind the page: what it asks vehicles, carries out for pages, and tells them."""
+"""The ground station behind the page: what it requests from vehicles, does for pages, and reports to them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Watched:
         self.news: list[dict[str, Any]] = []
 
     def run(self, seconds: float) -> None:
-        """Let both go on."""
+        """Run station and vehicle for so long."""
         for _ in self.world.ticks(self.station.receive, self._poll, seconds):
             self.news += self.station.news()
 
@@ -38,7 +38,7 @@ class Watched:
         return [out.datagram for out in self.station.poll(now_us)]
 
     def ask(self, action: Any, arguments: Any = None, **more: Any) -> dict[str, Any]:
-        """Ask as a page does, and wait for the answer."""
+        """Send a request as a page does, and wait for the result."""
         before = len(self.results)
         request = {"vehicle": 1, "request": 5, "action": action, "arguments": arguments or {}, **more}
         self.station.ask("page", request)
@@ -52,7 +52,7 @@ class Watched:
         return [record for record in self.news if record["type"] == "result"]
 
     def commands(self, number: int) -> list[Any]:
-        """The commands of that id that the vehicle has got."""
+        """The commands of that id that the vehicle has received."""
         return [one for one in self.world.vehicle.commands if one.command == number]
 
 
@@ -125,7 +125,7 @@ def test_a_clicked_place_is_sent_to_the_centimetre(watched: Watched) -> None:
     assert sent.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
     assert sent.z == 3.5
     east, north, _ = enu_from_geodetic(sent.x, sent.y, 0, Home())
-    # a unit of latitude is 11 mm
+    # the unit of latitude in the message is 11 mm
     assert (north, east) == pytest.approx((123.45, -67.89), abs=0.011)
 
 
@@ -191,7 +191,7 @@ def test_a_page_that_asks_too_much_is_told_so(watched: Watched) -> None:
 
 
 def heartbeat(system: int) -> bytes:
-    """The heartbeat of a vehicle of that number."""
+    """The heartbeat of the vehicle with that system id."""
     message = mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3
     )
@@ -343,7 +343,7 @@ def test_the_error_of_the_estimator_is_that_of_one_time() -> None:
         station.receive_truth(load(time_us, 2e-6 * time_us, TRUTH))
     station.receive(load(12_000, 0.024 + 0.003, ESTIMATE), 0)
     (state,) = station.state(0)["vehicles"]
-    assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)  # as it is rounded
+    assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)  # because it is rounded
     station.receive(load(24_000, 9.0, ESTIMATE), 0)  # its truth has not come yet
     (state,) = station.state(0)["vehicles"]
     assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)

@@ -1,4 +1,4 @@
-"""What the live page tells over its picture, in a page from disk."""
+"""The messages of the live page over its picture, in a page from disk."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import gcs.web
 from gcs.web import asset
 from tests.doubles.browser import Browser
 
-TEXT = "Reposition denied: load height -3.00 m, min 0.3 m"  # of the length that a STATUSTEXT may have
+TEXT = "Reposition denied: load height -3.00 m, min 0.3 m"  # as long as a STATUSTEXT may be
 
 PAGE = """<!doctype html><meta charset="utf-8"><title>messages</title><style>{style}</style>
 <main><section id="stage"><div id="over"><div id="banner">{text}</div></div><div id="toast">{text}</div>

@@ -30,7 +30,7 @@ globalThis.pixel = (x, y) => {{
 
 @pytest.fixture
 def page(browser: Browser, tmp_path: Path) -> Browser:
-    """A page from disk with a scene of its own, `scene`."""
+    """A page from disk with its scene in the variable `scene`."""
     path = tmp_path / "scene.html"
     path.write_text(PAGE.format(scripts="".join(f"<script>{asset(name)}</script>" for name in SCENE_SCRIPTS)))
     browser.open(path.as_uri())
@@ -46,7 +46,7 @@ def test_the_load_is_drawn_where_it_is_projected_to(page: Browser) -> None:
         return [before, pixel(...scene.project([0, 0, -1]))]"""
     )
     red, green, blue, _ = seen[0]
-    assert red > green > blue and red - blue > 60  # amber, as no other thing
+    assert red > green > blue and red - blue > 60  # amber, as nothing else is
     assert seen[1] != seen[0]
     page.listen()
     assert page.errors == []
@@ -94,7 +94,7 @@ def test_a_click_names_the_place_at_the_height_of_the_load_and_on_the_ground(pag
     )
     page.click_at("#scene", *spot)
     level, ground, clicks = page.wait("globalThis.picked")
-    # a pixel is some 4 mm there, seen at a slant
+    # a pixel covers about 4 mm there, seen at an angle
     assert level == pytest.approx([0.4, -0.3, -1.0], abs=0.02)
     assert ground[2] == pytest.approx(0.0, abs=1e-6)
     assert clicks == 1

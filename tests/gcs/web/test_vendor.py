@@ -1,4 +1,4 @@
-"""The libraries of others that pages carry: as their table says, licensed, fit to stand within a page."""
+"""The third-party libraries in pages: of the stated version, licensed, fit to be embedded in a page."""
 
 from __future__ import annotations
 
