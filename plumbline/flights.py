@@ -138,6 +138,11 @@ class Flight:
             return cls(log.read_bytes(), meta_beside(log))
 
     @property
+    def settings(self) -> dict[str, float | str]:
+        """The parameters that were changed for this flight, by name; empty if nothing is known of them."""
+        return dict(self._meta.settings)
+
+    @property
     def outcome(self) -> str:
         """`completed`, `diverged`, `timeout` or `refused`; for a flight that was read also an outcome derived
         from its telemetry (docs/report.md)."""

@@ -60,7 +60,8 @@ def sweep(
     `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or an object made in Python.
     `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
     of `gcs sweep --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings
-    (Latin hypercube) instead of the whole grid. `settings`: parameters that are the same in all flights.
+    (Latin hypercube) instead of the whole grid; of a list it draws the listed values, also if there are two.
+    `settings`: parameters that are the same in all flights.
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
     the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from

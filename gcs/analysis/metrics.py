@@ -122,12 +122,15 @@ def step_numbers(samples: Samples) -> Numbers:
 
 
 def cascade_numbers(telemetry: Telemetry) -> Numbers:
-    """Error functions of the cascade over the mission window; (3-1), (3-8)."""
+    """Error functions of the cascade over the mission window; (3-1), (3-8).
+
+    A function that the law does not define is 0 throughout, which no measured error is: None.
+    """
     cascade = telemetry.cascade
     window = in_window(telemetry, cascade.time_s)
     return {
-        "psi_R_max": _over(cascade.psi_R[window], np.max),
-        "psi_q_max": _over(cascade.psi_q[window], np.max),
+        "psi_R_max": _over(cascade.psi_R[window], np.max) or None,
+        "psi_q_max": _over(cascade.psi_q[window], np.max) or None,
     }
 
 
@@ -260,6 +263,13 @@ def coverage_numbers(samples: Samples) -> Numbers:
 DIVERGED_M = 2.0  # nearly three cable lengths of the nominal vehicle: tracking has failed
 
 
+def _disarmed(telemetry: Telemetry) -> bool:
+    """Whether the vehicle was disarmed at the end: a HEARTBEAT reports it at once, the phase comes later."""
+    modes, phase = telemetry.heartbeat.base_mode, telemetry.setpoint.phase
+    stopped = len(modes) > 0 and not modes[-1] & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    return stopped or bool(phase[-1] == mavlink.PLUMBLINE_PHASE_DISARMED)
+
+
 def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
     """The outcome of the flight judged from telemetry, for logs without a recorded outcome."""
     phase = telemetry.setpoint.phase
@@ -269,6 +279,6 @@ def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
     lost = not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any())
     if lost or (phase == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
         return "diverged"
-    if np.isin(phase, CARRIED).any() and phase[-1] == mavlink.PLUMBLINE_PHASE_DISARMED:
+    if np.isin(phase, CARRIED).any() and _disarmed(telemetry):
         return "completed"
     return "incomplete"

@@ -302,7 +302,7 @@ class SweptFlight:
             flown.load_error_rms_m = sqrt(f.error_square / f.samples)
             flown.estimator_error_max_m = f.estimator_error_max
             flown.saturated_fraction = f.saturated / f.ticks
-            flown.psi_R_max, flown.psi_q_max = f.psi_R_max, f.psi_q_max
+            flown.psi_R_max, flown.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
             flown.tension_min_n, flown.tension_max_n = f.tension_min, f.tension_max
             flown.rotor_force_min_n, flown.rotor_force_max_n = f.rotor_min, f.rotor_max
         return flown

@@ -83,6 +83,7 @@ def test_a_recorded_flight_is_read(flight: plumbline.Flight, tmp_path: Path) -> 
     factor = pytest.approx(flight.summary["real_time_factor"], rel=1e-8)
     assert found.summary == {**flight.summary, "real_time_factor": factor}
     assert repr(found) == repr(flight)
+    assert found.settings == flight.settings == {"SIM_ACT_DELAY_MS": 4}
     assert found.telemetry().equals(flight.telemetry())
     assert found.plot("error").png == flight.plot("error").png
     assert found.report(tmp_path / "again").read_bytes() == (tmp_path / "report.html").read_bytes()
@@ -93,6 +94,7 @@ def test_a_log_with_nothing_beside_it_is_read(flight: plumbline.Flight, tmp_path
     log.write_bytes(flight.tlog)
     found = plumbline.Flight.load(str(log))
     assert (found.outcome, found.reason, found.summary["mission"]) == ("completed", "", None)
+    assert found.settings == {}
     assert repr(found).startswith("<Flight of an unknown mission: completed, load error at most ")
 
 

@@ -1,5 +1,7 @@
 """Figures of synthetic flights, compared with values calculated by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -310,10 +312,22 @@ def test_a_hover_without_a_mission_phase_is_judged_while_it_holds():
 def test_an_attitude_run_has_no_load_position_error():
     flight = flights.flight(4.0, flights.half_sine_step(HEIGHT, 0.5))
     flight.control_mode[flight.mission] = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
+    flight.psi_r[flight.mission] = 0.125
     found = record(flight)
     assert found["load_error_max_m"] is None
     assert found["step_height_m"] is None
-    assert found["psi_R_max"] == 0.0
+    assert (found["psi_R_max"], found["psi_q_max"]) == (0.125, None), "the mode does not define the latter"
+
+
+def test_the_heartbeat_tells_of_the_landing_before_the_phase():
+    flight = flights.flight(4.0, flights.still)
+    flight.phase[flight.phase == mavlink.PLUMBLINE_PHASE_DISARMED] = mavlink.PLUMBLINE_PHASE_SET_DOWN
+    aloft = flight.telemetry()
+    modes = aloft.heartbeat.base_mode.copy()
+    modes[-1] = 0
+    landed = replace(aloft, heartbeat=replace(aloft.heartbeat, base_mode=modes))
+    found = [flight_record(one, FlightMeta())["outcome"] for one in (aloft, landed)]
+    assert found == ["incomplete", "completed"]
 
 
 @pytest.mark.parametrize(
