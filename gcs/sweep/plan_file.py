@@ -65,10 +65,10 @@ def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
 
 
 def _is_free(directory: Path) -> bool:
+    if not directory.exists():
+        return True
     try:
         return not any(directory.iterdir())
-    except FileNotFoundError:
-        return True
     except OSError:  # a file, or a directory that cannot be read
         return False
 
