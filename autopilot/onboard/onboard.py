@@ -729,11 +729,10 @@ class Onboard:
         if kept:
             numbers = ", ".join(map(str, kept[:MOST_NAMED])) + (" ..." if len(kept) > MOST_NAMED else "")
             self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
-        landings = [
-            item for step, item in zip(plan.steps[:-1], plan.sequence, strict=False) if isinstance(step, Land)
-        ]
-        if landings:
-            text = f"Mission ends with the landing of item {landings[0]}; no later item is flown"
+        early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
+        landing = next((item for step, item in early if isinstance(step, Land)), None)
+        if landing is not None:
+            text = f"Mission ends with the landing of item {landing}; no later item is flown"
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, text)
 
     def _prepare(self) -> None:

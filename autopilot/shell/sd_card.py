@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path
 
 from autopilot.services import files
@@ -118,11 +119,10 @@ class DirectoryCard:
             place = self._at(path)
         except FileError:
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
-        steps = (self._root.joinpath(*path[:depth]) for depth in range(1, len(path) + 1))
-        new = sum(not step.exists() for step in steps)
+        new = [*takewhile(lambda one: not one.exists(), (place, *place.parents))]
         place.parent.mkdir(parents=True, exist_ok=True)
         with place.open("ab") as file:
-            self._held += new
+            self._held += len(new)
             file.write(data)
             self._used += len(data)
 

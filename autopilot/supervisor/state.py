@@ -244,6 +244,15 @@ def fenced(flight: Flight, settings: Settings) -> bool:
     return settings.fence.action != 0 and flight.area.guarded
 
 
+def beyond_fence(flight: Flight, place: Vec3, settings: Settings) -> str:
+    """Why a fence in force forbids to fly there: of the load, or of the vehicle if it has released the load;
+    an empty string if it does not."""
+    if not fenced(flight, settings):
+        return ""
+    load = below(place, settings) if flight.cable.released else place
+    return forbidden(flight.area.fence, load, settings)
+
+
 def carries(flight: Flight) -> bool:
     """Whether the load must be known for the flight to continue: not if it is released, or lies on the ground
     while the vehicle lands beside it."""

@@ -21,9 +21,7 @@ from autopilot.supervisor.state import (
     Phase,
     Selected,
     View,
-    below,
-    fenced,
-    forbidden,
+    beyond_fence,
     off_mission,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -40,8 +38,8 @@ def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[s
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
-    place = below(view.x_quad, settings) if flight.cable.released else view.x_load
-    where = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
+    here = view.x_quad if flight.cable.released else view.x_load
+    where = beyond_fence(flight, here, settings)
     if where:
         found.append(where)
     return tuple(found)

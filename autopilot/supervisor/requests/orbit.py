@@ -13,7 +13,7 @@ from autopilot.supervisor.requests.guided import begin_guided
 from autopilot.supervisor.requests.limits import FARTHEST_M, LEAST_ALTITUDE_M
 from autopilot.supervisor.requests.verdicts import Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Guide, View, below, fenced, forbidden
+from autopilot.supervisor.state import CARRYING, Flight, Guide, View, beyond_fence
 
 LEAST_RADIUS_M = 0.2
 LEAST_SPEED_M_S = 0.05
@@ -61,11 +61,10 @@ def _complaint(flight: Flight, centre: Vec3, radius: float, speed: float, settin
     inward = speed * speed / radius
     if inward > settings.motion.accel_m_s2:
         return f"{inward:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.motion.accel_m_s2:g}"
-    for k in range(CIRCLE_POINTS if fenced(flight, settings) else 0):
+    for k in range(CIRCLE_POINTS):
         at = 2.0 * math.pi * k / CIRCLE_POINTS
         there = add(centre, (radius * math.cos(at), radius * math.sin(at), 0.0))
-        place = below(there, settings) if flight.cable.released else there
-        beyond = forbidden(flight.area.fence, place, settings)
+        beyond = beyond_fence(flight, there, settings)
         if beyond:
             return beyond
     return ""

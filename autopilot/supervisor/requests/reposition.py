@@ -15,7 +15,7 @@ from autopilot.supervisor.requests.limits import FARTHEST_M, FASTEST_M_S, LEAST_
 from autopilot.supervisor.requests.modes import hold
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Phase, View, below, fenced, forbidden
+from autopilot.supervisor.state import CARRYING, Flight, Phase, View, beyond_fence
 from autopilot.wire.dialect import plumbline as mavlink
 
 
@@ -54,8 +54,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
         return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m from home")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, min {LEAST_ALTITUDE_M} m")
-    place = below(there, settings) if flight.cable.released else there
-    beyond = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
+    beyond = beyond_fence(flight, there, settings)
     if beyond:
         return flight, denied(f"Reposition denied: {beyond}")
     if norm(sub(there, here)) == 0.0:

@@ -14,9 +14,7 @@ from autopilot.supervisor.state import (
     Phase,
     Selected,
     View,
-    below,
-    fenced,
-    forbidden,
+    beyond_fence,
     takeoff_event,
 )
 
@@ -33,9 +31,7 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
     if not altitude >= LEAST_ALTITUDE_M:
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {LEAST_ALTITUDE_M} m")
     here = view.x_quad if flight.cable.released else view.x_load
-    top = (here[0], here[1], altitude)
-    place = below(top, settings) if flight.cable.released else top
-    beyond = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
+    beyond = beyond_fence(flight, (here[0], here[1], altitude), settings)
     if beyond:
         return flight, denied(f"Take-off denied: {beyond}")
     flight_up = replace(
