@@ -17,12 +17,21 @@ from gcs.clients.flight import FlightClient
 from gcs.errors import EXIT_DONE, EXIT_ERROR
 from gcs.shell import session as session_module
 from gcs.shell.link import unix_us
+from tests.gcs.conftest import ScriptedVehicle
 
 KEY, OTHER = key_of_text("plumb"), key_of_text("bob")
 NOW = timestamp_of(1_800_000_000_000_000)
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 3, 3)
 TEXT = mavlink.MAVLink_statustext_message(4, b"hello")
 NO_KEY = "the vehicle signs its messages, and heeds only those that are signed with its key: "
+
+
+def signs(vehicle: ScriptedVehicle, key: bytes, timestamp: int) -> None:
+    """From now on the vehicle signs all its frames, as a real one does, those of its load included: the last
+    frame that is heard decides what is reported."""
+    sign = Signing(key, timestamp).signer(0)
+    for writer in (vehicle.writer, vehicle.dialect_writer, vehicle.load_writer):
+        writer.frame = partial(writer.frame, sign=sign)
 
 
 @pytest.mark.parametrize(
@@ -61,8 +70,7 @@ def test_a_radio_that_cannot_sign_and_a_frame_said_twice_are_no_trouble():
 
 def test_a_flight_that_is_not_answered_says_that_a_key_is_missing(world, items):
     vehicle = world.vehicle
-    sign = Signing(KEY, NOW).signer(0)
-    vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+    signs(vehicle, KEY, NOW)
     vehicle.on_command_long = lambda message: None
     client = FlightClient(items, 10.0)
     for _ in world.ticks(client.receive, client.poll, 20.0):
@@ -84,8 +92,7 @@ def test_a_flight_that_is_not_answered_says_that_a_key_is_missing(world, items):
 def test_a_command_says_what_does_not_match(live, monkeypatch, tmp_path, theirs, ours, words, told):
     vehicle, port = live
     if theirs:
-        sign = Signing(theirs, timestamp_of(unix_us())).signer(0)
-        vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+        signs(vehicle, theirs, timestamp_of(unix_us()))
     vehicle.on_param_request_read = lambda message: None
     monkeypatch.setattr("gcs.clients.parameter_transfer.SENDS", 1)
     monkeypatch.setattr(session_module, "FIND_S", 0.3)
@@ -102,8 +109,7 @@ def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_ca
     live, monkeypatch, tmp_path
 ):
     vehicle, port = live
-    sign = Signing(KEY, timestamp_of(unix_us())).signer(0)
-    vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+    signs(vehicle, KEY, timestamp_of(unix_us()))
     asked = []
     vehicle.on_command_long = asked.append
     monkeypatch.setattr("gcs.clients.command.RETRY_US", 10_000)
