@@ -22,7 +22,7 @@ CORDS: Mapping[str, Mapping[str, float]] = {
     "nylon 3 mm": {"SIM_CBL_MASS": 0.0056, "SIM_CABLE_DIAM": 3.0, "SIM_CBL_EA": 3e3, "SIM_CBL_DAMP": 2.0},
 }
 # a load of 4 cm, attached at its top
-TURNING = {"SIM_LOAD_HOOK": 0.03, "SIM_LOAD_GYR": 0.016, "SIM_LOAD_GYR_UP": 0.016}
+LOAD_INERTIA = {"SIM_LOAD_HOOK": 0.03, "SIM_LOAD_GYR": 0.016, "SIM_LOAD_GYR_UP": 0.016}
 FIGURES = ("load_error_max_m", "load_error_rms_m", "tracking_error_max_m", "slack_events")
 
 
@@ -32,12 +32,12 @@ def worlds(links: tuple[int, ...]) -> dict[str, dict[str, float]]:
     for cord, values in CORDS.items():
         for n in links:
             found[f"{cord}, {n} links"] = {"SIM_CBL_LINKS": float(n), **values}
-    most = f"{next(iter(CORDS))}, {max(links)} links"
-    found[f"{most}, load that turns"] = {**found[most], **TURNING}
+    longest = f"{next(iter(CORDS))}, {max(links)} links"
+    found[f"{longest}, load that turns"] = {**found[longest], **LOAD_INERTIA}
     return found
 
 
-def flown(case: str, settings: Mapping[str, float]) -> dict[str, Any]:
+def fly_case(case: str, settings: Mapping[str, float]) -> dict[str, Any]:
     """The figures of a flight."""
     flight = plumbline.fly(case, settings=settings, quiet=True)
     figures = {key: flight.summary[key] for key in FIGURES if key in flight.summary}
@@ -58,7 +58,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     args = parser.parse_args()
     table = {
-        name: {case: flown(case, settings) for case in CASES}
+        name: {case: fly_case(case, settings) for case in CASES}
         for name, settings in worlds(tuple(args.links)).items()
     }
     if args.json:

@@ -39,10 +39,10 @@ LINKS = (4, 8, 16, 32, 64)
 MODES = 3
 STEPS = (4e-4, 2e-4, 1e-4, 5e-5)  # s
 STIFFNESSES = (1e4, 1e5, 1e6, 1e7)  # N
-_SHORT = 5e-4  # s, shorter than half a period of every mode
-_HEIGHT = 3.0  # m, of the load
-_FIRM = 1e9  # kg, of a vehicle that nothing can move
-_LIGHT = 1e-9  # kg, instead of no load
+_SHORT_STEP = 5e-4  # s, shorter than half a period of every mode
+_LOAD_HEIGHT = 3.0  # m, of the load
+_FIXED_MASS = 1e9  # kg, of a vehicle that nothing can move
+_NO_LOAD_MASS = 1e-9  # kg, instead of no load
 
 
 def chain_model(links: int, **values: float) -> ChainModel:
@@ -93,17 +93,17 @@ class ChainPlant:
         x[[0, n]], v[[0, n]] = (state.x_quad, state.x_load), (state.v_quad, state.v_load)
         moments = truth.load_mass * np.array([model.gyration, model.gyration, model.gyration_upright]) ** 2
         spins = np.array([state.omega_body, rows.body[4:7]]) ** 2
-        turning = 0.5 * (spins[0] @ np.array(truth.inertia) + spins[1] @ moments)
+        rotation = 0.5 * (spins[0] @ np.array(truth.inertia) + spins[1] @ moments)
         stretch = np.linalg.norm(np.diff(rows.x, axis=0), axis=1) - rest
         elastic = 0.5 * model.stiffness / rest * (np.maximum(stretch, 0.0) ** 2).sum()
-        moving = 0.5 * masses @ (v**2).sum(axis=1) + truth.gravity * (masses @ x[:, 2])
-        return float(moving + turning + elastic)
+        translation = 0.5 * masses @ (v**2).sum(axis=1) + truth.gravity * (masses @ x[:, 2])
+        return float(translation + rotation + elastic)
 
 
-def hanging(truth: Truth, q: tuple[float, float, float] = (0.0, 0.0, -1.0), **fields: Any) -> PlantState:
-    """Taut and aloft, the load at rest at `_HEIGHT`, q from vehicle to load."""
+def suspended(truth: Truth, q: tuple[float, float, float] = (0.0, 0.0, -1.0), **fields: Any) -> PlantState:
+    """Taut and aloft, the load at rest at `_LOAD_HEIGHT`, q from vehicle to load."""
     direction = np.array(q) / np.linalg.norm(q)
-    x_load = np.array([0.0, 0.0, _HEIGHT])
+    x_load = np.array([0.0, 0.0, _LOAD_HEIGHT])
     x_quad = x_load - truth.cable_length * direction - np.array(truth.attachment)
     state = initial_state(truth)._replace(
         x_load=tuple(x_load.tolist()),
@@ -132,7 +132,7 @@ def bessel_frequencies(length: float, mass: float, load: float, gravity: float) 
     y = a J0(w) + b Y0(w) with w = 2 omega sqrt(s/g). It is 0 at the top; at the load, where s = s_0 =
     load/mass, g dy/ds = -omega^2 y. Without a load the frequencies are the zeros of J0(2 omega sqrt(L/g)).
     """
-    if load <= _LIGHT:
+    if load <= _NO_LOAD_MASS:
         return np.asarray(jn_zeros(0, MODES) / 2.0 * np.sqrt(gravity / length))
     below, above = load / mass, load / mass + length
 
@@ -149,40 +149,42 @@ def bessel_frequencies(length: float, mass: float, load: float, gravity: float) 
     return np.array([brentq(boundary, grid[i], grid[i + 1], xtol=1e-14) for i in found])
 
 
-def flown_frequencies(links: int, mass: float, load: float, length: float = 1.0) -> NDArray[np.complex128]:
+def simulated_frequencies(
+    links: int, mass: float, load: float, length: float = 1.0
+) -> NDArray[np.complex128]:
     """The slowest transverse modes of a hanging cable, as simulated: damping (negative), frequency, rad/s."""
     # stiff enough that its weight hardly stretches it, soft enough for a difference quotient; soon at rest
     model = chain_model(links, mass=mass, stiffness=1e5, damping=30.0)
     truth = without_drag(load_truth("bebop"))._replace(
         chain=model,
         load_mass=load,
-        quad_mass=_FIRM,
+        quad_mass=_FIXED_MASS,
         cable_length=length,
         rotor_max=np.inf,
         rotor_tau=0.0,
         load_radius=1e-3,
     )
-    plant = ChainPlant(truth, hanging(truth), hover(truth))
+    plant = ChainPlant(truth, suspended(truth), hover(truth))
     plant.fly(0.6)
     rest, rows = plant.state, [array.copy() for array in plant.rows]
     inner, load_at = slice(1, links), links - 1
     eps = 1e-7
 
-    def moved(shift: Array) -> Array:
-        for array, kept in zip(plant.rows, rows, strict=True):
-            array[...] = kept
+    def state_after(shift: Array) -> Array:
+        for array, original in zip(plant.rows, rows, strict=True):
+            array[...] = original
         plant.rows.x[inner, 0] += shift[:load_at]
         plant.rows.v[inner, 0] += shift[links:-1]
         (x, *x_rest), (v, *v_rest) = rest.x_load, rest.v_load
         plant.state = rest._replace(
             x_load=(x + float(shift[load_at]), *x_rest), v_load=(v + float(shift[-1]), *v_rest)
         )
-        end = plant.fly(_SHORT, _SHORT)
+        end = plant.fly(_SHORT_STEP, _SHORT_STEP)
         x_end, v_end = plant.rows.x[inner, 0], plant.rows.v[inner, 0]
         return np.concatenate([x_end, end.x_load[:1], v_end, end.v_load[:1]])
 
-    columns = [(moved(eps * e) - moved(-eps * e)) / (2.0 * eps) for e in np.eye(2 * links)]
-    found = np.log(np.linalg.eigvals(np.array(columns).T).astype(complex)) / _SHORT
+    columns = [(state_after(eps * e) - state_after(-eps * e)) / (2.0 * eps) for e in np.eye(2 * links)]
+    found = np.log(np.linalg.eigvals(np.array(columns).T).astype(complex)) / _SHORT_STEP
     found = found[found.imag > 0.0]
     return np.asarray(found[np.argsort(found.imag)][:MODES])
 
@@ -190,18 +192,18 @@ def flown_frequencies(links: int, mass: float, load: float, length: float = 1.0)
 def frequency_errors(links: int, mass: float, load: float) -> Array:
     """Relative errors of the lowest frequencies of a cable of 1 m."""
     exact = bessel_frequencies(1.0, mass, load, load_truth("bebop").gravity)
-    return flown_frequencies(links, mass, load).imag / exact - 1.0
+    return simulated_frequencies(links, mass, load).imag / exact - 1.0
 
 
 # ---- motion
 
 
-def swinging(model: ChainModel, attachment: Vec3 = ZERO) -> ChainPlant:
+def swinging_plant(model: ChainModel, attachment: Vec3 = ZERO) -> ChainPlant:
     """A vehicle that carries its load in the air, without drag; the cable is inclined and rotating."""
     truth = without_drag(load_truth("bebop"))._replace(chain=model, attachment=attachment)
     direction = np.array([0.3, 0.0, -0.95]) / np.hypot(0.3, 0.95)
     rate = (0.0, 1.5, 0.0)
-    start = hanging(truth, tuple(direction.tolist()), q_cable_dot=rate)
+    start = suspended(truth, tuple(direction.tolist()), q_cable_dot=rate)
     start = start._replace(v_quad=(0.0, -1.5 * truth.cable_length, 0.0))
     return ChainPlant(truth, start, hover(truth))
 
@@ -210,24 +212,26 @@ def step_errors(links: int = 4) -> list[float]:
     """For each step the greatest error (m) of the load within 1 s, relative to a quarter of the shortest."""
     model = chain_model(links, stiffness=2e3, damping=2.0)
 
-    def course(h: float) -> Array:
-        plant = swinging(model)
+    def trajectory(h: float) -> Array:
+        plant = swinging_plant(model)
         return np.array([plant.fly(0.02, h).x_load for _ in range(50)])
 
-    reference = course(STEPS[-1] / 4.0)
-    return [float(np.abs(course(h) - reference).max()) for h in STEPS]
+    reference = trajectory(STEPS[-1] / 4.0)
+    return [float(np.abs(trajectory(h) - reference).max()) for h in STEPS]
 
 
 def massless_difference(stiffness: float, h: float = TICK, attachment: Vec3 = ZERO) -> tuple[float, float]:
     """Differences of one link from the taut plant: greatest of load position in 1 s, m; final tension, N."""
-    plant = swinging(chain_model(1, mass=0.0, stiffness=stiffness, damping=1e-4 * stiffness), attachment)
+    plant = swinging_plant(
+        chain_model(1, mass=0.0, stiffness=stiffness, damping=1e-4 * stiffness), attachment
+    )
     taut: Any = initial_taut(plant.truth)._replace(**plant.state._asdict(), rotor_force=plant.force)
-    most = 0.0
+    largest = 0.0
     for _ in range(round(1.0 / h)):
         state = plant.fly(h, h)
         taut = advance_taut(taut, plant.truth, plant.force, ZERO, h)
-        most = max(most, float(np.abs(np.subtract(state.x_load, taut.x_load)).max()))
-    return most, abs(state.tension - taut.tension)
+        largest = max(largest, float(np.abs(np.subtract(state.x_load, taut.x_load)).max()))
+    return largest, abs(state.tension - taut.tension)
 
 
 # ---- compared with MuJoCo
@@ -283,7 +287,7 @@ def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tup
     timestep = TICK / 16
     scene = mujoco.MjModel.from_xml_string(mujoco_xml(truth, timestep))
     data = mujoco.MjData(scene)
-    data.qpos[:7] = 0.0, 0.0, _HEIGHT, np.cos(0.1), 0.0, np.sin(0.1), 0.0
+    data.qpos[:7] = 0.0, 0.0, _LOAD_HEIGHT, np.cos(0.1), 0.0, np.sin(0.1), 0.0
     data.qpos[7:11] = np.cos(0.15), 0.0, np.sin(0.15), 0.0
     data.qvel[0] = 0.5
     data.qvel[6:9] = 1.0, 0.5, 0.0
@@ -298,7 +302,7 @@ def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tup
         return along @ data.qvel, about @ data.qvel
 
     v_load, spin = velocity(load)
-    start = hanging(
+    start = suspended(
         truth,
         x_quad=tuple(data.qpos[:3].tolist()),
         v_quad=tuple(data.qvel[:3].tolist()),
@@ -321,12 +325,12 @@ def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tup
         mujoco.mj_comPos(scene, data)
         ours = np.array([state.x_load, *plant.rows.x[1:links]])
         theirs = data.xipos[[load, *points]]
-        turned = np.abs(plant.rows.body[:4] @ data.xquat[load])  # 1 - angle^2 / 8
+        alignment = np.abs(plant.rows.body[:4] @ data.xquat[load])  # 1 - angle^2 / 8
         differences.append(
             (
                 np.abs(ours - theirs).max(),
                 np.abs(np.subtract(state.x_quad, data.qpos[:3])).max(),
-                np.sqrt(max(0.0, 8.0 * (1.0 - turned))),
+                np.sqrt(max(0.0, 8.0 * (1.0 - alignment))),
             )
         )
     found = np.array(differences).max(axis=0).tolist()
@@ -339,7 +343,7 @@ def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tup
 def _tables(with_mujoco: bool) -> dict[str, Any]:
     tables: dict[str, Any] = {
         "a chain without load: relative error of frequencies 1, 2, 3": {
-            str(n): frequency_errors(n, 0.01, _LIGHT).tolist() for n in LINKS
+            str(n): frequency_errors(n, 0.01, _NO_LOAD_MASS).tolist() for n in LINKS
         },
         "a cord of 2.4 g/m with a load of 100 g: the same": {
             str(n): frequency_errors(n, 2.4e-3, 0.1).tolist() for n in LINKS

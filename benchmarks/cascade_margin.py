@@ -60,8 +60,8 @@ STEP = 1e-5
 # the innermost loop, the load position cascade, the vehicle position law with the load hanging, and the load
 # position of the law `plumbline`
 LOOPS = ("attitude", "position", "vehicle", "plumbline")
-WANTED_TAU = 0.010  # s, PLB_LAG_TO_MS
-WANTED = Wanted(
+TARGET_TAU = 0.010  # s, PLB_LAG_TO_MS
+TARGETS = Wanted(
     0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0
 )  # PLB_ defaults
 FILTERS = (
@@ -73,9 +73,9 @@ FILTERS = (
     "believed_delay",
     "wanted_tau",
 )
-GREATEST_DELAY = 0.2  # s; a greater margin is reported as this
-GREATEST_GAIN = 101.0
-LOST = 1.0 + 1e-9  # spectral radius from which on a loop is unstable
+MAX_DELAY = 0.2  # s; a greater margin is reported as this
+MAX_GAIN = 101.0
+UNSTABLE_RADIUS = 1.0 + 1e-9  # spectral radius from which on a loop is unstable
 
 MOTION = LOAD_STATES  # x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
 ROTATION = slice(10, 16)
@@ -117,7 +117,7 @@ class Margin:
 
     @property
     def stable(self) -> bool:
-        return self.radius < LOST
+        return self.radius < UNSTABLE_RADIUS
 
 
 def _vec(a: Any) -> tuple[float, float, float]:
@@ -167,18 +167,18 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     return tick
 
 
-def plumbline_built(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
+def built_law(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
     """The law, which assumes the delay and lag of the settings, unless `filters` gives others."""
-    told = {
+    assumed = {
         "believed_tau": settings.rotor_tau,
         "believed_delay": settings.delay,
-        "wanted_tau": WANTED_TAU,
+        "wanted_tau": TARGET_TAU,
         **settings.filters,
     }
     if settings.gains == thesis.THESIS_GAINS:
-        shown = min(told["believed_tau"], told["wanted_tau"])
-        timing = Timing(told["believed_delay"], told["believed_tau"], shown, settings.period)
-        gains = design(WANTED, timing, vehicle).gains
+        lag = min(assumed["believed_tau"], assumed["wanted_tau"])
+        timing = Timing(assumed["believed_delay"], assumed["believed_tau"], lag, settings.period)
+        gains = design(TARGETS, timing, vehicle).gains
     else:
         gains = plumbline.PlumblineGains(
             **{n: getattr(settings.gains, n, ZERO) for n in plumbline.PlumblineGains._fields}
@@ -186,15 +186,15 @@ def plumbline_built(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
     constants = PlumblineConstants(
         gains,
         Drag(0.0, 0.0),
-        actuation_constants(told["believed_delay"], told["believed_tau"], settings.period),
-        lag_gain(told["believed_tau"], told["wanted_tau"], settings.period),
+        actuation_constants(assumed["believed_delay"], assumed["believed_tau"], settings.period),
+        lag_gain(assumed["believed_tau"], assumed["wanted_tau"], settings.period),
         settings.period,
         vehicle,
     )
     # the other modes have no effect in load position
     filters = thesis.thesis_filters(settings.period)
-    others = ThesisLaw(thesis.THESIS_GAINS, filters, QUAD_POSITION_GAINS, vehicle)
-    return PlumblineLaw(constants, others, told["believed_delay"])
+    other_modes = ThesisLaw(thesis.THESIS_GAINS, filters, QUAD_POSITION_GAINS, vehicle)
+    return PlumblineLaw(constants, other_modes, assumed["believed_delay"])
 
 
 LAW_MEMORY = 8  # thrust rate, rotors' thrust and moment, integral; the commands in transit follow
@@ -206,12 +206,12 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
     Mass and wind are not estimated here: across the cable their estimate does not depend on the rotors, and
     along it the mass is learned slowly.
     """
-    built = plumbline_built(settings, vehicle)
+    law = built_law(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
     observed, cable = aloft(vehicle), Cable(vehicle.cable_length)
     others = thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO)
-    believed = built.constants.actuation
-    rows = believed.whole + 1
+    assumed_rotors = law.constants.actuation
+    rows = assumed_rotors.whole + 1
     weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
@@ -221,9 +221,9 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
         position = plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8]), 1.0)
         memory, command = load_position(
-            built, PlumblineMemory(position, others), state, reference, actuation, observed, cable
+            law, PlumblineMemory(position, others), state, reference, actuation, observed, cable
         )
-        after = advance(actuation, command.thrust, command.moment, believed)
+        after = advance(actuation, command.thrust, command.moment, assumed_rotors)
         return np.array(
             [
                 memory.position.thrust_rate,
@@ -271,11 +271,12 @@ def plant_of(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array,
     return A_d, B_d, C
 
 
-def joined(plant_model: tuple[Array, ...], law_model: tuple[Array, ...], shut: Array) -> Array:
-    """State matrix of plant and law together; `shut` has a factor for f and each moment: 1 closed, 0 open."""
+def closed_loop(plant_model: tuple[Array, ...], law_model: tuple[Array, ...], closure: Array) -> Array:
+    """State matrix of plant and law together; `closure` has a factor for f and each moment: 1 closed,
+    0 open."""
     A, B, C = plant_model
     Ac, Bc, Cc, Dc = law_model
-    S = np.diag(shut)
+    S = np.diag(closure)
     return np.block([[A + B @ S @ Dc @ C, B @ S @ Cc], [Bc @ C, Ac]])
 
 
@@ -287,12 +288,12 @@ def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
     """Margins of one setting."""
     law_model = linearised_law(settings, vehicle)
     plant_model = plant_of(settings, vehicle, settings.delay)
-    everything = np.ones(4)
-    spectral = radius(joined(plant_model, law_model, everything))
+    all_closed = np.ones(4)
+    spectral = radius(closed_loop(plant_model, law_model, all_closed))
 
-    cut = everything.copy()
-    cut[ROLL] = 0.0
-    A = joined(plant_model, law_model, cut)
+    roll_open = all_closed.copy()
+    roll_open[ROLL] = 0.0
+    A = closed_loop(plant_model, law_model, roll_open)
     b = np.concatenate([plant_model[1][:, ROLL], np.zeros(len(law_model[0]))])
     c = np.concatenate([law_model[3][ROLL] @ plant_model[2], law_model[2][ROLL]])
     omega = np.geomspace(0.5, 0.999 * math.pi / settings.period, 1000)
@@ -301,40 +302,40 @@ def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
     _, phases, _, _, crossings, _ = control.stability_margins(
         control.FRD(np.array(response), omega), returnall=True
     )
-    least = int(np.argmin(np.abs(phases)))
+    worst = int(np.argmin(np.abs(phases)))
 
     def scaled(factor: float) -> bool:
-        shut = everything.copy()
-        shut[ROLL] = factor
-        return radius(joined(plant_model, law_model, shut)) < LOST
+        closure = all_closed.copy()
+        closure[ROLL] = factor
+        return radius(closed_loop(plant_model, law_model, closure)) < UNSTABLE_RADIUS
 
     def delayed(extra: float) -> bool:
-        late = plant_of(settings, vehicle, settings.delay + extra)
-        return radius(joined(late, law_model, everything)) < LOST
+        delayed_plant = plant_of(settings, vehicle, settings.delay + extra)
+        return radius(closed_loop(delayed_plant, law_model, all_closed)) < UNSTABLE_RADIUS
 
-    stable = spectral < LOST
+    stable = spectral < UNSTABLE_RADIUS
     return Margin(
         radius=spectral,
-        gain_up=boundary(scaled, 1.0, GREATEST_GAIN) if stable else 1.0,
+        gain_up=boundary(scaled, 1.0, MAX_GAIN) if stable else 1.0,
         gain_down=boundary(scaled, 1.0, 0.0) if stable else 1.0,
-        phase_deg=float(phases[least]),
-        crossover=float(crossings[least]),
-        delay=boundary(delayed, 0.0, GREATEST_DELAY) if stable else 0.0,
+        phase_deg=float(phases[worst]),
+        crossover=float(crossings[worst]),
+        delay=boundary(delayed, 0.0, MAX_DELAY) if stable else 0.0,
         sooner=-boundary(delayed, 0.0, -settings.delay) if stable and settings.delay > 0.0 else 0.0,
     )
 
 
-def boundary(holds: Callable[[float], bool], inside: float, outside: float) -> float:
-    """The first value on the way from `inside` to `outside` at which `holds` is false, found in 100 strides
-    and then by bisection; `outside` if there is none."""
-    strides = np.linspace(inside, outside, 101)[1:]
-    first = next((float(x) for x in strides if not holds(float(x))), None)
+def boundary(is_inside: Callable[[float], bool], inside: float, outside: float) -> float:
+    """The first value on the way from `inside` to `outside` at which `is_inside` is false, found in 100
+    steps and then by bisection; `outside` if there is none."""
+    steps = np.linspace(inside, outside, 101)[1:]
+    first = next((float(x) for x in steps if not is_inside(float(x))), None)
     if first is None:
         return outside
     low, high = first - (outside - inside) / 100.0, first
     for _ in range(8):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
+        low, high = (middle, high) if is_inside(middle) else (low, middle)
     return low
 
 
@@ -347,7 +348,7 @@ def rotor_noise(settings: Settings, vehicle: Vehicle = BEBOP) -> list[tuple[str,
     """
     A_p, B_p, C_p = plant_of(settings, vehicle, settings.delay)
     A_c, B_c, C_c, D_c = linearised_law(settings, vehicle)
-    A = joined((A_p, B_p, C_p), (A_c, B_c, C_c, D_c), np.ones(4))
+    A = closed_loop((A_p, B_p, C_p), (A_c, B_c, C_c, D_c), np.ones(4))
     arm, ratio = 2.0 * vehicle.arm, 4.0 * vehicle.torque_ratio
     mixer = np.array(
         [
@@ -391,7 +392,7 @@ def table(grid: Iterable[Settings]) -> str:
     return "\n".join([title, *(row(settings) for settings in grid)])
 
 
-def parsed(pairs: Iterable[str]) -> tuple[thesis.ThesisGains, dict[str, float]]:
+def parsed_gains(pairs: Iterable[str]) -> tuple[thesis.ThesisGains, dict[str, float]]:
     """Gains and filter arguments from NAME=VALUE: fields of ThesisGains, arguments of thesis_filters."""
     gains: dict[str, Any] = {}
     filters: dict[str, float] = {}
@@ -415,7 +416,7 @@ def main() -> None:
     parser.add_argument("--loop", choices=LOOPS, help="default: all")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="gain or filter")
     arguments = parser.parse_args()
-    gains, filters = parsed(arguments.set)
+    gains, filters = parsed_gains(arguments.set)
     loops = LOOPS if arguments.loop is None else (arguments.loop,)
     for loop in loops:
         print(f"\n{loop} loop, {' '.join(arguments.set) or 'gains of Table 4-3, filters of 4-3'}")
@@ -448,8 +449,8 @@ def print_noise(settings: Settings) -> None:
     for name, deviation, newtons in noises:
         print(f"  {name:22s} {deviation:8.4f} {newtons:8.4f} N")
     total = math.sqrt(sum(newtons**2 for _, _, newtons in noises))
-    room = min(BEBOP.rotor_max - HOVER, HOVER - BEBOP.rotor_min)
-    print(f"  {'all together':31s} {total:8.4f} N; three of them should fit into {room:.2f} N")
+    headroom = min(BEBOP.rotor_max - HOVER, HOVER - BEBOP.rotor_min)
+    print(f"  {'all together':31s} {total:8.4f} N; three of them should fit into {headroom:.2f} N")
 
 
 if __name__ == "__main__":

@@ -45,8 +45,8 @@ from missions.model import Mission
 from sitl.sensors.imu import ImuState
 from sitl.world import IMU, World
 
-EVERY_S = 0.1
-INSIDE = 0.95
+INTERVAL_S = 0.1
+CONFIDENCE = 0.95
 PARTS = {
     "position": (POSITION, 3),
     "velocity": (VELOCITY, 3),
@@ -67,12 +67,12 @@ def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
     biases = unpack(ImuState, flight.world.errors[IMU], 0)
     vehicle, load = estimate.vehicle, estimate.load
     axes = np.array([load.across, np.cross(load.q_cable, load.across)])
-    turned = quat_log(quat_multiply(plant.quat_wxyz, quat_conjugate(vehicle.quat_wxyz)))
+    rotation = quat_log(quat_multiply(plant.quat_wxyz, quat_conjugate(vehicle.quat_wxyz)))
     return np.concatenate(
         [
             np.subtract(plant.x_quad, vehicle.x_quad),
             np.subtract(plant.v_quad, vehicle.v_quad),
-            turned,
+            rotation,
             np.subtract(biases.gyro_bias, vehicle.gyro_bias),
             np.subtract(biases.accel_bias, vehicle.accel_bias),
             axes @ np.subtract(plant.q_cable, load.q_cable),
@@ -81,7 +81,7 @@ def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
     )
 
 
-def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> float:
+def add_nees(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> float:
     """Add the NEES of this instant to `found`; returns the error of the cable's direction, rad."""
     estimate = unpack(EstimatorState, flight.core.rows.estimator, 0)
     error, P = error_of(flight, estimate), flight.core.rows.history.covariance
@@ -94,32 +94,32 @@ def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> floa
     if slack:
         plant, load = unpack(World, flight.world.world, 0).plant, estimate.load
         place, _, speed = load.covariance
-        tracked = load.source == TRACKER
-        off = np.subtract(plant.x_load, load.x_load)
-        if not tracked:  # the load lies on the ground: its position is known relative to the vehicle
-            off = (off - error[POSITION : POSITION + 3])[:2]
-        found["load place"].append((float(off @ off) / place, len(off)))
-        if tracked:
-            off = np.subtract(plant.v_load, load.v_load)
-            found["load speed"].append((float(off @ off) / speed, 3))
+        is_tracked = load.source == TRACKER
+        difference = np.subtract(plant.x_load, load.x_load)
+        if not is_tracked:  # the load lies on the ground: its position is known relative to the vehicle
+            difference = (difference - error[POSITION : POSITION + 3])[:2]
+        found["load place"].append((float(difference @ difference) / place, len(difference)))
+        if is_tracked:
+            difference = np.subtract(plant.v_load, load.v_load)
+            found["load speed"].append((float(difference @ difference) / speed, 3))
     return float(np.hypot(error[DIRECTION], error[DIRECTION + 1]))
 
 
-def flown(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Nees, dict[str, object]]:
+def fly_nees(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Nees, dict[str, object]]:
     """The NEES of one flight by phase, and its result."""
     found: Nees = defaultdict(lambda: defaultdict(list))
     flight = SweptFlight(cell_of(mission, conditions), conditions.seed, start)
-    every = round(EVERY_S * 1e6 / flight.tick_us)
-    at, slants = every, [0.0]
+    interval = round(INTERVAL_S * 1e6 / flight.tick_us)
+    next_tick, direction_errors = interval, [0.0]
     while not flight.flown.outcome:
-        flight.turn(at)
-        if flight.tick >= at:
-            at += every
+        flight.turn(next_tick)
+        if flight.tick >= next_tick:
+            next_tick += interval
             phase = flight.core.flight.phase
             if flight.airborne_us >= 0 and phase != Phase.DISARMED:
-                astray = note(flight, found[phase.name.lower()])
+                direction_error = add_nees(flight, found[phase.name.lower()])
                 if phase == Phase.MISSION:
-                    slants.append(astray)
+                    direction_errors.append(direction_error)
     end = flight.conclude()
     return {phase: dict(parts) for phase, parts in found.items()}, {
         "seed": conditions.seed,
@@ -127,7 +127,7 @@ def flown(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Ne
         "reason": end.reason,
         "error_mm": 1e3 * end.load_error_max_m,
         "rms_mm": 1e3 * end.load_error_rms_m,
-        "cable_deg": float(np.degrees(np.sqrt(np.mean(np.square(slants))))),
+        "cable_deg": float(np.degrees(np.sqrt(np.mean(np.square(direction_errors))))),
         "saturated": end.saturated_fraction,
     }
 
@@ -135,7 +135,7 @@ def flown(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Ne
 def inside(values: list[tuple[float, int]]) -> float:
     """The share of instants inside the bounds."""
     nees, dof = np.array(values).T
-    return float((nees <= chi2.ppf(INSIDE, dof)).mean())
+    return float((nees <= chi2.ppf(CONFIDENCE, dof)).mean())
 
 
 def per_degree(values: list[tuple[float, int]]) -> float:
@@ -160,13 +160,13 @@ def table(title: str, found: Nees) -> str:
             else ""
             for part in parts
         ]
-        seconds = EVERY_S * len(found[phase]["position"])
+        seconds = INTERVAL_S * len(found[phase]["position"])
         rows.append(f"| {phase.replace('_', ' ')} | {seconds:.0f} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
 
 
-def _one(work: tuple[Mission, Conditions, Boarding]) -> tuple[Nees, dict[str, object]]:
-    return flown(*work)
+def _fly_nees(task: tuple[Mission, Conditions, Boarding]) -> tuple[Nees, dict[str, object]]:
+    return fly_nees(*task)
 
 
 def measure(
@@ -174,12 +174,12 @@ def measure(
 ) -> tuple[Nees, list[dict[str, object]]]:
     """The NEES of `seeds` flights together, and the result of each."""
     start = boarding(mission, Conditions(sensors=sensors, settings=settings))
-    works = [
+    tasks = [
         (mission, Conditions(sensors=sensors, seed=s + 1, settings=settings), start) for s in range(seeds)
     ]
     together: Nees = defaultdict(lambda: defaultdict(list))
     ends = []
-    for found, end in pool.map(_one, works):
+    for found, end in pool.map(_fly_nees, tasks):
         ends.append(end)
         for phase, parts in found.items():
             for part, values in parts.items():
@@ -196,24 +196,26 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    more = {name: float(value) for name, _, value in (pair.partition("=") for pair in options.set)}
+    settings_for_all = {
+        name: float(value) for name, _, value in (pair.partition("=") for pair in options.set)
+    }
     mission = load_mission(options.mission)
     with ProcessPoolExecutor(options.jobs) as pool:
         for sensors in options.sensors:
             for wind in options.wind:
-                settings = {**more, **({"SIM_WIND_E": wind} if wind else {})}
+                settings = {**settings_for_all, **({"SIM_WIND_E": wind} if wind else {})}
                 found, ends = measure(mission, sensors, settings, options.seeds, pool)
                 title = f"`{sensors}`, " + (f"{wind:g} m/s of wind" if wind else "calm")
                 print(table(title, found))
                 worst = max(float(str(end["error_mm"])) for end in ends)
                 rms = sqrt(float(np.mean([float(str(end["rms_mm"])) ** 2 for end in ends])))
                 slant = max(float(str(end["cable_deg"])) for end in ends)
-                busy = max(float(str(end["saturated"])) for end in ends)
-                done = sum(end["outcome"] == "completed" for end in ends)
+                saturated = max(float(str(end["saturated"])) for end in ends)
+                completed = sum(end["outcome"] == "completed" for end in ends)
                 print(
-                    f"\n{done} of {len(ends)} completed, worst load error {worst:.1f} mm,"
+                    f"\n{completed} of {len(ends)} completed, worst load error {worst:.1f} mm,"
                     f" RMS {rms:.2f} mm, cable at worst {slant:.2f} deg RMS,"
-                    f" saturated at most {100 * busy:.1f} %\n",
+                    f" saturated at most {100 * saturated:.1f} %\n",
                     flush=True,
                 )
                 for end in ends:

@@ -21,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-from fit_to_fly import ROWS, Row, flown
+from fit_to_fly import ROWS, Row, fly_row
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 RECORD = DOCS / "figures.json"
-PLAIN = (
+BASIC = (
     Row("B lab", "case-b", {}),
     Row("B lab, wind 4", "case-b", {}, settings={"SIM_WIND_E": 4.0}),
     Row("B lab, wind 8", "case-b", {}, settings={"SIM_WIND_E": 8.0}),
@@ -34,16 +34,16 @@ PLAIN = (
 REAL_LAB, REAL_FIELD = ("lab-real", "bebop-real"), ("field", "bebop-real")
 HEAVY_FIELD = ("field", "heavy-real")
 WINDY = {"SIM_ACT_DELAY_MS": 0.0, "SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
-LATE = {"SIM_ACT_DELAY_MS": 12.0}
+DELAY = {"SIM_ACT_DELAY_MS": 12.0}
 STEP = {"rise_time_90_s": 0.0, "overshoot_pct": 0.0, "settling_time_5pct_s": 0.0}
-ROOM = {"MIS_ROTOR_MARG": 35.0}  # a battery whose voltage sags gives less thrust than assumed
+ROTOR_MARGIN = {"MIS_ROTOR_MARG": 35.0}  # a battery whose voltage sags gives less thrust than assumed
 
 
 def _real(
-    name: str, mission: str, limits: dict[str, float], where: tuple[str, str], **settings: float
+    name: str, mission: str, limits: dict[str, float], sensors_and_vehicle: tuple[str, str], **settings: float
 ) -> Row:
-    sensors, vehicle = where
-    return Row(f"{name}, real", mission, limits, sensors, {**LATE, **settings}, vehicle)
+    sensors, vehicle = sensors_and_vehicle
+    return Row(f"{name}, real", mission, limits, sensors, {**DELAY, **settings}, vehicle)
 
 
 REAL = (
@@ -57,27 +57,27 @@ REAL = (
     _real("B field heavy", "case-b", {}, HEAVY_FIELD, **WINDY),
     _real("C field heavy", "case-c", {}, HEAVY_FIELD, **WINDY),
     _real("gust lab", "hover", {}, REAL_LAB, SIM_GUST_E=5.0, SIM_GUST_AT_S=18.0, SIM_GUST_FOR_S=2.0),
-    _real("A lab", "case-a", STEP, REAL_LAB, **ROOM),
+    _real("A lab", "case-a", STEP, REAL_LAB, **ROTOR_MARGIN),
 )
 
 
 def worst(row: Row, seeds: int, pool: multiprocessing.pool.Pool) -> dict[str, float]:
     """The worst of each figure over the seeds, and how many flights were lost; outside REAL a lost flight
     ends the program."""
-    flights = pool.starmap(flown, [(row, "plumbline", seed) for seed in range(1, seeds + 1)], chunksize=1)
+    flights = pool.starmap(fly_row, [(row, "plumbline", seed) for seed in range(1, seeds + 1)], chunksize=1)
     lost = [flight for flight in flights if flight.outcome != "completed"]
     if lost and row not in REAL:
         sys.exit(f"{row.name}: {len(lost)} of {seeds} not completed ({lost[0].reason})")
-    home = [flight.figures for flight in flights if flight.outcome == "completed"]
+    completed = [flight.figures for flight in flights if flight.outcome == "completed"]
     found: dict[str, float] = {"lost": len(lost)} if lost else {}
-    for name in home[0] if home else ():
-        values = [figures[name] for figures in home]
+    for name in completed[0] if completed else ():
+        values = [figures[name] for figures in completed]
         if not any(value is None for value in values):
             found[name] = max(value for value in values if value is not None)
     return found
 
 
-def many(flights: int) -> dict[str, float]:
+def sweep_quantiles(flights: int) -> dict[str, float]:
     """Case B with motion capture, one seed per flight: how many completed, and quantiles of their errors."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "gcs", "sweep", "case-b", "--seeds", str(flights), "--out", folder]
@@ -97,16 +97,20 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--rows", nargs="+", metavar="NAME", help="fly these alone, and keep the rest")
     options = parser.parse_args()
-    rows = [row for row in (*PLAIN, *ROWS, *REAL) if options.rows is None or row.name in options.rows]
-    kept = json.loads(RECORD.read_text(encoding="utf-8")) if options.rows is not None else {"rows": {}}
-    record: dict[str, dict[str, float]] = kept["rows"]
+    rows = [row for row in (*BASIC, *ROWS, *REAL) if options.rows is None or row.name in options.rows]
+    stored = json.loads(RECORD.read_text(encoding="utf-8")) if options.rows is not None else {"rows": {}}
+    record: dict[str, dict[str, float]] = stored["rows"]
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
         for row in rows:
             found = worst(row, options.seeds, pool)
             record[row.name] = {name: float(f"{value:.4g}") for name, value in found.items()}
             print(row.name, record[row.name], flush=True)
-    made = {"seeds": options.seeds, "rows": record, "sweep": kept.get("sweep") or many(options.flights)}
-    RECORD.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+    record_file = {
+        "seeds": options.seeds,
+        "rows": record,
+        "sweep": stored.get("sweep") or sweep_quantiles(options.flights),
+    }
+    RECORD.write_text(json.dumps(record_file, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

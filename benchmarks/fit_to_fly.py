@@ -79,7 +79,7 @@ ROWS = (
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlightResult:
     """The result of one flight."""
 
     outcome: str
@@ -90,14 +90,14 @@ class Flown:
 def before_step_max(samples: Samples) -> float | None:
     """Greatest distance (m) of the true load from the origin of the requested step, before the step."""
     window = step_window(samples)
-    step = find_step(samples.time_s[window], samples.asked_m[window], samples.asked_m_s[window])
+    step = find_step(samples.time_s[window], samples.requested_m[window], samples.requested_m_s[window])
     if step is None:
         return None
     before = window & (samples.time_s <= step.start_s)
     return float(np.linalg.norm(samples.actual_m[before] - step.origin_m, axis=1).max())
 
 
-def flown(row: Row, law: str, seed: int) -> Flown:
+def fly_row(row: Row, law: str, seed: int) -> FlightResult:
     """Fly the row once."""
     settings = {"CTL_LAW": float(LAWS.index(law)), **row.settings}
     file = io.BytesIO()
@@ -110,10 +110,10 @@ def flown(row: Row, law: str, seed: int) -> Flown:
     record: dict[str, Any] = flight_record(telemetry, FlightMeta(outcome=outcome.name), samples)
     record["before_step_max_m"] = before_step_max(samples)
     figures = {"load_error_max_m", "saturated_fraction", "psi_q_max", *row.limits}
-    return Flown(outcome.name, outcome.reason, {name: record.get(name) for name in sorted(figures)})
+    return FlightResult(outcome.name, outcome.reason, {name: record.get(name) for name in sorted(figures)})
 
 
-def met(row: Row, flights: list[Flown]) -> bool:
+def is_met(row: Row, flights: list[FlightResult]) -> bool:
     """Whether every seed completed within every limit."""
     if any(flight.outcome != "completed" for flight in flights):
         return False
@@ -121,10 +121,10 @@ def met(row: Row, flights: list[Flown]) -> bool:
     return all(value is not None and value <= limit for value, limit in values)
 
 
-def shown(row: Row, flights: list[Flown]) -> str:
+def result_line(row: Row, flights: list[FlightResult]) -> str:
     """One line: the worst and the median of each figure."""
     lost = [flight for flight in flights if flight.outcome != "completed"]
-    text = f"{row.name:20} {'met' if met(row, flights) else 'MISSED':7}"
+    text = f"{row.name:20} {'met' if is_met(row, flights) else 'MISSED':7}"
     if lost:
         text += f" {len(lost)} of {len(flights)} lost ({lost[0].reason})"
     for name in sorted({*row.limits, "load_error_max_m"}):
@@ -147,20 +147,20 @@ def main() -> None:
     rows = [row for row in ROWS if not options.rows or any(word in row.name for word in options.rows)]
     if not rows:
         parser.error(f"no such row; they are: {', '.join(row.name for row in ROWS)}")
-    kept: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     missed = 0
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
         for row in rows:
             flights = pool.starmap(
-                flown, [(row, options.law, seed) for seed in range(1, options.seeds + 1)], chunksize=1
+                fly_row, [(row, options.law, seed) for seed in range(1, options.seeds + 1)], chunksize=1
             )
-            missed += not met(row, flights)
-            kept[row.name] = [vars(flight) for flight in flights]
-            print(shown(row, flights), flush=True)
-    print(f"{len(rows)} rows, {options.seeds} seeds, {time.perf_counter() - began:.0f} s")
+            missed += not is_met(row, flights)
+            results[row.name] = [vars(flight) for flight in flights]
+            print(result_line(row, flights), flush=True)
+    print(f"{len(rows)} rows, {options.seeds} seeds, {time.perf_counter() - start_s:.0f} s")
     if options.json:
-        options.json.write_text(json.dumps(kept, indent=1))
+        options.json.write_text(json.dumps(results, indent=1))
     sys.exit(missed > 0)
 
 

@@ -34,7 +34,7 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import encode_mission
-from benchmarks.hostile import order, ports_of
+from benchmarks.hostile import command_long, ports_of
 from gcs.shell.link import parse_address
 from gcs.shell.session import Session
 from missions.fileformat import load_mission
@@ -50,7 +50,7 @@ LARGE, LARGE_BYTES = "large.bin", 64 * 2**20  # on the card of a vehicle, for re
 class Flood(NamedTuple):
     """Datagrams that the peers send in turn, over TCP if `tcp`. `large`: they request the file LARGE."""
 
-    words: list[bytes]
+    datagrams: list[bytes]
     tcp: bool = False
     large: bool = False
 
@@ -77,18 +77,18 @@ def upload() -> list[bytes]:
     """A mission of many items, sent without waiting for the vehicle's requests."""
     square = encode_mission(load_mission("square"), Home())
     items = [square[1]] * ITEMS
-    said = [m.MAVLink_mission_count_message(1, 1, ITEMS, 0)]
-    said += [
+    output = [m.MAVLink_mission_count_message(1, 1, ITEMS, 0)]
+    output += [
         m.MAVLink_mission_item_int_message(1, 1, i, mission_type=0, **item._asdict())
         for i, item in enumerate(items)
     ]
-    return frames(said)
+    return frames(output)
 
 
-def everything_often() -> list[bytes]:
+def all_streams() -> list[bytes]:
     """Requests for all streams, more often than there are ticks."""
     ids = sorted(m.mavlink_map)
-    return frames(order(m.MAV_CMD_SET_MESSAGE_INTERVAL, float(number), 1000.0) for number in ids)
+    return frames(command_long(m.MAV_CMD_SET_MESSAGE_INTERVAL, float(number), 1000.0) for number in ids)
 
 
 FLOODS: dict[str, Callable[[], Flood]] = {
@@ -112,15 +112,15 @@ FLOODS: dict[str, Callable[[], Flood]] = {
         frames([m.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0xDF8, 0, 0, -2, *((0.0,) * 8))])
     ),
     "commands": lambda: Flood(
-        frames([order(m.MAV_CMD_DO_SET_MODE, 1, 4, 3), order(m.MAV_CMD_DO_SET_MODE, 1, 4, 5)])
+        frames([command_long(m.MAV_CMD_DO_SET_MODE, 1, 4, 3), command_long(m.MAV_CMD_DO_SET_MODE, 1, 4, 5)])
     ),
-    "all streams at 1 kHz": lambda: Flood(everything_often()),
+    "all streams at 1 kHz": lambda: Flood(all_streams()),
     "2 kB of 0xFE by TCP": lambda: Flood([b"\xfe" * 2048], tcp=True),
     "all parameters by TCP": lambda: Flood(frames([m.MAVLink_param_request_list_message(1, 1)]), tcp=True),
 }
 
 
-def pour(flood: Flood, ports: list[int], tcp: int, sent: Any) -> None:
+def send_flood(flood: Flood, ports: list[int], tcp: int, sent: Any) -> None:
     """Send the flood until the process is killed; `sent` counts the datagrams."""
     peers: list[socket.socket] = []
     for _ in range(PEERS):
@@ -132,13 +132,13 @@ def pour(flood: Flood, ports: list[int], tcp: int, sent: Any) -> None:
     addresses = [("127.0.0.1", port) for port in ports]
     sources = itertools.cycle(peers if flood.tcp else [(x, to) for x in peers for to in addresses])
     for peer in sources:
-        for word in flood.words:
+        for datagram in flood.datagrams:
             with suppress(OSError):
                 if flood.tcp:
-                    peer.send(word)
+                    peer.send(datagram)
                     peer.recv(65536)
                 else:
-                    peer[0].sendto(word, peer[1])
+                    peer[0].sendto(datagram, peer[1])
                 sent.value += 1
 
 
@@ -172,8 +172,8 @@ class Vehicle:
     def take_off(self) -> None:
         with Session(parse_address(self._ground), find_s=60.0) as session:
             session.find()
-        for words in (("takeoff", "2"), ("arm",)):
-            command = [sys.executable, "-m", "gcs", *words, "--connect", self._ground]
+        for datagrams in (("takeoff", "2"), ("arm",)):
+            command = [sys.executable, "-m", "gcs", *datagrams, "--connect", self._ground]
             subprocess.run(command, check=True, capture_output=True)
         self._hold()
 
@@ -188,22 +188,22 @@ class Vehicle:
         self._autopilot.wait()
         return self._log.read_text(encoding="utf-8")
 
-    def under(self, flood: Flood, seconds: float) -> tuple[int, str]:
+    def run_under(self, flood: Flood, seconds: float) -> tuple[int, str]:
         """Run a new autopilot under a flood: how many datagrams were sent, and what the autopilot printed."""
         self._end_autopilot()
         self._autopilot = self._start_autopilot(flood.large)
         self._hold()
         sent = multiprocessing.Value("l", 0)
         arguments = (flood, ports_of(self._autopilot.pid), self._base + 4, sent)
-        fire = multiprocessing.Process(target=pour, args=arguments, daemon=True)
-        if flood.words:
-            fire.start()
+        sender = multiprocessing.Process(target=send_flood, args=arguments, daemon=True)
+        if flood.datagrams:
+            sender.start()
         time.sleep(seconds)
-        said = self._end_autopilot()
-        if flood.words:
-            fire.kill()
-        assert "Traceback" not in said, said
-        return sent.value, said
+        output = self._end_autopilot()
+        if flood.datagrams:
+            sender.kill()
+        assert "Traceback" not in output, output
+        return sent.value, output
 
     def close(self) -> None:
         for program in (self._autopilot, self._sitl):
@@ -224,9 +224,9 @@ def main() -> None:
         stack.callback(vehicle.close)
         vehicle.take_off()
         for name in arguments.only or FLOODS:
-            sent, said = vehicle.under(FLOODS[name](), arguments.seconds)
-            found = SUMMARY.search(said)
-            assert found is not None, said
+            sent, output = vehicle.run_under(FLOODS[name](), arguments.seconds)
+            found = SUMMARY.search(output)
+            assert found is not None, output
             p50, p99, most, long, ticks = found.groups()
             print(f"{name:28} {sent:9} {p50:>6} {p99:>6} {most:>7}  {long} of {ticks}", flush=True)
 

@@ -57,26 +57,26 @@ KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(2, 34))
 SENSORS, ANSWERS = "sensors", "answers"  # the two ends of the simulator link
 LINKS = ("gcs", "api", "stranger", "noise", "gcs", "api", "stranger", "noise", SENSORS, ANSWERS)
 MISSION = "delivery"  # waypoints, a release, and a flight home
-PATIENCE_S = 120.0  # time limit: programs start on a busy machine, and may have to compile
+TIMEOUT_S = 120.0  # time limit: programs start on a busy machine, and may have to compile
 TICKS = 80_000  # over which the datagrams are spread
 RATE = 20_000  # datagrams per second over sockets
 
 
-def order(command: int, *params: float) -> Any:
+def command_long(command: int, *params: float) -> Any:
     """A command of the true ground station."""
     return m.MAVLink_command_long_message(1, 1, command, 0, *params, *((0.0,) * (7 - len(params))))
 
 
-ARM = order(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-ORDERS = (  # commands by tick: the mission; and a flight by commands, with the load on the cable to the end
-    {250: order(m.MAV_CMD_MISSION_START), 260: ARM},
+ARM = command_long(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+COMMANDS = (  # commands by tick: the mission; and a flight by commands, with the load on the cable to the end
+    {250: command_long(m.MAV_CMD_MISSION_START), 260: ARM},
     {
-        250: order(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0),
+        250: command_long(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0),
         260: ARM,
-        6000: order(m.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        6000: command_long(m.MAV_CMD_NAV_RETURN_TO_LAUNCH),
     },
 )
-Make = Callable[[random.Random], bytes]
+MakeDatagram = Callable[[random.Random], bytes]
 
 
 # ---- what strangers send
@@ -110,14 +110,14 @@ def random_frames(rng: random.Random, count: int, system: int) -> list[bytes]:
     return [writer.frame(_random_message(rng, rng.choice(kinds), system)) for _ in range(count)]
 
 
-def tempting_frames(rng: random.Random, count: int, key: bytes | None = None) -> list[bytes]:
+def harmful_frames(rng: random.Random, count: int, key: bytes | None = None) -> list[bytes]:
     """Complete frames of commands, parameters and uploads that would do harm, signed if there is a key."""
     writer = FrameWriter(255, 190)
     sign = None if key is None else Signing(key, 10**13).signer(1)
-    return [writer.frame(message, sign) for _ in range(count // 8) for message in _tempting(rng)]
+    return [writer.frame(message, sign) for _ in range(count // 8) for message in _harmful_messages(rng)]
 
 
-def _tempting(rng: random.Random) -> Iterator[Any]:
+def _harmful_messages(rng: random.Random) -> Iterator[Any]:
     """Messages that would do harm."""
     yield m.MAVLink_command_long_message(
         1, 1, rng.choice((400, 176, 20, 21, 22, 185, 246, 245, 179, 300, 211, 420, 42600)), 0,
@@ -133,7 +133,7 @@ def _tempting(rng: random.Random) -> Iterator[Any]:
     yield m.MAVLink_mission_set_current_message(1, 1, rng.randrange(9))
 
 
-def refused(rng: random.Random) -> Iterator[Any]:
+def requests_to_refuse(rng: random.Random) -> Iterator[Any]:
     """Requests that a vehicle without a key receives and must refuse."""
     odd = rng.choice((float("nan"), float("inf"), -float("inf"), 1e30))
     yield m.MAVLink_param_set_message(1, 1, rng.choice((b"MIS_SPEED", b"NO_SUCH", b"\xff\xfe", b"")), odd, 9)
@@ -160,7 +160,7 @@ def file_request(rng: random.Random) -> Any:
     return m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload))
 
 
-def broken(rng: random.Random, frames: list[bytes]) -> bytes:
+def broken_frame(rng: random.Random, frames: list[bytes]) -> bytes:
     """A frame with a flipped bit, or truncated, or followed by a piece of another; it no longer decodes."""
     while True:
         frame = bytearray(rng.choice(frames))
@@ -169,40 +169,40 @@ def broken(rng: random.Random, frames: list[bytes]) -> bytes:
         if rng.random() < 0.2:
             frame += rng.choice(frames)[: rng.randrange(1, 20)]
         frame[rng.randrange(1, len(frame))] ^= 1 << rng.randrange(8)
-        found = bytes(frame)
-        if not decode(found)[0]:  # one of 65,536 changed headers fits the checksum
-            return found
+        result = bytes(frame)
+        if not decode(result)[0]:  # one of 65,536 changed headers fits the checksum
+            return result
 
 
-def one_of(frames: list[bytes]) -> Make:
+def choice_of(frames: list[bytes]) -> MakeDatagram:
     """A maker that chooses one of these frames."""
     return lambda rng: rng.choice(frames)
 
 
-def for_a_vehicle_with_a_key(rng: random.Random) -> dict[str, Make]:
+def datagrams_without_its_key(rng: random.Random) -> dict[str, MakeDatagram]:
     """Makers of datagrams that are not signed with its key."""
-    forged = tempting_frames(rng, 8000)
+    forged = harmful_frames(rng, 8000)
     whole = [*random_frames(rng, 20_000, 1), *forged]
     writer = FrameWriter(255, 190)
     return {
         "bytes": any_bytes,
-        "unsigned messages": one_of(whole),
-        "forged commands": one_of(forged),
-        "signed with another key": one_of(tempting_frames(rng, 8000, OTHER_KEY)),
-        "broken": lambda rng: broken(rng, whole),
+        "unsigned messages": choice_of(whole),
+        "forged commands": choice_of(forged),
+        "signed with another key": choice_of(harmful_frames(rng, 8000, OTHER_KEY)),
+        "broken": lambda rng: broken_frame(rng, whole),
         "requests for files": lambda rng: writer.frame(file_request(rng)),
     }
 
 
-def for_a_vehicle_without(rng: random.Random) -> dict[str, Make]:
+def datagrams_for_unsigned_vehicle(rng: random.Random) -> dict[str, MakeDatagram]:
     """Makers of datagrams that are no message, not for it, or to be refused; and of requests for files."""
-    whole = [*random_frames(rng, 20_000, 1), *tempting_frames(rng, 8000)]
+    whole = [*random_frames(rng, 20_000, 1), *harmful_frames(rng, 8000)]
     writer = FrameWriter(255, 190)
     return {
         "bytes": any_bytes,
-        "broken": lambda rng: broken(rng, whole),
-        "for another vehicle": one_of(random_frames(rng, 20_000, 9)),
-        "to be refused": one_of([writer.frame(x) for _ in range(2000) for x in refused(rng)]),
+        "broken": lambda rng: broken_frame(rng, whole),
+        "for another vehicle": choice_of(random_frames(rng, 20_000, 9)),
+        "to be refused": choice_of([writer.frame(x) for _ in range(2000) for x in requests_to_refuse(rng)]),
         "requests for files": lambda rng: writer.frame(file_request(rng)),
     }
 
@@ -210,7 +210,7 @@ def for_a_vehicle_without(rng: random.Random) -> dict[str, Make]:
 # ---- in process
 
 
-class Twin:
+class SimulatedVehicle:
     """An autopilot in its world."""
 
     def __init__(self, key: bytes | None) -> None:
@@ -225,13 +225,13 @@ class Twin:
         self.onboard.add_link("api")
         self.writer = FrameWriter(255, 190)
         self.sign = None if key is None else Signing(key, 10**12).signer(0)
-        self.said: list[bytes] = []
+        self.sent_frames: list[bytes] = []
         self.texts: list[str] = []
 
-    def say(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         """Send a message of the true ground station."""
         frame = self.writer.frame(message, self.sign)
-        self.said.append(frame)
+        self.sent_frames.append(frame)
         self.onboard.receive_ground(frame, "gcs")
 
     def tick(self) -> None:
@@ -243,7 +243,7 @@ class Twin:
         self.simulator.receive(answer)
         self.simulator.advance()
 
-    def hear_stranger(self, datagram: bytes, link: str) -> Any:
+    def receive_from_stranger(self, datagram: bytes, link: str) -> Any:
         """Deliver a stranger's datagram; returns what it causes, which must be nothing."""
         if link == SENSORS:
             return self.onboard.receive_sensors(datagram)
@@ -253,46 +253,56 @@ class Twin:
         return [event for event in events if not isinstance(event, TimesyncAnswered)]
 
     @property
-    def kept(self) -> Any:
+    def stored_data(self) -> Any:
         """The data that outlasts the flight."""
         endpoint = self.onboard.endpoint
         return repr((endpoint.mission, endpoint.areas, self.onboard.parameters.values()))
 
 
-def fly_under_fire(name: str, key: bytes | None, hostile: dict[str, Make], count: int, each: int) -> None:
-    """Fly undisturbed and under attack, with `each` datagrams per tick, until `count` have been sent."""
+def fly_under_attack(
+    name: str, key: bytes | None, hostile: dict[str, MakeDatagram], count: int, per_tick: int
+) -> None:
+    """Fly undisturbed and under attack, with `per_tick` datagrams per tick, until `count` have been sent."""
     rng = random.Random(count)
     kinds, phases = Counter[str](), Counter[str]()
     spent_s, flights = 0.0, 0
     while kinds.total() < count:
-        peace, fire = Twin(key), Twin(key)
+        undisturbed, attacked = SimulatedVehicle(key), SimulatedVehicle(key)
         makers = list(hostile.items())
         if key is not None:
-            makers.append(("replayed", lambda rng, said=fire.said: rng.choice(said) if said else b""))
+            makers.append(
+                (
+                    "replayed",
+                    lambda rng, sent_frames=attacked.sent_frames: (
+                        rng.choice(sent_frames) if sent_frames else b""
+                    ),
+                )
+            )
         flown = False
-        orders = ORDERS[flights % len(ORDERS)]
+        commands = COMMANDS[flights % len(COMMANDS)]
         flights += 1
-        while kinds.total() < count and not (flown and peace.onboard.phase == Phase.DISARMED):
-            for twin in (peace, fire):
-                if twin.onboard.tick in orders:
-                    twin.say(orders[twin.onboard.tick])
-            for _ in range(each):
+        while kinds.total() < count and not (flown and undisturbed.onboard.phase == Phase.DISARMED):
+            for vehicle in (undisturbed, attacked):
+                if vehicle.onboard.tick in commands:
+                    vehicle.send(commands[vehicle.onboard.tick])
+            for _ in range(per_tick):
                 kind, make = rng.choice(makers)
                 datagram, link = make(rng), rng.choice(LINKS)
-                began = time.perf_counter()
-                heeded = fire.hear_stranger(datagram, link)
-                spent_s += time.perf_counter() - began
-                assert not heeded, (kind, link, datagram.hex(), heeded)
+                start_s = time.perf_counter()
+                effect = attacked.receive_from_stranger(datagram, link)
+                spent_s += time.perf_counter() - start_s
+                assert not effect, (kind, link, datagram.hex(), effect)
                 kinds[kind] += 1
-            phases[fire.onboard.phase.name.lower()] += each
-            peace.tick()
-            fire.tick()
-            worlds = [twin.simulator.core.rows.world for twin in (peace, fire)]
+            phases[attacked.onboard.phase.name.lower()] += per_tick
+            undisturbed.tick()
+            attacked.tick()
+            worlds = [vehicle.simulator.core.rows.world for vehicle in (undisturbed, attacked)]
             assert np.array_equal(*worlds, equal_nan=True), (
-                f"the flights part at tick {fire.onboard.tick}: {peace.onboard.phase}, {fire.onboard.phase}"
+                f"the flights part at tick {attacked.onboard.tick}: "
+                f"{undisturbed.onboard.phase}, {attacked.onboard.phase}"
             )
-            flown = flown or peace.onboard.phase in (Phase.HOLD, Phase.MISSION)
-        assert fire.kept == peace.kept
+            flown = flown or undisturbed.onboard.phase in (Phase.HOLD, Phase.MISSION)
+        assert attacked.stored_data == undisturbed.stored_data
     print(f"{name}: {kinds.total()} datagrams, {1e6 * spent_s / kinds.total():.1f} us each; nothing changed")
     for counts in (kinds, phases):
         print("  " + ", ".join(f"{word} {n}" for word, n in counts.most_common()))
@@ -311,19 +321,19 @@ def ports_of(pid: int) -> list[int]:
     return [int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes]
 
 
-def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> None:
+def attack_ports(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> None:
     """Send `count` datagrams to these ports of this machine, a tenth of them by TCP; `done` counts them."""
     rng = random.Random(seed)
-    makers = list(for_a_vehicle_with_a_key(rng).values())
+    makers = list(datagrams_without_its_key(rng).values())
     sensors = [
         FrameWriter(1, 200).frame(message)
         for kind in (m.MAVLink_hil_sensor_message, m.MAVLink_hil_actuator_controls_message)
         for message in (_random_message(rng, kind, 1) for _ in range(500))
     ]
-    makers.append(one_of(sensors))
-    socks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
+    makers.append(choice_of(sensors))
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
     stream: socket.socket | None = None
-    begun = time.monotonic()
+    start_s = time.monotonic()
     for sent in range(count):
         datagram = rng.choice(makers)(rng)
         if rng.random() < 0.1:  # by TCP
@@ -339,20 +349,20 @@ def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> Non
                 stream = None
         else:
             with suppress(OSError):
-                rng.choice(socks).sendto(datagram, ("127.0.0.1", rng.choice(ports)))
+                rng.choice(sockets).sendto(datagram, ("127.0.0.1", rng.choice(ports)))
         done.value = sent + 1
-        ahead_s = sent / RATE - (time.monotonic() - begun)
+        ahead_s = sent / RATE - (time.monotonic() - start_s)
         if ahead_s > 0.01:
             time.sleep(ahead_s)
 
 
-class Watched:
+class ApiClient:
     """The true API client: knows the key, starts the flights, and records what the vehicle reports."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
-        self._socket.settimeout(PATIENCE_S)
+        self._socket.settimeout(TIMEOUT_S)
         self._writer, self._signing = (
             FrameWriter(255, 191),
             Signing(KEY, timestamp_of(time.time_ns() // 1000)),
@@ -361,11 +371,11 @@ class Watched:
         self.boot_ms, self.armed, self.flights = 0, False, 0
         self.texts: list[str] = []
 
-    def say(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         self._signing.advance(timestamp_of(time.time_ns() // 1000))
         self._socket.sendto(self._writer.frame(message, self._signing.signer(2)), self._vehicle)
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Receive one datagram of the vehicle, which is silent for long only while it starts."""
         datagram, self._vehicle = self._socket.recvfrom(65535)
         for received in decode(datagram)[0]:
@@ -377,31 +387,31 @@ class Watched:
             elif message.get_type() == "STATUSTEXT":
                 self.texts.append(message.text)
 
-    def forget(self) -> None:
+    def discard_received(self) -> None:
         """Discard what was received from a vehicle that has ended."""
         self._socket.setblocking(False)
         with suppress(BlockingIOError):
             while True:
                 self._socket.recv(65535)
-        self._socket.settimeout(PATIENCE_S)
+        self._socket.settimeout(TIMEOUT_S)
 
     def fly(self, until: Callable[[], bool]) -> None:
         """Fly missions, one after another, until `until()` is true and the last mission has ended."""
-        asked_ms = -10_000
+        commanded_ms = -10_000
         flying = False
         while not (until() and not flying):
-            self.hear()
+            self.receive()
             flying = flying or self.armed
             if flying and not self.armed:
                 flying = False
                 self.flights += 1
-            if not flying and not until() and self.boot_ms - asked_ms > 3000:
-                asked_ms = self.boot_ms
-                for message in ORDERS[0].values():
-                    self.say(message)
+            if not flying and not until() and self.boot_ms - commanded_ms > 3000:
+                commanded_ms = self.boot_ms
+                for message in COMMANDS[0].values():
+                    self.send(message)
 
 
-def state_of(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:
+def stored_state(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:
     """Parameters and mission, as a ground station reads them from the vehicle."""
     values = folder / "values.params"
     values.unlink(missing_ok=True)
@@ -411,7 +421,7 @@ def state_of(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:
 
 def over_sockets(count: int, base: int) -> None:
     """Attack the real programs on all their ports."""
-    listen, truth, ground, api, tcp = (f"127.0.0.1:{base + i}" for i in range(5))
+    simulator_address, truth, ground, api, tcp = (f"127.0.0.1:{base + i}" for i in range(5))
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
         key_file = folder / "key"
@@ -433,50 +443,55 @@ def over_sockets(count: int, base: int) -> None:
 
         def start_autopilot() -> subprocess.Popen[bytes]:
             return start(
-                *("autopilot", "--sim", listen, "--gcs", ground, "--api", api, "--tcp", tcp),
+                *("autopilot", "--sim", simulator_address, "--gcs", ground, "--api", api, "--tcp", tcp),
                 *("--storage", str(folder / "storage"), "--signing-key", str(key_file)),
             )
 
-        sitl = start("sitl", "--listen", listen, "--truth", truth, "--speed", "4")
-        watched = Watched(base + 3)
+        sitl = start("sitl", "--listen", simulator_address, "--truth", truth, "--speed", "4")
+        client = ApiClient(base + 3)
         autopilot = start_autopilot()
-        watched.hear()
+        client.receive()
         gcs("upload", MISSION)
         gcs("param", "set", "MIS_SPEED", "1.25")
-        before = state_of(gcs, folder)
+        before = stored_state(gcs, folder)
 
         def cost_s(until: Callable[[], bool]) -> float:
             """Processor seconds of the autopilot per tick of 4 ms."""
-            begun_s, begun_ms = processor_s(autopilot.pid), watched.boot_ms
-            watched.fly(until)
-            return (processor_s(autopilot.pid) - begun_s) / max(watched.boot_ms - begun_ms, 1) * 4.0
+            before_s, before_ms = processor_s(autopilot.pid), client.boot_ms
+            client.fly(until)
+            return (processor_s(autopilot.pid) - before_s) / max(client.boot_ms - before_ms, 1) * 4.0
 
-        peace_s = cost_s(lambda: watched.flights >= 1)
+        undisturbed_s = cost_s(lambda: client.flights >= 1)
         done = multiprocessing.Value("l", 0)
         ports = [*ports_of(sitl.pid), *ports_of(autopilot.pid)]
-        fire = multiprocessing.Process(target=fire_at, args=(ports, base + 4, count, 1, done), daemon=True)
-        began = time.monotonic()
-        fire.start()
-        fire_s = cost_s(lambda: done.value >= count)
-        wall_s = time.monotonic() - began
-        fire.join()
+        attack = multiprocessing.Process(
+            target=attack_ports, args=(ports, base + 4, count, 1, done), daemon=True
+        )
+        start_s = time.monotonic()
+        attack.start()
+        attacked_s = cost_s(lambda: done.value >= count)
+        wall_s = time.monotonic() - start_s
+        attack.join()
         assert sitl.poll() is None and autopilot.poll() is None, "a program ended"
-        after = state_of(gcs, folder)
+        after = stored_state(gcs, folder)
         autopilot.kill()
         autopilot.wait()
-        watched.forget()
+        client.discard_received()
         autopilot = start_autopilot()
-        watched.hear()
-        restarted = state_of(gcs, folder)
+        client.receive()
+        restarted = stored_state(gcs, folder)
         logs = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.log"))
     assert before == after == restarted, "parameters or mission are others"
-    bad = [text for text in watched.texts if re.search("Internal|failsafe|denied|lost", text, re.IGNORECASE)]
-    assert not bad, watched.texts
+    unexpected = [
+        text for text in client.texts if re.search("Internal|failsafe|denied|lost", text, re.IGNORECASE)
+    ]
+    assert not unexpected, client.texts
     assert "Traceback" not in logs, logs
     print(f"over sockets: {count} datagrams to {len(ports)} ports and by TCP in {wall_s:.0f} s;")
-    print(f"  {watched.flights} flights of {MISSION} ended as they should; a restart finds everything")
+    print(f"  {client.flights} flights of {MISSION} ended as they should; a restart finds everything")
     print(
-        f"  autopilot {1e6 * peace_s:.0f} us of processor time a tick in peace, {1e6 * fire_s:.0f} under fire"
+        f"  autopilot {1e6 * undisturbed_s:.0f} us of processor time a tick in peace, "
+        f"{1e6 * attacked_s:.0f} under fire"
     )
 
 
@@ -489,9 +504,13 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.in_process:
         half = arguments.in_process // 2
-        each = max(1, half // TICKS)
-        fly_under_fire("with a signing key", KEY, for_a_vehicle_with_a_key(random.Random(1)), half, each)
-        fly_under_fire("without one", None, for_a_vehicle_without(random.Random(2)), half, each)
+        per_tick = max(1, half // TICKS)
+        fly_under_attack(
+            "with a signing key", KEY, datagrams_without_its_key(random.Random(1)), half, per_tick
+        )
+        fly_under_attack(
+            "without one", None, datagrams_for_unsigned_vehicle(random.Random(2)), half, per_tick
+        )
     if arguments.sockets:
         over_sockets(arguments.sockets, arguments.port)
 

@@ -33,7 +33,7 @@ class Progress(BaseCallback):
 
     def __init__(self) -> None:
         super().__init__()
-        self.began_s = time.perf_counter()
+        self.start_s = time.perf_counter()
         self.next = 0
 
     def _on_step(self) -> bool:
@@ -41,9 +41,9 @@ class Progress(BaseCallback):
             self.next += 200_000
             rewards = [each["r"] for each in self.model.ep_info_buffer]
             lengths = [each["l"] for each in self.model.ep_info_buffer]
-            passed_s = time.perf_counter() - self.began_s
+            elapsed_s = time.perf_counter() - self.start_s
             print(
-                f"{passed_s:5.0f} s {self.num_timesteps:9d} steps: "
+                f"{elapsed_s:5.0f} s {self.num_timesteps:9d} steps: "
                 f"reward {np.mean(rewards):7.1f}, {np.mean(lengths):5.0f} steps an episode",
                 flush=True,
             )
@@ -74,16 +74,16 @@ def learn(steps: int, seed: int) -> PPO:
 def score(model: PPO, episodes: int = 100) -> tuple[float, float]:
     """(share of episodes without a crash, mean position error in m of the load over their last second)."""
     envs = gymnasium.make_vec(plumbline.learning.HOVER, episodes, autoreset_mode="Disabled", **OPTIONS)
-    seen, _ = envs.reset(seed=10_000)
+    observations, _ = envs.reset(seed=10_000)
     alive = np.ones(episodes, bool)
     errors = []
     for step in range(499):
-        seen, _, crashed, _, _ = envs.step(model.predict(seen, deterministic=True)[0])
+        observations, _, crashed, _, _ = envs.step(model.predict(observations, deterministic=True)[0])
         alive &= ~crashed
         if crashed.any():
-            seen, _ = envs.reset(options={"reset_mask": crashed})
+            observations, _ = envs.reset(options={"reset_mask": crashed})
         if step >= 449:
-            errors.append(np.linalg.norm(seen[:, :3], axis=1))
+            errors.append(np.linalg.norm(observations[:, :3], axis=1))
     return float(alive.mean()), float(np.mean(errors))
 
 
@@ -93,15 +93,15 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--steps", type=int, default=3_000_000)
     parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    model = learn(given.steps, given.seed)
+    arguments = parser.parse_args()
+    model = learn(arguments.steps, arguments.seed)
     alive, error_m = score(model)
     print(
         f"{alive:.0%} of 100 episodes without a crash, "
         f"{1e3 * error_m:.0f} mm from the place in their last second"
     )
-    policy_of_sb3(model, OPTIONS).save(given.out)
-    print(f"{given.out} is written; it flies as a law: docs/learning.md")
+    policy_of_sb3(model, OPTIONS).save(arguments.out)
+    print(f"{arguments.out} is written; it flies as a law: docs/learning.md")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ import plumbline.learning
 from sitl.plant.records import Truth
 from sitl.vehicles.truth import load_truth
 
-LEAST_S = 2.0  # of each measurement
+MIN_DURATION_S = 2.0  # of each measurement
 TIMESTEP_S = 0.004
 
 MODEL = """<mujoco>
@@ -51,9 +51,10 @@ def mujoco_model(truth: Truth, integrator: str) -> Any:
     """The vehicle as a MuJoCo model."""
     import mujoco
 
-    c, tau, most = truth.torque_ratio, truth.rotor_tau, truth.rotor_max
+    c, tau, max_force = truth.torque_ratio, truth.rotor_tau, truth.rotor_max
     rotors = "".join(
-        ROTOR.format(i=i, yaw=sign * c, tau=tau, most=most) for i, sign in enumerate((-1, 1, -1, 1), start=1)
+        ROTOR.format(i=i, yaw=sign * c, tau=tau, most=max_force)
+        for i, sign in enumerate((-1, 1, -1, 1), start=1)
     )
     text = MODEL.format(
         h=TIMESTEP_S,
@@ -76,7 +77,7 @@ def rate(run: Callable[[], int]) -> float:
     found = []
     for _ in range(3):
         steps, began_s = 0, time.perf_counter()
-        while time.perf_counter() - began_s < LEAST_S / 3:
+        while time.perf_counter() - began_s < MIN_DURATION_S / 3:
             steps += run()
         found.append(steps / (time.perf_counter() - began_s))
     return max(found)

@@ -43,7 +43,7 @@ class Peer(NamedTuple):
     """What flies, what its flight includes, and a call that flies and returns the seconds flown."""
 
     name: str
-    holds: str
+    includes: str
     fly: Callable[[], float]
 
 
@@ -54,7 +54,7 @@ def circle(t: float) -> tuple[Any, Any, Any]:
     return np.array([c, s, 1.0]), np.array([-w * s, w * c, 0.0]), np.array([-w * w * c, -w * w * s, 0.0])
 
 
-def ours() -> Peer:
+def plumbline_peer() -> Peer:
     """Case B with the sensors `lab`, without messages."""
     mission, conditions = load_mission("case-b"), Conditions()
     board = boarding(mission, conditions)
@@ -69,7 +69,7 @@ def udaan(mujoco_cable: str | None) -> Peer:
     """The load on a circle, by udaan's own law."""
     from udaan.models.quadrotor_cspayload import QuadrotorCsPayloadBase, QuadrotorCsPayloadMujoco
 
-    def flown() -> float:
+    def fly_once() -> float:
         if mujoco_cable is None:
             model: Any = QuadrotorCsPayloadBase()
         else:
@@ -81,8 +81,8 @@ def udaan(mujoco_cable: str | None) -> Peer:
         return float(model.t)
 
     if mujoco_cable is None:
-        return Peer("udaan, its own physics", "load on a taut cable, law: 200 Hz, Euler at 800 Hz", flown)
-    return Peer(f"udaan, MuJoCo's {mujoco_cable}", "load, law; truth instead of sensors", flown)
+        return Peer("udaan, its own physics", "load on a taut cable, law: 200 Hz, Euler at 800 Hz", fly_once)
+    return Peer(f"udaan, MuJoCo's {mujoco_cable}", "load, law; truth instead of sensors", fly_once)
 
 
 def rotorpy(rate_hz: int) -> Peer:
@@ -93,13 +93,13 @@ def rotorpy(rate_hz: int) -> Peer:
     from rotorpy.vehicles.hummingbird_params import quad_params
     from rotorpy.vehicles.multirotor import Multirotor
 
-    def flown() -> float:
+    def fly_once() -> float:
         turns = np.array([1.0 / PERIOD_S] * 3)
         path = ThreeDCircularTraj(radius=np.array([RADIUS_M, RADIUS_M, 0.0]), freq=turns)
         world = Environment(Multirotor(quad_params), SE3Control(quad_params), path, sim_rate=rate_hz)
         return float(world.run(t_final=FLIGHT_S, plot=False, verbose=False)["time"][-1])
 
-    return Peer(f"RotorPy at {rate_hz} Hz", "no load; rotors, drag, inertial unit, law", flown)
+    return Peer(f"RotorPy at {rate_hz} Hz", "no load; rotors, drag, inertial unit, law", fly_once)
 
 
 def mujoco() -> Peer:
@@ -110,13 +110,13 @@ def mujoco() -> Peer:
     model = mujoco_model(truth, "RK4")
     data = mj.MjData(model)
 
-    def flown() -> float:
+    def fly_once() -> float:
         mj.mj_resetData(model, data)
         data.act[:] = data.ctrl[:] = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
         mj.mj_step(model, data, nstep=round(FLIGHT_S / TIMESTEP_S))
         return FLIGHT_S
 
-    return Peer("MuJoCo, physics alone", "load on a tendon, rotors: Runge-Kutta at 250 Hz; no law", flown)
+    return Peer("MuJoCo, physics alone", "load on a tendon, rotors: Runge-Kutta at 250 Hz; no law", fly_once)
 
 
 def processor_s_of_a_second(peer: Peer) -> float:
@@ -137,7 +137,15 @@ def main() -> None:
         parser.error(f"not installed: {', '.join(missing)} (pip install '.[peers]')")
     logging.disable(logging.INFO)
     warnings.simplefilter("ignore")
-    peers = [ours(), mujoco(), udaan(None), udaan("tendon"), udaan("links"), rotorpy(100), rotorpy(500)]
+    peers = [
+        plumbline_peer(),
+        mujoco(),
+        udaan(None),
+        udaan("tendon"),
+        udaan("links"),
+        rotorpy(100),
+        rotorpy(500),
+    ]
     for peer in peers:
         peer.fly()  # what is loaded or compiled at the first flight does not count
     costs: dict[str, list[float]] = {peer.name: [] for peer in peers}
@@ -149,7 +157,7 @@ def main() -> None:
     lines.append("| --- | --- | --- | --- |")
     for peer in peers:
         cost = statistics.median(costs[peer.name])
-        lines.append(f"| {peer.name} | {peer.holds} | {1.0 / cost:.3g} | {cost / base:.3g} |")
+        lines.append(f"| {peer.name} | {peer.includes} | {1.0 / cost:.3g} | {cost / base:.3g} |")
     text = "\n".join(lines) + "\n"
     print(text)
     if options.docs:

@@ -55,16 +55,16 @@ def over_udp(folder: Path) -> tuple[dict[str, float], float, float]:
     """The record of `gcs fly` in lockstep, the seconds until the vehicle is heard, and those in total."""
     out = folder / f"flight-{time.monotonic_ns()}"
     command = [sys.executable, "-m", "gcs", "fly", MISSION, "--sensors", "lab", "--out", str(out)]
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     assert child.stderr is not None
     of_vehicle = (line for line in child.stderr if _CLOCK.match(line) and "looking for" not in line)
-    heard = next((time.perf_counter() - began for _ in of_vehicle), float("nan"))
+    heard_s = next((time.perf_counter() - start_s for _ in of_vehicle), float("nan"))
     child.communicate()
-    whole = time.perf_counter() - began
+    total_s = time.perf_counter() - start_s
     if child.returncode != 0:
         raise SystemExit(f"gcs fly failed: exit code {child.returncode}")
-    return json.loads((out / "summary.json").read_text(encoding="utf-8")), heard, whole
+    return json.loads((out / "summary.json").read_text(encoding="utf-8")), heard_s, total_s
 
 
 def _echo(port: int, core: int) -> None:
@@ -124,7 +124,7 @@ def sweep_s(flights: int) -> float:
     return float(json.loads(done.stdout)["wall_s"])
 
 
-def holding(seconds: float) -> Mission:
+def hold_mission(seconds: float) -> Mission:
     """A mission that takes off and holds."""
     return Mission("hold", "Hold", "", (), (Takeoff(1.0), Waypoint(0.0, 0.0, 1.0, hold_s=seconds), Land()))
 
@@ -158,10 +158,10 @@ def real_time(seconds: float, folder: Path) -> tuple[str, str]:
     )
     time.sleep(seconds)
     simulator.send_signal(signal.SIGINT)
-    said, _ = simulator.communicate()
+    simulator_text, _ = simulator.communicate()
     autopilot.send_signal(signal.SIGINT)
-    worked, _ = autopilot.communicate()
-    last, cost = (text.strip().splitlines()[-1] for text in (said, worked))
+    autopilot_text, _ = autopilot.communicate()
+    last, cost = (text.strip().splitlines()[-1] for text in (simulator_text, autopilot_text))
     return last.removeprefix("sitl: "), cost.partition("; ")[2]
 
 
@@ -178,8 +178,8 @@ def machine() -> str:
     widths = {"avx512f": 512, "avx2": 256}
     width = next((bits for flag, bits in widths.items() if flag in about["flags"].split()), 0)
     vectors = f", vectors of {width} bits" if width else ""
-    named = about["model name"] or platform.machine()
-    return f"{os.cpu_count()} cores of {named}{vectors}, Python {platform.python_version()}."
+    name_of_model = about["model name"] or platform.machine()
+    return f"{os.cpu_count()} cores of {name_of_model}{vectors}, Python {platform.python_version()}."
 
 
 Rows = Iterator[tuple[str, ...]]  # each as soon as it is measured
@@ -189,30 +189,30 @@ def lockstep_rows(repeat: int, folder: Path) -> Rows:
     """Flights through three processes and in one, and the limit that UDP sets."""
     mission, conditions = load_mission(MISSION), Conditions()
     over_udp(folder)  # loads everything once
-    flown, heard, whole, floor, one = [], [], [], [], []
+    udp_factors, first_word, totals, udp_shares, one_process = [], [], [], [], []
     for _ in range(repeat):
-        record, heard_s, whole_s = over_udp(folder)
+        record, heard_s, total_s = over_udp(folder)
         wall_s = record["recorded_s"] / record["real_time_factor"]
-        flown.append(record["real_time_factor"])
-        heard.append(heard_s)
-        whole.append(whole_s)
-        floor.append(ping_pong(round(record["recorded_s"] * TICKS_PER_S)) / wall_s)
-        began = time.perf_counter()
+        udp_factors.append(record["real_time_factor"])
+        first_word.append(heard_s)
+        totals.append(total_s)
+        udp_shares.append(ping_pong(round(record["recorded_s"] * TICKS_PER_S)) / wall_s)
+        start_s = time.perf_counter()
         fly_with_wire(mission, conditions, NoLog())
-        one.append(record["recorded_s"] / (time.perf_counter() - began))
+        one_process.append(record["recorded_s"] / (time.perf_counter() - start_s))
     median = statistics.median
     yield (
         "three processes over UDP in lockstep",
-        f"{median(flown):.0f} x real time",
-        f"{median(floor):.0%} of a ping-pong of UDP datagrams, as many and as large",
+        f"{median(udp_factors):.0f} x real time",
+        f"{median(udp_shares):.0%} of a ping-pong of UDP datagrams, as many and as large",
     )
     yield (
         "the same cores in one process",
-        f"{median(one):.0f} x real time",
-        f"{median(one) / median(flown):.1f} x three processes",
+        f"{median(one_process):.0f} x real time",
+        f"{median(one_process) / median(udp_factors):.1f} x three processes",
     )
-    yield "`gcs fly`, from the command to the vehicle's first word", f"{median(heard):.1f} s", ""
-    yield "`gcs fly`, from the command to the prompt, with its report", f"{median(whole):.1f} s", ""
+    yield "`gcs fly`, from the command to the vehicle's first word", f"{median(first_word):.1f} s", ""
+    yield "`gcs fly`, from the command to the prompt, with its report", f"{median(totals):.1f} s", ""
 
 
 def sweep_rows(repeat: int, flights: int) -> Rows:
@@ -257,20 +257,20 @@ def linear_rows() -> Rows:
     mission, conditions = load_mission(MISSION), Conditions()
     board = boarding(mission, conditions)
 
-    def flown(flights: Iterable[tuple[Mission, Conditions]], ticks_per_s: float) -> str:
-        began = time.process_time()
-        flight_s = sum(fly(one, under, board).flight_s for one, under in flights)
-        return f"{1e6 * (time.process_time() - began) / (flight_s * ticks_per_s):.2f}"
+    def us_per_tick(flights: Iterable[tuple[Mission, Conditions]], ticks_per_s: float) -> str:
+        start_s = time.process_time()
+        flight_s = sum(fly(one, conditions_of_one, board).flight_s for one, conditions_of_one in flights)
+        return f"{1e6 * (time.process_time() - start_s) / (flight_s * ticks_per_s):.2f}"
 
     for count in (1, 10, 100, 1000):
-        cost = flown(((mission, Conditions(seed=k)) for k in range(count)), TICKS_PER_S)
+        cost = us_per_tick(((mission, Conditions(seed=k)) for k in range(count)), TICKS_PER_S)
         yield f"{count} flights of {MISSION}", cost
     for seconds in (10.0, 100.0, 1000.0, 10_000.0):
-        cost = flown([(holding(seconds), conditions)], TICKS_PER_S)
+        cost = us_per_tick([(hold_mission(seconds), conditions)], TICKS_PER_S)
         yield f"one flight that holds for {seconds:g} s", cost
     for rate in (250, 500, 1000):
         faster = Conditions(settings={"SIM_RATE_HZ": float(rate)})
-        yield f"{MISSION} at {rate} Hz", flown([(mission, faster)], rate)
+        yield f"{MISSION} at {rate} Hz", us_per_tick([(mission, faster)], rate)
 
 
 def all_rows(options: argparse.Namespace, folder: Path) -> Rows:

@@ -34,7 +34,7 @@ LAST_S = 1.5  # how long the last frame stays before the picture repeats
 QUALITY = 70
 
 # The scene fills the window; over it are the legend, load error, tension, swing and speed.
-ALONE = """
+SCENE_ONLY = """
 const style = document.createElement("style");
 style.textContent = `body { overflow: hidden } .over.cameras { display: none }
   #stage { position: fixed; inset: 0; z-index: 9; border: 0; border-radius: 0 }
@@ -73,14 +73,14 @@ window.frameAt = (t, distance, turn, height) => {
   stage.scene.render();
 };
 """
-DRAWN = """
+DRAW_FRAME = """
 const [done, ...where] = [arguments[arguments.length - 1], ...Array.from(arguments).slice(0, -1)];
 window.frameAt(...where);
 requestAnimationFrame(() => requestAnimationFrame(done));
 """
 
 
-def flown(folder: Path, *mission: str) -> str:
+def fly_report(folder: Path, *mission: str) -> str:
     """The address of the report of a flight with these arguments of `gcs fly`."""
     out = folder / mission[0]
     command = [sys.executable, "-m", "gcs", "fly", *mission, "--quiet", "--out", str(out)]
@@ -96,13 +96,13 @@ def open_report(browser: Browser, address: str, width: int, height: int) -> None
 
 def animated(browser: Browser, folder: Path, path: Path) -> None:
     """A replay, with a camera that slowly circles the vehicle."""
-    open_report(browser, flown(folder, *FLIGHT), *SIZE)
-    browser.run(ALONE)
+    open_report(browser, fly_report(folder, *FLIGHT), *SIZE)
+    browser.run(SCENE_ONLY)
     browser.run(PREPARE, PERIOD_S)
     frames = []
     for time_s in np.arange(BEGIN_S, END_S, PACE / FRAMES_PER_S):
         share = (time_s - BEGIN_S) / (END_S - BEGIN_S)
-        browser.driver.execute_async_script(DRAWN, time_s, 3.2, 45.0 - 37.0 * share, 0.28 + 0.1 * share)
+        browser.driver.execute_async_script(DRAW_FRAME, time_s, 3.2, 45.0 - 37.0 * share, 0.28 + 0.1 * share)
         frames.append(Image.open(io.BytesIO(browser.driver.get_screenshot_as_png())).convert("RGB"))
     durations = [round(1000 / FRAMES_PER_S)] * (len(frames) - 1) + [round(1000 * LAST_S)]
     frames[0].save(
@@ -112,7 +112,7 @@ def animated(browser: Browser, folder: Path, path: Path) -> None:
 
 def report(browser: Browser, folder: Path, path: Path) -> None:
     """The report of Case B, as it opens."""
-    open_report(browser, flown(folder, "case-b", "--sensors", "lab"), 1280, 860)
+    open_report(browser, fly_report(folder, "case-b", "--sensors", "lab"), 1280, 860)
     browser.screenshot(path)
 
 

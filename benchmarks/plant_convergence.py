@@ -34,7 +34,7 @@ WIND = (2.0, -1.0, 0.5)
 Case = tuple[Truth, Flown, Callable[[int], Forces], float]
 
 
-def _aloft(truth: Truth) -> Flown:
+def _hovering(truth: Truth) -> Flown:
     """Hanging at rest, 5 m up, rotors at hover."""
     hover = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
     return initial_state(truth)._replace(
@@ -53,7 +53,7 @@ def _taut() -> Case:
     tilt = (0.3, 0.0, -0.95)
     length = math.hypot(*tilt)
     q = (tilt[0] / length, 0.0, tilt[2] / length)
-    start = _aloft(truth)._replace(q_cable=q, q_cable_dot=(0.0, 1.5, 0.0))
+    start = _hovering(truth)._replace(q_cable=q, q_cable_dot=(0.0, 1.5, 0.0))
     start = start._replace(
         x_quad=axpy(-truth.cable_length, q, start.x_load),
         v_quad=(0.0, -1.5 * truth.cable_length, 0.0),
@@ -70,7 +70,7 @@ def _taut() -> Case:
 
 def _slack() -> Case:
     truth = load_truth("bebop")
-    start = _aloft(truth)
+    start = _hovering(truth)
     start = start._replace(
         x_load=(0.0, 0.0, start.x_quad[2] - 0.2),
         taut=0.0,
@@ -95,7 +95,7 @@ def _contact() -> Case:
 
 def _switching() -> Case:
     truth = load_truth("bebop")
-    start = _aloft(truth)._replace(v_load=(0.2, 0.1, 5.0), v_quad=(0.2, 0.1, 5.0))
+    start = _hovering(truth)._replace(v_load=(0.2, 0.1, 5.0), v_quad=(0.2, 0.1, 5.0))
 
     # Thrown upwards with the rotors at rest, the vehicle is braked by its drag while the load flies on; then
     # full thrust until the cable snaps taut; and so on. The rotors' lag puts the release inside a step.
@@ -142,7 +142,7 @@ def call_time_us(h: float) -> dict[str, float]:
     """Wall time of one call from Python, in the air and on the ground."""
     truth = load_truth("bebop")
     times = {}
-    for name, state in (("air", _aloft(truth)), ("ground", initial_state(truth))):
+    for name, state in (("air", _hovering(truth)), ("ground", initial_state(truth))):
         advance_many(state, truth, state.rotor_force, WIND, h, 1)
         begin = time.perf_counter()
         for _ in range(5000):

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from gcs.recorded.column_map import ColumnMap, MapError, load_map
-from gcs.recorded.estimates import rows_of
+from gcs.recorded.estimates import filter_rows
 from gcs.recorded.identification import identify_load, tracked_length
 from gcs.recorded.motion import distances, motion_of
 from gcs.recorded.recording import RecordingError, read_recording
@@ -38,11 +38,11 @@ COLUMNS = (
 )
 
 
-def scored(path: Path, columns: ColumnMap) -> tuple[dict[str, Any], tuple[Score, ...]]:
+def score_flight(path: Path, columns: ColumnMap) -> tuple[dict[str, Any], tuple[Score, ...]]:
     """The figures of one flight, and the scores from which they are computed."""
     motion = motion_of(read_recording(path, columns), columns)
     model = columns.load_model(float(np.nanmedian(distances(motion))))
-    rows = rows_of(motion, model)
+    rows = filter_rows(motion, model)
     scores = (*score_ahead(motion, rows, model), score_pose_alone(motion, rows, model))
     swing = next(one for one in identify_load(motion, model, ("length_m",)) if one.name == "length_m")
     tracked = tracked_length(motion, columns.attachment.below_m)
@@ -68,7 +68,7 @@ def _figures(scores: tuple[Score, ...]) -> dict[str, float]:
     }
 
 
-def together(scores: list[tuple[Score, ...]]) -> dict[str, float]:
+def combined(scores: list[tuple[Score, ...]]) -> dict[str, float]:
     """The figures of all windows of all flights."""
     return _figures(
         tuple(Score(*map(np.concatenate, zip(*each, strict=True))) for each in zip(*scores, strict=True))
@@ -98,27 +98,29 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", default=os.environ.get("PLUMBLINE_REAL_FLIGHTS"), type=Path)
     parser.add_argument("--columns", default="motion-capture", help="column map: a shipped name or a file")
     parser.add_argument("--out", type=Path, help="write the figures as JSON too")
-    asked = parser.parse_args()
-    if asked.folder is None:
+    options = parser.parse_args()
+    if options.folder is None:
         parser.error("name a folder with recordings, or set PLUMBLINE_REAL_FLIGHTS")
-    paths = sorted([*asked.folder.glob("*.csv.gz"), *asked.folder.glob("*.csv")])
+    paths = sorted([*options.folder.glob("*.csv.gz"), *options.folder.glob("*.csv")])
     if not paths:
-        sys.exit(f"{asked.folder}: holds no recordings (*.csv, *.csv.gz)")
+        sys.exit(f"{options.folder}: holds no recordings (*.csv, *.csv.gz)")
     table, scores = [], []
     print("| " + " | ".join(COLUMNS) + " |\n|" + "---|" * len(COLUMNS))
     try:
-        columns = load_map(asked.columns)
+        columns = load_map(options.columns)
         for path in paths:
-            row, found = scored(path, columns)
+            row, found = score_flight(path, columns)
             table.append(row)
             scores.append(found)
             print("| " + " | ".join(line(row)) + " |", flush=True)
     except (MapError, RecordingError) as error:
         sys.exit(str(error))
-    whole = {"flight": "all", "rows": sum(row["rows"] for row in table), **together(scores)}
+    whole = {"flight": "all", "rows": sum(row["rows"] for row in table), **combined(scores)}
     print("| " + " | ".join(line(whole)) + " |")
-    if asked.out:
-        asked.out.write_text(json.dumps({"flights": table, "all": whole}, indent=1) + "\n", encoding="utf-8")
+    if options.out:
+        options.out.write_text(
+            json.dumps({"flights": table, "all": whole}, indent=1) + "\n", encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

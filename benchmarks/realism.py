@@ -18,7 +18,7 @@ import plumbline
 
 CASES = ("case-a", "case-b", "case-c")
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
-LEAST_SHARE = 0.005  # of the ticks at a rotor's limit, that is shown
+MIN_SHARE = 0.005  # of the ticks at a rotor's limit, that is shown
 
 
 class Effect(NamedTuple):
@@ -32,9 +32,9 @@ class Effect(NamedTuple):
 
 BATTERY = {"SIM_BATTERY": 1, "SIM_BAT_CHARGE": 90, "SIM_THR_CURVE": 0.57, "SIM_THR_KNOWN": 0.57}
 OFF_CENTRE = {"X": 0.008, "Y": -0.004, "Z": -0.02}
-ATTACHED = {f"SIM_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
-TOLD = {f"VEH_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
-SHAKEN = {"SIM_VIB_ACC": 2, "SIM_VIB_GYR": 0.05}
+ATTACHMENT = {f"SIM_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
+CONFIGURED = {f"VEH_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
+VIBRATION = {"SIM_VIB_ACC": 2, "SIM_VIB_GYR": 0.05}
 CORD = {"SIM_CBL_LINKS": 4, "SIM_CBL_MASS": 0.003, "SIM_CABLE_DIAM": 2}
 WINDY = {"SIM_WIND_E": 5, "SIM_GUST_STD": 1}
 EFFECTS = (
@@ -49,14 +49,14 @@ EFFECTS = (
     Effect("downwash", {"SIM_DOWNWASH": 1}),
     Effect("downwash, cable of 1 mm", {"SIM_DOWNWASH": 1, "SIM_CABLE_DIAM": 1}),
     Effect("cord of 2 mm and 3 g/m, four links", CORD),
-    Effect("attachment 2 cm off the centre", ATTACHED),
-    Effect("the same, told", {**ATTACHED, **TOLD}),
+    Effect("attachment 2 cm off the centre", ATTACHMENT),
+    Effect("the same, told", {**ATTACHMENT, **CONFIGURED}),
     Effect("thrust curve 0.62, taken for 0.57", {"SIM_THR_CURVE": 0.62, "SIM_THR_KNOWN": 0.57}),
     Effect("throttle of 1000 steps", {"SIM_ESC_STEPS": 1000}),
     Effect("battery at 90 %, rotors slow down with it", BATTERY),
     Effect("the same, speed controlled", {**BATTERY, "SIM_ESC_RPM_CTL": 1}),
     Effect("vibration of 0.5 m/s²", {"SIM_VIB_ACC": 0.5}),
-    Effect("vibration of 2 m/s² and 0.05 rad/s, low-pass 98 Hz", {**SHAKEN, "SIM_IMU_LPF_HZ": 98}),
+    Effect("vibration of 2 m/s² and 0.05 rad/s, low-pass 98 Hz", {**VIBRATION, "SIM_IMU_LPF_HZ": 98}),
     Effect("white noise, 0.3 m/s² and 0.02 rad/s", {"SIM_ACC_NOISE": 0.3, "SIM_GYR_NOISE": 0.02}),
     Effect("white noise, 1.0 m/s² and 0.05 rad/s", {"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05}),
     Effect("readings late at random, 5 ms on average", {"SIM_SENS_JIT_MS": 5}),
@@ -80,15 +80,15 @@ EFFECTS = (
 
 def cell(table: Any) -> str:
     """The cell for the flights of one mission."""
-    home = table[table["outcome"] == "completed"]
+    completed = table[table["outcome"] == "completed"]
     text = "none came home"
-    if len(home):
-        errors = 1e3 * home["load_error_max_m"]
+    if len(completed):
+        errors = 1e3 * completed["load_error_max_m"]
         text = f"{errors.median():.0f}, {errors.max():.0f}"
-    if lost := len(table) - len(home):
-        text += f"; {lost} of {len(table)} lost" if len(home) else ""
-    share = home["saturated_fraction"].mean() if len(home) else 0.0
-    return text + (f" ({share:.0%})" if share >= LEAST_SHARE else "")
+    if lost := len(table) - len(completed):
+        text += f"; {lost} of {len(table)} lost" if len(completed) else ""
+    share = completed["saturated_fraction"].mean() if len(completed) else 0.0
+    return text + (f" ({share:.0%})" if share >= MIN_SHARE else "")
 
 
 def row(effect: Effect, seeds: int) -> str:
@@ -111,14 +111,14 @@ def row(effect: Effect, seeds: int) -> str:
     return f"| {effect.name} | {' | '.join(cells)} |"
 
 
-def written(page: str, effect: Effect, line: str, seeds: int) -> str:
+def with_row(page: str, effect: Effect, line: str, seeds: int) -> str:
     """The page with this row in its table; rows of other effects stay, if those effects still exist."""
     table = page[page.index(BEGIN) : page.index(END)]
     rows = {name: row for row, name in re.findall(r"^(\| (.*?) \| .*)$", table, flags=re.MULTILINE)}
     rows[effect.name] = line
     head = f"{seeds} seeds each:\n\n| effect | Case A | Case B | Case C |\n|---|---|---|---|\n"
-    kept = "".join(rows[each.name] + "\n" for each in EFFECTS if each.name in rows)
-    return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{head}{kept}{END}", page, flags=re.DOTALL)
+    body = "".join(rows[each.name] + "\n" for each in EFFECTS if each.name in rows)
+    return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{head}{body}{END}", page, flags=re.DOTALL)
 
 
 def main() -> None:
@@ -135,7 +135,7 @@ def main() -> None:
         print(line, flush=True)
         if options.docs:
             page = options.docs.read_text(encoding="utf-8")
-            options.docs.write_text(written(page, effect, line, options.seeds), encoding="utf-8")
+            options.docs.write_text(with_row(page, effect, line, options.seeds), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ SWEEPS = {
     "wind-gusts": "case-b --seeds 3 --vary SIM_WIND_E=0:10:11 --vary SIM_GUST_STD=0,0.5,1,2,3",
     "dropouts": f"case-b {BOTH} --seeds 10 --vary SIM_DROP_PCT=0:95:20",
 }
-WHOLE = {
+ALL_TOGETHER = {
     "everything": (
         "case-b --sample 2000 --seeds 5 --vary SIM_ACT_DELAY_MS=0:40 --vary SIM_ROTOR_TAU_MS=0:40"
         " --vary SIM_SENS_LAT_MS=0:30 --vary SIM_NOISE_SCALE=0:4 --vary SIM_DROP_PCT=0:30"
@@ -76,7 +76,7 @@ def cells(directory: Path, names: list[str]) -> list[dict[str, Any]]:
     return found
 
 
-def keep(record: dict[str, list[dict[str, Any]]]) -> None:
+def store_results(record: dict[str, list[dict[str, Any]]]) -> None:
     """Write the results into the record, a line for each cell."""
     stored = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {}
     parts = []
@@ -90,14 +90,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("sweeps/robustness"))
     parser.add_argument("--docs", type=Path, default=ROOT / "docs/images/robustness")
-    parser.add_argument("--only", nargs="*", choices=[*SWEEPS, *WHOLE])
+    parser.add_argument("--only", nargs="*", choices=[*SWEEPS, *ALL_TOGETHER])
     parser.add_argument("--whole", action="store_true")
     options = parser.parse_args()
-    wanted = options.only or [*SWEEPS, *(WHOLE if options.whole else ())]
-    for name in wanted:
-        words = shlex.split({**SWEEPS, **WHOLE}[name])
+    chosen = options.only or [*SWEEPS, *(ALL_TOGETHER if options.whole else ())]
+    for name in chosen:
+        arguments = shlex.split({**SWEEPS, **ALL_TOGETHER}[name])
         directory = options.out / name
-        sys.argv = ["gcs", "sweep", *words, "--out", str(directory)]
+        sys.argv = ["gcs", "sweep", *arguments, "--out", str(directory)]
         print(f"== {name}: {shlex.join(sys.argv)}", flush=True)
         try:
             gcs(sys.argv[1:], prog_name="gcs")
@@ -105,8 +105,8 @@ def main() -> int:
             if end.code:
                 return int(end.code)
         if name in SWEEPS:
-            varied = [words[i + 1].split("=")[0] for i, word in enumerate(words) if word == "--vary"]
-            keep({name: cells(directory, varied)})
+            varied = [arguments[i + 1].split("=")[0] for i, word in enumerate(arguments) if word == "--vary"]
+            store_results({name: cells(directory, varied)})
         options.docs.mkdir(parents=True, exist_ok=True)
         maps = sorted(directory.glob("map-*.png")) if name in SWEEPS else []
         for picture in maps or sorted(directory.glob("curve-*.png")):

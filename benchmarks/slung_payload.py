@@ -92,11 +92,14 @@ type = "land"
 SETTINGS = {"WPNAV_SPEED_UP": 50, "WPNAV_ACCEL": 300, "WPNAV_JERK": 20}
 GRAVITY = 9.80665  # the firmware's
 SPHERE_NS2_M2 = 0.5 * 1.225 * 0.07  # force of its payload at 1 m/s with SIM_SLUP_DRAG 1
-WAITED, WATCHED = 2.0, 3.0  # periods: from the stop until the fit begins, and for which the fit lasts
-HZ = 10.0  # rate of its payload's log, at which both flights are evaluated
+WAIT_PERIODS, FIT_PERIODS = (
+    2.0,
+    3.0,
+)  # periods: from the stop until the fit begins, and for which the fit lasts
+LOG_RATE_HZ = 10.0  # rate of its payload's log, at which both flights are evaluated
 
 
-class Flown(NamedTuple):
+class RecordedFlight(NamedTuple):
     """One flight, a row each 0.1 s: east, north, up; m, s, N. The stop is at time 0."""
 
     time_s: Floats
@@ -111,14 +114,14 @@ class Swing(NamedTuple):
 
     s: complex  # 1/s
     k: complex
-    begins_m: float  # amplitude at the beginning of the fit
+    start_amplitude_m: float  # amplitude at the beginning of the fit
 
     @property
     def period_s(self) -> float:
         return 2.0 * pi / abs(self.s.imag)
 
     @property
-    def lost(self) -> float:
+    def loss(self) -> float:
         """Share of the amplitude that is lost in a period."""
         return 1.0 - float(np.exp(self.s.real * self.period_s))
 
@@ -133,9 +136,9 @@ class FlatGround(UdpSocket):
         writer = FrameWriter(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         for one in (one for datagram in found for one in decode(datagram)[0]):
             if one.id == mavlink.MAVLINK_MSG_ID_TERRAIN_REQUEST:
-                asked = one.message
-                for bit in (bit for bit in range(56) if asked.mask >> bit & 1):
-                    grid = asked.lat, asked.lon, asked.grid_spacing, bit, [0] * 16
+                request = one.message
+                for bit in (bit for bit in range(56) if request.mask >> bit & 1):
+                    grid = request.lat, request.lon, request.grid_spacing, bit, [0] * 16
                     self.send(writer.frame(mavlink.MAVLink_terrain_data_message(*grid)))
         return found
 
@@ -158,7 +161,7 @@ def model_of(vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flown:
+def fly_firmware_payload(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> RecordedFlight:
     """The firmware's own quadrotor and payload."""
     out.mkdir()
     (out / "model.json").write_text(json.dumps(model_of(vehicle)), encoding="ascii")
@@ -170,9 +173,9 @@ def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flo
         "TERRAIN_ENABLE": 1,
         "SR0_EXTRA3": 5,  # the stream with its requests for terrain
     }
-    shipped = (files("sitl.interfaces") / "ardupilot.parm").read_text(encoding="ascii")
+    defaults = (files("sitl.interfaces") / "ardupilot.parm").read_text(encoding="ascii")
     lines = [f"{name} {value:.9g}\n" for name, value in (payload | SETTINGS).items()]
-    (out / "own.parm").write_text(shipped + "".join(lines), encoding="ascii")
+    (out / "own.parm").write_text(defaults + "".join(lines), encoding="ascii")
     home = Home()
     steps = load_mission(str(mission)).steps
     items = firmware_items(steps, home, vehicle.cable_length_m, vehicle.gear_height_m, True)
@@ -196,10 +199,10 @@ def fly_theirs(program: Path, mission: Path, vehicle: Vehicle, out: Path) -> Flo
         run_wall_clock(client, capture, link, truth, processes.ended, display, stop, lambda: None)
     if client.outcome is None or client.outcome.name != "completed":
         sys.exit(f"the firmware with its own payload: {client.outcome}")
-    return theirs_of(next((out / "logs").glob("*.BIN")))
+    return flight_from_log(next((out / "logs").glob("*.BIN")))
 
 
-def theirs_of(log: Path) -> Flown:
+def flight_from_log(log: Path) -> RecordedFlight:
     """A flight from the firmware's own log: SLUP of the payload, SIM2 of the vehicle."""
     payload, vehicle = [], []
     reader = DFReader_binary(str(log))
@@ -211,10 +214,12 @@ def theirs_of(log: Path) -> Flown:
             force = sqrt(m.VFN**2 + m.VFE**2 + m.VFD**2)
             payload.append((at_s, m.PE, m.PN, -m.PD, m.VE, m.VN, -m.VD, force))
     rows, places = np.array(payload), np.array(vehicle)
-    return stopped_at_0(rows[:, 0], at(rows[:, 0], places), rows[:, 1:4], rows[:, 4:7], rows[:, 7])
+    return with_stop_at_zero(
+        rows[:, 0], interpolated(rows[:, 0], places), rows[:, 1:4], rows[:, 4:7], rows[:, 7]
+    )
 
 
-def fly_ours(program: Path, mission: Path, vehicle: Path, out: Path) -> Flown:
+def fly_plumbline(program: Path, mission: Path, vehicle: Path, out: Path) -> RecordedFlight:
     """The same firmware in our world."""
     settings = [word for name, value in SETTINGS.items() for word in ("--set", f"{name}={value}")]
     flight = ["--vehicle", str(vehicle), "--sensors", "rtk", "--out", str(out), "--quiet", *settings]
@@ -232,37 +237,39 @@ def fly_ours(program: Path, mission: Path, vehicle: Path, out: Path) -> Flown:
     load = load_telemetry(out / "flight.tlog").load_truth
     rows = np.c_[load.time_s, load.position_m, load.q_cable * load.distance_m[:, None], load.velocity_m_s]
     rows = np.c_[rows, load.tension_n]
-    seen = np.arange(load.time_s[0], load.time_s[-1], 1.0 / HZ)
-    found = at(seen, rows)
-    below = found[:, 3:6]
-    return stopped_at_0(seen, found[:, :3] - below, below, found[:, 6:9], found[:, 9])
+    times_s = np.arange(load.time_s[0], load.time_s[-1], 1.0 / LOG_RATE_HZ)
+    resampled = interpolated(times_s, rows)
+    below = resampled[:, 3:6]
+    return with_stop_at_zero(times_s, resampled[:, :3] - below, below, resampled[:, 6:9], resampled[:, 9])
 
 
-def at(time_s: Floats, rows: Floats) -> Floats:
+def interpolated(time_s: Floats, rows: Floats) -> Floats:
     """The rows, whose first column is their time, interpolated at these times."""
     return np.array([np.interp(time_s, rows[:, 0], column) for column in rows.T[1:]]).T
 
 
-def stopped_at_0(time_s: Floats, vehicle: Floats, below: Floats, velocity: Floats, tension: Floats) -> Flown:
+def with_stop_at_zero(
+    time_s: Floats, vehicle: Floats, below: Floats, velocity: Floats, tension: Floats
+) -> RecordedFlight:
     """The flight, with the time at which the vehicle arrives at its waypoint as 0."""
-    there_s = time_s[np.argmax(vehicle[:, 0] > DISTANCE_M - 0.3)]
-    return Flown(time_s - there_s, vehicle, below, velocity, tension)
+    stop_s = time_s[np.argmax(vehicle[:, 0] > DISTANCE_M - 0.3)]
+    return RecordedFlight(time_s - stop_s, vehicle, below, velocity, tension)
 
 
-def swing_of(flown: Flown, cable_m: float) -> Swing:
+def swing_of(flight: RecordedFlight, cable_m: float) -> Swing:
     """The damped oscillation that fits load and vehicle best, after the stop."""
     period_s = 2.0 * pi * sqrt(cable_m / GRAVITY)
-    begins_s = WAITED * period_s
-    chosen = (flown.time_s > begins_s) & (flown.time_s < begins_s + WATCHED * period_s)
-    t = flown.time_s[chosen] - begins_s
-    columns = flown.below_m[chosen, 0], flown.vehicle_m[chosen, 0]
+    start_s = WAIT_PERIODS * period_s
+    fitted_rows = (flight.time_s > start_s) & (flight.time_s < start_s + FIT_PERIODS * period_s)
+    t = flight.time_s[fitted_rows] - start_s
+    columns = flight.below_m[fitted_rows, 0], flight.vehicle_m[fitted_rows, 0]
 
     def fitted(guess: Floats) -> tuple[list[complex], Floats]:
         wave = np.exp(complex(*guess) * t)
         basis = np.c_[wave.real, -wave.imag, np.ones_like(t), t]
         found = [np.linalg.lstsq(basis, column, rcond=None)[0] for column in columns]
-        missed = [basis @ x - column for x, column in zip(found, columns, strict=True)]
-        return [complex(x[0], x[1]) for x in found], np.concatenate(missed)
+        residuals = [basis @ x - column for x, column in zip(found, columns, strict=True)]
+        return [complex(x[0], x[1]) for x in found], np.concatenate(residuals)
 
     best = least_squares(lambda guess: fitted(guess)[1], (-0.1, 2.0 * pi / period_s)).x
     (load, vehicle), _ = fitted(best)
@@ -283,65 +290,65 @@ class Lift(NamedTuple):
     slack_m: float  # the cable's length less the distance of its ends, when it begins to pull
 
 
-def rates(flown: Flown) -> tuple[Floats, Floats]:
+def rates(flight: RecordedFlight) -> tuple[Floats, Floats]:
     """Speeds (m/s) along the cable, of the vehicle, and, as reported, of the load."""
-    up = -flown.below_m / np.linalg.norm(flown.below_m, axis=1)[:, None]
-    climb = np.gradient(flown.vehicle_m, flown.time_s, axis=0)
-    return np.sum(climb * up, axis=1), np.sum(flown.load_m_s * up, axis=1)
+    up = -flight.below_m / np.linalg.norm(flight.below_m, axis=1)[:, None]
+    climb = np.gradient(flight.vehicle_m, flight.time_s, axis=0)
+    return np.sum(climb * up, axis=1), np.sum(flight.load_m_s * up, axis=1)
 
 
-def taut_at(flown: Flown, cable_m: float) -> int:
+def taut_at(flight: RecordedFlight, cable_m: float) -> int:
     """The last row with a slack cable before the load is carried."""
-    height = flown.vehicle_m[:, 2] + flown.below_m[:, 2]
-    up = int(np.argmax((height > height[0] + 0.5) & (flown.time_s < 0.0)))
-    distance = np.linalg.norm(flown.below_m[:up], axis=1)
+    height = flight.vehicle_m[:, 2] + flight.below_m[:, 2]
+    up = int(np.argmax((height > height[0] + 0.5) & (flight.time_s < 0.0)))
+    distance = np.linalg.norm(flight.below_m[:up], axis=1)
     return int(np.flatnonzero(distance < cable_m - 0.005)[-1])
 
 
-def lift_of(flown: Flown, cable_m: float, weight_n: float) -> Lift:
+def lift_of(flight: RecordedFlight, cable_m: float, weight_n: float) -> Lift:
     """The lift-off, from the last time that the cable is slack before the load is carried."""
-    taut = taut_at(flown, cable_m)
-    vehicle, load = rates(flown)
-    begins = slice(taut - round(HZ), taut + 2)
-    pulls = flown.tension_n[begins] > 0.05 * weight_n
-    distance = np.linalg.norm(flown.below_m[begins], axis=1)[pulls]
+    taut = taut_at(flight, cable_m)
+    vehicle, load = rates(flight)
+    onset = slice(taut - round(LOG_RATE_HZ), taut + 2)
+    taut_rows = flight.tension_n[onset] > 0.05 * weight_n
+    distance = np.linalg.norm(flight.below_m[onset], axis=1)[taut_rows]
     return Lift(
-        float(flown.tension_n[taut : taut + round(HZ) + 1].max()),
+        float(flight.tension_n[taut : taut + round(LOG_RATE_HZ) + 1].max()),
         float(load[taut + 4] / vehicle[taut + 4]),
         max(cable_m - float(distance.min()), 0.0),
     )
 
 
-def carried(flown: Flown) -> NDArray[np.bool_]:
+def carried(flight: RecordedFlight) -> NDArray[np.bool_]:
     """Which rows are between the start of the carrying and the time when all is at rest."""
-    return (flown.time_s > -6.0) & (flown.time_s < 20.0)
+    return (flight.time_s > -6.0) & (flight.time_s < 20.0)
 
 
-def widest_deg(flown: Flown) -> float:
+def max_swing_deg(flight: RecordedFlight) -> float:
     """The greatest angle of the cable against the vertical while the load is carried."""
-    below = flown.below_m[carried(flown)]
+    below = flight.below_m[carried(flight)]
     return float(np.degrees(np.arctan2(np.hypot(below[:, 0], below[:, 1]), -below[:, 2])).max())
 
 
-def unaccounted_m_s(flown: Flown) -> float:
+def velocity_mismatch_m_s(flight: RecordedFlight) -> float:
     """The greatest difference between the reported velocity of the load and the rate at which its position
     changes, while it is carried."""
-    place = flown.vehicle_m + flown.below_m
-    rate = (place[2:] - place[:-2]) / (flown.time_s[2:] - flown.time_s[:-2])[:, None]
-    told = (flown.load_m_s[2:] + 2.0 * flown.load_m_s[1:-1] + flown.load_m_s[:-2]) / 4.0
-    return float(np.linalg.norm(rate - told, axis=1)[carried(flown)[1:-1]].max())
+    position = flight.vehicle_m + flight.below_m
+    rate = (position[2:] - position[:-2]) / (flight.time_s[2:] - flight.time_s[:-2])[:, None]
+    reported = (flight.load_m_s[2:] + 2.0 * flight.load_m_s[1:-1] + flight.load_m_s[:-2]) / 4.0
+    return float(np.linalg.norm(rate - reported, axis=1)[carried(flight)[1:-1]].max())
 
 
-def rows_of(cable_m: float, vehicle: Vehicle, flights: Sequence[Flown]) -> list[str]:
+def rows_of(cable_m: float, vehicle: Vehicle, flights: Sequence[RecordedFlight]) -> list[str]:
     """The table's rows of one cable; the flights are theirs and ours."""
     m, M = vehicle.load_mass_kg, vehicle.quad_mass_kg
-    fixed, free = pendulum(0.0, cable_m).period_s, pendulum(-m / (M + m), cable_m).period_s
+    fixed, moving = pendulum(0.0, cable_m).period_s, pendulum(-m / (M + m), cable_m).period_s
     weight_n = m * GRAVITY
-    swings = [swing_of(flown, cable_m) for flown in flights]
+    swings = [swing_of(flight, cable_m) for flight in flights]
     ideal = [pendulum(swing.k, cable_m) for swing in swings]
-    lifts = [lift_of(flown, cable_m, weight_n) for flown in flights]
-    under = "the same of a pendulum under that vehicle"
-    told: list[tuple[str, str, list[str]]] = [
+    lifts = [lift_of(flight, cable_m, weight_n) for flight in flights]
+    same_pendulum = "the same of a pendulum under that vehicle"
+    rows: list[tuple[str, str, list[str]]] = [
         (f"**cable of {cable_m:g} m**", "", ["", ""]),
         ("tension at lift-off, maximum", f"weight {weight_n:.2f} N", [f"{x.tension_n:.2f} N" for x in lifts]),
         (
@@ -354,34 +361,38 @@ def rows_of(cable_m: float, vehicle: Vehicle, flights: Sequence[Flown]) -> list[
             "0",
             [f"{1e3 * x.slack_m:.0f} mm" for x in lifts],
         ),
-        ("swing of carrying and stop, maximum", "", [f"{widest_deg(x):.0f} degrees" for x in flights]),
-        (f"amplitude {WAITED:g} periods after the stop", "", [f"{1e3 * x.begins_m:.0f} mm" for x in swings]),
-        ("period of the swing", f"{free:.2f} to {fixed:.2f} s", [f"{x.period_s:.2f} s" for x in swings]),
-        (under, "", [f"{x.period_s:.2f} s" for x in ideal]),
-        ("swing lost in a period", "", [f"{x.lost:.0%}" for x in swings]),
-        (under, "", [f"{x.lost:.0%}" for x in ideal]),
+        ("swing of carrying and stop, maximum", "", [f"{max_swing_deg(x):.0f} degrees" for x in flights]),
+        (
+            f"amplitude {WAIT_PERIODS:g} periods after the stop",
+            "",
+            [f"{1e3 * x.start_amplitude_m:.0f} mm" for x in swings],
+        ),
+        ("period of the swing", f"{moving:.2f} to {fixed:.2f} s", [f"{x.period_s:.2f} s" for x in swings]),
+        (same_pendulum, "", [f"{x.period_s:.2f} s" for x in ideal]),
+        ("swing lost in a period", "", [f"{x.loss:.0%}" for x in swings]),
+        (same_pendulum, "", [f"{x.loss:.0%}" for x in ideal]),
         (
             "velocity of the load less the rate of its position, maximum",
             "0",
-            [f"{unaccounted_m_s(x):.2f} m/s" for x in flights],
+            [f"{velocity_mismatch_m_s(x):.2f} m/s" for x in flights],
         ),
     ]
-    return [f"| {what} | {analytic} | {' | '.join(cells)} |" for what, analytic, cells in told]
+    return [f"| {what} | {analytic} | {' | '.join(cells)} |" for what, analytic, cells in rows]
 
 
-def draw(flights: Sequence[Flown], cable_m: float, path: Path) -> None:
+def draw(flights: Sequence[RecordedFlight], cable_m: float, path: Path) -> None:
     """Draw lift-off and swing of both flights, side by side."""
     plt.rcParams["svg.hashsalt"] = "plumbline"
     figure, (lift, swing) = plt.subplots(1, 2, figsize=(9.0, 3.2), layout="constrained")
-    for flown, name, colour in zip(flights, ("ArduPilot's own", "here"), ("C1", "C0"), strict=True):
-        taut = taut_at(flown, cable_m)
+    for flight, name, colour in zip(flights, ("ArduPilot's own", "here"), ("C1", "C0"), strict=True):
+        taut = taut_at(flight, cable_m)
         shown = slice(taut - 10, taut + 26)
-        since_s = flown.time_s[shown] - flown.time_s[taut]
-        vehicle, load = rates(flown)
+        since_s = flight.time_s[shown] - flight.time_s[taut]
+        vehicle, load = rates(flight)
         lift.plot(since_s, vehicle[shown], colour, linestyle=":", label=f"{name}: vehicle")
         lift.plot(since_s, load[shown], colour, label=f"{name}: load")
-        after = (flown.time_s > -5.0) & (flown.time_s < 15.0)
-        swing.plot(flown.time_s[after], flown.below_m[after, 0], colour, label=name)
+        after = (flight.time_s > -5.0) & (flight.time_s < 15.0)
+        swing.plot(flight.time_s[after], flight.below_m[after, 0], colour, label=name)
     lift.set(title="Lift-off", xlabel="since the cable came taut (s)", ylabel="speed along the cable (m/s)")
     swing.set(title="Hard stop", xlabel="since the stop (s)", ylabel="load ahead of the vehicle (m)")
     for axes in (lift, swing):
@@ -408,18 +419,18 @@ def main() -> None:
         vehicle = plumbline.Vehicle.load("iris").replace(name=f"iris-{cable_m:g}m", cable_length_m=cable_m)
         file = out / f"{vehicle.name}.toml"
         vehicle.save(file)
-        theirs = fly_theirs(program, mission, vehicle, out / f"theirs-{cable_m:g}m")
-        ours = fly_ours(program, mission, file, out / f"ours-{cable_m:g}m")
-        rows = rows_of(cable_m, vehicle, (theirs, ours))
+        firmware_flight = fly_firmware_payload(program, mission, vehicle, out / f"theirs-{cable_m:g}m")
+        plumbline_flight = fly_plumbline(program, mission, file, out / f"ours-{cable_m:g}m")
+        rows = rows_of(cable_m, vehicle, (firmware_flight, plumbline_flight))
         print("\n".join(rows), flush=True)
         lines += rows
         if options.docs and cable_m == CABLES_M[0]:
-            draw((theirs, ours), cable_m, options.docs.parent / PICTURE)
+            draw((firmware_flight, plumbline_flight), cable_m, options.docs.parent / PICTURE)
     if options.docs:
         text = "\n".join(lines) + "\n"
         page = options.docs.read_text(encoding="utf-8")
-        made = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
-        options.docs.write_text(made, encoding="utf-8")
+        updated = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
+        options.docs.write_text(updated, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ TOLERANCE = (0.08, 6.0, 0.25)
 STEPS_S = (0.75, 0.78, 0.79, 0.80)
 RATES_HZ = (250.0, 1000.0)
 CASES = ("case-b", "case-b-extended", "case-c")
-HEIGHT_M, WATCHED_S = 0.25, 7.0  # of Case A
+HEIGHT_M, DURATION_S = 0.25, 7.0  # of Case A
 ALTITUDE_M = 3.0
 # a flight is lost when the load is this far from its path, or the cosine of the tilt is below this
 LOST_M, LOST_COSINE = 5.0, -0.5
@@ -77,7 +77,7 @@ HEADING = (1.0, 0.0, 0.0)
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Feed(NamedTuple):
+class ErrorSources(NamedTuple):
     """1.0: the error is taken from the raw command, 0.0: from the filtered one."""
 
     x: float
@@ -85,8 +85,8 @@ class Feed(NamedTuple):
     R: float
 
 
-FLIES = Feed(x=0.0, q=0.0, R=1.0)
-AS_FLOWN = Feed(x=-1.0, q=-1.0, R=-1.0)  # not composed here: thesis.load_position itself
+AS_IMPLEMENTED = ErrorSources(x=0.0, q=0.0, R=1.0)
+THESIS_CASCADE = ErrorSources(x=-1.0, q=-1.0, R=-1.0)  # not composed here: thesis.load_position itself
 
 
 class Flight(NamedTuple):
@@ -101,7 +101,7 @@ def cascade(
     memory: thesis.ThesisMemory,
     state: State,
     x_raw: Vec3,
-    feed: Feed,
+    sources: ErrorSources,
     gains: thesis.ThesisGains,
     filters: thesis.ThesisFilters,
     vehicle: Vehicle,
@@ -114,7 +114,7 @@ def cascade(
         state.v_load,
         state.q_cable,
         state.q_cable_dot,
-        x_raw if feed.x > 0.0 else x.x1,
+        x_raw if sources.x > 0.0 else x.x1,
         x.x2,
         filter_acceleration(x, filters.reference),
         gains.k_x,
@@ -130,7 +130,7 @@ def cascade(
     direction = load_attitude_force(
         state.q_cable,
         state.q_cable_dot,
-        DirectionCommand(q_raw if feed.q > 0.0 else q_c, q_c_dot, q_c_ddot),
+        DirectionCommand(q_raw if sources.q > 0.0 else q_c, q_c_dot, q_c_ddot),
         normal_force_tracking(state.q_cable, position.A),
         gains.k_q,
         gains.k_omega,
@@ -145,7 +145,7 @@ def cascade(
     b2_ddot = filter_acceleration(b2, filters.attitude)
     b3_ddot = filter_acceleration(b3, filters.attitude)
     attitude = attitude_from_axes(b3.x1, b3.x2, b3_ddot, b1.x1, b1.x2, b1_ddot)
-    if feed.R > 0.0:
+    if sources.R > 0.0:
         R_dot = from_columns(b1.x2, b2.x2, b3.x2)
         attitude = attitude_from_rates(R_raw, R_dot, from_columns(b1_ddot, b2_ddot, b3_ddot))
     result = attitude_moment(
@@ -174,13 +174,13 @@ def run(
     plant: PlantState,
     truth: Truth,
     table: SignalTable,
-    feed: Feed,
+    sources: ErrorSources,
     gains: thesis.ThesisGains,
     filters: thesis.ThesisFilters,
     vehicle: Vehicle,
     limited: float,
     table_of_mixer: NDArray[np.float64],
-    asked: NDArray[np.float64],
+    commanded: NDArray[np.float64],
     rotors: RotorRows,
     dt: float,
     out: NDArray[np.float64],
@@ -194,13 +194,13 @@ def run(
         x_d = add(anchor, jet[0])
         R = rotation_from_quat(plant.quat_wxyz)
         state = state_of(plant, R)
-        if feed.x < 0.0:
+        if sources.x < 0.0:
             reference = Reference((x_d, jet[1], jet[2], jet[3], jet[4], jet[5], jet[6]), HEADING)
             memory, command = thesis.load_position(memory, state, reference, gains, filters, vehicle)
             thrust, moment = command.thrust, command.moment
         else:
-            memory, thrust, moment = cascade(memory, state, x_d, feed, gains, filters, vehicle)
-        mixed = mix(thrust, moment, vehicle, limited, table_of_mixer, asked)
+            memory, thrust, moment = cascade(memory, state, x_d, sources, gains, filters, vehicle)
+        mixed = mix(thrust, moment, vehicle, limited, table_of_mixer, commanded)
         error = norm(sub(plant.x_load, x_d))
         out[k, 0] = k * dt
         out[k, 1], out[k, 2], out[k, 3] = plant.x_load
@@ -210,12 +210,12 @@ def run(
         if not error < LOST_M or R[2][2] < LOST_COSINE or plant.diverged > 0.0:
             return k
         for i in range(4):
-            rotors.rows[COMMAND, i] = asked[FORCE, i]
+            rotors.rows[COMMAND, i] = commanded[FORCE, i]
         plant = advance(plant, truth, rotors, ZERO, dt)
     return len(out)
 
 
-def hanging(truth: Truth) -> PlantState:
+def suspended(truth: Truth) -> PlantState:
     """At rest in the air."""
     return initial_state(truth)._replace(
         x_load=(0.0, 0.0, ALTITUDE_M),
@@ -227,7 +227,7 @@ def hanging(truth: Truth) -> PlantState:
     )
 
 
-def fly(truth: Truth, terms: Sequence[Term], duration_s: float, feed: Feed, hz: float) -> Flight:
+def fly(truth: Truth, terms: Sequence[Term], duration_s: float, sources: ErrorSources, hz: float) -> Flight:
     """One flight of one choice."""
     vehicle = Vehicle(
         truth.quad_mass,
@@ -243,11 +243,11 @@ def fly(truth: Truth, terms: Sequence[Term], duration_s: float, feed: Feed, hz: 
     rows = np.zeros((round(duration_s * hz), COLUMNS))
     rotors = RotorRows(rotor_table(PLUS), rotors_at_rest())
     rotors.rows[ROTOR_FORCE, :4] = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
-    flown = run(
-        hanging(truth),
+    count = run(
+        suspended(truth),
         truth,
         signal_table(terms),
-        feed,
+        sources,
         thesis.THESIS_GAINS,
         thesis.thesis_filters(1.0 / hz),
         vehicle,
@@ -258,12 +258,12 @@ def fly(truth: Truth, terms: Sequence[Term], duration_s: float, feed: Feed, hz: 
         1.0 / hz,
         rows,
     )
-    return Flight(rows[: flown + 1], flown == len(rows))
+    return Flight(rows[: count + 1], count == len(rows))
 
 
-def case_a(truth: Truth, feed: Feed, step_s: float, hz: float) -> StepResponse | None:
+def case_a(truth: Truth, sources: ErrorSources, step_s: float, hz: float) -> StepResponse | None:
     """The step response, or None if the flight was lost."""
-    flight = fly(truth, [Term("y", HEIGHT_M, 0.0, step_s, None, 0.0)], WATCHED_S, feed, hz)
+    flight = fly(truth, [Term("y", HEIGHT_M, 0.0, step_s, None, 0.0)], DURATION_S, sources, hz)
     step = Step(0.0, HEIGHT_M, np.array([0.0, 0.0, ALTITUDE_M]), np.array([0.0, 1.0, 0.0]))
     return step_response(step, flight.rows[:, TIME], flight.rows[:, LOAD]) if flight.completed else None
 
@@ -273,7 +273,7 @@ def signals_of(case: str) -> Signals:
     return next(step for step in load_mission(case).steps if isinstance(step, Signals))
 
 
-def met(response: StepResponse) -> bool:
+def is_met(response: StepResponse) -> bool:
     """All three printed figures, each within its tolerance."""
     found = (response.rise_90_s, response.overshoot_pct, response.settling_5_s)
     return all(
@@ -286,7 +286,7 @@ def step_cell(response: StepResponse | None) -> str:
     if response is None or response.rise_90_s is None or response.settling_5_s is None:
         return f"{'lost':>17s} "
     figures = f"{response.rise_90_s:.2f} {response.overshoot_pct:4.1f} % {response.settling_5_s:.2f}"
-    return f"{figures:>17s}{'*' if met(response) else ' '}"
+    return f"{figures:>17s}{'*' if is_met(response) else ' '}"
 
 
 def case_cell(flight: Flight) -> str:
@@ -295,9 +295,9 @@ def case_cell(flight: Flight) -> str:
     return f"{flight.rows[:, ERROR].max():7.3f} m {100.0 * flight.rows[:, SATURATED].mean():3.0f} %"
 
 
-def label(feed: Feed) -> str:
-    words = " ".join("raw     " if value > 0.0 else "filtered" for value in feed)
-    return f"{words} {'flies' if feed == FLIES else '     '}"
+def label(sources: ErrorSources) -> str:
+    words = " ".join("raw     " if value > 0.0 else "filtered" for value in sources)
+    return f"{words} {'flies' if sources == AS_IMPLEMENTED else '     '}"
 
 
 def main() -> None:
@@ -306,28 +306,29 @@ def main() -> None:
     parser.add_argument("--hz", type=float, nargs="+", default=RATES_HZ, help="control rates, 100 ... 1000")
     arguments = parser.parse_args()
     unlimited, bebop = load_truth("thesis"), load_truth("bebop")
-    feeds = [Feed(*values) for values in product((0.0, 1.0), repeat=3)]
+    choices = [ErrorSources(*values) for values in product((0.0, 1.0), repeat=3)]
 
     for hz in arguments.hz:
         print(f"\nCase A at {hz:.0f} Hz: rise s, overshoot, settling s, by duration of the step")
         print(f"{'x        q        R':33s}" + "".join(f"{step:16.2f} s " for step in arguments.step))
-        for feed in feeds:
-            cells = (step_cell(case_a(unlimited, feed, step, hz)) for step in arguments.step)
-            print(label(feed), "".join(cells))
+        for sources in choices:
+            cells = (step_cell(case_a(unlimited, sources, step, hz)) for step in arguments.step)
+            print(label(sources), "".join(cells))
     print("\nlargest load error, saturation; 250 Hz; without limits and lag, then with those of the bebop")
     print(f"{'x        q        R':33s}" + "".join(f"{case:>17s}" for case in CASES * 2))
-    for feed in feeds:
+    for sources in choices:
         flights = (
-            fly(truth, signals.terms, signals.duration_s, feed, 250.0)
+            fly(truth, signals.terms, signals.duration_s, sources, 250.0)
             for truth in (unlimited, bebop)
             for signals in map(signals_of, CASES)
         )
-        print(label(feed), "".join(f"{case_cell(flight):>17s}" for flight in flights))
+        print(label(sources), "".join(f"{case_cell(flight):>17s}" for flight in flights))
     signals = signals_of("case-c")
-    composed, flown = (
-        fly(bebop, signals.terms, signals.duration_s, feed, 250.0).rows for feed in (FLIES, AS_FLOWN)
+    composed, direct = (
+        fly(bebop, signals.terms, signals.duration_s, sources, 250.0).rows
+        for sources in (AS_IMPLEMENTED, THESIS_CASCADE)
     )
-    print(f"\nthe law that flies, against its row, Case C: {np.abs(composed - flown).max():.1e} m")
+    print(f"\nthe law that flies, against its row, Case C: {np.abs(composed - direct).max():.1e} m")
 
 
 if __name__ == "__main__":

@@ -34,10 +34,10 @@ from gcs.sweep.group import FEWEST, Group, suits
 from missions.fileformat import load_mission
 
 RECORD = Path(__file__).with_name("yardstick.json")
-MOST_TICKS = 60_000
+MAX_TICKS = 60_000
 TEXTS = {mavlink.MAVLINK_MSG_ID_STATUSTEXT}
 # messages about the parameters, which are no part of a flight
-UNCOUNTED = {mavlink.MAVLINK_MSG_ID_PARAM_VALUE, mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST}
+IGNORED = {mavlink.MAVLINK_MSG_ID_PARAM_VALUE, mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST}
 THESIS, LQR = {"CTL_LAW": 0.0}, {"CTL_LAW": 1.0}
 
 FLIGHTS: dict[str, tuple[str, Conditions]] = {
@@ -72,20 +72,20 @@ class Hasher:
     """A log that keeps two hashes of its frames: of the flight, and of the texts."""
 
     def __init__(self) -> None:
-        self.flown, self.said = sha256(), sha256()
+        self.telemetry, self.texts = sha256(), sha256()
 
     def write(self, unix_us: int, *frames: bytes) -> None:
         """Add frames to the hashes."""
         for one in decode(b"".join(frames))[0]:
             message = one.message
             kind = message.get_msgId()
-            if kind in UNCOUNTED:
+            if kind in IGNORED:
                 continue
-            into = self.said if kind in TEXTS else self.flown
+            into = self.texts if kind in TEXTS else self.telemetry
             into.update(f"{unix_us} {one.system} {kind} {message.to_dict()!r}\n".encode())
 
 
-def measured(name: str) -> dict[str, str]:
+def measure(name: str) -> dict[str, str]:
     """The hashes of one flight."""
     mission_name, conditions = FLIGHTS[name]
     mission = load_mission(mission_name)
@@ -93,10 +93,10 @@ def measured(name: str) -> dict[str, str]:
     outcome = fly_with_wire(mission, conditions, log)
     found = {
         "outcome": outcome.name,
-        "flown": log.flown.hexdigest()[:16],
-        "said": log.said.hexdigest()[:16],
+        "flown": log.telemetry.hexdigest()[:16],
+        "said": log.texts.hexdigest()[:16],
     }
-    trace = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
+    trace = np.full((MAX_TICKS, TRACE_COLUMNS), np.nan)
     try:
         swept = fly(mission, conditions, boarding(mission, conditions), trace)
     except ValueError as error:
@@ -110,7 +110,7 @@ def measured(name: str) -> dict[str, str]:
     }
 
 
-def lanes_measured(name: str) -> dict[str, str]:
+def measure_lanes(name: str) -> dict[str, str]:
     """Whether three seeds of a flight give the same results together as each alone."""
     mission_name, conditions = FLIGHTS[name]
     mission = load_mission(mission_name)
@@ -125,22 +125,22 @@ def lanes_measured(name: str) -> dict[str, str]:
     group = Group(flights)
     group.run()
     alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
-    unlike = sum(repr(one) != repr(flight.flown) for one, flight in zip(alone, flights, strict=True))
+    differing = sum(repr(one) != repr(flight.flown) for one, flight in zip(alone, flights, strict=True))
     share = group.in_lanes / sum(flight.tick for flight in flights)
     found = {"outcome": alone[0].outcome, "in lanes": f"{share:.0%}"}
-    return {**found, "differ": str(unlike)} if unlike else found
+    return {**found, "differ": str(differing)} if differing else found
 
 
 def _hash(data: bytes | np.ndarray) -> str:
     return sha256(data if isinstance(data, bytes) else data.tobytes()).hexdigest()[:16]
 
 
-def compare_lanes(only: str) -> int:
+def compare_lanes(part_of_name: str) -> int:
     """Fly in lanes; returns 1 if a flight differs there."""
     differ = 0
     for name in FLIGHTS:
-        if only in name:
-            found = lanes_measured(name)
+        if part_of_name in name:
+            found = measure_lanes(name)
             differ += "differ" in found
             print(f"{name:26} {', '.join(f'{key}: {value}' for key, value in found.items())}", flush=True)
     return 1 if differ else 0
@@ -161,11 +161,11 @@ def main() -> int:
         if options.only not in name:
             continue
         begun = time.perf_counter()
-        found = measured(name)
+        found = measure(name)
         before = recorded.get(name, {})
-        unlike = [key for key in {**before, **found} if before.get(key) != found.get(key)]
-        changed += bool(unlike)
-        verdict = ", ".join(f"{key}: {before.get(key)} -> {found.get(key)}" for key in unlike) or "same"
+        differing = [key for key in {**before, **found} if before.get(key) != found.get(key)]
+        changed += bool(differing)
+        verdict = ", ".join(f"{key}: {before.get(key)} -> {found.get(key)}" for key in differing) or "same"
         print(f"{name:26} {time.perf_counter() - begun:5.1f} s  {found['outcome']:10} {verdict}", flush=True)
         if options.record:
             recorded[name] = found

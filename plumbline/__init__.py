@@ -72,7 +72,7 @@ __all__ = [
 
 __version__ = version("plumbline")
 
-_WHEN_ASKED_FOR = {
+_LOADED_ON_FIRST_USE = {
     "RunningVehicle": "plumbline.running",
     "Sensors": "plumbline.sensors",
     "State": "plumbline.state",
@@ -82,6 +82,6 @@ _WHEN_ASKED_FOR = {
 
 def __getattr__(name: str) -> Any:
     """Load on first use what only some scripts need: the simulator's sensors, the link to a vehicle."""
-    if name not in _WHEN_ASKED_FOR:
+    if name not in _LOADED_ON_FIRST_USE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_WHEN_ASKED_FOR[name]), name)
+    return getattr(import_module(_LOADED_ON_FIRST_USE[name]), name)

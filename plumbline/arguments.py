@@ -19,7 +19,7 @@ from missions.nearest import did_you_mean
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_LONGEST_SHOWN = 80  # characters of a value
+_MAX_SHOWN_CHARS = 80  # characters of a value
 _PHRASES = (  # phrases of the command line, and their equivalents in Python
     (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
@@ -37,12 +37,12 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
 )
 
 
-def knows_its_arguments(function: Callable[P, R]) -> Callable[P, R]:
+def checks_argument_names(function: Callable[P, R]) -> Callable[P, R]:
     """The function; an unknown argument name raises a TypeError that suggests the nearest name."""
     names = tuple(signature(function).parameters)
 
     @wraps(function)
-    def called(*values: P.args, **named: P.kwargs) -> R:
+    def wrapper(*values: P.args, **named: P.kwargs) -> R:
         for name in named:
             if name not in names:
                 hint = did_you_mean(name, names)
@@ -50,22 +50,22 @@ def knows_its_arguments(function: Callable[P, R]) -> Callable[P, R]:
                 raise TypeError(f"{function.__name__}: no argument {name!r}; {hint}must be one of {known}")
         return function(*values, **named)
 
-    return called
+    return wrapper
 
 
 @contextmanager
-def told_in_python() -> Iterator[None]:
+def errors_for_python() -> Iterator[None]:
     """Reword an Error raised in this context: without options of the command line."""
     try:
         yield
     except GcsError as error:
-        raise type(error)(in_python(str(error))) from None
+        raise type(error)(reworded_for_python(str(error))) from None
 
 
-def in_python(text: str) -> str:
+def reworded_for_python(text: str) -> str:
     """A text written for the command line, reworded for scripts."""
-    for phrase, instead in _PHRASES:
-        text = re.sub(phrase, instead, text)
+    for phrase, replacement in _PHRASES:
+        text = re.sub(phrase, replacement, text)
     return text
 
 
@@ -76,7 +76,7 @@ def number(name: str, value: Any) -> float:
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
-        raise GcsError(f"{name} = {shown(value)}; must be a finite number")
+        raise GcsError(f"{name} = {shown_value(value)}; must be a finite number")
     return found
 
 
@@ -84,19 +84,19 @@ def positive(name: str, value: Any) -> float:
     """A finite number above 0, or `Error`."""
     found = number(name, value)
     if found <= 0.0:
-        raise GcsError(f"{name} = {shown(value)}; must be greater than 0")
+        raise GcsError(f"{name} = {shown_value(value)}; must be greater than 0")
     return found
 
 
-def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
-    """A whole number from `least` to `most`, or `Error`."""
+def whole_number(name: str, value: Any, minimum: int, maximum: int | None = None) -> int:
+    """A whole number from `minimum` to `maximum`, or `Error`."""
     try:
         found = index(value)
     except TypeError:
-        found = least - 1
-    if found < least or (most is not None and found > most):
-        limits = f", {least} or more" if most is None else f" from {least} to {most}"
-        raise GcsError(f"{name} = {shown(value)}; must be a whole number{limits}")
+        found = minimum - 1
+    if found < minimum or (maximum is not None and found > maximum):
+        limits = f", {minimum} or more" if maximum is None else f" from {minimum} to {maximum}"
+        raise GcsError(f"{name} = {shown_value(value)}; must be a whole number{limits}")
     return found
 
 
@@ -111,7 +111,7 @@ def numbers(name: str, values: Any) -> tuple[float, ...]:
 def text(name: str, value: Any, example: str) -> str:
     """A text, or `Error`, which shows an example."""
     if not isinstance(value, str):
-        raise GcsError(f"{name} = {shown(value)}; must be a text, as {example!r}")
+        raise GcsError(f"{name} = {shown_value(value)}; must be a text, as {example!r}")
     return value
 
 
@@ -128,7 +128,7 @@ def name_or_file(name: str, value: Any) -> str:
     path."""
     path = fspath(value) if isinstance(value, str | PathLike) else None
     if not isinstance(path, str):
-        raise GcsError(f"{name} = {shown(value)}; must be a text or a Path")
+        raise GcsError(f"{name} = {shown_value(value)}; must be a text or a Path")
     return path
 
 
@@ -137,15 +137,15 @@ def items(name: str, values: Any, what: str) -> tuple[Any, ...]:
     if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
         with suppress(TypeError):  # a numpy array without dimensions
             return tuple(values)
-    raise GcsError(f"{name} = {shown(values)}; must be {what}")
+    raise GcsError(f"{name} = {shown_value(values)}; must be {what}")
 
 
-def by_parameter(name: str, values: Any, example: str) -> Mapping[str, Any]:
+def parameter_mapping(name: str, values: Any, example: str) -> Mapping[str, Any]:
     """A mapping whose keys are names of parameters, empty for None; or `Error`, which shows an example."""
     if values is None:
         return {}
     if not isinstance(values, Mapping):
-        raise GcsError(f"{name} = {shown(values)}; must be a dict, as {example}")
+        raise GcsError(f"{name} = {shown_value(values)}; must be a dict, as {example}")
     for key in values:
         parameter_name(name, key)
     return values
@@ -154,20 +154,20 @@ def by_parameter(name: str, values: Any, example: str) -> Mapping[str, Any]:
 def parameter_name(where: str, name: Any) -> str:
     """The name of a parameter, which need not exist, in capitals; `Error` if it cannot be a name."""
     if not isinstance(name, str) or not name.isidentifier():
-        raise GcsError(f"{where}: {shown(name)} is no name of a parameter; must be one as 'SIM_WIND_E'")
+        raise GcsError(f"{where}: {shown_value(name)} is no name of a parameter; must be one as 'SIM_WIND_E'")
     return name.upper()
 
 
-def setting_words(settings: Any) -> tuple[str, ...]:
+def setting_arguments(settings: Any) -> tuple[str, ...]:
     """Parameters with their values, as the command line writes them; or `Error`."""
-    found = by_parameter("settings", settings, "{'SIM_WIND_E': 3}")
+    found = parameter_mapping("settings", settings, "{'SIM_WIND_E': 3}")
     return tuple(f"{name}={number(f'settings[{name!r}]', value)!r}" for name, value in found.items())
 
 
-def shown(value: Any) -> str:
+def shown_value(value: Any) -> str:
     """The value as Python writes it, in one short line."""
     try:
         written = " ".join(repr(value).split())
     except ValueError:  # an integer of thousands of digits
         written = f"a number of {value.bit_length()} bits" if isinstance(value, int) else type(value).__name__
-    return written if len(written) <= _LONGEST_SHOWN else written[: _LONGEST_SHOWN - 3] + "..."
+    return written if len(written) <= _MAX_SHOWN_CHARS else written[: _MAX_SHOWN_CHARS - 3] + "..."

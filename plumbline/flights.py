@@ -19,14 +19,14 @@ from gcs.workflows.flight_options import FlightOptions
 from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
+    checks_argument_names,
+    errors_for_python,
     file_path,
-    in_python,
-    knows_its_arguments,
     positive,
-    setting_words,
+    reworded_for_python,
+    setting_arguments,
     text,
-    told_in_python,
-    whole,
+    whole_number,
 )
 from plumbline.frames import as_frame
 from plumbline.made_files import name_or_path
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot by name
 
 
-@knows_its_arguments
+@checks_argument_names
 def fly(
     mission: str | Path | model.Mission,
     *,
@@ -85,11 +85,11 @@ def fly(
         law=law_reference(law),
         sensors=name_or_path("sensors", sensors),
         vehicle=name_or_path("vehicle", vehicle),
-        seed=whole("seed", seed, 0, MOST_SEED),
+        seed=whole_number("seed", seed, 0, MOST_SEED),
         speed=None,
         real_time=False,
         out=None,
-        settings=setting_words(settings),
+        settings=setting_arguments(settings),
         connect=None,
         quiet=quiet,
         force=force,
@@ -99,16 +99,16 @@ def fly(
         planner=planner_reference(planner),
     )
     log = io.BytesIO()
-    began_s = time.perf_counter()
-    with told_in_python():
-        outcome = fly_here(flown, options, TlogWriter(log), _doubt)
-    wall_s = time.perf_counter() - began_s
+    started_s = time.perf_counter()
+    with errors_for_python():
+        outcome = fly_here(flown, options, TlogWriter(log), _warn)
+    wall_s = time.perf_counter() - started_s
     return Flight(log.getvalue(), meta_of(flown, options, outcome, wall_s), flown)
 
 
-def _doubt(line: str) -> None:
+def _warn(line: str) -> None:
     """Warn, at the line that called `fly`, of an option that is possible but may be unintended."""
-    warnings.warn(in_python(line), stacklevel=5)
+    warnings.warn(reworded_for_python(line), stacklevel=5)
 
 
 class Flight:
@@ -133,7 +133,7 @@ class Flight:
         """
         from gcs.workflows.report import find_log, meta_beside
 
-        with told_in_python():
+        with errors_for_python():
             log = find_log(file_path("path", path))
             return cls(log.read_bytes(), meta_beside(log))
 
@@ -158,14 +158,14 @@ class Flight:
         """The figures of the flight: the keys of `gcs fly --json` (docs/report.md)."""
         from gcs.analysis.record import flight_record
 
-        return flight_record(self._received, self._meta, self._samples)
+        return flight_record(self._tracks, self._meta, self._samples)
 
     def telemetry(self, kind: Literal["pandas", "polars", "arrow"] = "pandas") -> Any:
         """The table of flight.parquet (docs/report.md): a row for each sample of the true load, with units in
         the column names; as a pandas or polars DataFrame, or as an Arrow table."""
         from gcs.analysis.parquet import flight_table
 
-        return as_frame(flight_table(self._received, self._samples, self._meta.to_json()), kind)
+        return as_frame(flight_table(self._tracks, self._samples, self._meta.to_json()), kind)
 
     def plot(self, name: str = "overview") -> Picture:
         """One picture of the report: overview, track, position, error, angles, psi, rotors or tension."""
@@ -176,7 +176,7 @@ class Flight:
         if text("plot", name, "error") not in pictures:
             hint = did_you_mean(name, pictures)
             raise GcsError(f"plot {name!r}: there is none; {hint}must be one of {', '.join(pictures)}")
-        view = View(self._received, self._samples, self.summary, self._meta)
+        view = View(self._tracks, self._samples, self.summary, self._meta)
         png = io.BytesIO()
         with style():
             pictures[name].draw(view, png)
@@ -195,7 +195,7 @@ class Flight:
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
-        with told_in_python():
+        with errors_for_python():
             make_folder(folder)
             keep_others(folder, TLOG_FILE)
             if not overwrite and _holds_another(folder / TLOG_FILE, self.tlog):
@@ -209,7 +209,7 @@ class Flight:
         return folder / PAGE_FILE
 
     @cached_property
-    def _received(self) -> Telemetry:
+    def _tracks(self) -> Telemetry:
         from gcs.analysis.telemetry import telemetry_of
 
         return telemetry_of(read_tlog(io.BytesIO(self.tlog)))
@@ -218,7 +218,7 @@ class Flight:
     def _samples(self) -> Samples:
         from gcs.analysis.samples import samples_of
 
-        return samples_of(self._received)
+        return samples_of(self._tracks)
 
     def __repr__(self) -> str:
         error_m = self.summary["load_error_max_m"]
@@ -252,8 +252,10 @@ class Picture:
         try:
             file.write_bytes(self.png)
         except OSError as error:
-            told = f"{file}: cannot be written: {error.strerror}; name a file in a folder that can be written"
-            raise GcsError(told) from None
+            message = (
+                f"{file}: cannot be written: {error.strerror}; name a file in a folder that can be written"
+            )
+            raise GcsError(message) from None
 
     def _repr_png_(self) -> bytes:
         return self.png

@@ -17,7 +17,7 @@ from typing import Protocol
 from platformdirs import user_cache_path
 
 from gcs.errors import GcsError
-from plumbline.arguments import name_or_file, shown
+from plumbline.arguments import name_or_file, shown_value
 
 
 class Savable(Protocol):
@@ -35,16 +35,16 @@ def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
     kind = argument.capitalize()
     if not hasattr(given, "save") or kind not in (one.__name__ for one in type(given).__mro__):
         raise GcsError(
-            f"{argument} = {shown(given)}; must be a name, the path of a file, or a plumbline.{kind}"
+            f"{argument} = {shown_value(given)}; must be a name, the path of a file, or a plumbline.{kind}"
         )
     name = getattr(given, "name", "") or argument
     folder = user_cache_path("plumbline") / "inputs"
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as beside:
-        new = Path(beside) / "new"
-        given.save(new)
-        kept = folder / hashlib.sha256(new.read_bytes()).hexdigest()[:16]
-        kept.mkdir(exist_ok=True)
-        path = kept / (re.sub(r"[^\w-]", "-", name)[:64] + ".toml")
-        new.replace(path)  # atomic, even if another process does the same at this moment
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+        file = Path(temporary) / "new"
+        given.save(file)
+        cached = folder / hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+        cached.mkdir(exist_ok=True)
+        path = cached / (re.sub(r"[^\w-]", "-", name)[:64] + ".toml")
+        file.replace(path)  # atomic, even if another process does the same at this moment
     return str(path)

@@ -13,7 +13,7 @@ from missions.fileformat import MissionFileError, load_mission, mission_of
 from missions.model import KINDS, Signals, Step, Term
 from missions.toml_files import FileError
 from missions.writing import mission_table, write_toml
-from plumbline.arguments import file_path, items, name_or_file, shown, text
+from plumbline.arguments import file_path, items, name_or_file, shown_value, text
 
 
 class Mission(model.Mission):
@@ -41,19 +41,21 @@ class Mission(model.Mission):
     ) -> None:
         text("name", name, "there")
         if not name.strip():
-            raise GcsError(f"name = {shown(name)}; must be a text that is not empty, as 'there'")
+            raise GcsError(f"name = {shown_value(name)}; must be a text that is not empty, as 'there'")
         if name.splitlines() != [name] or not (title or name.isprintable()):
-            raise GcsError(f"name = {shown(name)}; must be one line of printable characters, as 'there'")
+            raise GcsError(
+                f"name = {shown_value(name)}; must be one line of printable characters, as 'there'"
+            )
         texts = items("assumptions", assumptions, "a list of texts")
-        listed = items("steps", steps, "a list of steps, as [Takeoff(1.0), Land()]")
-        if wrong := list(_mistakes(listed)):
+        step_list = items("steps", steps, "a list of steps, as [Takeoff(1.0), Land()]")
+        if wrong := list(_mistakes(step_list)):
             raise InputError(*(f"{name}: {line}" for line in wrong))
-        table = mission_table(title or name, description, texts, listed)
+        table = mission_table(title or name, description, texts, step_list)
         try:
-            made = mission_of(table, name, name)
+            checked = mission_of(table, name, name)
         except MissionFileError as error:
             raise input_error(error) from None
-        super().__init__(made.name, made.title, made.description, made.assumptions, made.steps)
+        super().__init__(checked.name, checked.title, checked.description, checked.assumptions, checked.steps)
 
     @classmethod
     def load(cls, name_or_path: str | PathLike[str]) -> Mission:

@@ -33,13 +33,13 @@ from gcs.workflows.transfer import checked_upload
 from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
-    knows_its_arguments,
+    checks_argument_names,
+    errors_for_python,
     number,
     parameter_name,
     positive,
-    shown,
+    shown_value,
     text,
-    told_in_python,
 )
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
@@ -50,11 +50,11 @@ Value = TypeVar("Value")
 Condition = Callable[[State], bool]
 
 _LOAD_STATE_US = 50_000  # interval of the load's state, by the vehicle's clock
-_STILL_S = 60.0  # how long the vehicle's clock may stand still while its heartbeats continue
+_MAX_STALL_S = 60.0  # how long the vehicle's clock may stand still while its heartbeats continue
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
-_WORDS: dict[str, Condition] = {
+_NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
     "holding": lambda state: state.phase == "hold",
     "mission complete": lambda state: state.mission == "complete",
@@ -62,7 +62,7 @@ _WORDS: dict[str, Condition] = {
 }
 
 
-@knows_its_arguments
+@checks_argument_names
 def connect(
     address: str = "udpin:127.0.0.1:14550", *, timeout_s: float = 10.0, signing_key: bytes | None = None
 ) -> RunningVehicle:
@@ -75,7 +75,7 @@ def connect(
     limit_s = positive("timeout_s", timeout_s)
     if signing_key is not None and not (isinstance(signing_key, bytes) and len(signing_key) == KEY_BYTES):
         raise GcsError(f"signing_key: must be {KEY_BYTES} bytes, as secrets.token_bytes({KEY_BYTES})")
-    with told_in_python():
+    with errors_for_python():
         found = parse_address(text("address", address, "udpin:127.0.0.1:14550"))
         where = replace(found, signing_key=signing_key)
         return RunningVehicle(Session(where, limit_s, round(limit_s * 1e6)), limit_s)
@@ -100,10 +100,10 @@ class RunningVehicle:
         except BaseException:
             session.close()
             raise
-        self._thread = threading.Thread(target=self._serve, name="plumbline link", daemon=True)
+        self._thread = threading.Thread(target=self._run_link, name="plumbline link", daemon=True)
         self._thread.start()
         try:
-            self._ask_for_load()
+            self._request_load_state()
         except BaseException:
             self.close()
             raise
@@ -143,7 +143,7 @@ class RunningVehicle:
         """
         height_m = None if up_m is None else number("up_m", up_m)
         limit_s = positive("timeout_s", timeout_s)
-        self._must_be_armed("takeoff")
+        self._require_armed("takeoff")
 
         def make(session: Session) -> Operation:
             if height_m is None:
@@ -171,12 +171,12 @@ class RunningVehicle:
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
-        pace_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
+        checked_speed_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
         limit_s = positive("timeout_s", timeout_s)
-        self._must_be_armed("goto")
-        self._command(lambda session: reposition(session, place, False, pace_m_s).operation)
+        self._require_armed("goto")
+        self._command(lambda session: reposition(session, place, False, checked_speed_m_s).operation)
         if wait:
-            self.wait(lambda state: _is_there(state, place), limit_s)
+            self.wait(lambda state: _has_arrived(state, place), limit_s)
 
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
         """Set the load down, and the vehicle beside it.
@@ -202,9 +202,9 @@ class RunningVehicle:
         if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
             mission = Mission(mission.name, mission.steps, mission.title)
         path, checked = name_or_path("mission", mission), name_or_path("vehicle", vehicle)
-        with told_in_python():
+        with errors_for_python():
             send = checked_upload(path, checked, force, False, lambda _: None)
-        self._patiently(lambda: send(self._session))
+        self._with_retries(lambda: send(self._session))
 
     def start(self) -> None:
         """Fly the mission from its first item; a disarmed vehicle begins when it is armed."""
@@ -228,20 +228,22 @@ class RunningVehicle:
 
     def parameter(self, name: str) -> float:
         """The value of a parameter."""
-        asked = parameter_name("parameter", name)
+        checked_name = parameter_name("parameter", name)
 
         def read() -> float:
-            operation = ParameterGet(self._session.target, asked)
+            operation = ParameterGet(self._session.target, checked_name)
             exchange(self._session, operation)
             assert operation.value is not None
             return operation.value
 
-        return self._patiently(read)
+        return self._with_retries(read)
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter, and check that it was stored."""
-        asked, wanted = parameter_name("parameter", name), number(name, value)
-        self._patiently(lambda: exchange(self._session, ParameterSet(self._session.target, asked, wanted)))
+        checked_name, checked_value = parameter_name("parameter", name), number(name, value)
+        self._with_retries(
+            lambda: exchange(self._session, ParameterSet(self._session.target, checked_name, checked_value))
+        )
 
     # ---- waiting
 
@@ -258,15 +260,17 @@ class RunningVehicle:
 
     def _condition(self, until: str | float | Condition) -> tuple[Condition, str]:
         if isinstance(until, str):
-            if until not in _WORDS:
-                raise GcsError(f"wait {until!r}: must be one of {', '.join(_WORDS)}, a number or a function")
-            return _WORDS[until], f"{until!r}"
+            if until not in _NAMED_CONDITIONS:
+                raise GcsError(
+                    f"wait {until!r}: must be one of {', '.join(_NAMED_CONDITIONS)}, a number or a function"
+                )
+            return _NAMED_CONDITIONS[until], f"{until!r}"
         if isinstance(until, int | float):
             clock, awaited_s = _Clock(), number("wait", until)
-            return lambda state: clock.passed_s(state) >= awaited_s, f"{awaited_s:g} s"
+            return lambda state: clock.elapsed_s(state) >= awaited_s, f"{awaited_s:g} s"
         if not callable(until):
-            known = ", ".join(_WORDS)
-            raise GcsError(f"wait {shown(until)}: must be one of {known}, a number or a function")
+            known = ", ".join(_NAMED_CONDITIONS)
+            raise GcsError(f"wait {shown_value(until)}: must be one of {known}, a number or a function")
         return until, "what was asked for"
 
     def _watch(self, condition: Condition, what: str, timeout_s: float) -> State:
@@ -274,33 +278,33 @@ class RunningVehicle:
         session, clock = self._session, _Clock()
         was_armed, texts_before = self.state.armed, len(session.view.texts)
         found: list[State] = []
-        trouble: list[str] = []
+        problems: list[str] = []
 
-        def over() -> bool:
+        def is_over() -> bool:
             state = self.state
             if condition(state):
                 found.append(state)
             elif session.lost:
-                trouble.append(f"the vehicle fell silent for {self._timeout_s:g} s")
+                problems.append(f"the vehicle fell silent for {self._timeout_s:g} s")
             elif was_armed and not state.armed:
-                trouble.append("the vehicle was disarmed")
-            elif clock.passed_s(state) > timeout_s:
-                trouble.append(f"not within {timeout_s:g} s of the vehicle's clock")
-            elif clock.still_s > _STILL_S:
-                trouble.append(f"the vehicle's clock stands still for {_STILL_S:g} s; is sitl running?")
+                problems.append("the vehicle was disarmed")
+            elif clock.elapsed_s(state) > timeout_s:
+                problems.append(f"not within {timeout_s:g} s of the vehicle's clock")
+            elif clock.stalled_s > _MAX_STALL_S:
+                problems.append(f"the vehicle's clock stands still for {_MAX_STALL_S:g} s; is sitl running?")
             elif self._closing.is_set():
-                trouble.append("the link was closed")
-            return bool(found or trouble)
+                problems.append("the link was closed")
+            return bool(found or problems)
 
-        session.watch(over, None)
+        session.watch(is_over, None)
         if found:
             return found[-1]
-        said = session.view.complaints_since(texts_before)
-        raise NoVehicleError("; ".join([f"waiting for {what}: {trouble[0]}", *said]))
+        reasons = session.view.complaints_since(texts_before)
+        raise NoVehicleError("; ".join([f"waiting for {what}: {problems[0]}", *reasons]))
 
     # ---- the thread of the link
 
-    def _serve(self) -> None:
+    def _run_link(self) -> None:
         while not self._closing.is_set():
             try:
                 self._session.watch(lambda: self._closing.is_set() or not self._jobs.empty(), None)
@@ -323,7 +327,7 @@ class RunningVehicle:
         self._jobs.put(job)
         return future.result()
 
-    def _patiently(self, work: Callable[[], Value]) -> Value:
+    def _with_retries(self, work: Callable[[], Value]) -> Value:
         """An exchange, repeated while the vehicle does not answer, for as long as it may be silent."""
         until_us = monotonic_us() + round(self._timeout_s * 1e6)
         while True:
@@ -334,17 +338,17 @@ class RunningVehicle:
                     raise
 
     def _command(self, make: Callable[[Session], Operation]) -> None:
-        self._patiently(lambda: self._session.run(make(self._session)))
+        self._with_retries(lambda: self._session.run(make(self._session)))
 
-    def _ask_for_load(self) -> None:
+    def _request_load_state(self) -> None:
         """Request frequent messages of the load's state; a vehicle that has none is accepted too."""
         number = mavlink.MAVLINK_MSG_ID_LOAD_STATE
         session = self._session
         with suppress(RefusedError, NoVehicleError):
-            asked = command.message_interval(session.target, number, _LOAD_STATE_US)
-            self._in_thread(lambda: session.run(asked))
+            request = command.message_interval(session.target, number, _LOAD_STATE_US)
+            self._in_thread(lambda: session.run(request))
 
-    def _must_be_armed(self, what: str) -> None:
+    def _require_armed(self, what: str) -> None:
         if not self.state.armed:
             raise GcsError(f"{what}: the vehicle is not armed; arm() first")
 
@@ -371,27 +375,29 @@ class _Clock:
     """Time elapsed by the vehicle's clock, which may restart, and how long that clock has stood still."""
 
     def __init__(self) -> None:
-        self._passed_s = 0.0
+        self._elapsed_s = 0.0
         self._last_s: float | None = None
-        self._moved_us = monotonic_us()
+        self._changed_us = monotonic_us()
 
-    def passed_s(self, state: State) -> float:
+    def elapsed_s(self, state: State) -> float:
         """Time elapsed up to this state."""
         now_s = state.time_s
         if now_s is not None and now_s != self._last_s:
             if self._last_s is not None:
-                self._passed_s += max(0.0, now_s - self._last_s)
-            self._last_s, self._moved_us = now_s, monotonic_us()
-        return self._passed_s
+                self._elapsed_s += max(0.0, now_s - self._last_s)
+            self._last_s, self._changed_us = now_s, monotonic_us()
+        return self._elapsed_s
 
     @property
-    def still_s(self) -> float:
+    def stalled_s(self) -> float:
         """How long the vehicle's clock has stood still, by the clock of this machine."""
-        return (monotonic_us() - self._moved_us) * 1e-6
+        return (monotonic_us() - self._changed_us) * 1e-6
 
 
-def _is_there(state: State, place: tuple[float, float, float | None]) -> bool:
+def _has_arrived(state: State, place: tuple[float, float, float | None]) -> bool:
     if state.load_m is None or state.load_speed_m_s is None:
         return False
-    off = [there - asked for there, asked in zip(state.load_m, place, strict=True) if asked is not None]
-    return math.hypot(*off) < _NEAR_M and state.load_speed_m_s < _SLOW_M_S
+    offsets = [
+        actual - wanted for actual, wanted in zip(state.load_m, place, strict=True) if wanted is not None
+    ]
+    return math.hypot(*offsets) < _NEAR_M and state.load_speed_m_s < _SLOW_M_S

@@ -14,15 +14,15 @@ from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
 from gcs.workflows.flight_options import own_words
 from plumbline.arguments import (
-    by_parameter,
+    checks_argument_names,
+    errors_for_python,
     file_path,
     items,
-    knows_its_arguments,
     numbers,
-    setting_words,
-    shown,
-    told_in_python,
-    whole,
+    parameter_mapping,
+    setting_arguments,
+    shown_value,
+    whole_number,
 )
 from plumbline.frames import as_frame, check_kind
 from plumbline.made_files import name_or_path
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from plumbline.sensors import Sensors
     from plumbline.vehicles import Vehicle
 
-_SAYS = "gcs: "  # begins the line of a known error
+_ERROR_PREFIX = "gcs: "  # begins the line of a known error
 
 
-@knows_its_arguments
+@checks_argument_names
 def sweep(
     mission: str | Path | Mission,
     *,
@@ -72,34 +72,34 @@ def sweep(
     needs no `if __name__ == "__main__"`. `Error` if the sweep cannot be flown.
     """
     with ExitStack() as stack:
-        words = []
+        arguments = []
         if out is None:
             out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
-            words += ["--table-only"]  # the page would be deleted with the folder
+            arguments += ["--table-only"]  # the page would be deleted with the folder
         folder = file_path("out", out)
-        words += [
+        arguments += [
             name_or_path("mission", mission),
             "--seeds",
-            str(whole("seeds", seeds, 1)),
+            str(whole_number("seeds", seeds, 1)),
         ]
-        words += ["--sensors", name_or_path("sensors", sensors)]
-        words += ["--vehicle", name_or_path("vehicle", vehicle)]
+        arguments += ["--sensors", name_or_path("sensors", sensors)]
+        arguments += ["--vehicle", name_or_path("vehicle", vehicle)]
         for law in _laws(laws):
-            words += ["--law", law_reference(law)]
-        words += own_words(estimator_reference(estimator), planner_reference(planner))
-        for name, values in by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
-            words += ["--vary", f"{name}={_values(name, values)}"]
+            arguments += ["--law", law_reference(law)]
+        arguments += own_words(estimator_reference(estimator), planner_reference(planner))
+        for name, values in parameter_mapping("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
+            arguments += ["--vary", f"{name}={_values(name, values)}"]
         if sample is not None:
-            words += ["--sample", str(whole("sample", sample, 1))]
-        for setting in setting_words(settings):
-            words += ["--set", setting]
+            arguments += ["--sample", str(whole_number("sample", sample, 1))]
+        for setting in setting_arguments(settings):
+            arguments += ["--set", setting]
         if jobs is not None:
-            words += ["--jobs", str(whole("jobs", jobs, 1))]
+            arguments += ["--jobs", str(whole_number("jobs", jobs, 1))]
         if scheduler is not None:
-            words += ["--scheduler", _address(scheduler)]
+            arguments += ["--scheduler", _address(scheduler)]
         check_kind(kind)
-        with told_in_python():
-            _run([*words, "--out", str(folder)], quiet)
+        with errors_for_python():
+            _run([*arguments, "--out", str(folder)], quiet)
 
         from pyarrow import parquet
 
@@ -125,30 +125,30 @@ def _address(scheduler: Any) -> str:
     found = getattr(getattr(scheduler, "scheduler", None), "address", scheduler)
     if not isinstance(found, str) or not found:
         raise GcsError(
-            f"scheduler = {shown(scheduler)}; must be a Dask client or an address, as tcp://HOST:8786"
+            f"scheduler = {shown_value(scheduler)}; must be a Dask client or an address, as tcp://HOST:8786"
         )
     return found
 
 
-def _run(words: list[str], quiet: bool) -> None:
+def _run(arguments: list[str], quiet: bool) -> None:
     """Run `gcs sweep`. Its progress goes to our stderr, and so does, even if `quiet`, all that a law prints.
     If the sweep fails, its last message becomes the text of the error."""
-    command = [sys.executable, "-P", "-m", "gcs", "sweep", *words, *(["--quiet"] if quiet else [])]
+    command = [sys.executable, "-P", "-m", "gcs", "sweep", *arguments, *(["--quiet"] if quiet else [])]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
         assert program.stderr is not None
-        said: list[str] = []
-        others: list[str] = []
+        messages: list[str] = []
+        other_lines: list[str] = []
         for line in program.stderr:
-            if not line.startswith(_SAYS):
-                others.append(line)
+            if not line.startswith(_ERROR_PREFIX):
+                other_lines.append(line)
                 sys.stderr.write(line)
                 continue
-            said.append(line)
-            if len(said) > 1 and not quiet:
-                sys.stderr.write(said[-2])
-    last = said[-1] if said else ""
+            messages.append(line)
+            if len(messages) > 1 and not quiet:
+                sys.stderr.write(messages[-2])
+    last = messages[-1] if messages else ""
     # without progress, each message is an error; a program that crashes leaves a last line of its traceback
-    told = (said if quiet else [last]) if said else others[-1:]
+    errors = (messages if quiet else [last]) if messages else other_lines[-1:]
     if program.returncode == 0:
         if not quiet:
             sys.stderr.write(last)
@@ -156,5 +156,5 @@ def _run(words: list[str], quiet: bool) -> None:
     if program.returncode == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     kind = InputError if program.returncode == InputError.exit_code else GcsError
-    wrong = "; ".join(line.strip().removeprefix(_SAYS) for line in told if line.strip())
-    raise kind(wrong or f"gcs sweep ended with {program.returncode}")
+    reason = "; ".join(line.strip().removeprefix(_ERROR_PREFIX) for line in errors if line.strip())
+    raise kind(reason or f"gcs sweep ended with {program.returncode}")

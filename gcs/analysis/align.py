@@ -16,7 +16,7 @@ from gcs.analysis.axes import Floats
 
 Indices = NDArray[np.intp]
 # left neighbours, right neighbours, fraction of the way (shaped to broadcast against the values) -> values
-Between = Callable[[Indices, Indices, Floats], Floats]
+Interpolant = Callable[[Indices, Indices, Floats], Floats]
 
 MAX_GAP_S = 0.5  # a load that moves at 2 m/s is anywhere within a metre after half a second of silence
 
@@ -58,10 +58,10 @@ def hermite(
 
 
 def _interpolate(
-    stamps_s: Floats, values: Floats, at_s: Floats, max_gap_s: float, between: Between
+    stamps_s: Floats, values: Floats, at_s: Floats, max_gap_s: float, interpolant: Interpolant
 ) -> Floats:
-    """The sample itself where a time equals its stamp; `between` where it lies between two stamps that are
-    at most `max_gap_s` apart; else NaN."""
+    """The sample itself where a time equals its stamp; `interpolant` where it lies between two stamps that
+    are at most `max_gap_s` apart; else NaN."""
     found = np.full((len(at_s), *values.shape[1:]), np.nan)
     if len(stamps_s) == 0:
         return found
@@ -69,9 +69,9 @@ def _interpolate(
     left = np.clip(np.searchsorted(stamps_s, at_s, side="right") - 1, 0, last)
     right = np.minimum(left + 1, last)
     span = stamps_s[right] - stamps_s[left]
-    met = at_s == stamps_s[left]
-    found[met] = values[left[met]]
-    inner = ~met & (at_s > stamps_s[left]) & (at_s < stamps_s[right]) & (span <= max_gap_s)
+    exact = at_s == stamps_s[left]
+    found[exact] = values[left[exact]]
+    inner = ~exact & (at_s > stamps_s[left]) & (at_s < stamps_s[right]) & (span <= max_gap_s)
     fraction = (at_s[inner] - stamps_s[left[inner]]) / span[inner]
-    found[inner] = between(left[inner], right[inner], fraction.reshape(-1, *(1,) * (values.ndim - 1)))
+    found[inner] = interpolant(left[inner], right[inner], fraction.reshape(-1, *(1,) * (values.ndim - 1)))
     return found

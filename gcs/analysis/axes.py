@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_HALF = np.sqrt(0.5)
+_SQRT_HALF = np.sqrt(0.5)
 
 
 def enu_from_ned(v: Floats) -> Floats:
@@ -30,8 +30,8 @@ def quat_enu_flu_from_ned_frd(quat_wxyz: Floats) -> Floats:
     This is the product (0, 1, 1, 0)/sqrt(2) * q * (0, 1, 0, 0), written out: a half turn on each side.
     """
     w, x, y, z = (quat_wxyz[..., i] for i in range(4))
-    turned = _HALF * np.stack((w + z, x + y, x - y, w - z), axis=-1)
-    return np.asarray(np.where(turned[..., :1] < 0.0, -turned, turned), dtype=np.float64)
+    rotated = _SQRT_HALF * np.stack((w + z, x + y, x - y, w - z), axis=-1)
+    return np.asarray(np.where(rotated[..., :1] < 0.0, -rotated, rotated), dtype=np.float64)
 
 
 def roll_pitch_yaw(quat_wxyz: Floats) -> Floats:

@@ -52,6 +52,6 @@ class Columns:
             columns = [self._rows[name].astype(np.float64) for name in names.split()]
         return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
 
-    def whole(self, name: str) -> Ints:
+    def integers(self, name: str) -> Ints:
         """A column of whole numbers."""
         return self._rows[name].astype(np.int64)

@@ -14,11 +14,11 @@ UNKNOWN = "–"
 _ONE_METRE = 1.0  # lengths of this or more are shown in metres, not in millimetres
 
 
-class _Strict(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
-class Metric(_Strict):
+class Metric(_StrictModel):
     """One key of the record."""
 
     name: str
@@ -31,32 +31,32 @@ class Metric(_Strict):
     decimals: int | None = Field(None, ge=0)
     better: Literal["less", "more"] | None = None
 
-    def read(self, record: Mapping[str, Any]) -> str:
+    def formatted(self, record: Mapping[str, Any]) -> str:
         """The recorded value as displayed, with its unit; an en dash if it is not known."""
         value = record.get(self.name)
         if value is None:
             return UNKNOWN
-        unit = self._shown_unit
+        unit = self._displayed_unit
         if unit == "mm" and abs(value) >= _ONE_METRE:
             return f"{value:.2f} m"
         text = f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
         return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
 
-    def read_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    def formatted_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         """The values of several records as displayed; all in metres if one is a metre or more."""
         values = [record.get(self.name) for record in records]
-        if self._shown_unit != "mm" or not any(
+        if self._displayed_unit != "mm" or not any(
             value is not None and abs(value) >= _ONE_METRE for value in values
         ):
-            return tuple(self.read(record) for record in records)
+            return tuple(self.formatted(record) for record in records)
         return tuple(UNKNOWN if value is None else f"{value:.3f} m" for value in values)
 
     @property
-    def _shown_unit(self) -> str:
+    def _displayed_unit(self) -> str:
         return self.unit if self.shown is None else self.shown
 
 
-class Group(_Strict):
+class Group(_StrictModel):
     """Figures that are shown together. `window` is the part of the flight that they cover; `note` is for the
     documentation."""
 
@@ -65,7 +65,7 @@ class Group(_Strict):
     note: str = ""
 
 
-class MetricFile(_Strict):
+class MetricFile(_StrictModel):
     """The whole file."""
 
     groups: dict[str, Group]
@@ -74,12 +74,12 @@ class MetricFile(_Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, document: dict[str, Any]) -> dict[str, Any]:
+    def _add_names(cls, document: dict[str, Any]) -> dict[str, Any]:
         metrics = {name: {"name": name, **table} for name, table in document["metrics"].items()}
         return {**document, "metrics": metrics}
 
     @model_validator(mode="after")
-    def _known(self) -> MetricFile:
+    def _check_references(self) -> MetricFile:
         for name, metric in self.metrics.items():
             if metric.group not in self.groups:
                 raise ValueError(f"{name}.group = {metric.group}; must be one of {', '.join(self.groups)}")
@@ -88,7 +88,7 @@ class MetricFile(_Strict):
                 raise ValueError(f"headline.{name}: no such metric")
         return self
 
-    def of(self, group: str) -> tuple[Metric, ...]:
+    def metrics_of(self, group: str) -> tuple[Metric, ...]:
         """The metrics of a group, in order."""
         return tuple(metric for metric in self.metrics.values() if metric.group == group)
 
@@ -96,12 +96,12 @@ class MetricFile(_Strict):
 _FILE = MetricFile.model_validate(tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8")))
 METRICS: dict[str, Metric] = _FILE.metrics  # by key, in the order of the record
 GROUPS: tuple[tuple[Group, tuple[Metric, ...]], ...] = tuple(
-    (group, _FILE.of(name)) for name, group in _FILE.groups.items()
+    (group, _FILE.metrics_of(name)) for name, group in _FILE.groups.items()
 )
 HEADLINE: dict[str, str] = _FILE.headline  # key: label at the top of the report
 
 
-def told(record: Mapping[str, Any]) -> list[tuple[Group, list[Metric]]]:
+def known_groups(record: Mapping[str, Any]) -> list[tuple[Group, list[Metric]]]:
     """The groups that a report shows, each with its known metrics. A group in which nothing happened (for
     example if no gust blew) is left out."""
     return [

@@ -27,8 +27,8 @@ from gcs.analysis.tracks import Telemetry
 from gcs.errors import GcsError, from_clone
 
 _WORLD, _VEHICLE, _LOAD = "world", "vehicle", "load"
-_EVERY_S = 0.04  # shortest time between two drawings of the cable
-_MOST_POINTS = 4000  # of a path
+_CABLE_INTERVAL_S = 0.04  # shortest time between two drawings of the cable
+_MAX_POINTS = 4000  # of a path
 _NANO = 1e9
 # colours as red, green, blue, alpha
 _DARK, _AMBER, _BLUE, _GREY = (
@@ -71,9 +71,9 @@ def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterato
     """(time, topic, message) of all messages, unordered."""
     known = np.isfinite(samples.actual_m).all(axis=1) & np.isfinite(samples.vehicle_m).all(axis=1)
     if known.any():
-        begin_s = float(samples.time_s[known][0])
-        yield begin_s, "/scene", _bodies(layout, begin_s, samples, known)
-        yield from _paths(samples, begin_s, known)
+        start_s = float(samples.time_s[known][0])
+        yield start_s, "/scene", _static_entities(layout, start_s, samples, known)
+        yield from _paths(samples, start_s, known)
         yield from _transforms(samples, known)
         yield from _cable(samples, known)
     yield from _columns(telemetry, samples)
@@ -88,7 +88,7 @@ def _columns(telemetry: Telemetry, samples: Samples) -> Iterator[tuple[float, st
     values = {name: array.tolist() for name, array in columns.items() if name != "time_s"}
     for i, time_s in enumerate(times.tolist()):
         message = flight(phase=PHASE_NAMES.get(int(samples.phase[i]), ""))
-        _stamp(message.timestamp, time_s)
+        _set_time(message.timestamp, time_s)
         for name, column in values.items():
             setattr(message, name, float(column[i]))
         yield time_s, "/flight", message
@@ -124,71 +124,71 @@ def _transforms(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]
     for i in np.flatnonzero(known).tolist():
         time_s = float(samples.time_s[i])
         found = FrameTransforms()
-        for frame, place, turn in (
+        for frame, position, quaternion in (
             (_VEHICLE, samples.vehicle_m[i], samples.quat_wxyz[i]),
             (_LOAD, samples.actual_m[i], (1.0, 0.0, 0.0, 0.0)),
         ):
             one = found.transforms.add(parent_frame_id=_WORLD, child_frame_id=frame)
-            _stamp(one.timestamp, time_s)
-            _put(one.translation, place)
-            _turn(one.rotation, turn)
+            _set_time(one.timestamp, time_s)
+            _set_vector(one.translation, position)
+            _set_quaternion(one.rotation, quaternion)
         yield time_s, "/tf", found
 
 
-def _paths(samples: Samples, begin_s: float, known: Any) -> Iterator[tuple[float, str, Any]]:
+def _paths(samples: Samples, start_s: float, known: Any) -> Iterator[tuple[float, str, Any]]:
     from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 
-    for topic, places in (
+    for topic, path in (
         ("/load/flown", samples.actual_m[known & samples.attached]),
-        ("/load/asked", samples.asked_m[np.isfinite(samples.asked_m).all(axis=1)]),
+        ("/load/asked", samples.requested_m[np.isfinite(samples.requested_m).all(axis=1)]),
     ):
         poses = PosesInFrame(frame_id=_WORLD)
-        _stamp(poses.timestamp, begin_s)
-        for place in _thinned(places):
+        _set_time(poses.timestamp, start_s)
+        for point in _thinned(path):
             pose = poses.poses.add()
-            _put(pose.position, place)
+            _set_vector(pose.position, point)
             pose.orientation.w = 1.0
-        yield begin_s, topic, poses
+        yield start_s, topic, poses
 
 
-def _bodies(layout: Layout, begin_s: float, samples: Samples, known: Any) -> Any:
+def _static_entities(layout: Layout, start_s: float, samples: Samples, known: Any) -> Any:
     """The entities that do not move in their frames: vehicle, load and the paths."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
     update = SceneUpdate()
-    vehicle = _entity(update, begin_s, _VEHICLE, _VEHICLE)
+    vehicle = _entity(update, start_s, _VEHICLE, _VEHICLE)
     radius = 0.6 * max(hypot(x, y) for x, y in layout.rotors_m)
     for x, y in layout.rotors_m:
         arm = vehicle.cubes.add()
-        turn = 0.5 * atan2(y, x)
-        arm.pose.orientation.w, arm.pose.orientation.z = cos(turn), sin(turn)
-        _put(arm.pose.position, (0.5 * x, 0.5 * y, 0.0))
-        _put(arm.size, (hypot(x, y), 0.02, 0.02))
-        _paint(arm.color, _DARK)
+        half_yaw = 0.5 * atan2(y, x)
+        arm.pose.orientation.w, arm.pose.orientation.z = cos(half_yaw), sin(half_yaw)
+        _set_vector(arm.pose.position, (0.5 * x, 0.5 * y, 0.0))
+        _set_vector(arm.size, (hypot(x, y), 0.02, 0.02))
+        _set_colour(arm.color, _DARK)
         disc = vehicle.cylinders.add(bottom_scale=1.0, top_scale=1.0)
-        _put(disc.pose.position, (x, y, 0.03))
+        _set_vector(disc.pose.position, (x, y, 0.03))
         disc.pose.orientation.w = 1.0
-        _put(disc.size, (2.0 * radius, 2.0 * radius, 0.005))
-        _paint(disc.color, (*_BLUE[:3], 0.4))
-    ball = _entity(update, begin_s, _LOAD, _LOAD).spheres.add()
+        _set_vector(disc.size, (2.0 * radius, 2.0 * radius, 0.005))
+        _set_colour(disc.color, (*_BLUE[:3], 0.4))
+    ball = _entity(update, start_s, _LOAD, _LOAD).spheres.add()
     ball.pose.orientation.w = 1.0
-    _put(ball.size, (2.0 * layout.load_radius_m,) * 3)
-    _paint(ball.color, _AMBER)
-    for name, places, colour in (
+    _set_vector(ball.size, (2.0 * layout.load_radius_m,) * 3)
+    _set_colour(ball.color, _AMBER)
+    for name, path, colour in (
         ("flown", samples.actual_m[known & samples.attached], _BLUE),
-        ("asked", samples.asked_m[np.isfinite(samples.asked_m).all(axis=1)], _GREY),
+        ("asked", samples.requested_m[np.isfinite(samples.requested_m).all(axis=1)], _GREY),
     ):
-        line = _entity(update, begin_s, name, _WORLD).lines.add(type=LinePrimitive.LINE_STRIP, thickness=0.01)
+        line = _entity(update, start_s, name, _WORLD).lines.add(type=LinePrimitive.LINE_STRIP, thickness=0.01)
         line.pose.orientation.w = 1.0
-        _paint(line.color, colour)
-        for place in _thinned(places):
-            _put(line.points.add(), place)
+        _set_colour(line.color, colour)
+        for point in _thinned(path):
+            _set_vector(line.points.add(), point)
     return update
 
 
 def _cable(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
-    """The line of the cable every `_EVERY_S`; deleted when the load is released."""
+    """The line of the cable every `_CABLE_INTERVAL_S`; deleted when the load is released."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
@@ -198,19 +198,19 @@ def _cable(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
         update = SceneUpdate()
         if not samples.attached[i]:
             if drawn:
-                _stamp(update.deletions.add(id="cable").timestamp, time_s)
+                _set_time(update.deletions.add(id="cable").timestamp, time_s)
                 drawn = False
                 yield time_s, "/scene", update
             continue
-        if time_s - last_s < _EVERY_S:
+        if time_s - last_s < _CABLE_INTERVAL_S:
             continue
         line = _entity(update, time_s, "cable", _WORLD).lines.add(
             type=LinePrimitive.LINE_STRIP, thickness=0.005
         )
         line.pose.orientation.w = 1.0
-        _paint(line.color, _DARK)
-        for place in (samples.vehicle_m[i], samples.actual_m[i]):
-            _put(line.points.add(), place)
+        _set_colour(line.color, _DARK)
+        for end in (samples.vehicle_m[i], samples.actual_m[i]):
+            _set_vector(line.points.add(), end)
         last_s, drawn = time_s, True
         yield time_s, "/scene", update
 
@@ -222,33 +222,33 @@ def _texts(telemetry: Telemetry) -> Iterator[tuple[float, str, Any]]:
         time_s = max(text.time_s, 0.0)
         level: Any = _LEVELS[text.severity] if 0 <= text.severity < len(_LEVELS) else 0
         message = Log(level=level, message=text.text, name="vehicle")
-        _stamp(message.timestamp, time_s)
+        _set_time(message.timestamp, time_s)
         yield time_s, "/texts", message
 
 
 def _entity(update: Any, time_s: float, name: str, frame: str) -> Any:
     entity = update.entities.add(id=name, frame_id=frame, frame_locked=True)
-    _stamp(entity.timestamp, time_s)
+    _set_time(entity.timestamp, time_s)
     return entity
 
 
-def _stamp(timestamp: Any, time_s: float) -> None:
+def _set_time(timestamp: Any, time_s: float) -> None:
     timestamp.FromNanoseconds(round(time_s * _NANO))
 
 
-def _put(vector: Any, place: Any) -> None:
-    vector.x, vector.y, vector.z = map(float, place)
+def _set_vector(vector: Any, xyz: Any) -> None:
+    vector.x, vector.y, vector.z = map(float, xyz)
 
 
-def _turn(quaternion: Any, wxyz: Any) -> None:
+def _set_quaternion(quaternion: Any, wxyz: Any) -> None:
     finite = bool(np.isfinite(wxyz).all())
     values = map(float, wxyz) if finite else (1.0, 0.0, 0.0, 0.0)
     quaternion.w, quaternion.x, quaternion.y, quaternion.z = values
 
 
-def _paint(colour: Any, rgba: tuple[float, float, float, float]) -> None:
+def _set_colour(colour: Any, rgba: tuple[float, float, float, float]) -> None:
     colour.r, colour.g, colour.b, colour.a = rgba
 
 
-def _thinned(places: Floats) -> Floats:
-    return places[:: max(1, -(-len(places) // _MOST_POINTS))]
+def _thinned(path: Floats) -> Floats:
+    return path[:: max(1, -(-len(path) // _MAX_POINTS))]

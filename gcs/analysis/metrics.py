@@ -31,14 +31,14 @@ Numbers = dict[str, float | int | None]
 _LEAD_S = 0.5  # of hold before a step: shows that it begins at rest
 RECOVERED_M = 0.05  # once the load error stays below this, the load has recovered from a gust
 SNAP_S = 0.5  # after a snap: the time in which its peak tension is searched
-_WRAP = 65536  # slack_events is a uint16
+_COUNTER_RANGE = 65536  # slack_events is a uint16
 _AXES = "xyz"
 
 
-def _over(values: Floats, measure: Callable[[Floats], float]) -> float | None:
-    """`measure` of the finite values; None if there are none."""
+def _statistic(values: Floats, function: Callable[[Floats], float]) -> float | None:
+    """`function` of the finite values; None if there are none."""
     finite = values[np.isfinite(values)]
-    return float(measure(finite)) if finite.size else None
+    return float(function(finite)) if finite.size else None
 
 
 def _rms(values: Floats) -> float:
@@ -70,21 +70,21 @@ def tracking_numbers(samples: Samples) -> Numbers:
     norm = np.linalg.norm(error, axis=1)
     known = norm[np.isfinite(norm)]
     numbers: Numbers = {
-        "load_error_max_m": _over(norm, np.max),
-        "load_error_rms_m": _over(norm, _rms),
+        "load_error_max_m": _statistic(norm, np.max),
+        "load_error_rms_m": _statistic(norm, _rms),
         "load_error_final_m": float(known[-1]) if len(known) else None,
     }
     tracked = samples.position_tracked
-    shaped = np.linalg.norm((samples.desired_m - samples.asked_m)[tracked], axis=1)
-    numbers["shaping_distance_max_m"] = _over(shaped, np.max)
-    flown = np.linalg.norm((samples.actual_m - samples.desired_m)[tracked], axis=1)
-    numbers["tracking_error_max_m"] = _over(flown, np.max)
+    shaped = np.linalg.norm((samples.desired_m - samples.requested_m)[tracked], axis=1)
+    numbers["shaping_distance_max_m"] = _statistic(shaped, np.max)
+    tracking = np.linalg.norm((samples.actual_m - samples.desired_m)[tracked], axis=1)
+    numbers["tracking_error_max_m"] = _statistic(tracking, np.max)
     for i, axis in enumerate(_AXES):
-        numbers[f"load_error_max_{axis}_m"] = _over(np.abs(error[:, i]), np.max)
+        numbers[f"load_error_max_{axis}_m"] = _statistic(np.abs(error[:, i]), np.max)
     for i, axis in enumerate(_AXES):
-        numbers[f"load_error_rms_{axis}_m"] = _over(error[:, i], _rms)
+        numbers[f"load_error_rms_{axis}_m"] = _statistic(error[:, i], _rms)
     speed = np.linalg.norm(samples.actual_m_s[samples.carried], axis=1)
-    numbers["load_speed_max_m_s"] = _over(speed, np.max)
+    numbers["load_speed_max_m_s"] = _statistic(speed, np.max)
     return numbers
 
 
@@ -96,10 +96,10 @@ def step_window(samples: Samples) -> NDArray[np.bool_]:
     if len(first) == 0:
         return window
     begin = int(first[0])
-    held = np.isin(samples.phase, (MISSION, HOLD))
-    end = begin + int(np.argmin(np.append(held[begin:], False)))
+    hold_or_mission = np.isin(samples.phase, (MISSION, HOLD))
+    end = begin + int(np.argmin(np.append(hold_or_mission[begin:], False)))
     earliest = samples.time_s[begin] - _LEAD_S
-    while begin > 0 and held[begin - 1] and samples.time_s[begin - 1] >= earliest:
+    while begin > 0 and hold_or_mission[begin - 1] and samples.time_s[begin - 1] >= earliest:
         begin -= 1
     window[begin:end] = True
     return window & np.isfinite(samples.desired_m).all(axis=1) & np.isfinite(samples.desired_m_s).all(axis=1)
@@ -114,7 +114,7 @@ def step_numbers(samples: Samples) -> Numbers:
     if not samples.position_tracked[window].any():
         return numbers
     time_s = samples.time_s[window]
-    step = find_step(time_s, samples.asked_m[window], samples.asked_m_s[window])
+    step = find_step(time_s, samples.requested_m[window], samples.requested_m_s[window])
     if step is None:
         return numbers
     response = step_response(step, time_s, samples.actual_m[window])
@@ -129,8 +129,8 @@ def cascade_numbers(telemetry: Telemetry) -> Numbers:
     cascade = telemetry.cascade
     window = in_window(telemetry, cascade.time_s)
     return {
-        "psi_R_max": _over(cascade.psi_R[window], np.max) or None,
-        "psi_q_max": _over(cascade.psi_q[window], np.max) or None,
+        "psi_R_max": _statistic(cascade.psi_R[window], np.max) or None,
+        "psi_q_max": _statistic(cascade.psi_q[window], np.max) or None,
     }
 
 
@@ -141,8 +141,8 @@ def rotor_numbers(telemetry: Telemetry) -> Numbers:
     force = true.force_n[in_window(telemetry, true.time_s)]
     return {
         "saturated_fraction": float(np.mean(saturated)) if len(saturated) else None,
-        "rotor_force_min_n": _over(force, np.min),
-        "rotor_force_max_n": _over(force, np.max),
+        "rotor_force_min_n": _statistic(force, np.min),
+        "rotor_force_max_n": _statistic(force, np.max),
     }
 
 
@@ -150,23 +150,23 @@ def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
     """True tilt, swing and tension over the mission window; slack events while the load is carried."""
     truth = telemetry.load_truth
     window = samples.carried
-    tilt_max = _over(tilt(samples.quat_wxyz[samples.in_mission]), np.max)
-    swing_max = _over(swing(truth.q_cable[window]), np.max)
-    went_slack = np.diff(truth.slack_events, prepend=truth.slack_events[:1]) % _WRAP
+    tilt_max = _statistic(tilt(samples.quat_wxyz[samples.in_mission]), np.max)
+    swing_max = _statistic(swing(truth.q_cable[window]), np.max)
+    went_slack = np.diff(truth.slack_events, prepend=truth.slack_events[:1]) % _COUNTER_RANGE
     carried = np.isin(samples.phase, CARRIED) & samples.attached
     return {
         "tilt_max_deg": None if tilt_max is None else float(np.degrees(tilt_max)),
         "swing_max_deg": None if swing_max is None else float(np.degrees(swing_max)),
-        "tension_min_n": _over(truth.tension_n[window], np.min),
-        "tension_max_n": _over(truth.tension_n[window], np.max),
+        "tension_min_n": _statistic(truth.tension_n[window], np.min),
+        "tension_max_n": _statistic(truth.tension_n[window], np.max),
         "slack_events": int(went_slack[carried].sum()) if carried.any() else None,
     }
 
 
 def gust_intervals(wind: WindTrack) -> list[tuple[float, float]]:
     """Beginning and end (s) of every gust pulse; the end is NaN if the log ends before it."""
-    blows = (wind.gust_m_s != 0.0).any(axis=1)
-    edges = np.flatnonzero(np.diff(blows, prepend=False))
+    gusting = (wind.gust_m_s != 0.0).any(axis=1)
+    edges = np.flatnonzero(np.diff(gusting, prepend=False))
     times = [float(t) for t in wind.time_s[edges]]
     return list(zip(times[::2], [*times[1::2], np.nan][: len(times[::2])], strict=True))
 
@@ -180,54 +180,54 @@ def gust_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
     carried = np.isin(samples.phase, CARRIED) & ~np.isin(samples.control_mode, ATTITUDE_MODES)
     carried &= samples.attached
     error = np.linalg.norm(samples.error_m, axis=1)
-    whole, worst_m, recovery_s = 0, 0.0, 0.0
+    complete, worst_m, recovery_s = 0, 0.0, 0.0
     gusts = gust_intervals(telemetry.wind)
     for i, (begin, end) in enumerate(gusts):
         next_begin = gusts[i + 1][0] if i + 1 < len(gusts) else np.inf
         after = samples.time_s >= begin
-        ceases = samples.time_s[after & ~carried]
-        until = min(next_begin, ceases[0] if len(ceases) else np.inf)
-        window = after & (samples.time_s < until) & np.isfinite(error)
-        if not end < until or not (window & (samples.time_s >= end)).any():
+        ends = samples.time_s[after & ~carried]
+        evaluated_until = min(next_begin, ends[0] if len(ends) else np.inf)
+        window = after & (samples.time_s < evaluated_until) & np.isfinite(error)
+        if not end < evaluated_until or not (window & (samples.time_s >= end)).any():
             continue
-        whole += 1
+        complete += 1
         worst_m = max(worst_m, float(error[window].max()))
         outside = samples.time_s[window & (error > RECOVERED_M)]
         last = samples.time_s[window][-1]
         if len(outside):
             recovery_s = max(recovery_s, np.inf if outside[-1] == last else float(outside[-1]) - end)
     return {
-        "gusts": whole,
-        "gust_error_max_m": worst_m if whole else None,
-        "gust_recovery_50mm_s": recovery_s if whole and np.isfinite(recovery_s) else None,
+        "gusts": complete,
+        "gust_error_max_m": worst_m if complete else None,
+        "gust_recovery_50mm_s": recovery_s if complete and np.isfinite(recovery_s) else None,
     }
 
 
 def snap_numbers(telemetry: Telemetry) -> Numbers:
     """How hard the slack cable came taut, from take-off to touchdown."""
     snaps, truth = telemetry.snaps, telemetry.load_truth
-    flown = np.isin(phase_at(telemetry, snaps.time_s), AIRBORNE)
-    times, speeds = snaps.time_s[flown], snaps.speed_m_s[flown]
+    airborne = np.isin(phase_at(telemetry, snaps.time_s), AIRBORNE)
+    times, speeds = snaps.time_s[airborne], snaps.speed_m_s[airborne]
     # the last snap before each sample, and whether it is recent
     last = np.searchsorted(times, truth.time_s, side="right") - 1
     recent = (last >= 0) & (truth.time_s - np.append(times, 0.0)[last] <= SNAP_S)
     return {
-        "snaps": int(flown.sum()) if len(truth.time_s) else None,
-        "snap_speed_max_m_s": _over(speeds, np.max),
-        "snap_impulse_max_n_s": _over(snaps.impulse_n_s[flown], np.max),
-        "snap_tension_max_n": _over(truth.tension_n[recent], np.max),
+        "snaps": int(airborne.sum()) if len(truth.time_s) else None,
+        "snap_speed_max_m_s": _statistic(speeds, np.max),
+        "snap_impulse_max_n_s": _statistic(snaps.impulse_n_s[airborne], np.max),
+        "snap_tension_max_n": _statistic(truth.tension_n[recent], np.max),
     }
 
 
 def estimator_numbers(samples: Samples) -> Numbers:
     """Estimated minus true load position over the mission window."""
     norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.carried], axis=1)
-    beside = np.linalg.norm((samples.filtered_m - samples.actual_m)[samples.carried], axis=1)
+    filter_norm = np.linalg.norm((samples.filtered_m - samples.actual_m)[samples.carried], axis=1)
     return {
-        "estimator_error_max_m": _over(norm, np.max),
-        "estimator_error_rms_m": _over(norm, _rms),
-        "filter_error_max_m": _over(beside, np.max),
-        "filter_error_rms_m": _over(beside, _rms),
+        "estimator_error_max_m": _statistic(norm, np.max),
+        "estimator_error_rms_m": _statistic(norm, _rms),
+        "filter_error_max_m": _statistic(filter_norm, np.max),
+        "filter_error_rms_m": _statistic(filter_norm, _rms),
     }
 
 
@@ -240,7 +240,7 @@ def clock_numbers(telemetry: Telemetry) -> Numbers:
         return int(late_us[timed].max()) if timed.any() else None
 
     return {
-        "rate_hz": _over(status.rate_hz[timed], lambda v: float(np.median(v))),
+        "rate_hz": _statistic(status.rate_hz[timed], lambda v: float(np.median(v))),
         "late_p50_us": worst(status.late_p50_us),
         "late_p99_us": worst(status.late_p99_us),
         "late_max_us": worst(status.late_max_us),

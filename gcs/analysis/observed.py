@@ -20,15 +20,15 @@ from gcs.analysis.align import as_of
 from gcs.analysis.axes import Floats
 from gcs.analysis.tracks import Ints, ItemTrack, LoadTrack, RotorTrack, SetpointTrack
 
-_PLACES = (
+_POSITION_COMMANDS = (
     mavlink.MAV_CMD_NAV_WAYPOINT,
     mavlink.MAV_CMD_NAV_LOITER_TIME,
     mavlink.MAV_CMD_NAV_TAKEOFF,
     mavlink.MAV_CMD_NAV_LAND,
 )
 _LIFTED_M = 0.01  # height above its initial position from which the load counts as lifted
-_TURNS = 0.002  # share of the greatest force above which rotors count as turning
-_EVER = np.inf  # greatest age of a value: it holds until the next is received
+_TURNING_SHARE = 0.002  # share of the greatest force above which rotors count as turning
+_ANY_AGE_S = np.inf  # greatest age of a value: it holds until the next is received
 
 
 def observed_setpoint(
@@ -36,37 +36,37 @@ def observed_setpoint(
 ) -> SetpointTrack:
     """The setpoints at the time stamps of the true load; `home` is the origin of the world."""
     time_s, position = load.time_s, load.position_m
-    item = as_of(current.time_s, current.item.astype(np.float64), time_s, _EVER)
+    item = as_of(current.time_s, current.item.astype(np.float64), time_s, _ANY_AGE_S)
     seq = np.clip(np.nan_to_num(item), 0, len(items) - 1).astype(np.int64)
     command = np.array([one.command for one in items])
-    rests = position[0, 2]
-    lifted = position[:, 2] > rests + _LIFTED_M
+    ground_m = position[0, 2]
+    lifted = position[:, 2] > ground_m + _LIFTED_M
     turning = _turning(rotors, time_s)
     phase = np.full(len(time_s), mavlink.PLUMBLINE_PHASE_MISSION)
     phase[command[seq] == mavlink.MAV_CMD_NAV_LAND] = mavlink.PLUMBLINE_PHASE_LOWER
-    places = _places(items, load, home)
-    phase[seq <= _last_of_lift(command, places, rests)] = mavlink.PLUMBLINE_PHASE_LIFT
-    ever = np.cumsum(lifted & turning) > 0
-    phase[~lifted & ~ever] = mavlink.PLUMBLINE_PHASE_TAUTEN
-    phase[~lifted & ever] = mavlink.PLUMBLINE_PHASE_SET_DOWN
+    positions = _item_positions(items, load, home)
+    phase[seq <= _last_lift_item(command, positions, ground_m)] = mavlink.PLUMBLINE_PHASE_LIFT
+    was_lifted = np.cumsum(lifted & turning) > 0
+    phase[~lifted & ~was_lifted] = mavlink.PLUMBLINE_PHASE_TAUTEN
+    phase[~lifted & was_lifted] = mavlink.PLUMBLINE_PHASE_SET_DOWN
     phase[~turning] = mavlink.PLUMBLINE_PHASE_DISARMED
     carried = lifted & turning
-    line = _nearest(position, places[np.maximum(seq - 1, 0)], places[seq])
-    asked = np.where(carried[:, None], line, position)
-    still, nothing = np.zeros_like(asked), np.full(len(time_s), np.nan)
+    line = _nearest_on_segments(position, positions[np.maximum(seq - 1, 0)], positions[seq])
+    requested = np.where(carried[:, None], line, position)
+    zeros, unknown = np.zeros_like(requested), np.full(len(time_s), np.nan)
     mode = np.where(carried, mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, mavlink.PLUMBLINE_CONTROL_NONE).astype(
         np.int64
     )
     return SetpointTrack(
         time_s=time_s,
-        position_m=asked,
-        velocity_m_s=still,
-        acceleration_m_s2=still,
-        asked_m=asked,
-        asked_m_s=still,
-        q_cable_c=np.full_like(asked, np.nan),
-        elapsed_s=nothing,
-        duration_s=nothing,
+        position_m=requested,
+        velocity_m_s=zeros,
+        acceleration_m_s2=zeros,
+        requested_m=requested,
+        requested_m_s=zeros,
+        q_cable_c=np.full_like(requested, np.nan),
+        elapsed_s=unknown,
+        duration_s=unknown,
         item=seq,
         phase=phase.astype(np.int64),
         control_mode=mode,
@@ -78,42 +78,42 @@ def _turning(rotors: RotorTrack, at_s: Floats) -> NDArray[np.bool_]:
     if len(rotors.time_s) == 0:
         return np.ones(len(at_s), dtype=np.bool_)
     shares = rotors.force_n.max(axis=1) / rotors.force_max_n
-    return np.asarray(np.nan_to_num(as_of(rotors.time_s, shares, at_s, _EVER)) > _TURNS)
+    return np.asarray(np.nan_to_num(as_of(rotors.time_s, shares, at_s, _ANY_AGE_S)) > _TURNING_SHARE)
 
 
-def _last_of_lift(command: Ints, places: Floats, rests: float) -> int:
+def _last_lift_item(command: Ints, positions: Floats, ground_m: float) -> int:
     """Index of the last item that lifts the load: the first item that ends above the ground or, if that is
     the take-off and a waypoint at the same place follows, that waypoint, in which the load comes to rest."""
-    raised = np.flatnonzero(places[:, 2] > rests + _LIFTED_M)
+    raised = np.flatnonzero(positions[:, 2] > ground_m + _LIFTED_M)
     if not len(raised):
         return 0
     last = int(raised[0])
-    rests_next = (
+    stop_follows = (
         command[last] == mavlink.MAV_CMD_NAV_TAKEOFF
         and command[last + 1 : last + 2] == mavlink.MAV_CMD_NAV_WAYPOINT
-        and np.array_equal(places[last + 1], places[last])
+        and np.array_equal(positions[last + 1], positions[last])
     )
-    return last + 1 if rests_next else last
+    return last + 1 if stop_follows else last
 
 
-def _places(items: Sequence[WireItem], load: LoadTrack, home: Home) -> Floats:
+def _item_positions(items: Sequence[WireItem], load: LoadTrack, home: Home) -> Floats:
     """(items, 3) position of the hanging load at the end of each item, ENU."""
     taut = load.distance_m[load.taut > 0]
     cable_m = float(np.median(taut if len(taut) else load.distance_m))
-    stands_m = float(load.position_m[0, 2] - load.distance_m[0] * load.q_cable[0, 2])
-    rests = load.position_m[0, 2]
-    found, here = [], load.position_m[0]
+    vehicle_ground_m = float(load.position_m[0, 2] - load.distance_m[0] * load.q_cable[0, 2])
+    ground_m = load.position_m[0, 2]
+    found, last = [], load.position_m[0]
     for item in items:
-        if item.command in _PLACES:
+        if item.command in _POSITION_COMMANDS:
             x, y, _ = enu_from_geodetic(item.x, item.y, 0, home)
-            low = item.command == mavlink.MAV_CMD_NAV_LAND
-            height = rests if low else max(item.z + stands_m - cable_m, rests)
-            here = np.array([x, y, height])
-        found.append(here)
+            lands = item.command == mavlink.MAV_CMD_NAV_LAND
+            height = ground_m if lands else max(item.z + vehicle_ground_m - cable_m, ground_m)
+            last = np.array([x, y, height])
+        found.append(last)
     return np.array(found)
 
 
-def _nearest(points: Floats, begin: Floats, end: Floats) -> Floats:
+def _nearest_on_segments(points: Floats, begin: Floats, end: Floats) -> Floats:
     """(n, 3) the points on the line segments from `begin` to `end` that are nearest to `points`."""
     along = end - begin
     length = np.sum(along * along, axis=1)

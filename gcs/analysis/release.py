@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from gcs.analysis.tracks import LoadTrack
 
-BEYOND_M = 0.02  # a slack cable is shorter than when it was taut; more than noise and single precision
+RELEASE_MARGIN_M = (
+    0.02  # a slack cable is shorter than when it was taut; more than noise and single precision
+)
 
 
 def attached(load: LoadTrack) -> NDArray[np.bool_]:
@@ -24,7 +26,7 @@ def attached(load: LoadTrack) -> NDArray[np.bool_]:
     last = np.searchsorted(taut, np.arange(n), side="right") - 1  # index into `taut`, -1 before the first
     length_m = load.distance_m[taut[np.maximum(last, 0)]]
     slack = (load.taut != 1) & (last >= 0)
-    apart = slack & (load.distance_m > length_m + BEYOND_M)
-    lost = np.zeros(len(taut) + 1, dtype=np.bool_)
-    lost[last[apart]] = True
-    return np.asarray(~(slack & lost[last]))
+    too_far = slack & (load.distance_m > length_m + RELEASE_MARGIN_M)
+    released = np.zeros(len(taut) + 1, dtype=np.bool_)
+    released[last[too_far]] = True
+    return np.asarray(~(slack & released[last]))

@@ -53,8 +53,8 @@ class Samples:
     actual_m_s: Floats  # (n, 3) true load velocity
     desired_m: Floats  # (n, 3)
     desired_m_s: Floats  # (n, 3)
-    asked_m: Floats  # (n, 3) requested by the mission; desired is the nearest that can be flown
-    asked_m_s: Floats  # (n, 3)
+    requested_m: Floats  # (n, 3) requested by the mission; desired is the nearest that can be flown
+    requested_m_s: Floats  # (n, 3)
     estimated_m: Floats  # (n, 3) load position as estimated by the autopilot
     filtered_m: Floats  # (n, 3) the same from the built-in filter, in flights with a custom estimator
     vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
@@ -63,12 +63,12 @@ class Samples:
     @property
     def error_m(self) -> Floats:
         """(n, 3) true minus requested load position, e_x of (3-40)."""
-        return self.actual_m - self.asked_m
+        return self.actual_m - self.requested_m
 
     @property
     def error_m_s(self) -> Floats:
         """(n, 3) true minus requested load velocity."""
-        return self.actual_m_s - self.asked_m_s
+        return self.actual_m_s - self.requested_m_s
 
     @property
     def position_tracked(self) -> NDArray[np.bool_]:
@@ -83,7 +83,7 @@ class Samples:
 
 def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
     """(n,) the phase of the setpoint in force at each time; UNKNOWN where there is none."""
-    return _whole_as_of(telemetry, telemetry.setpoint.phase, at_s)
+    return _integers_as_of(telemetry, telemetry.setpoint.phase, at_s)
 
 
 def in_window(telemetry: Telemetry, at_s: Floats) -> NDArray[np.bool_]:
@@ -91,11 +91,11 @@ def in_window(telemetry: Telemetry, at_s: Floats) -> NDArray[np.bool_]:
 
     In a flight without that phase (the load was only lifted and held), the window is phase HOLD.
     """
-    flown = bool((telemetry.setpoint.phase == MISSION).any())
-    return np.asarray(phase_at(telemetry, at_s) == (MISSION if flown else HOLD))
+    has_mission = bool((telemetry.setpoint.phase == MISSION).any())
+    return np.asarray(phase_at(telemetry, at_s) == (MISSION if has_mission else HOLD))
 
 
-def _whole_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
+def _integers_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
     found = as_of(telemetry.setpoint.time_s, values.astype(np.float64), at_s)
     return np.where(np.isnan(found), UNKNOWN, found).astype(np.int64)
 
@@ -107,13 +107,13 @@ def samples_of(telemetry: Telemetry) -> Samples:
     filtered = telemetry.load_filtered
     time_s = truth.time_s
     # while no law follows the setpoint, the estimate is sent in its place to complete the message
-    tracked = np.isin(_whole_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
+    tracked = np.isin(_integers_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
     # the acceleration is sent too: the desired velocity is therefore also a cubic between stamps
     return Samples(
         time_s=time_s,
         phase=phase_at(telemetry, time_s),
-        item=_whole_as_of(telemetry, setpoint.item, time_s),
-        control_mode=_whole_as_of(telemetry, setpoint.control_mode, time_s),
+        item=_integers_as_of(telemetry, setpoint.item, time_s),
+        control_mode=_integers_as_of(telemetry, setpoint.control_mode, time_s),
         in_mission=in_window(telemetry, time_s),
         attached=attached(truth),
         actual_m=truth.position_m,
@@ -126,10 +126,10 @@ def samples_of(telemetry: Telemetry) -> Samples:
             hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
             np.nan,
         ),
-        asked_m=np.where(
-            tracked, hermite(setpoint.time_s, setpoint.asked_m, setpoint.asked_m_s, time_s), np.nan
+        requested_m=np.where(
+            tracked, hermite(setpoint.time_s, setpoint.requested_m, setpoint.requested_m_s, time_s), np.nan
         ),
-        asked_m_s=np.where(tracked, linear(setpoint.time_s, setpoint.asked_m_s, time_s), np.nan),
+        requested_m_s=np.where(tracked, linear(setpoint.time_s, setpoint.requested_m_s, time_s), np.nan),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
         filtered_m=hermite(filtered.time_s, filtered.position_m, filtered.velocity_m_s, time_s),
         vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,

@@ -10,13 +10,13 @@ from gcs.analysis.axes import Floats
 
 MIN_HEIGHT_M = 0.01  # below a centimetre the noise of a tracker is a tenth of the step
 _OFF_LINE = 1e-3  # of the height: a path that deviates more from its line is no step
-_BACK = 1e-4  # of the height: single-precision wire values of a monotone path go back by less
-_BEGUN = 1e-4  # of the height: the desired path has left its start
+_BACKWARD = 1e-4  # of the height: single-precision wire values of a monotone path go back by less
+_STARTED = 1e-4  # of the height: the desired path has left its start
 _ARRIVED = 1.0 - 1e-4  # of the height
 _PAUSE = 0.01  # of the peak speed: a path that becomes slower than this in between is two moves
-_MIDDLE = (0.02, 0.98)  # of the height: the part that is searched for pauses
+_MIDDLE_RANGE = (0.02, 0.98)  # of the height: the part that is searched for pauses
 _REST = 0.01  # of the peak speed: at rest
-_HELD_S = 0.5  # a shorter hold says nothing about settling
+_MIN_HOLD_S = 0.5  # a shorter hold says nothing about settling
 
 
 class Step(NamedTuple):
@@ -55,24 +55,24 @@ def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | 
     along = offset @ direction
     speed = desired_m_s @ direction
     peak = float(speed.max())
-    middle = (along > _MIDDLE[0] * height) & (along < _MIDDLE[1] * height)
-    moved = (along > _BEGUN * height) | (speed > _REST * peak)
-    begun = int(np.argmax(moved))
+    middle = (along > _MIDDLE_RANGE[0] * height) & (along < _MIDDLE_RANGE[1] * height)
+    moved = (along > _STARTED * height) | (speed > _REST * peak)
+    started = int(np.argmax(moved))
     arrived = int(np.argmax(along >= _ARRIVED * height))
     if (
         np.linalg.norm(offset - along[:, None] * direction, axis=1).max() > _OFF_LINE * height
-        or np.diff(along).min() < -_BACK * height
-        or along.max() > (1.0 + _BACK) * height
+        or np.diff(along).min() < -_BACKWARD * height
+        or along.max() > (1.0 + _BACKWARD) * height
         or abs(speed[0]) > _REST * peak
         or abs(speed[-1]) > _REST * peak
         or bool((speed[middle] < _PAUSE * peak).any())
-        or begun == 0
-        or time_s[-1] - time_s[arrived] < _HELD_S
+        or started == 0
+        or time_s[-1] - time_s[arrived] < _MIN_HOLD_S
     ):
         return None
-    start = time_s[begun]
-    if speed[begun] > 0.0:
-        start = max(time_s[begun - 1], start - 2.0 * along[begun] / speed[begun])
+    start = time_s[started]
+    if speed[started] > 0.0:
+        start = max(time_s[started - 1], start - 2.0 * along[started] / speed[started])
     return Step(float(start), height, desired_m[0], direction)
 
 

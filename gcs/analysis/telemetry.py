@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from autopilot.wire.codec import Received
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.analysis.asked import ASKED, VEHICLE_SYSTEM, Asked
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
 from gcs.analysis.observed import observed_setpoint
@@ -32,8 +31,9 @@ from gcs.analysis.tracks import (
     Telemetry,
     WindTrack,
 )
+from gcs.analysis.vehicle_setup import SETUP_MESSAGES, VEHICLE_SYSTEM, VehicleSetup
 
-Record = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
+LogRecord = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
 
 AUTOPILOT_COMPONENT = 1
 _MICRO = 1e-6
@@ -46,7 +46,7 @@ def load_telemetry(tlog: Path) -> Telemetry:
     return telemetry_of(read_tlog(tlog))
 
 
-_READ = (
+_STAMPED = (
     mavlink.MAVLINK_MSG_ID_LOAD_STATE,
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
@@ -58,7 +58,7 @@ _READ = (
     mavlink.MAVLINK_MSG_ID_FILTER_STATE,
 )
 # without a time stamp of the vehicle; other components than the autopilot send some of them too
-_HEARD = (
+_UNSTAMPED = (
     mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
@@ -67,44 +67,46 @@ _HEARD = (
 )
 
 
-def telemetry_of(records: Iterable[Record]) -> Telemetry:
+def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
     """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
-    frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_READ, *_HEARD)}
+    frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_STAMPED, *_UNSTAMPED)}
     stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
     texts: list[tuple[int, Any]] = []
-    asked = Asked()
+    setup = VehicleSetup()
     for unix_us, received in records:
-        if received.id in ASKED:
-            asked.take(received)
+        if received.id in SETUP_MESSAGES:
+            setup.receive(received)
         if received.system != VEHICLE_SYSTEM:
             continue
         if received.id not in frames:
             if received.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
                 texts.append((unix_us, received.message))
-        elif received.component == AUTOPILOT_COMPONENT or received.id not in _HEARD:
+        elif received.component == AUTOPILOT_COMPONENT or received.id not in _UNSTAMPED:
             frames[received.id].append(received.frame)
             stamps[received.id].append(unix_us)
     columns = {message_id: Columns(message_id, found) for message_id, found in frames.items()}
-    waited_us = stamps[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]
-    if waited_us:
+    received_us = stamps[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]
+    if received_us:
         # the message with the shortest delay gives the best estimate of when the vehicle's clock was zero
         sent_us = columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT].raw("time_usec").tolist()
-        boot_us = min(heard - sent for heard, sent in zip(waited_us, sent_us, strict=True))
+        boot_us = min(
+            received_at_us - sent for received_at_us, sent in zip(received_us, sent_us, strict=True)
+        )
     elif stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME]:
         clock = columns[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME].raw("time_boot_ms").tolist()
-        told = zip(stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME], clock, strict=True)
-        boot_us = min(heard - 1000 * sent for heard, sent in told)
+        received_and_sent = zip(stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME], clock, strict=True)
+        boot_us = min(received_at_us - 1000 * sent for received_at_us, sent in received_and_sent)
     else:
-        boot_us = min((stamps[message_id][0] for message_id in _HEARD if stamps[message_id]), default=0)
-    heard = {
+        boot_us = min((stamps[message_id][0] for message_id in _UNSTAMPED if stamps[message_id]), default=0)
+    received_at_us = {
         message_id: (np.array(stamps[message_id], dtype=np.float64) - boot_us) * _MICRO
-        for message_id in _HEARD
+        for message_id in _UNSTAMPED
     }
-    telemetry = _assemble(columns, heard, _texts(texts, boot_us), asked)
+    telemetry = _assemble(columns, received_at_us, _texts(texts, boot_us), setup)
     if len(telemetry.setpoint.time_s) or not (len(telemetry.load_truth.time_s) and telemetry.mission):
         return telemetry
     # an autopilot that knows of no load; its home is where the vehicle stood, not the load
-    home = _origin(columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION], telemetry.load_truth) or asked.home
+    home = _origin(columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION], telemetry.load_truth) or setup.home
     setpoint = observed_setpoint(
         telemetry.load_truth, telemetry.rotors_truth, telemetry.mission_current, telemetry.mission, home
     )
@@ -115,26 +117,26 @@ def _origin(hil: Columns, load: LoadTrack) -> Home | None:
     """The origin of the world: the true vehicle position in degrees minus the same position in metres."""
     hil_us = hil.raw("time_usec")
     load_us = np.round(load.time_s / _MICRO).astype(hil_us.dtype)
-    _, ours, theirs = np.intersect1d(load_us, hil_us, return_indices=True)
-    if not len(ours):
+    _, load_rows, hil_rows = np.intersect1d(load_us, hil_us, return_indices=True)
+    if not len(load_rows):
         return None
-    vehicle = load.position_m[ours] - load.distance_m[ours, None] * load.q_cable[ours]
-    degE7, mm = hil["lat lon"][theirs], hil["alt"][theirs]
-    first = Home(1e-7 * float(degE7[0, 0]), 1e-7 * float(degE7[0, 1]), 1e-3 * float(mm[0]))
+    vehicle = load.position_m[load_rows] - load.distance_m[load_rows, None] * load.q_cable[load_rows]
+    degE7, mm = hil["lat lon"][hil_rows], hil["alt"][hil_rows]
+    initial = Home(1e-7 * float(degE7[0, 0]), 1e-7 * float(degE7[0, 1]), 1e-3 * float(mm[0]))
     # take the first vehicle position as origin, then move it by the mean difference
-    moved = [
-        np.subtract(enu_from_geodetic(int(lat), int(lon), int(alt), first), place)
+    differences = [
+        np.subtract(enu_from_geodetic(int(lat), int(lon), int(alt), initial), place)
         for (lat, lon), alt, place in zip(degE7, mm, vehicle, strict=True)
     ]
-    east, north, up = (float(v) for v in np.mean(moved, axis=0))
-    latitude, longitude, altitude = geodetic_from_enu((east, north, up), first)
+    east, north, up = (float(v) for v in np.mean(differences, axis=0))
+    latitude, longitude, altitude = geodetic_from_enu((east, north, up), initial)
     return Home(1e-7 * latitude, 1e-7 * longitude, 1e-3 * altitude)
 
 
 TrackT = TypeVar("TrackT")
 
 
-def _in_order(track: TrackT, keep: NDArray[np.bool_] | None = None) -> TrackT:
+def _sorted(track: TrackT, keep: NDArray[np.bool_] | None = None) -> TrackT:
     """The samples to keep, sorted by time; of several with the same time stamp, the last received."""
     columns = {field.name: getattr(track, field.name) for field in fields(track)}  # type: ignore[arg-type]
     time_s = columns["time_s"]
@@ -154,41 +156,41 @@ def _load(c: Columns, source: int) -> LoadTrack:
         q_cable_dot=enu_from_ned(c["qx_dot qy_dot qz_dot"]),
         distance_m=c["distance"],
         tension_n=c["tension"],
-        slack_events=c.whole("slack_events"),
-        taut=c.whole("taut"),
+        slack_events=c.integers("slack_events"),
+        taut=c.integers("taut"),
     )
-    return _in_order(track, c["source"] == source)
+    return _sorted(track, c["source"] == source)
 
 
 def _filtered(c: Columns) -> FilterTrack:
     times_s, velocity_m_s = c["time_usec"] * _MICRO, enu_from_ned(c["vx vy vz"])
-    return _in_order(FilterTrack(times_s, enu_from_ned(c["x y z"]), velocity_m_s))
+    return _sorted(FilterTrack(times_s, enu_from_ned(c["x y z"]), velocity_m_s))
 
 
 def _setpoint(c: Columns) -> SetpointTrack:
-    asked, asked_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
-    if not asked.any():  # the vehicle does not send it: missing extension fields are decoded as zeros
-        asked, asked_m_s = c["x y z"], c["vx vy vz"]
-    return _in_order(
+    requested, requested_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
+    if not requested.any():  # the vehicle does not send it: missing extension fields are decoded as zeros
+        requested, requested_m_s = c["x y z"], c["vx vy vz"]
+    return _sorted(
         SetpointTrack(
             time_s=c["time_usec"] * _MICRO,
             position_m=enu_from_ned(c["x y z"]),
             velocity_m_s=enu_from_ned(c["vx vy vz"]),
             acceleration_m_s2=enu_from_ned(c["ax ay az"]),
-            asked_m=enu_from_ned(asked),
-            asked_m_s=enu_from_ned(asked_m_s),
+            requested_m=enu_from_ned(requested),
+            requested_m_s=enu_from_ned(requested_m_s),
             q_cable_c=enu_from_ned(c["qx qy qz"]),
             elapsed_s=c["elapsed"],
             duration_s=c["duration"],
-            item=c.whole("seq"),
-            phase=c.whole("phase"),
-            control_mode=c.whole("control_mode"),
+            item=c.integers("seq"),
+            phase=c.integers("phase"),
+            control_mode=c.integers("control_mode"),
         )
     )
 
 
 def _cascade(c: Columns) -> CascadeTrack:
-    return _in_order(
+    return _sorted(
         CascadeTrack(
             time_s=c["time_usec"] * _MICRO,
             e_x=enu_from_ned(c["e_x"]),
@@ -201,77 +203,77 @@ def _cascade(c: Columns) -> CascadeTrack:
             psi_q=c["psi_q"],
             thrust_n=c["thrust"],
             moment_n_m=flu_from_frd(c["moment"]),
-            control_mode=c.whole("control_mode"),
+            control_mode=c.integers("control_mode"),
         )
     )
 
 
 def _rotors(c: Columns, source: int) -> RotorTrack:
     of_source = c["source"] == source
-    told = c.whole("rotors")[of_source]
-    count = int(told.max()) if len(told) and told.max() > 0 else 4
+    counts = c.integers("rotors")[of_source]
+    count = int(counts.max()) if len(counts) and counts.max() > 0 else 4
     track = RotorTrack(
         time_s=c["time_usec"] * _MICRO,
         force_n=np.hstack([c["force"], c["more_force"]])[:, :count],
         force_min_n=c["force_min"],
         force_max_n=c["force_max"],
-        saturated=c.whole("saturated") | c.whole("more_saturated") << 8,
+        saturated=c.integers("saturated") | c.integers("more_saturated") << 8,
     )
-    return _in_order(track, of_source)
+    return _sorted(track, of_source)
 
 
 def _attitude(time_s: Floats, quat_ned_frd: Floats, rates_frd: Floats) -> AttitudeTrack:
-    return _in_order(AttitudeTrack(time_s, quat_enu_flu_from_ned_frd(quat_ned_frd), flu_from_frd(rates_frd)))
+    return _sorted(AttitudeTrack(time_s, quat_enu_flu_from_ned_frd(quat_ned_frd), flu_from_frd(rates_frd)))
 
 
 def _simulation(c: Columns) -> SimulationTrack:
-    return _in_order(
+    return _sorted(
         SimulationTrack(
             time_s=c["time_usec"] * _MICRO,
             speed_factor=c["speed_factor"],
             rate_hz=c["rate_hz"],
-            late_p50_us=c.whole("late_p50_us"),
-            late_p99_us=c.whole("late_p99_us"),
-            late_max_us=c.whole("late_max_us"),
-            missed=c.whole("missed"),
-            vehicle_on_ground=c.whole("vehicle_on_ground"),
-            load_on_ground=c.whole("load_on_ground"),
+            late_p50_us=c.integers("late_p50_us"),
+            late_p99_us=c.integers("late_p99_us"),
+            late_max_us=c.integers("late_max_us"),
+            missed=c.integers("missed"),
+            vehicle_on_ground=c.integers("vehicle_on_ground"),
+            load_on_ground=c.integers("load_on_ground"),
         )
     )
 
 
 def _wind(c: Columns) -> WindTrack:
-    return _in_order(WindTrack(c["time_usec"] * _MICRO, enu_from_ned(c["wind"]), enu_from_ned(c["gust"])))
+    return _sorted(WindTrack(c["time_usec"] * _MICRO, enu_from_ned(c["wind"]), enu_from_ned(c["gust"])))
 
 
 def _snaps(c: Columns) -> SnapTrack:
-    return _in_order(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
+    return _sorted(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
 
 
 def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
     """Chunks of one id joined in the order of arrival; a text with id 0 is not joined."""
-    whole: list[StatusText] = []
+    joined: list[StatusText] = []
     open_id = 0
     for unix_us, message in texts:
         text = message.text
         text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
         text = text.rstrip("\0")
         if message.id and message.id == open_id and message.chunk_seq:
-            whole[-1] = whole[-1]._replace(text=whole[-1].text + text)
+            joined[-1] = joined[-1]._replace(text=joined[-1].text + text)
         else:
-            whole.append(StatusText((unix_us - boot_us) * _MICRO, message.severity, text))
+            joined.append(StatusText((unix_us - boot_us) * _MICRO, message.severity, text))
         open_id = message.id
-    return tuple(whole)
+    return tuple(joined)
 
 
 def _assemble(
-    columns: dict[int, Columns], times: dict[int, Floats], texts: tuple[StatusText, ...], asked: Asked
+    columns: dict[int, Columns], times: dict[int, Floats], texts: tuple[StatusText, ...], setup: VehicleSetup
 ) -> Telemetry:
     load = columns[mavlink.MAVLINK_MSG_ID_LOAD_STATE]
     rotors = columns[mavlink.MAVLINK_MSG_ID_ROTOR_STATE]
     hil = columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION]
     attitude = columns[mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION]
-    beat = columns[mavlink.MAVLINK_MSG_ID_HEARTBEAT]
+    heartbeat = columns[mavlink.MAVLINK_MSG_ID_HEARTBEAT]
     current = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT
     reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
     return Telemetry(
@@ -292,17 +294,17 @@ def _assemble(
         ),
         heartbeat=HeartbeatTrack(
             times[mavlink.MAVLINK_MSG_ID_HEARTBEAT],
-            beat.whole("base_mode"),
-            beat.whole("custom_mode"),
-            beat.whole("system_status"),
+            heartbeat.integers("base_mode"),
+            heartbeat.integers("custom_mode"),
+            heartbeat.integers("system_status"),
         ),
-        mission_current=ItemTrack(times[current], columns[current].whole("seq")),
-        mission_reached=ItemTrack(times[reached], columns[reached].whole("seq")),
+        mission_current=ItemTrack(times[current], columns[current].integers("seq")),
+        mission_reached=ItemTrack(times[reached], columns[reached].integers("seq")),
         simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
         wind=_wind(columns[mavlink.MAVLINK_MSG_ID_WIND_STATE]),
         snaps=_snaps(columns[mavlink.MAVLINK_MSG_ID_CABLE_SNAP]),
         texts=texts,
-        mission=asked.mission,
-        parameters=asked.parameters,
-        home=asked.home,
+        mission=setup.mission,
+        parameters=setup.parameters,
+        home=setup.home,
     )

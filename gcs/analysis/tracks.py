@@ -52,8 +52,8 @@ class SetpointTrack:
     position_m: Floats  # (n, 3) ENU, desired
     velocity_m_s: Floats  # (n, 3) ENU, desired
     acceleration_m_s2: Floats  # (n, 3) ENU, desired
-    asked_m: Floats  # (n, 3) ENU, requested by the mission; desired is the nearest that can be flown
-    asked_m_s: Floats  # (n, 3) ENU
+    requested_m: Floats  # (n, 3) ENU, requested by the mission; desired is the nearest that can be flown
+    requested_m_s: Floats  # (n, 3) ENU
     q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
     elapsed_s: Floats  # (n,) since the item or phase began
     duration_s: Floats  # (n,) of the item or phase, NaN if open
@@ -91,7 +91,7 @@ class RotorTrack:
     saturated: Ints  # (n,) bit i: the command of rotor i was cut at a limit
 
 
-def numbers(rotors: RotorTrack) -> tuple[str, ...]:
+def rotor_names(rotors: RotorTrack) -> tuple[str, ...]:
     """Names of the rotors: 1, 2, ..."""
     return tuple(str(i + 1) for i in range(rotors.force_n.shape[1]))
 

@@ -34,7 +34,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
 
     found, page = compare(runs, out)
 
-    from gcs.report.compare import STAR, comparison, comparison_table, figures, in_columns
+    from gcs.report.compare import STAR, comparison, comparison_table, figures, fits_in_columns
 
     if as_json:
         print_json(comparison(found))
@@ -43,7 +43,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
         from rich.console import Console
 
         console = Console()
-        if in_columns(found, console.width):
+        if fits_in_columns(found, console.width):
             console.print(comparison_table(found))
         else:
             from gcs.report.overview import overview

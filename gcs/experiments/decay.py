@@ -10,9 +10,9 @@ from gcs.analysis.axes import Floats
 
 DEPTH = 1e-3  # of the peak: the fit ends there, so that a long tail of rounding errors does not dominate it
 _TAIL_S = 0.25  # at the end: the greatest value in this time is the final value
-_ZERO = 0.02  # of the greatest value of the mission: a smaller final value counts as zero
-_LEAST = 10  # samples of a fit
-_SPREAD = 5.0  # ratio of peak to resolution: below this no rate can be determined
+_ZERO_SHARE = 0.02  # of the greatest value of the mission: a smaller final value counts as zero
+_MIN_SAMPLES = 10  # samples of a fit
+_MIN_PEAK_RATIO = 5.0  # ratio of peak to resolution: below this no rate can be determined
 
 
 class Decay(NamedTuple):
@@ -39,7 +39,7 @@ def decay_of(time_s: Floats, values: Floats, rest_s: float, resolution: float, d
     if not after.any():  # the flight was lost before
         return Decay(greatest, float(v[-1]), False, None, None)
     final = float(v[t >= t[-1] - _TAIL_S].max())
-    decays = bool(final <= max(_ZERO * greatest, resolution))
+    decays = bool(final <= max(_ZERO_SHARE * greatest, resolution))
     rate, scale = fit_bound(t[after] - rest_s, v[after], resolution, depth)
     return Decay(greatest, final, decays, rate, scale)
 
@@ -54,7 +54,7 @@ def fit_bound(
     the resolution, or to the last crest.
     """
     peak = int(np.argmax(v))
-    if v[peak] < _SPREAD * resolution:
+    if v[peak] < _MIN_PEAK_RATIO * resolution:
         return None, None
     envelope = np.maximum.accumulate(v[::-1])[::-1]
     below = np.flatnonzero(envelope[peak:] < max(depth * v[peak], resolution))
@@ -63,7 +63,7 @@ def fit_bound(
     crests = crests[crests < end]
     if len(crests) > 1 and not len(below):  # the last wave is incomplete, and its envelope falls to zero
         end = int(crests[-1]) + 1
-    if end - peak < _LEAST:
+    if end - peak < _MIN_SAMPLES:
         return None, None
     slope, _ = np.polyfit(t[peak:end], np.log(envelope[peak:end]), 1)
     beta = float(-slope)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 
 from gcs.analysis.record import Record
-from gcs.experiments.figures.catalogue import FIGURES, Drawn
+from gcs.experiments.figures.catalogue import FIGURES, DrawnFigure
 from gcs.experiments.plan import CASE_NAMES, CASES, VEHICLE_NAMES, VEHICLES, Experiment
 from gcs.experiments.table import tables
 from missions.fileformat import load_mission
@@ -17,7 +17,7 @@ _TEMPLATE = "thesis.html"
 
 
 def render_page(
-    records: Sequence[Record], drawn: Sequence[Drawn], folder: str, version: str, code: str
+    records: Sequence[Record], drawn: Sequence[DrawnFigure], folder: str, version: str, code: str
 ) -> str:
     """The page; it links pictures in `folder`, and reports at the locations given in the records."""
     from jinja2 import Environment
@@ -36,7 +36,9 @@ def render_page(
     )
 
 
-def _case(case: str, records: Sequence[Record], drawn: Sequence[Drawn], folder: str) -> dict[str, object]:
+def _case(
+    case: str, records: Sequence[Record], drawn: Sequence[DrawnFigure], folder: str
+) -> dict[str, object]:
     mission = load_mission(case)
     # the idealised vehicle on the left, the true one on the right
     rows = []

@@ -50,7 +50,7 @@ _PRINTED: dict[tuple[str, str], dict[str, float]] = {
 }
 
 
-def printed(experiment: Experiment) -> dict[str, float]:
+def printed_results(experiment: Experiment) -> dict[str, float]:
     """The printed results for this case and law. The thesis had one vehicle; both vehicles here are compared
     with it."""
     return dict(_PRINTED.get((experiment.case, experiment.law), {}))

@@ -11,8 +11,8 @@ import numpy as np
 from gcs.analysis.axes import Floats
 from gcs.analysis.record import Record, flight_record, jsonable
 from gcs.experiments.decay import DEPTH, Decay, decay_of
-from gcs.experiments.flown import Flown
-from gcs.experiments.plan import printed
+from gcs.experiments.flight import ExperimentFlight
+from gcs.experiments.plan import printed_results
 
 # error function: unit; resolution (single precision on the wire, 20 m from home), below which it counts as
 # zero; depth below its peak to which the fit goes: the configuration errors are squares of the others
@@ -28,45 +28,45 @@ ERROR_FUNCTIONS: dict[str, tuple[str, float, float]] = {
 }
 
 
-def error_values(flown: Flown, name: str) -> tuple[Floats, Floats]:
+def error_values(flight: ExperimentFlight, name: str) -> tuple[Floats, Floats]:
     """(n,) times and (n,) norms of an error function of the cascade, from the beginning of the signals to the
     end."""
-    cascade = flown.telemetry.cascade
+    cascade = flight.telemetry.cascade
     values = getattr(cascade, name)
-    seen = flown.seen(cascade.time_s)
+    window = flight.signal_window(cascade.time_s)
     norm = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
-    return cascade.time_s[seen], norm[seen]
+    return cascade.time_s[window], norm[window]
 
 
-def decays(flown: Flown) -> dict[str, Decay]:
+def decays(flight: ExperimentFlight) -> dict[str, Decay]:
     """The decay of each error function."""
     return {
-        name: decay_of(*error_values(flown, name), flown.rest_s, resolution, depth)
+        name: decay_of(*error_values(flight, name), flight.rest_s, resolution, depth)
         for name, (_, resolution, depth) in ERROR_FUNCTIONS.items()
     }
 
 
-def result(flown: Flown, report_dir: str) -> Record:
+def experiment_record(flight: ExperimentFlight, report_dir: str) -> Record:
     """The record of an experiment: case, law, vehicle; the keys of the flight record; lost_after_s;
     error_functions; printed and difference."""
-    record = flight_record(flown.telemetry, flown.meta, flown.samples)
+    record = flight_record(flight.telemetry, flight.meta, flight.samples)
     record["report_dir"] = report_dir
-    experiment = flown.experiment
-    known = printed(experiment)
+    experiment = flight.experiment
+    printed = printed_results(experiment)
     difference = {
-        name: None if record[name] is None else record[name] - value for name, value in known.items()
+        name: None if record[name] is None else record[name] - value for name, value in printed.items()
     }
     return jsonable(
         {
             "case": experiment.case,
             "law": experiment.law,
             **{name: value for name, value in record.items() if name != "law"},
-            "lost_after_s": flown.length_s if flown.lost else None,
+            "lost_after_s": flight.duration_s if flight.lost else None,
             "error_functions": {
                 name: {"unit": ERROR_FUNCTIONS[name][0], **decay._asdict()}
-                for name, decay in decays(flown).items()
+                for name, decay in decays(flight).items()
             },
-            "printed": known,
+            "printed": printed,
             "difference": difference,
         }
     )

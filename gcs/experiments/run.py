@@ -13,12 +13,12 @@ from gcs.experiments.plan import SEED, SENSORS, Experiment
 from gcs.shell.processes import Child
 
 LOG_FILE = "gcs.log"
-Ended = tuple[Experiment, bool]  # an ended flight, and whether it was completed
+EndedFlight = tuple[Experiment, bool]  # an ended flight, and whether it was completed
 
 
 def start(experiment: Experiment, directory: Path, core: int) -> Child:
     """Start the flight of an experiment; results go to `directory`, and its output to gcs.log there."""
-    store.begin(directory)
+    store.prepare(directory)
     arguments = ["fly", experiment.case, "--law", experiment.law, "--vehicle", experiment.vehicle]
     arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force", "--overwrite"]
     program = [sys.executable, "-m", "gcs"]
@@ -35,14 +35,14 @@ def missing(plan: Sequence[Experiment], directory: Path, fresh: bool) -> list[Ex
 def fly_missing(
     waiting: Sequence[Experiment],
     directory: Path,
-    crew: Crew[Experiment, Ended],
-    tell: Callable[[Sequence[Ended], Running], None],
+    crew: Crew[Experiment, EndedFlight],
+    tell: Callable[[Sequence[EndedFlight], Running], None],
     stopped: Callable[[], bool],
 ) -> bool:
     """Fly the `waiting` experiments into `directory`/NAME; False if it was stopped before the end."""
 
-    def keep(ended: Sequence[Ended]) -> None:
+    def store_ended(ended: Sequence[EndedFlight]) -> None:
         for experiment, _ in ended:
-            store.finish(directory / experiment.name, store.experiment_origin(experiment))
+            store.mark_complete(directory / experiment.name, store.experiment_origin(experiment))
 
-    return fly_all(((experiment,) for experiment in waiting), crew, keep, tell, stopped)
+    return fly_all(((experiment,) for experiment in waiting), crew, store_ended, tell, stopped)

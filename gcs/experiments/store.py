@@ -12,7 +12,7 @@ from gcs.folders import TLOG_FILE
 from gcs.report.build import META_FILE, ReportError, load_meta
 
 MARK_FILE = "flown.json"  # written when a flight is complete; says which code flew it
-_WHOLE = ("completed", "diverged", "timeout")  # outcomes that are results of the experiment
+_RESULT_OUTCOMES = ("completed", "diverged", "timeout")  # outcomes that are results of the experiment
 # entry points of the code that flies an experiment: `gcs fly` from reading the mission file on, and the
 # programs that it starts
 ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.__main__", "autopilot.__main__")
@@ -35,16 +35,20 @@ def is_flown(directory: Path, origin: Origin) -> bool:
     settings = _settings(meta.mission, meta.law, meta.vehicle, meta.sensors, meta.seed, meta.settings)
     code = mark.get("code") if isinstance(mark, dict) else None
     stored = {"settings": settings, "version": meta.version, "code": code}
-    return not origin.differences(stored) and meta.outcome in _WHOLE and (directory / TLOG_FILE).is_file()
+    return (
+        not origin.differences(stored)
+        and meta.outcome in _RESULT_OUTCOMES
+        and (directory / TLOG_FILE).is_file()
+    )
 
 
-def begin(directory: Path) -> None:
+def prepare(directory: Path) -> None:
     """Prepare a flight: create `directory`, and invalidate an earlier flight in it."""
     directory.mkdir(parents=True, exist_ok=True)
     (directory / MARK_FILE).unlink(missing_ok=True)
 
 
-def finish(directory: Path, origin: Origin) -> None:
+def mark_complete(directory: Path, origin: Origin) -> None:
     """Mark a flight that has ended as reusable."""
     (directory / MARK_FILE).write_text(json.dumps({"code": origin.code}) + "\n", encoding="utf-8")
 

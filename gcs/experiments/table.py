@@ -14,7 +14,7 @@ from gcs.experiments.results import ERROR_FUNCTIONS
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-NONE = "–"
+NO_VALUE = "–"
 _STEP = (("rise_time_90_s", 2), ("overshoot_pct", 1), ("settling_time_5pct_s", 2))
 _LABELS = {
     "rise_time_90_s": "rise to 90 % (s)",
@@ -32,8 +32,8 @@ SYMBOLS = {
     "psi_R": "Ψ_R",
     "psi_q": "Ψ_q",
 }
-_WHO = ("case", "vehicle", "law")
-_WORDS = (*_WHO, "outcome", "number")  # columns that hold no numbers
+_NAME_COLUMNS = ("case", "vehicle", "law")
+_TEXT_COLUMNS = (*_NAME_COLUMNS, "outcome", "number")  # columns that hold no numbers
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Table:
 
     def markdown(self) -> str:
         """The table as Markdown; the first columns contain names, the others numbers."""
-        names = sum(cell in _WORDS for cell in self.header)
+        names = sum(cell in _TEXT_COLUMNS for cell in self.header)
         rule = ["---"] * names + ["---:"] * (len(self.header) - names)
         lines = [f"| {' | '.join(cells)} |" for cells in (self.header, rule, *self.rows)]
         return f"### {self.title}\n\n{self.note}\n\n" + "\n".join(lines) + "\n"
@@ -60,7 +60,7 @@ class Table:
 
         table = Rich(box=SIMPLE_HEAD, title=self.title, title_justify="left", pad_edge=False)
         for cell in self.header:
-            named = cell in _WORDS
+            named = cell in _TEXT_COLUMNS
             table.add_column(cell, justify="left" if named else "right", no_wrap=True)
         for row in self.rows:
             table.add_row(*(Text(cell) for cell in row))
@@ -81,14 +81,14 @@ def tables(records: Sequence[Record]) -> tuple[Table, ...]:
 def step_table(records: Sequence[Record]) -> Table:
     """Case A: rise, overshoot, settling."""
     rows = tuple(
-        (*_who(r), *(_against(r, name, decimals) for name, decimals in _STEP))
+        (*_flight_names(r), *(_with_printed(r, name, decimals) for name, decimals in _STEP))
         for r in records
         if r["case"] == "case-a"
     )
     return Table(
         "Step response, Case A",
         "In brackets what the thesis prints, and our value minus that.",
-        (*_WHO, *(_LABELS[name] for name, _ in _STEP)),
+        (*_NAME_COLUMNS, *(_LABELS[name] for name, _ in _STEP)),
         rows,
     )
 
@@ -98,9 +98,9 @@ def error_table(records: Sequence[Record]) -> Table:
     keys = [f"load_error_{what}_{axis}_m" for what in ("max", "rms") for axis in "xyz"]
     rows = tuple(
         (
-            *_who(r),
+            *_flight_names(r),
             r["outcome"],
-            _against(r, "load_error_max_m", 3),
+            _with_printed(r, "load_error_max_m", 3),
             *(_number(r[key], 3) for key in keys),
         )
         for r in records
@@ -109,7 +109,12 @@ def error_table(records: Sequence[Record]) -> Table:
         "Load position error",
         "Metres, over the mission; of a flight that was lost, up to that moment. In brackets what the thesis"
         " prints, and our value minus that.",
-        (*_WHO, "outcome", "maximum", *(f"{what} {axis}" for what in ("max", "RMS") for axis in "xyz")),
+        (
+            *_NAME_COLUMNS,
+            "outcome",
+            "maximum",
+            *(f"{what} {axis}" for what in ("max", "RMS") for axis in "xyz"),
+        ),
         rows,
     )
 
@@ -118,10 +123,10 @@ def decay_table(records: Sequence[Record]) -> Table:
     """Error functions: whether they go to zero after the last motion of the reference, and how fast."""
     rows = tuple(
         (
-            *_who(r),
+            *_flight_names(r),
             _number(r["psi_R_max"], 4),
             _number(r["psi_q_max"], 4),
-            *(_decay(r["error_functions"][name]) for name in ERROR_FUNCTIONS),
+            *(_decay_text(r["error_functions"][name]) for name in ERROR_FUNCTIONS),
         )
         for r in records
     )
@@ -129,8 +134,8 @@ def decay_table(records: Sequence[Record]) -> Table:
         "Error functions",
         "Greatest Ψ_R and Ψ_q; then, for each error function, whether it goes to zero (→ 0: at the end less"
         " than 2 % of its greatest) and the rate β in 1/s of the bound α e^(-β t) fitted from the last motion"
-        f" of the reference on; {NONE}: nothing to fit above what telemetry resolves.",
-        (*_WHO, "max Ψ_R", "max Ψ_q", *(SYMBOLS[name] for name in ERROR_FUNCTIONS)),
+        f" of the reference on; {NO_VALUE}: nothing to fit above what telemetry resolves.",
+        (*_NAME_COLUMNS, "max Ψ_R", "max Ψ_q", *(SYMBOLS[name] for name in ERROR_FUNCTIONS)),
         rows,
     )
 
@@ -139,7 +144,7 @@ def saturation_table(records: Sequence[Record]) -> Table:
     """Saturation and forces of the rotors, tilt, swing and slack events."""
     rows = tuple(
         (
-            *_who(r),
+            *_flight_names(r),
             _number(r["saturated_fraction"], 1, 100.0),
             _number(r["rotor_force_min_n"], 2),
             _number(r["rotor_force_max_n"], 2),
@@ -153,7 +158,7 @@ def saturation_table(records: Sequence[Record]) -> Table:
         "Rotors, vehicle and cable",
         "Share of rotor commands that a limit cut; least and greatest force of a rotor; greatest tilt of the"
         " vehicle and swing of the cable; times the cable went slack.",
-        (*_WHO, "saturated (%)", "force min (N)", "max (N)", "tilt (°)", "swing (°)", "slack"),
+        (*_NAME_COLUMNS, "saturated (%)", "force min (N)", "max (N)", "tilt (°)", "swing (°)", "slack"),
         rows,
     )
 
@@ -170,7 +175,7 @@ def comparison_table(records: Sequence[Record]) -> Table:
                 continue
             for key, decimals in keys:
                 names = (CASE_NAMES[case], VEHICLE_SHORT[vehicle], _LABELS[key])
-                both = (_final(ngc, key, decimals), _final(lqr, key, decimals))
+                both = (_final_text(ngc, key, decimals), _final_text(lqr, key, decimals))
                 rows.append((*names, *both, better(ngc, lqr, key)))
     return Table(
         "NGC against LQR",
@@ -189,7 +194,7 @@ def better(ngc: Record, lqr: Record, key: str) -> str:
         return float("inf") if value is None or record["outcome"] != "completed" else sign * float(value)
 
     if cost(ngc) == cost(lqr):
-        return NONE
+        return NO_VALUE
     return LAW_NAMES["thesis"] if cost(ngc) < cost(lqr) else LAW_NAMES["lqr"]
 
 
@@ -198,20 +203,20 @@ def markdown(records: Sequence[Record]) -> str:
     return "\n".join(table.markdown() for table in tables(records))
 
 
-def _who(record: Record) -> tuple[str, str, str]:
+def _flight_names(record: Record) -> tuple[str, str, str]:
     return CASE_NAMES[record["case"]], VEHICLE_SHORT[record["vehicle"]], LAW_NAMES[record["law"]]
 
 
 def _number(value: Any, decimals: int, scale: float = 1.0) -> str:
-    return NONE if value is None else f"{value * scale:.{decimals}f}"
+    return NO_VALUE if value is None else f"{value * scale:.{decimals}f}"
 
 
-def _final(record: Record, key: str, decimals: int) -> str:
+def _final_text(record: Record, key: str, decimals: int) -> str:
     lost = record["outcome"] != "completed"
     return str(record["outcome"]) if lost else _number(record[key], decimals)
 
 
-def _against(record: Record, key: str, decimals: int) -> str:
+def _with_printed(record: Record, key: str, decimals: int) -> str:
     """The value, and in brackets the printed one and the difference."""
     if record[key] is None and record["outcome"] != "completed":
         return str(record["outcome"])
@@ -219,11 +224,11 @@ def _against(record: Record, key: str, decimals: int) -> str:
     if key not in record["printed"]:
         return text
     difference = record["difference"][key]
-    away = NONE if difference is None else f"{difference:+.{decimals}f}"
-    return f"{text} ({record['printed'][key]:g}; {away})"
+    deviation = NO_VALUE if difference is None else f"{difference:+.{decimals}f}"
+    return f"{text} ({record['printed'][key]:g}; {deviation})"
 
 
-def _decay(decay: Record) -> str:
+def _decay_text(decay: Record) -> str:
     if decay["decays"] is None:
-        return NONE
+        return NO_VALUE
     return f"{'→ 0' if decay['decays'] else 'no'}, {_number(decay['rate_1_s'], 2)}"

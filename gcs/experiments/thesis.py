@@ -10,11 +10,11 @@ from typing import NamedTuple
 from gcs.analysis.record import Record
 from gcs.errors import InputError
 from gcs.experiments.figures.canvas import Scene
-from gcs.experiments.figures.catalogue import Drawn, draw_figures, wanted
-from gcs.experiments.flown import read_flown
+from gcs.experiments.figures.catalogue import DrawnFigure, draw_figures, figures_of
+from gcs.experiments.flight import read_flight
 from gcs.experiments.page import PAGE_FILE, render_page
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
-from gcs.experiments.results import result, write_results
+from gcs.experiments.results import experiment_record, write_results
 from gcs.experiments.table import markdown
 from gcs.folders import RESULTS_FILE, keep_others, make_folder
 
@@ -23,35 +23,35 @@ FIGURES = "figures"
 TABLE_FILE = "table.md"
 
 # figures drawn, figures in total, the file drawn last
-Tell = Callable[[int, int, str], None]
+Progress = Callable[[int, int, str], None]
 
 
 class Report(NamedTuple):
     """The content of the output directory."""
 
     records: tuple[Record, ...]
-    drawn: tuple[Drawn, ...]
+    drawn: tuple[DrawnFigure, ...]
 
 
-def write_report(out: Path, code: str, tell: Tell) -> Report:
+def write_report(out: Path, code: str, progress: Progress) -> Report:
     """Read all flights in `out`/flights and write everything else in `out`."""
     scenes = [(case, vehicle) for case in CASES for vehicle in VEHICLES]
-    total = sum(1 for case, vehicle in scenes for _ in wanted(case, vehicle))
+    total = sum(1 for case, vehicle in scenes for _ in figures_of(case, vehicle))
     records: list[Record] = []
-    drawn: list[Drawn] = []
+    drawn: list[DrawnFigure] = []
 
-    def count(figure: Drawn) -> None:
+    def on_drawn(figure: DrawnFigure) -> None:
         drawn.append(figure)
-        tell(len(drawn), total, figure.file)
+        progress(len(drawn), total, figure.file)
 
-    tell(0, total, "")
+    progress(0, total, "")
     for case, vehicle in scenes:
-        flown = {}
+        flights = {}
         for law in LAWS:
             experiment = Experiment(case, law, vehicle)
-            flown[law] = read_flown(out / FLIGHTS / experiment.name, experiment)
-            records.append(result(flown[law], f"{FLIGHTS}/{experiment.name}"))
-        draw_figures(Scene(case, vehicle, *(flown[law] for law in LAWS)), out / FIGURES, count)
+            flights[law] = read_flight(out / FLIGHTS / experiment.name, experiment)
+            records.append(experiment_record(flights[law], f"{FLIGHTS}/{experiment.name}"))
+        draw_figures(Scene(case, vehicle, *(flights[law] for law in LAWS)), out / FIGURES, on_drawn)
     ordered = tuple(sorted(records, key=_order))
     write_results(out / RESULTS_FILE, ordered)
     (out / TABLE_FILE).write_text(markdown(ordered), encoding="utf-8")
@@ -64,7 +64,7 @@ def _order(record: Record) -> tuple[int, int, int]:
     return in_reading_order(Experiment(record["case"], record["law"], record["vehicle"]))
 
 
-def make_directory(out: Path) -> None:
+def make_output_directory(out: Path) -> None:
     """Create `out`; a GcsError says in one line why that is impossible."""
     keep_others(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(out / FLIGHTS, out)
@@ -86,7 +86,7 @@ KEY_FIGURES = (
 _COLOURS = 192  # of a line drawing: halves the file without a visible difference
 
 
-def around_tables(page: Path) -> tuple[str, str]:
+def text_around_tables(page: Path) -> tuple[str, str]:
     """The text before and after the markers of a page of the documentation; InputError if it has none."""
     try:
         text = page.read_text(encoding="utf-8")
@@ -105,7 +105,7 @@ def write_docs(page: Path, out: Path, records: Sequence[Record]) -> None:
     """Put the tables between the markers of `page`, and the key figures into images/thesis beside it."""
     from PIL import Image
 
-    head, tail = around_tables(page)
+    head, tail = text_around_tables(page)
     page.write_text(f"{head}{BEGIN}\n\n{markdown(records)}\n{END}{tail}", encoding="utf-8")
     images = page.parent / "images" / "thesis"
     images.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import decimal_from_float32
 from gcs.errors import InputError
 
-NO_INT = 2**31 - 1  # a coordinate that is not given
+NO_COORDINATE = 2**31 - 1  # a coordinate that is not given
 _FLOAT32 = struct.Struct("<f")
 _GLOBAL = frozenset(
     {
@@ -43,10 +43,10 @@ def item_of(
     frame: int, command: int, current: int, autocontinue: int, params: list[float], where: str
 ) -> WireItem:
     """The item of a row of a file: seven parameters in degrees and metres, NaN for what is not given."""
-    for name, value, most in (("frame", frame, 255), ("command", command, 65535)):
-        if not 0 <= value <= most:
-            raise FormatError(f"{where}: {name} {value}; must be 0 ... {most}")
-    x, y = (_whole(value, frame, number, where) for number, value in ((5, params[4]), (6, params[5])))
+    for name, value, maximum in (("frame", frame, 255), ("command", command, 65535)):
+        if not 0 <= value <= maximum:
+            raise FormatError(f"{where}: {name} {value}; must be 0 ... {maximum}")
+    x, y = (_coordinate(value, frame, number, where) for number, value in ((5, params[4]), (6, params[5])))
     p1, p2, p3, p4, _, _, z = (_float32(value, number, where) for number, value in enumerate(params, start=1))
     flags = (int(current == 1), int(bool(autocontinue)))
     return WireItem(frame, command, *flags, p1, p2, p3, p4, x, y, z)
@@ -56,7 +56,7 @@ def params_of(item: WireItem) -> list[float]:
     """The seven parameters of an item in degrees and metres, with enough digits to restore the item."""
     floats = [decimal_from_float32(value) for value in (item.param1, item.param2, item.param3, item.param4)]
     scale = _scale(item.frame)
-    places = [math.nan if value == NO_INT else value / scale for value in (item.x, item.y)]
+    places = [math.nan if value == NO_COORDINATE else value / scale for value in (item.x, item.y)]
     return [*floats, *places, decimal_from_float32(item.z)]
 
 
@@ -76,11 +76,11 @@ def _scale(frame: int) -> float:
     return 1e4 if frame in _LOCAL else 1.0
 
 
-def _whole(value: float, frame: int, number: int, where: str) -> int:
+def _coordinate(value: float, frame: int, number: int, where: str) -> int:
     if math.isnan(value):
-        return NO_INT
+        return NO_COORDINATE
     scaled = value * _scale(frame)
-    if not abs(scaled) < NO_INT:
+    if not abs(scaled) < NO_COORDINATE:
         raise FormatError(f"{where}: parameter {number} = {value:g} is beyond what an item holds")
     return round(scaled)
 

@@ -11,14 +11,14 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import Fate, MissionItemError, WireItem, fate, located_steps
 from gcs.formats.items import FormatError, command_name
 from gcs.formats.plan import Plan, read_plan, write_plan
-from gcs.formats.waypoints import HEAD, read_waypoints, write_waypoints
+from gcs.formats.waypoints import HEADER, read_waypoints, write_waypoints
 from missions.text_files import TextFileError, text_of
 
 PLAN_ENDING = ".plan"
 WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
 
 
-class Judged(NamedTuple):
+class CheckedPlan(NamedTuple):
     """The items of a file that can be sent to the vehicle; a line for each part that must be left out, and
     for the items that the vehicle keeps but does not execute."""
 
@@ -39,7 +39,7 @@ def read_foreign(path: Path) -> Plan:
     except TextFileError as error:
         raise FormatError(f"{path}: {error}") from None
     try:
-        if path.suffix.lower() == PLAN_ENDING and not text.startswith(HEAD):
+        if path.suffix.lower() == PLAN_ENDING and not text.startswith(HEADER):
             return read_plan(text)
         return Plan(read_waypoints(text), [])
     except FormatError as error:
@@ -68,41 +68,43 @@ def write_foreign(
         raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def judge(plan: Plan, home: Home) -> Judged:
+def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     """The parts of a plan that the vehicle would accept, and those that it would not execute.
 
     Commands that the vehicle keeps and skips (camera, gimbal ...) stay among the items; those that it would
     refuse are left out.
     """
-    left = list(plan.items)
-    numbers = list(range(len(left)))
-    told: list[tuple[int, str]] = []
-    passed: dict[int, list[int]] = {}
-    if _is_row_of_another_home(plan, home):
+    remaining = list(plan.items)
+    numbers = list(range(len(remaining)))
+    problems: list[tuple[int, str]] = []
+    kept_items: dict[int, list[int]] = {}
+    if _begins_with_other_home(plan, home):
         numbers.pop(0)
-        _, where = left.pop(0)
-        told.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
-    for number, (item, _) in zip(numbers, left, strict=True):
+        _, where = remaining.pop(0)
+        problems.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
+    for number, (item, _) in zip(numbers, remaining, strict=True):
         if fate(item.command) is Fate.KEPT:
-            passed.setdefault(item.command, []).append(number)
+            kept_items.setdefault(item.command, []).append(number)
     while True:
         try:
-            located_steps([one.item for one in left], home)
+            located_steps([one.item for one in remaining], home)
             break
         except MissionItemError as error:
-            place = min(max(error.seq, 0), len(left) - 1)
-            number, (item, where) = numbers.pop(place), left.pop(place)
-            told.append((number, f"{_named(number, item, where)}: {_advice(item, error.text)}"))
-    told.sort()
+            place = min(max(error.seq, 0), len(remaining) - 1)
+            number, (item, where) = numbers.pop(place), remaining.pop(place)
+            problems.append((number, f"{_item_title(number, item, where)}: {_advice(item, error.text)}"))
+    problems.sort()
     kept = [
-        f"item{'' if len(found) == 1 else 's'} {', '.join(map(str, found))}, {_command_too(command)}: "
+        f"item{'' if len(found) == 1 else 's'} {', '.join(map(str, found))}, {_command_text(command)}: "
         "kept on the vehicle but not done"
-        for command, found in passed.items()
+        for command, found in kept_items.items()
     ]
-    return Judged(tuple(one.item for one in left), [*(line for _, line in told), *plan.lost], kept)
+    return CheckedPlan(
+        tuple(one.item for one in remaining), [*(line for _, line in problems), *plan.not_converted], kept
+    )
 
 
-def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
+def _begins_with_other_home(plan: Plan, home: Home) -> bool:
     """Whether the list begins with a home item, as Mission Planner writes it, that is not the vehicle's."""
     if len(plan.items) < 2:
         return False
@@ -111,11 +113,11 @@ def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
         first.command == mavlink.MAV_CMD_NAV_WAYPOINT
         and first.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
         and second.command == mavlink.MAV_CMD_NAV_TAKEOFF
-        and _is_no_home(first, home)
+        and _is_not_home(first, home)
     )
 
 
-def _is_no_home(item: WireItem, home: Home) -> bool:
+def _is_not_home(item: WireItem, home: Home) -> bool:
     """Whether the vehicle would fly the item as a step, or refuse it, instead of taking it as its home."""
     try:
         return bool(located_steps([item], home))
@@ -123,24 +125,24 @@ def _is_no_home(item: WireItem, home: Home) -> bool:
         return True
 
 
-def _named(number: int, item: WireItem, where: str) -> str:
-    return f"item {number} ({where}), {_command_too(item.command)}"
+def _item_title(number: int, item: WireItem, where: str) -> str:
+    return f"item {number} ({where}), {_command_text(item.command)}"
 
 
-def _command_too(command: int) -> str:
+def _command_text(command: int) -> str:
     name = command_name(command)
     return name if name == str(command) else f"{name} ({command})"
 
 
 def _advice(item: WireItem, text: str) -> str:
-    if item.command in _INSTEAD:
-        return f"cannot be flown; {_INSTEAD[item.command]}"
+    if item.command in _ALTERNATIVES:
+        return f"cannot be flown; {_ALTERNATIVES[item.command]}"
     if fate(item.command) is not Fate.FLOWN:
         return "cannot be flown; take it out, or use waypoints"
     return text
 
 
-_INSTEAD = {
+_ALTERNATIVES = {
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "use NAV_TAKEOFF",
     mavlink.MAV_CMD_NAV_VTOL_LAND: "use NAV_LAND",
     mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "use NAV_LAND: landing sets the load down first",

@@ -14,7 +14,7 @@ from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
 _TRANSECT = "TransectStyleComplexItem"  # surveys and corridors contain the simple items that they consist of
 _PARAMS = 7
-_ON_SEA, _ABOVE_HOME = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+_ABOVE_SEA_LEVEL, _ABOVE_HOME = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
 _INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 _OUTSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
 _INSIDE_CIRCLE = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
@@ -23,13 +23,13 @@ _RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 
 
 class Plan(NamedTuple):
-    """The content of a file; `lost` has a line for each part for which there are no mission items.
+    """The content of a file; `not_converted` has a line for each part for which there are no mission items.
 
     Fence and rally points are None if the file does not mention them.
     """
 
     items: list[FileItem]
-    lost: list[str]
+    not_converted: list[str]
     fence: tuple[WireItem, ...] | None = None
     rally: tuple[WireItem, ...] | None = None
 
@@ -37,25 +37,25 @@ class Plan(NamedTuple):
 def read_plan(text: str) -> Plan:
     """The items of a plan; complex items are replaced by the simple ones that QGroundControl has stored."""
     try:
-        record = json.loads(text)
+        document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"not JSON: {error}") from None
-    if not isinstance(record, dict) or record.get("fileType") != "Plan":
+    if not isinstance(document, dict) or document.get("fileType") != "Plan":
         raise FormatError('"fileType" must be "Plan"')
-    mission = _member(record, "mission", dict, "mission")
+    mission = _member(document, "mission", dict, "mission")
     items: list[FileItem] = []
-    lost: list[str] = []
+    not_converted: list[str] = []
     for number, entry in enumerate(_member(mission, "items", list, "mission.items")):
         where = f"mission.items[{number}]"
         if not isinstance(entry, dict):
             raise FormatError(f"{where}: must be an object")
         if entry.get("type") == "ComplexItem":
-            items += _complex(entry, where, lost)
+            items += _complex(entry, where, not_converted)
         elif entry.get("type", "SimpleItem") == "SimpleItem":
             items.append(_simple(entry, where))
         else:
             raise FormatError(f"{where}.type: {entry['type']!r}; must be SimpleItem or ComplexItem")
-    return Plan(items, lost, _fence(record), _rally(record))
+    return Plan(items, not_converted, _fence(document), _rally(document))
 
 
 def write_plan(
@@ -70,7 +70,7 @@ def write_plan(
             "command": item.command,
             "doJumpId": number,
             "frame": item.frame,
-            "params": [_told(value, number) for value in params_of(item)],
+            "params": [_json_number(value, number) for value in params_of(item)],
         }
         for number, item in enumerate(items, start=1)
     ]
@@ -94,7 +94,7 @@ def write_plan(
     return json.dumps(record, indent=4, allow_nan=False) + "\n"
 
 
-def _told(value: float, number: int) -> float | None:
+def _json_number(value: float, number: int) -> float | None:
     if math.isinf(value):
         raise FormatError(f"item {number - 1}: a parameter is infinite, for which JSON has no number")
     return None if math.isnan(value) else value
@@ -111,11 +111,11 @@ def _simple(entry: dict[str, Any], where: str) -> FileItem:
     return FileItem(item_of(frame, command, 0, int(autocontinue), numbers, where), where)
 
 
-def _complex(entry: dict[str, Any], where: str, lost: list[str]) -> Iterator[FileItem]:
+def _complex(entry: dict[str, Any], where: str, not_converted: list[str]) -> Iterator[FileItem]:
     kind = str(entry.get("complexItemType", "?"))
     transect = entry.get(_TRANSECT)
     if not isinstance(transect, dict) or not isinstance(transect.get("Items"), list):
-        lost.append(f"{where}: {kind} holds no items; make it of waypoints in the ground station")
+        not_converted.append(f"{where}: {kind} holds no items; make it of waypoints in the ground station")
         return
     for number, inner in enumerate(transect["Items"]):
         place = f"{where}.{_TRANSECT}.Items[{number}]"
@@ -130,57 +130,67 @@ def _fence(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
         return None
     fence = _member(record, "geoFence", dict, "geoFence")
     items: list[WireItem] = []
-    for number, entry in enumerate(_listed(fence, "polygons", "geoFence")):
+    for number, entry in enumerate(_optional_list(fence, "polygons", "geoFence")):
         where = f"geoFence.polygons[{number}]"
         corners = _member(_object(entry, where), "polygon", list, f"{where}.polygon")
         command = _INSIDE_POLYGON if entry.get("inclusion", True) else _OUTSIDE_POLYGON
-        for corner, spot in enumerate(corners):
+        for corner, corner_place in enumerate(corners):
             place = f"{where}.polygon[{corner}]"
-            items.append(_area_item(_ON_SEA, command, len(corners), (*_spot(spot, 2, place), 0.0), place))
-    for number, entry in enumerate(_listed(fence, "circles", "geoFence")):
+            items.append(
+                _area_item(
+                    _ABOVE_SEA_LEVEL,
+                    command,
+                    len(corners),
+                    (*_coordinates(corner_place, 2, place), 0.0),
+                    place,
+                )
+            )
+    for number, entry in enumerate(_optional_list(fence, "circles", "geoFence")):
         where = f"geoFence.circles[{number}]"
         circle = _member(_object(entry, where), "circle", dict, f"{where}.circle")
         command = _INSIDE_CIRCLE if entry.get("inclusion", True) else _OUTSIDE_CIRCLE
         radius = _number(circle.get("radius"), f"{where}.circle.radius")
-        centre = _spot(circle.get("center"), 2, f"{where}.circle.center")
-        items.append(_area_item(_ON_SEA, command, radius, (*centre, 0.0), where))
+        centre = _coordinates(circle.get("center"), 2, f"{where}.circle.center")
+        items.append(_area_item(_ABOVE_SEA_LEVEL, command, radius, (*centre, 0.0), where))
     if fence.get("breachReturn"):
-        back = _spot(fence["breachReturn"], 3, "geoFence.breachReturn")
-        items.append(_area_item(_ABOVE_HOME, _RETURN, 0.0, back, "geoFence.breachReturn"))
+        return_point = _coordinates(fence["breachReturn"], 3, "geoFence.breachReturn")
+        items.append(_area_item(_ABOVE_HOME, _RETURN, 0.0, return_point, "geoFence.breachReturn"))
     return tuple(items)
 
 
 def _fence_record(items: Sequence[WireItem]) -> dict[str, Any]:
     record: dict[str, Any] = {"version": 2, "circles": [], "polygons": []}
-    left = list(items)
-    while left:
-        item = left[0]
-        spot = params_of(item)[4:6]
-        taken = 1
+    remaining = list(items)
+    while remaining:
+        item = remaining[0]
+        position = params_of(item)[4:6]
+        count = 1
         if item.command in (_INSIDE_POLYGON, _OUTSIDE_POLYGON):
-            taken = max(int(item.param1), 1)
-            corners = [params_of(one)[4:6] for one in left[:taken]]
+            count = max(int(item.param1), 1)
+            corners = [params_of(vertex)[4:6] for vertex in remaining[:count]]
             inclusion = item.command == _INSIDE_POLYGON
             record["polygons"].append({"version": 1, "inclusion": inclusion, "polygon": corners})
         elif item.command in (_INSIDE_CIRCLE, _OUTSIDE_CIRCLE):
-            circle = {"center": spot, "radius": params_of(item)[0]}
+            circle = {"center": position, "radius": params_of(item)[0]}
             inclusion = item.command == _INSIDE_CIRCLE
             record["circles"].append({"version": 1, "inclusion": inclusion, "circle": circle})
         elif item.command == _RETURN:
             record["breachReturn"] = params_of(item)[4:]
-        del left[:taken]
+        del remaining[:count]
     return record
 
 
 def _rally(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
     if "rallyPoints" not in record:
         return None
-    points = _listed(_member(record, "rallyPoints", dict, "rallyPoints"), "points", "rallyPoints")
+    points = _optional_list(_member(record, "rallyPoints", dict, "rallyPoints"), "points", "rallyPoints")
     items = []
     for number, point in enumerate(points):
         where = f"rallyPoints.points[{number}]"
         items.append(
-            _area_item(_ABOVE_HOME, mavlink.MAV_CMD_NAV_RALLY_POINT, 0.0, _spot(point, 3, where), where)
+            _area_item(
+                _ABOVE_HOME, mavlink.MAV_CMD_NAV_RALLY_POINT, 0.0, _coordinates(point, 3, where), where
+            )
         )
     return tuple(items)
 
@@ -189,7 +199,7 @@ def _area_item(frame: int, command: int, first: float, place: Sequence[float], w
     return item_of(frame, command, 0, 0, [first, 0.0, 0.0, 0.0, *place], where)
 
 
-def _spot(value: Any, size: int, where: str) -> list[float]:
+def _coordinates(value: Any, size: int, where: str) -> list[float]:
     """Latitude, longitude and, if `size` is three, height."""
     if not isinstance(value, list) or len(value) != size:
         raise FormatError(f"{where}: must be a list of {size} numbers")
@@ -199,7 +209,7 @@ def _spot(value: Any, size: int, where: str) -> list[float]:
     return numbers
 
 
-def _listed(record: dict[str, Any], name: str, where: str) -> list[Any]:
+def _optional_list(record: dict[str, Any], name: str, where: str) -> list[Any]:
     """A member that is a list; empty if it is missing."""
     value: list[Any] = _member(record, name, list, f"{where}.{name}") if name in record else []
     return value

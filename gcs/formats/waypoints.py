@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from autopilot.wire.items import WireItem
 from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
-HEAD = "QGC WPL 110"
+HEADER = "QGC WPL 110"
 _COLUMNS = 12
 
 
 def read_waypoints(text: str) -> list[FileItem]:
     """The items of a file; columns are separated by tabs or spaces, `#` begins a comment."""
     lines = text.splitlines()
-    if not lines or lines[0].split() != HEAD.split():
+    if not lines or lines[0].split() != HEADER.split():
         first = lines[0].strip()[:40] if lines else ""
-        raise FormatError(f"line 1: {first!r}; must be {HEAD!r}")
+        raise FormatError(f"line 1: {first!r}; must be {HEADER!r}")
     items: list[FileItem] = []
     for number, line in enumerate(lines[1:], start=2):
         words = line.partition("#")[0].split()
@@ -38,7 +38,7 @@ def read_waypoints(text: str) -> list[FileItem]:
 
 def write_waypoints(items: Sequence[WireItem]) -> str:
     """The text of a file with these items; numbers have enough digits to restore the same items."""
-    lines = [HEAD]
+    lines = [HEADER]
     for seq, item in enumerate(items):
         params = map(repr, params_of(item))
         columns = (seq, item.current, item.frame, item.command, *params, item.autocontinue)

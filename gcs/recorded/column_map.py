@@ -12,11 +12,11 @@ from gcs.recorded.load_model import LoadModel
 from missions.toml_files import FileError, TomlFiles
 
 Column = Annotated[int, Field(ge=0, le=9999)]
-Three = Annotated[list[Column], Field(min_length=3, max_length=3)]
-Four = Annotated[list[Column], Field(min_length=4, max_length=4)]
+ThreeColumns = Annotated[list[Column], Field(min_length=3, max_length=3)]
+FourColumns = Annotated[list[Column], Field(min_length=4, max_length=4)]
 Positive = Annotated[float, Field(gt=0.0, le=1e6, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)]
-Any = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class MapError(FileError):
@@ -30,15 +30,15 @@ class _Table(BaseModel):
 class VehicleColumns(_Table):
     """The vehicle's measured pose, in a frame whose z is up; body z up, too."""
 
-    position: Three
-    quaternion: Four
+    position: ThreeColumns
+    quaternion: FourColumns
     quaternion_order: Literal["xyzw", "wxyz"] = "wxyz"
 
 
 class LoadColumns(_Table):
     """The load's measured position."""
 
-    position: Three
+    position: ThreeColumns
 
 
 class Tracking(_Table):
@@ -52,24 +52,24 @@ class Tracking(_Table):
 class Attachment(_Table):
     """Attachment point of the cable and direction of the thrust, in the tracked body."""
 
-    below_m: Any = 0.0
-    thrust_tilt: Annotated[list[Any], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    below_m: Finite = 0.0
+    thrust_tilt: Annotated[list[Finite], Field(min_length=2, max_length=2)] = [0.0, 0.0]
 
 
 class ModelTable(_Table):
     """Parameters of `LoadModel`; the default length is the median distance from attachment to load."""
 
     length_m: Positive | None = None
-    drag_per_m: Any = 0.0
-    wash_per_s2: Any = 0.0
-    swirl_per_s2: Any = 0.0
+    drag_per_m: Finite = 0.0
+    wash_per_s2: Finite = 0.0
+    swirl_per_s2: Finite = 0.0
     wash_radius_m: Positive = 0.5
     wash_delay_s: NotNegative = 0.0
-    acceleration_share: Any = 0.0
-    push_x_m_s2: Any = 0.0
-    push_y_m_s2: Any = 0.0
+    acceleration_share: Finite = 0.0
+    push_x_m_s2: Finite = 0.0
+    push_y_m_s2: Finite = 0.0
     mass_ratio: NotNegative
-    vehicle_drag_per_s: Any = 0.0
+    vehicle_drag_per_s: Finite = 0.0
     tilt_share: Positive = 1.0
     turbulence_m_s2: Positive = 0.05
     turbulence_s: Positive = 3.0
@@ -81,7 +81,7 @@ class ModelTable(_Table):
     tilt_walk: Positive = 1e-3
 
 
-Name = Literal[
+ParameterName = Literal[
     "length_m",
     "drag_per_m",
     "wash_per_s2",
@@ -97,7 +97,7 @@ Name = Literal[
 class Identify(_Table):
     """The parameters of the load that `gcs identify` estimates."""
 
-    parameters: Annotated[list[Name], Field(min_length=1)] = ["length_m", "drag_per_m"]
+    parameters: Annotated[list[ParameterName], Field(min_length=1)] = ["length_m", "drag_per_m"]
 
 
 class ColumnMap(_Table):
@@ -118,11 +118,11 @@ class ColumnMap(_Table):
     def _consistent(self) -> ColumnMap:
         if self.time is not None and self.rate_hz is not None:
             raise ValueError("has both time and rate_hz; rows that have a time need no rate")
-        named: dict[int, str] = {}
+        used: dict[int, str] = {}
         for name, column in self._columns():
-            if column in named:
-                raise ValueError(f"{name} = {column}; is {named[column]} already")
-            named[column] = name
+            if column in used:
+                raise ValueError(f"{name} = {column}; is {used[column]} already")
+            used[column] = name
         return self
 
     def _columns(self) -> Iterator[tuple[str, int]]:

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcs.recorded.load_filter import SIZE, WORK, look_ahead, run_filter
+from gcs.recorded.load_filter import SIZE, WORK, predict_ahead, run_filter
 from gcs.recorded.load_model import LoadModel
-from gcs.recorded.motion import Motion, drive_rows, sight_rows, slow_rows
+from gcs.recorded.motion import Motion, drive_rows, measurement_rows, slow_rows
 from gcs.recorded.smoothing import Floats
 
 
@@ -21,25 +21,27 @@ class Estimates(NamedTuple):
     squares: Floats
 
 
-class Rows(NamedTuple):
+class FilterRows(NamedTuple):
     """A motion as the kernels read it."""
 
     time_s: Floats
     drive: Floats
     slow: Floats
-    sight: Floats
+    measurements: Floats
 
 
-def rows_of(motion: Motion, model: LoadModel) -> Rows:
+def filter_rows(motion: Motion, model: LoadModel) -> FilterRows:
     """The rows of a motion; of the model they use the length and the delay of the wash."""
-    return Rows(motion.time_s, drive_rows(motion, model), slow_rows(motion), sight_rows(motion))
+    return FilterRows(motion.time_s, drive_rows(motion, model), slow_rows(motion), measurement_rows(motion))
 
 
-def filtered(rows: Rows, model: LoadModel, *, load: bool, tilt: bool, smoothed: bool = False) -> Estimates:
+def filtered_estimates(
+    rows: FilterRows, model: LoadModel, *, load: bool, tilt: bool, smoothed: bool = False
+) -> Estimates:
     """Estimates from the load's position, the vehicle's attitude, or both; `smoothed`: each from all rows."""
     n = len(rows.time_s)
     states, forecasts = np.zeros((2, n, SIZE))
-    covariances, before, transitions = np.zeros((3, n, SIZE, SIZE))
+    covariances, forecast_covariances, transitions = np.zeros((3, n, SIZE, SIZE))
     squares = np.zeros((n, 2))
     run_filter(
         *rows,
@@ -49,28 +51,28 @@ def filtered(rows: Rows, model: LoadModel, *, load: bool, tilt: bool, smoothed: 
         states,
         covariances,
         forecasts,
-        before,
+        forecast_covariances,
         transitions,
         squares,
         np.zeros((WORK, SIZE)),
     )
     if smoothed:
-        _smooth(states, covariances, forecasts, before, transitions)
+        _smooth(states, covariances, forecasts, forecast_covariances, transitions)
     return Estimates(states, covariances, squares)
 
 
 def _smooth(
-    states: Floats, covariances: Floats, forecasts: Floats, before: Floats, transitions: Floats
+    states: Floats, covariances: Floats, forecasts: Floats, forecast_covariances: Floats, transitions: Floats
 ) -> None:
     """Rauch, Tung and Striebel's backward pass, in place."""
-    gains = np.linalg.solve(before[1:], transitions[1:] @ covariances[:-1]).transpose(0, 2, 1)
+    gains = np.linalg.solve(forecast_covariances[1:], transitions[1:] @ covariances[:-1]).transpose(0, 2, 1)
     for k in range(len(states) - 2, -1, -1):
         gain = gains[k]
         states[k] += gain @ (states[k + 1] - forecasts[k + 1])
-        covariances[k] += gain @ (covariances[k + 1] - before[k + 1]) @ gain.T
+        covariances[k] += gain @ (covariances[k + 1] - forecast_covariances[k + 1]) @ gain.T
 
 
-class Window(NamedTuple):
+class Prediction(NamedTuple):
     """A prediction: rows at which it begins and ends, cable directions (k, 2) there, covariances (k, 3)."""
 
     begin: int
@@ -79,24 +81,24 @@ class Window(NamedTuple):
     covariance: Floats
 
 
-def predicted(
-    rows: Rows,
+def predictions(
+    rows: FilterRows,
     model: LoadModel,
     estimates: Estimates,
-    begins: NDArray[np.intp],
+    starts: NDArray[np.intp],
     horizons_s: tuple[float, ...],
     *,
     tilt: bool,
-) -> list[Window]:
-    """Predictions from rows `begins` on, by the vehicle's motion alone; stops where the rows end."""
+) -> list[Prediction]:
+    """Predictions from rows `starts` on, by the vehicle's motion alone; stops where the rows end."""
     windows = []
     work = np.zeros((WORK + SIZE, SIZE))
-    for begin in begins:
+    for begin in starts:
         ends = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
         if ends[-1] >= len(rows.time_s):
             break
         found = np.zeros((len(ends), 5))
-        look_ahead(
+        predict_ahead(
             *rows,
             model,
             tilt,
@@ -107,7 +109,7 @@ def predicted(
             found,
             work,
         )
-        windows.append(Window(int(begin), ends, found[:, :2], found[:, 2:]))
+        windows.append(Prediction(int(begin), ends, found[:, :2], found[:, 2:]))
     return windows
 
 

@@ -22,21 +22,21 @@ from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 from scipy.special import stdtrit
 
-from gcs.recorded.estimates import filtered, load_position, predicted, rows_of
+from gcs.recorded.estimates import filter_rows, filtered_estimates, load_position, predictions
 from gcs.recorded.load_model import LoadModel
 from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion
 from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
 from gcs.recorded.smoothing import Floats, smooth
 
 _BLOCK_S = 10.0  # residuals further apart are assumed independent
-_EVERY_S = 1.0  # between the beginnings of predictions
-_ROUNDS = 6
-_BEND_M = 0.03  # larger errors count by their size, not their square
+_PREDICTION_INTERVAL_S = 1.0  # between the beginnings of predictions
+_MAX_ITERATIONS = 6
+_HUBER_M = 0.03  # larger errors count by their size, not their square
 _FAR_WEIGHT = 0.35  # of the longer horizon
-_PART = 0.3  # share of a step, for finite differences
-_HELD_STEPS = 100.0  # damping, in steps: an undetermined parameter stays where it began
-_SHORTENED = (1.0, 0.5, 0.25)
-_ABOVE_SWING = 4.0  # times the pendulum's frequency: cut-off of the low-pass
+_DIFFERENCE_SHARE = 0.3  # share of a step, for finite differences
+_DAMPING_STEPS = 100.0  # damping, in steps: an undetermined parameter stays where it began
+_STEP_FACTORS = (1.0, 0.5, 0.25)
+_CUTOFF_RATIO = 4.0  # times the pendulum's frequency: cut-off of the low-pass
 _EDGE_S = 5.0  # left out at both ends of the filtered signals
 
 _STEPS = {
@@ -51,7 +51,7 @@ _STEPS = {
     "push_y_m_s2": 0.01,
 }
 # for parameters that may be zero: a half width up to this also counts as determined
-_SMALL = {
+_NEGLIGIBLE = {
     "drag_per_m": 1e-3,
     "wash_per_s2": 0.05,
     "swirl_per_s2": 0.05,
@@ -63,10 +63,14 @@ _SMALL = {
     "attitude_delay_s": 0.01,
     "vehicle_drag_per_m": 5e-3,
 }
-_LEAST = {"length_m": 0.01, "wash_radius_m": 0.01, "wash_delay_s": 0.0}  # parameters that cannot be negative
+_MINIMUM = {
+    "length_m": 0.01,
+    "wash_radius_m": 0.01,
+    "wash_delay_s": 0.0,
+}  # parameters that cannot be negative
 
 # shortest recording that can be evaluated: the edges, and one block between them
-LEAST_S = 2.0 * _EDGE_S + _BLOCK_S
+MIN_DURATION_S = 2.0 * _EDGE_S + _BLOCK_S
 
 
 _TILT_SHARE = (0.5, 2.0)  # of a vehicle that tilts to accelerate, as all multirotors do
@@ -88,20 +92,22 @@ class Identified(NamedTuple):
     half_width: float
 
     @property
-    def is_told(self) -> bool:
+    def is_determined(self) -> bool:
         """Whether the recording determines it: the half width is at most the value, or what matters."""
-        return self.half_width <= max(abs(self.value), _SMALL.get(self.name, 0.0))
+        return self.half_width <= max(abs(self.value), _NEGLIGIBLE.get(self.name, 0.0))
 
 
 def tracked_length(motion: Motion, below_m: float) -> Identified:
     """The median distance from the vehicle's tracked point, `below_m` above the attachment, to the load."""
-    arm = motion.attachment.position + below_m * motion.thrust
-    far = np.linalg.norm(motion.load - arm, axis=1)
-    known = np.isfinite(far)
+    tracked_point = motion.attachment.position + below_m * motion.thrust
+    distance = np.linalg.norm(motion.load - tracked_point, axis=1)
+    known = np.isfinite(distance)
     blocks = _blocks(motion.time_s[known])
-    medians = np.array([np.median(far[known][blocks == k]) for k in np.unique(blocks)])
+    medians = np.array([np.median(distance[known][blocks == k]) for k in np.unique(blocks)])
     spread = float(np.std(medians, ddof=1)) / np.sqrt(len(medians)) if len(medians) > 1 else float("nan")
-    return Identified("tracked_length_m", float(np.median(far[known])), _student(len(medians)) * spread)
+    return Identified(
+        "tracked_length_m", float(np.median(distance[known])), _student_t(len(medians)) * spread
+    )
 
 
 def identify_load(
@@ -115,40 +121,40 @@ def identify_load(
 
     `progress` receives the number of predictions of the recording that are done, and their greatest number.
     """
-    total = 1 + _ROUNDS * (len(names) + len(_SHORTENED))
+    total = 1 + _MAX_ITERATIONS * (len(names) + len(_STEP_FACTORS))
     done = 0
 
-    def tried(asked: LoadModel) -> tuple[Floats, Floats]:
+    def evaluate(candidate: LoadModel) -> tuple[Floats, Floats]:
         nonlocal done
-        found = _errors(motion, asked)
+        found = _errors(motion, candidate)
         done += 1
         progress(done, total)
         return found
 
     steps = np.array([_STEPS[name] for name in names])
-    errors, times = tried(model)
+    errors, times = evaluate(model)
     sensitivity = np.zeros((len(names), *errors.shape))
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         for j, name in enumerate(names):
-            nudged = model._replace(**{name: getattr(model, name) + _PART * steps[j]})
-            sensitivity[j] = (tried(nudged)[0] - errors) / _PART
+            perturbed = model._replace(**{name: getattr(model, name) + _DIFFERENCE_SHARE * steps[j]})
+            sensitivity[j] = (evaluate(perturbed)[0] - errors) / _DIFFERENCE_SHARE
         weights = _weights(errors)
         normal = np.einsum("jkhi,kh,lkhi->jl", sensitivity, weights, sensitivity)
         gradient = np.einsum("jkhi,kh,khi->j", sensitivity, weights, errors)
-        held = normal + _prior(errors) * np.eye(len(names))
-        if not np.isfinite(held).all() or not held.any():
+        damped = normal + _prior(errors) * np.eye(len(names))
+        if not np.isfinite(damped).all() or not damped.any():
             raise NoLoadError("the load does not move as one on a cable does: does the column map fit?")
-        change = -np.linalg.solve(held, gradient)
+        change = -np.linalg.solve(damped, gradient)
         before = _cost(errors)
-        for shorter in _SHORTENED:
-            moved = {
-                n: getattr(model, n) + shorter * s * c for n, s, c in zip(names, steps, change, strict=True)
+        for factor in _STEP_FACTORS:
+            stepped = {
+                n: getattr(model, n) + factor * s * c for n, s, c in zip(names, steps, change, strict=True)
             }
-            if any(moved.get(name, least) < least for name, least in _LEAST.items()):
+            if any(stepped.get(name, minimum) < minimum for name, minimum in _MINIMUM.items()):
                 continue
-            found, _ = tried(model._replace(**moved))
+            found, _ = evaluate(model._replace(**stepped))
             if _cost(found) < before:
-                model, errors = model._replace(**moved), found
+                model, errors = model._replace(**stepped), found
                 break
         else:
             break
@@ -169,8 +175,8 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     TooLittleMotionError if the recording does not determine them separately.
     """
     time, slow = motion.time_s, motion.slow
-    load = smooth(time, motion.load, SLOW_NOISE_M**2 / motion.times.sure, SLOW_DENSITY)
-    cut = _ABOVE_SWING * np.sqrt(model.gravity_m_s2 / model.length_m) / (2.0 * np.pi)
+    load = smooth(time, motion.load, SLOW_NOISE_M**2 / motion.times.weight, SLOW_DENSITY)
+    cut = _CUTOFF_RATIO * np.sqrt(model.gravity_m_s2 / model.length_m) / (2.0 * np.pi)
     rate = 1.0 / float(np.median(np.diff(time)))
     b, a = butter(3, min(0.9, 2.0 * cut / rate))
     up = (
@@ -179,36 +185,36 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
         + model.mass_ratio * (load.acceleration[:, 2] + model.gravity_m_s2)
     )
     speed = np.linalg.norm(slow.velocity, axis=1)
-    turning = np.gradient(motion.tilt, time, axis=0)
-    one, none = np.ones_like(up), np.zeros_like(up)
+    tilt_rate = np.gradient(motion.tilt, time, axis=0)
+    one, zero = np.ones_like(up), np.zeros_like(up)
     terms = [
         load.acceleration[:, :2],
         slow.velocity[:, :2],
         slow.acceleration[:, :2],
-        -up[:, None] * turning,
+        -up[:, None] * tilt_rate,
         speed[:, None] * slow.velocity[:, :2],
-        np.column_stack([one, none]) * up[:, None],
-        np.column_stack([none, one]) * up[:, None],
+        np.column_stack([one, zero]) * up[:, None],
+        np.column_stack([zero, one]) * up[:, None],
     ]
     edge = int(_EDGE_S * rate)
     kept = slice(edge, len(time) - edge)
     rows = np.stack([filtfilt(b, a, term, axis=0)[kept] for term in terms], axis=-1)
-    right = filtfilt(b, a, up[:, None] * motion.tilt, axis=0)[kept]
+    target = filtfilt(b, a, up[:, None] * motion.tilt, axis=0)[kept]
     flat = rows.reshape(-1, len(terms))
     if np.linalg.matrix_rank(flat) < len(terms):
         raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
-    found = np.linalg.solve(flat.T @ flat, flat.T @ right.ravel())
-    each = np.einsum("kij,ki->kj", rows, rows @ found - right)
-    spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), each, time[kept])
+    found = np.linalg.solve(flat.T @ flat, flat.T @ target.ravel())
+    gradients = np.einsum("kij,ki->kj", rows, rows @ found - target)
+    spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), gradients, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
     return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
 
 
-def map_doubt(vehicle: Sequence[Identified]) -> str:
+def map_warning(vehicle: Sequence[Identified]) -> str:
     """Why the column map may not fit the recording, by the parameters of the vehicle; empty: it may fit."""
     share = next(one for one in vehicle if one.name == "tilt_share")
-    least, most = _TILT_SHARE
-    if share.value + share.half_width >= least and share.value - share.half_width <= most:
+    low, high = _TILT_SHARE
+    if share.value + share.half_width >= low and share.value - share.half_width <= high:
         return ""
     return (
         f"the tilt shows {share.value:.2f} of the vehicle's acceleration, and of a multirotor some 1: the "
@@ -218,38 +224,39 @@ def map_doubt(vehicle: Sequence[Identified]) -> str:
 
 def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
     """Errors of predictions (k, horizons, 3) in metres, and when they began (k,)."""
-    rows = rows_of(motion, model)
-    estimates = filtered(rows, model, load=True, tilt=False)
-    every = max(1, round(_EVERY_S / float(np.median(np.diff(rows.time_s)))))
-    begins = np.arange(SETTLED_ROWS, len(rows.time_s), every)
-    windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=False)
-    at = np.array([one.ends for one in windows], dtype=np.intp)
+    rows = filter_rows(motion, model)
+    estimates = filtered_estimates(rows, model, load=True, tilt=False)
+    interval = max(1, round(_PREDICTION_INTERVAL_S / float(np.median(np.diff(rows.time_s)))))
+    starts = np.arange(SETTLED_ROWS, len(rows.time_s), interval)
+    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=False)
+    end_rows = np.array([one.ends for one in windows], dtype=np.intp)
     direction = np.array([one.direction for one in windows])
     errors = [
-        load_position(motion, model, at[:, i], direction[:, i]) - motion.load[at[:, i]] for i in range(2)
+        load_position(motion, model, end_rows[:, i], direction[:, i]) - motion.load[end_rows[:, i]]
+        for i in range(2)
     ]
-    began = motion.time_s[[one.begin for one in windows]]
-    return np.nan_to_num(np.stack(errors, axis=1)), began
+    start_s = motion.time_s[[one.begin for one in windows]]
+    return np.nan_to_num(np.stack(errors, axis=1)), start_s
 
 
 def _weights(errors: Floats) -> Floats:
     """Weights of errors (k, horizons): constant up to the bend, then inversely proportional to the size."""
     size = np.linalg.norm(errors, axis=2)
-    weights: Floats = np.array([1.0, _FAR_WEIGHT]) * _BEND_M / np.maximum(size, _BEND_M)
+    weights: Floats = np.array([1.0, _FAR_WEIGHT]) * _HUBER_M / np.maximum(size, _HUBER_M)
     return weights
 
 
 def _cost(errors: Floats) -> float:
     size = np.linalg.norm(errors, axis=2)
-    bent = np.where(size < _BEND_M, size**2 / 2.0, _BEND_M * (size - _BEND_M / 2.0))
-    return float(np.sum(bent * np.array([1.0, _FAR_WEIGHT])))
+    huber = np.where(size < _HUBER_M, size**2 / 2.0, _HUBER_M * (size - _HUBER_M / 2.0))
+    return float(np.sum(huber * np.array([1.0, _FAR_WEIGHT])))
 
 
 def _prior(errors: Floats) -> float:
     """Weight of a squared step, for parameters that the recording does not determine: a change of a hundred
     steps costs as much as a mean error, so any dependence of the errors on a parameter outweighs it."""
     size = np.linalg.norm(errors, axis=2)
-    return float(np.mean(_weights(errors) * size**2)) / _HELD_STEPS**2
+    return float(np.mean(_weights(errors) * size**2)) / _DAMPING_STEPS**2
 
 
 def _blocks(time: Floats) -> NDArray[np.intp]:
@@ -260,7 +267,7 @@ def _blocks(time: Floats) -> NDArray[np.intp]:
     return blocks
 
 
-def _student(blocks: int) -> float:
+def _student_t(blocks: int) -> float:
     """Half the width of a 95 % interval in standard deviations that were estimated from so many blocks."""
     return float(stdtrit(blocks - 1, 0.975)) if blocks > 1 else float("nan")
 
@@ -277,11 +284,11 @@ def half_widths(normal: Floats, gradient: Floats, time: Floats) -> Floats:
     gradients = np.zeros((count, gradient.shape[1]))
     np.add.at(normals, blocks, normal)
     np.add.at(gradients, blocks, gradient)
-    rest, push = normals.sum(axis=0) - normals, gradients.sum(axis=0) - gradients
+    remaining_normals, remaining_gradients = normals.sum(axis=0) - normals, gradients.sum(axis=0) - gradients
     try:
-        moved = -np.linalg.solve(rest, push[..., None])[..., 0]
+        estimates = -np.linalg.solve(remaining_normals, remaining_gradients[..., None])[..., 0]
     except np.linalg.LinAlgError:
         return np.full(gradient.shape[1], np.inf)
-    scatter = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
-    widths: Floats = _student(count) * np.sqrt(scatter)
+    scatter = np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
+    widths: Floats = _student_t(count) * np.sqrt(scatter)
     return widths

@@ -2,8 +2,8 @@
 
 Eight states: cable direction (2), its rate (2), turbulence (2), bias of the thrust's direction (2).
 The rows of `drive` hold the vehicle's motion (`load_model.Drive`), those of `slow` the same smoothed as
-strongly as the attitude, and those of `sight` the measurements: load relative to attachment (2, m), direction
-of the thrust (2), weight of the row, whether the time since the row before is unknown.
+strongly as the attitude, and those of `measurements`: load relative to attachment (2, m), direction of the
+thrust (2), weight of the row, whether the time since the row before is unknown.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from gcs.recorded.smoothing import Floats
 
 SIZE = 8
 WORK = 3 * SIZE + 4  # rows of SIZE numbers, working memory of the kernels
-_LITTLE = 1e-5  # step of finite differences
+_DIFFERENCE_STEP = 1e-5  # step of finite differences
 _GATE_LOAD = 60.0  # greatest normalised square of an innovation
 _GATE_TILT = 30.0
-_LOST_ROWS = 8  # after more refusals in succession the filter starts anew
-_SEEN_SD = 0.01  # of a measured direction at the start; `_RATE_SD`: of its rate
+_MAX_REJECTED_ROWS = 8  # after more refusals in succession the filter starts anew
+_MEASURED_SD = 0.01  # of a measured direction at the start; `_RATE_SD`: of its rate
 _RATE_SD = 1.0
-_UNSEEN_SD = 0.15  # of a direction at the start that is not measured; its rate as in a swing
+_UNMEASURED_SD = 0.15  # of a direction at the start that is not measured; its rate as in a swing
 _BIAS_SD = 5e-3  # of the thrust's direction
 
 
@@ -44,8 +44,8 @@ def _state(x: Floats) -> LoadState:
 
 
 @kernel
-def _nudged(s: LoadState, j: int) -> LoadState:
-    e = _LITTLE
+def _perturbed(s: LoadState, j: int) -> LoadState:
+    e = _DIFFERENCE_STEP
     return (
         s[0] + (e if j == 0 else 0.0),
         s[1] + (e if j == 1 else 0.0),
@@ -67,13 +67,13 @@ def forecast(
         for j in range(SIZE):
             f[i, j] = 1.0 if i == j else 0.0
     for j in range(6):
-        other = step_load(_nudged(s, j), h, before, after, m)
-        f[0, j] = (other[0] - new[0]) / _LITTLE
-        f[1, j] = (other[1] - new[1]) / _LITTLE
-        f[2, j] = (other[2] - new[2]) / _LITTLE
-        f[3, j] = (other[3] - new[3]) / _LITTLE
-        f[4, j] = (other[4] - new[4]) / _LITTLE
-        f[5, j] = (other[5] - new[5]) / _LITTLE
+        other = step_load(_perturbed(s, j), h, before, after, m)
+        f[0, j] = (other[0] - new[0]) / _DIFFERENCE_STEP
+        f[1, j] = (other[1] - new[1]) / _DIFFERENCE_STEP
+        f[2, j] = (other[2] - new[2]) / _DIFFERENCE_STEP
+        f[3, j] = (other[3] - new[3]) / _DIFFERENCE_STEP
+        f[4, j] = (other[4] - new[4]) / _DIFFERENCE_STEP
+        f[5, j] = (other[5] - new[5]) / _DIFFERENCE_STEP
     for i in range(6):
         x[i] = new[i]
     for i in range(SIZE):
@@ -89,13 +89,13 @@ def forecast(
                 total += work[i, k] * f[j, k]
             p[i, j] = total
             p[j, i] = total
-    shaken = (m.force_density / m.length_m) ** 2 * h
-    turbulent = 2.0 * m.turbulence_m_s2**2 / m.turbulence_s * h
-    drifting = m.tilt_walk**2 * h
+    rate_noise = (m.force_density / m.length_m) ** 2 * h
+    turbulence_noise = 2.0 * m.turbulence_m_s2**2 / m.turbulence_s * h
+    bias_noise = m.tilt_walk**2 * h
     for i in range(2):
-        p[2 + i, 2 + i] += shaken
-        p[4 + i, 4 + i] += turbulent
-        p[6 + i, 6 + i] += drifting
+        p[2 + i, 2 + i] += rate_noise
+        p[4 + i, 4 + i] += turbulence_noise
+        p[6 + i, 6 + i] += bias_noise
 
 
 @kernel
@@ -141,21 +141,21 @@ def _correct(
 
 
 @kernel
-def see_load(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, work: Floats) -> float:
+def correct_by_load(x: Floats, p: Floats, measurements: Floats, k: int, m: LoadModel, work: Floats) -> float:
     """Correct by the load's position of row k; return the normalised square, negative if refused."""
     h = work[:2]
     for i in range(2):
         for j in range(SIZE):
             h[i, j] = 1.0 if i == j else 0.0
     inverse = 1.0 / m.length_m
-    place = m.seen_m**2 * inverse * inverse / sight[k, 4]
+    place = m.seen_m**2 * inverse * inverse / measurements[k, 4]
     late = m.seen_s**2
     return _correct(
         x,
         p,
         h,
-        sight[k, 0] * inverse - x[0],
-        sight[k, 1] * inverse - x[1],
+        measurements[k, 0] * inverse - x[0],
+        measurements[k, 1] * inverse - x[1],
         place + late * x[2] * x[2],
         late * x[2] * x[3],
         place + late * x[3] * x[3],
@@ -165,7 +165,9 @@ def see_load(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, work: Fl
 
 
 @kernel
-def see_tilt(x: Floats, p: Floats, sight: Floats, slow: Floats, k: int, m: LoadModel, work: Floats) -> float:
+def correct_by_tilt(
+    x: Floats, p: Floats, measurements: Floats, slow: Floats, k: int, m: LoadModel, work: Floats
+) -> float:
     """Correct by the thrust's direction of row k; return the normalised square, negative if refused."""
     h = work[:2]
     s, u = _state(x), _drive(slow, k)
@@ -174,27 +176,36 @@ def see_tilt(x: Floats, p: Floats, sight: Floats, slow: Floats, k: int, m: LoadM
         h[0, j] = 1.0 if j == 6 else 0.0
         h[1, j] = 1.0 if j == 7 else 0.0
     for j in range(4):
-        ox, oy = thrust_tilt(_nudged(s, j), u, m)
-        h[0, j] = (ox - tx) / _LITTLE
-        h[1, j] = (oy - ty) / _LITTLE
-    r = m.tilt_noise**2 * (1.0 + m.tilt_per_accel * (u[0] * u[0] + u[1] * u[1])) / sight[k, 4]
+        ox, oy = thrust_tilt(_perturbed(s, j), u, m)
+        h[0, j] = (ox - tx) / _DIFFERENCE_STEP
+        h[1, j] = (oy - ty) / _DIFFERENCE_STEP
+    r = m.tilt_noise**2 * (1.0 + m.tilt_per_accel * (u[0] * u[0] + u[1] * u[1])) / measurements[k, 4]
     return _correct(
-        x, p, h, sight[k, 2] - tx - x[6], sight[k, 3] - ty - x[7], r, 0.0, r, _GATE_TILT, work[2:]
+        x,
+        p,
+        h,
+        measurements[k, 2] - tx - x[6],
+        measurements[k, 3] - ty - x[7],
+        r,
+        0.0,
+        r,
+        _GATE_TILT,
+        work[2:],
     )
 
 
 @kernel
-def start(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, with_load: bool) -> None:
+def start(x: Floats, p: Floats, measurements: Floats, k: int, m: LoadModel, with_load: bool) -> None:
     """Start the filter from the cable's direction in row k alone, or without any measurement."""
     for i in range(SIZE):
         x[i] = 0.0
         for j in range(SIZE):
             p[i, j] = 0.0
     if with_load:
-        x[0], x[1] = sight[k, 0] / m.length_m, sight[k, 1] / m.length_m
+        x[0], x[1] = measurements[k, 0] / m.length_m, measurements[k, 1] / m.length_m
     for i in range(2):
-        p[i, i] = _SEEN_SD**2 if with_load else _UNSEEN_SD**2
-        p[2 + i, 2 + i] = _RATE_SD**2 if with_load else _UNSEEN_SD**2 * m.gravity_m_s2 / m.length_m
+        p[i, i] = _MEASURED_SD**2 if with_load else _UNMEASURED_SD**2
+        p[2 + i, 2 + i] = _RATE_SD**2 if with_load else _UNMEASURED_SD**2 * m.gravity_m_s2 / m.length_m
         p[4 + i, 4 + i] = m.turbulence_m_s2**2
         p[6 + i, 6 + i] = _BIAS_SD**2
 
@@ -204,7 +215,7 @@ def run_filter(
     time: Floats,
     drive: Floats,
     slow: Floats,
-    sight: Floats,
+    measurements: Floats,
     m: LoadModel,
     with_load: bool,
     with_tilt: bool,
@@ -221,10 +232,10 @@ def run_filter(
     """
     n = len(time)
     x, p, rest = work[0], work[1 : 1 + SIZE], work[1 + SIZE :]
-    lost = 0
+    rejected = 0
     for k in range(n):
-        if k == 0 or sight[k, 5] > 0.0:
-            start(x, p, sight, k, m, with_load)
+        if k == 0 or measurements[k, 5] > 0.0:
+            start(x, p, measurements, k, m, with_load)
             for i in range(SIZE):
                 for j in range(SIZE):
                     transitions[k, i, j] = 0.0  # no information is passed on, forwards or backwards
@@ -237,13 +248,13 @@ def run_filter(
             for j in range(SIZE):
                 forecast_covariances[k, i, j] = p[i, j]
         if with_tilt:
-            squares[k, 1] = see_tilt(x, p, sight, slow, k, m, rest)
+            squares[k, 1] = correct_by_tilt(x, p, measurements, slow, k, m, rest)
         if with_load:
-            squares[k, 0] = see_load(x, p, sight, k, m, rest)
-            lost = lost + 1 if squares[k, 0] < 0.0 else 0
-            if lost > _LOST_ROWS:
-                start(x, p, sight, k, m, True)
-                lost = 0
+            squares[k, 0] = correct_by_load(x, p, measurements, k, m, rest)
+            rejected = rejected + 1 if squares[k, 0] < 0.0 else 0
+            if rejected > _MAX_REJECTED_ROWS:
+                start(x, p, measurements, k, m, True)
+                rejected = 0
         for i in range(SIZE):
             states[k, i] = x[i]
             for j in range(SIZE):
@@ -251,11 +262,11 @@ def run_filter(
 
 
 @kernel
-def look_ahead(
+def predict_ahead(
     time: Floats,
     drive: Floats,
     slow: Floats,
-    sight: Floats,
+    measurements: Floats,
     m: LoadModel,
     with_tilt: bool,
     begin: int,
@@ -280,6 +291,6 @@ def look_ahead(
             k += 1
             forecast(x, p, f, time[k] - time[k - 1], _drive(drive, k - 1), _drive(drive, k), m, rest)
             if with_tilt:
-                see_tilt(x, p, sight, slow, k, m, rest)
+                correct_by_tilt(x, p, measurements, slow, k, m, rest)
         found[e, 0], found[e, 1] = x[0], x[1]
         found[e, 2], found[e, 3], found[e, 4] = p[0, 0], p[0, 1], p[1, 1]

@@ -29,7 +29,7 @@ LoadState = tuple[float, float, float, float, float, float]
 # acceleration (3) and velocity (3) of the vehicle, and its position relative to where its wash comes down (2)
 Drive = tuple[float, float, float, float, float, float, float, float]
 
-_LEAST_DOWN = 1e-3  # of -q_z: the equations are for a cable that points down
+_MIN_DOWN = 1e-3  # of -q_z: the equations are for a cable that points down
 _STEPS = 2  # of integration from row to row
 
 
@@ -60,16 +60,16 @@ class LoadModel(NamedTuple):
 
 
 @kernel
-def down(qx: float, qy: float) -> float:
+def downward_q_z(qx: float, qy: float) -> float:
     """q_z of a cable that points down."""
-    return -math.sqrt(max(_LEAST_DOWN**2, 1.0 - qx * qx - qy * qy))
+    return -math.sqrt(max(_MIN_DOWN**2, 1.0 - qx * qx - qy * qy))
 
 
 @kernel
 def _rates(s: LoadState, u: Drive, m: LoadModel) -> LoadState:
     qx, qy, wx, wy, dx, dy = s
     ax, ay, az, vx, vy, vz, cx, cy = u
-    qz = down(qx, qy)
+    qz = downward_q_z(qx, qy)
     wz = -(qx * wx + qy * wy) / qz
     lx, ly, lz = vx + m.length_m * wx, vy + m.length_m * wy, vz + m.length_m * wz
     drag = m.drag_per_m * math.sqrt(lx * lx + ly * ly + lz * lz)
@@ -94,7 +94,7 @@ def _rates(s: LoadState, u: Drive, m: LoadModel) -> LoadState:
 
 
 @kernel
-def _moved(s: LoadState, rate: LoadState, h: float) -> LoadState:
+def _advanced(s: LoadState, rate: LoadState, h: float) -> LoadState:
     return (
         s[0] + h * rate[0],
         s[1] + h * rate[1],
@@ -106,7 +106,7 @@ def _moved(s: LoadState, rate: LoadState, h: float) -> LoadState:
 
 
 @kernel
-def _between(a: Drive, b: Drive, part: float) -> Drive:
+def _interpolated(a: Drive, b: Drive, part: float) -> Drive:
     rest = 1.0 - part
     return (
         rest * a[0] + part * b[0],
@@ -126,14 +126,14 @@ def step_load(s: LoadState, h: float, before: Drive, after: Drive, m: LoadModel)
     part = 1.0 / _STEPS
     e = h * part
     for i in range(_STEPS):
-        first = _between(before, after, i * part)
-        middle = _between(before, after, (i + 0.5) * part)
-        last = _between(before, after, (i + 1) * part)
+        first = _interpolated(before, after, i * part)
+        middle = _interpolated(before, after, (i + 0.5) * part)
+        last = _interpolated(before, after, (i + 1) * part)
         k1 = _rates(s, first, m)
-        k2 = _rates(_moved(s, k1, 0.5 * e), middle, m)
-        k3 = _rates(_moved(s, k2, 0.5 * e), middle, m)
-        k4 = _rates(_moved(s, k3, e), last, m)
-        s = _moved(_moved(_moved(_moved(s, k1, e / 6), k2, e / 3), k3, e / 3), k4, e / 6)
+        k2 = _rates(_advanced(s, k1, 0.5 * e), middle, m)
+        k3 = _rates(_advanced(s, k2, 0.5 * e), middle, m)
+        k4 = _rates(_advanced(s, k3, e), last, m)
+        s = _advanced(_advanced(_advanced(_advanced(s, k1, e / 6), k2, e / 3), k3, e / 3), k4, e / 6)
     return s
 
 
@@ -145,7 +145,7 @@ def thrust_tilt(s: LoadState, u: Drive, m: LoadModel) -> tuple[float, float]:
     strongly as the attitude that is compared with it.
     """
     qx, qy, wx, wy = s[0], s[1], s[2], s[3]
-    qz = down(qx, qy)
+    qz = downward_q_z(qx, qy)
     wz = -(qx * wx + qy * wy) / qz
     ax, ay, az = u[0], u[1], u[2] + m.gravity_m_s2
     turning = wx * wx + wy * wy + wz * wz

@@ -17,18 +17,18 @@ from gcs.folders import TLOG_FILE
 from gcs.recorded.column_map import ColumnMap
 from gcs.recorded.smoothing import Floats
 
-LEAST_ROWS = 200
-_MOST_BYTES = 2**30
-_LONGEST_ROW = 2**16  # bytes
-_STAMPS = range(10**15, 10**16)  # us since 1970, of any year from 2001 to 2286
-_FRAMES = (b"\xfd", b"\xfe")  # first byte of a MAVLink frame
-_SHORTEST_S, _LONGEST_S = 1e-4, 0.5  # between rows
-_UNIT = 0.1  # by which the length of a quaternion may differ from 1
+MIN_ROWS = 200
+_MAX_BYTES = 2**30
+_MAX_ROW_BYTES = 2**16  # bytes
+_UNIX_US = range(10**15, 10**16)  # us since 1970, of any year from 2001 to 2286
+_FRAME_STARTS = (b"\xfd", b"\xfe")  # first byte of a MAVLink frame
+_MIN_STEP_S, _MAX_STEP_S = 1e-4, 0.5  # between rows
+_UNIT_TOLERANCE = 0.1  # by which the length of a quaternion may differ from 1
 _LIFTED_M = 0.05  # above the lowest place of the load: a log begins and ends on the ground
 
 
 # what `gcs identify` and `gcs replay` read
-READ = (
+ACCEPTED_FILES = (
     f"must be a flight's folder (with its {TLOG_FILE}), a telemetry log (.tlog), or rows of comma-separated "
     "numbers (.csv, .csv.gz)"
 )
@@ -52,11 +52,13 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
     """The recording in a file; RecordingError if the file has none."""
     try:
         if not path.is_file():
-            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}; {READ}")
-        found = _telemetry(path) if is_log(path) else _rows(path, columns)
+            raise RecordingError(
+                f"{path}: {'not a file' if path.exists() else 'no such file'}; {ACCEPTED_FILES}"
+            )
+        found = _read_log(path) if is_log(path) else _read_table(path, columns)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return _valid(found, path)
+    return _valid_rows(found, path)
 
 
 def name_of(path: Path) -> str:
@@ -74,7 +76,7 @@ def is_log(path: Path) -> bool:
             head = file.read(9)
     except OSError:
         return False
-    return int.from_bytes(head[:8]) in _STAMPS and head[8:] in _FRAMES
+    return int.from_bytes(head[:8]) in _UNIX_US and head[8:] in _FRAME_STARTS
 
 
 def is_table(path: Path) -> bool:
@@ -91,13 +93,13 @@ def _has_headings(path: Path) -> bool:
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
     """The first two lines; empty if they cannot be read."""
     try:
-        with _opened(path) as file:
-            return file.readline(_LONGEST_ROW), file.readline(_LONGEST_ROW)
+        with _open(path) as file:
+            return file.readline(_MAX_ROW_BYTES), file.readline(_MAX_ROW_BYTES)
     except (OSError, EOFError, zlib.error):  # the last two: a truncated archive
         return b"", b""
 
 
-def _opened(path: Path) -> BufferedIOBase:
+def _open(path: Path) -> BufferedIOBase:
     return gzip.open(path) if path.suffix == ".gz" else path.open("rb")
 
 
@@ -114,10 +116,10 @@ def _is_number(cell: bytes) -> bool:
     return True
 
 
-def _no_number(path: Path, headings: int, missing: Collection[str]) -> str:
+def _first_non_number(path: Path, headings: int, missing: Collection[str]) -> str:
     """The place of the first cell that is neither a number nor one of the words for a `missing` one; empty if
     there is none."""
-    with _opened(path) as file:
+    with _open(path) as file:
         for number, line in enumerate(file, start=1):
             for cell in line.split(b",") if number > headings else ():
                 word = cell.decode(errors="replace").strip(' \t\r\n"')
@@ -127,7 +129,7 @@ def _no_number(path: Path, headings: int, missing: Collection[str]) -> str:
     return ""
 
 
-def _rows(path: Path, columns: ColumnMap) -> Recording:
+def _read_table(path: Path, columns: ColumnMap) -> Recording:
     from pyarrow import ArrowInvalid, csv
 
     if columns.vehicle is None:
@@ -136,8 +138,8 @@ def _rows(path: Path, columns: ColumnMap) -> Recording:
         )
     if columns.time is None and columns.rate_hz is None:
         raise RecordingError(f"{path}: the column map says neither time nor rate_hz")
-    if path.stat().st_size > _MOST_BYTES:
-        raise RecordingError(f"{path}: more than {_MOST_BYTES // 2**20} MiB")
+    if path.stat().st_size > _MAX_BYTES:
+        raise RecordingError(f"{path}: more than {_MAX_BYTES // 2**20} MiB")
     headings = int(_has_headings(path))
     try:
         table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True, skip_rows=headings))
@@ -145,19 +147,20 @@ def _rows(path: Path, columns: ColumnMap) -> Recording:
     except (ArrowInvalid, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         if not isinstance(error, ArrowInvalid):
-            reason = _no_number(path, headings, csv.ConvertOptions().null_values) or reason
+            reason = _first_non_number(path, headings, csv.ConvertOptions().null_values) or reason
         raise RecordingError(f"{path}: not rows of comma-separated numbers: {reason}") from None
     pose, load = columns.vehicle, columns.load
     order = pose.quaternion if pose.quaternion_order == "xyzw" else [*pose.quaternion[1:], pose.quaternion[0]]
-    asked = [
+    required = [
         *pose.position,
         *order,
         *(load.position if load else []),
         *([columns.time] if columns.time is not None else []),
     ]
-    if max(asked) >= values.shape[1]:
+    if max(required) >= values.shape[1]:
         raise RecordingError(
-            f"{path}: {values.shape[1]} columns; the column map asks for column {max(asked)} (counted from 0)"
+            f"{path}: {values.shape[1]} columns; the column map asks for column {max(required)} "
+            "(counted from 0)"
         )
     return Recording(
         name_of(path),
@@ -168,7 +171,7 @@ def _rows(path: Path, columns: ColumnMap) -> Recording:
     )
 
 
-def _telemetry(path: Path) -> Recording:
+def _read_log(path: Path) -> Recording:
     from gcs.analysis.telemetry import load_telemetry
 
     try:
@@ -182,39 +185,43 @@ def recording_of(telemetry: Telemetry, name: str) -> Recording:
     from scipy.spatial.transform import Rotation, Slerp
 
     track, attitude = telemetry.load_truth, telemetry.attitude_truth
-    if len(track.time_s) < LEAST_ROWS or len(attitude.time_s) < LEAST_ROWS:
+    if len(track.time_s) < MIN_ROWS or len(attitude.time_s) < MIN_ROWS:
         raise RecordingError("holds no true states of a simulated flight, or too few")
     within = (track.time_s >= attitude.time_s[0]) & (track.time_s <= attitude.time_s[-1])
-    lifted = track.position_m[:, 2] > np.min(track.position_m[:, 2]) + _LIFTED_M
-    flown = _longest(within & lifted & (track.taut > 0))
-    if flown.stop - flown.start < LEAST_ROWS:
-        held = "is never carried" if flown.stop == 0 else f"is carried for {flown.stop - flown.start} rows"
-        raise RecordingError(f"the load {held} off the ground; at least {LEAST_ROWS} rows are needed")
-    turned = Slerp(attitude.time_s, Rotation.from_quat(np.roll(attitude.quat_wxyz, -1, axis=1)))
-    time, load = track.time_s[flown], track.position_m[flown]
-    vehicle = load - track.distance_m[flown, None] * track.q_cable[flown]
-    return Recording(name, time, vehicle, turned(time).as_quat(), load)
+    off_ground = track.position_m[:, 2] > np.min(track.position_m[:, 2]) + _LIFTED_M
+    carried_rows = _longest_run(within & off_ground & (track.taut > 0))
+    if carried_rows.stop - carried_rows.start < MIN_ROWS:
+        carried = (
+            "is never carried"
+            if carried_rows.stop == 0
+            else f"is carried for {carried_rows.stop - carried_rows.start} rows"
+        )
+        raise RecordingError(f"the load {carried} off the ground; at least {MIN_ROWS} rows are needed")
+    attitude_at = Slerp(attitude.time_s, Rotation.from_quat(np.roll(attitude.quat_wxyz, -1, axis=1)))
+    time, load = track.time_s[carried_rows], track.position_m[carried_rows]
+    vehicle = load - track.distance_m[carried_rows, None] * track.q_cable[carried_rows]
+    return Recording(name, time, vehicle, attitude_at(time).as_quat(), load)
 
 
-def _longest(true: NDArray[np.bool_]) -> slice:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], true.astype(np.int8), [0]])))
-    begins, ends = edges[0::2], edges[1::2]
-    if not len(begins):
+def _longest_run(flags: NDArray[np.bool_]) -> slice:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    starts, ends = edges[0::2], edges[1::2]
+    if not len(starts):
         return slice(0, 0)
-    k = int(np.argmax(ends - begins))
-    return slice(int(begins[k]), int(ends[k]))
+    k = int(np.argmax(ends - starts))
+    return slice(int(starts[k]), int(ends[k]))
 
 
-def _valid(found: Recording, path: Path) -> Recording:
+def _valid_rows(found: Recording, path: Path) -> Recording:
     """The rows with a valid pose; RecordingError if they are too few or their times are wrong."""
     length = np.linalg.norm(found.quaternion_xyzw, axis=1)
-    good = np.isfinite(found.position).all(axis=1) & (np.abs(length - 1.0) < _UNIT)
+    good = np.isfinite(found.position).all(axis=1) & (np.abs(length - 1.0) < _UNIT_TOLERANCE)
     if found.time_s is not None:
         good &= np.isfinite(found.time_s)
-    if good.sum() < LEAST_ROWS:
+    if good.sum() < MIN_ROWS:
         raise RecordingError(
             f"{path}: {int(good.sum())} rows of {len(good)} with a position and a unit quaternion; "
-            f"at least {LEAST_ROWS} are needed"
+            f"at least {MIN_ROWS} are needed"
         )
     time = None if found.time_s is None else found.time_s[good]
     kept = Recording(found.name, time, found.position[good], found.quaternion_xyzw[good], found.load[good])
@@ -222,9 +229,9 @@ def _valid(found: Recording, path: Path) -> Recording:
         raise RecordingError(f"{path}: times do not increase from row to row")
     if kept.time_s is not None:
         step_s = float(np.median(np.diff(kept.time_s)))
-        if not _SHORTEST_S <= step_s <= _LONGEST_S:
+        if not _MIN_STEP_S <= step_s <= _MAX_STEP_S:
             raise RecordingError(
-                f"{path}: rows would be {step_s:.3g} s apart; must be {_SHORTEST_S:g} to {_LONGEST_S:g} s: "
+                f"{path}: rows would be {step_s:.3g} s apart; must be {_MIN_STEP_S:g} to {_MAX_STEP_S:g} s: "
                 "are times in s, and in the column that the map names?"
             )
     return kept

@@ -4,7 +4,7 @@ The recorder ran evenly, but each row holds the latest pose that the tracker had
 scatter about an even grid, and the scatter does not accumulate. The motion of the vehicle reveals it: a pose
 that is 5 ms late lies 5 mm further along a course of 1 m/s. Course and times are estimated in turn, the times
 by one step of Gauss-Newton with the even grid as prior. While the vehicle stands still the times cannot be
-inferred, and nothing depends on them. Where rows are missing (`gaps`), the grid leaves room for them.
+inferred, and nothing depends on them. Where rows are missing (`find_gaps`), the grid leaves room for them.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcs.recorded.gaps import gaps
-from gcs.recorded.smoothing import Course, Floats, smooth
+from gcs.recorded.gaps import find_gaps
+from gcs.recorded.smoothing import Floats, SmoothedMotion, smooth
 
-_ROUNDS = 30
-_COARSE_ROUNDS = 9  # in which the poses are assumed less precise, so that times far off can be reached
+_ITERATIONS = 30
+_COARSE_ITERATIONS = 9  # in which the poses are assumed less precise, so that times far off can be reached
 _OUTLIER = 5.0  # standard deviations beyond which a row is weighted down
-_STALE = 1e-6  # weight of a row that repeats the one before
-_SILENCE_S = 1.0
-_LEAST_STEP_S = 2e-3  # between rows
+_REPEATED_WEIGHT = 1e-6  # weight of a row that repeats the one before
+_MAX_GAP_S = 1.0
+_MIN_STEP_S = 2e-3  # between rows
 
 
 class RowTimes(NamedTuple):
@@ -30,9 +30,9 @@ class RowTimes(NamedTuple):
 
     time_s: Floats  # (n,)
     offset_s: Floats  # (n,) from the even grid
-    sure: Floats  # (n,) weight of the row's pose: 1, or less if it fits no smooth course
+    weight: Floats  # (n,) weight of the row's pose: 1, or less if it fits no smooth course
     broken: NDArray[np.bool_]  # (n,) where the time since the row before is not known
-    course: Course
+    smoothed: SmoothedMotion
 
 
 def infer_times(
@@ -45,37 +45,37 @@ def infer_times(
 ) -> RowTimes:
     """Times of rows with `position` (n, 3), recorded at `rate_hz` on average with a jitter of `jitter_s`."""
     n = len(position)
-    missing, broken = gaps(position)
+    missing, broken = find_gaps(position)
     grid = (np.arange(n) + np.cumsum(missing)) / rate_hz
     offset = np.zeros(n)
-    fresh = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
-    sure = np.where(fresh, 1.0, _STALE)
-    for k in range(_ROUNDS):
-        noise = noise_m * max(1.0, 2.0 * (_COARSE_ROUNDS - k))
+    new_pose = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
+    weight = np.where(new_pose, 1.0, _REPEATED_WEIGHT)
+    for k in range(_ITERATIONS):
+        noise = noise_m * max(1.0, 2.0 * (_COARSE_ITERATIONS - k))
         time = _increasing(grid + offset)
-        course = smooth(time, position, noise**2 / sure, jerk_density)
-        left = position - course.position
-        speed2 = np.sum(course.velocity**2, axis=1)
-        prior = noise**2 / (sure * jitter_s**2)
-        offset = offset + (np.sum(course.velocity * left, axis=1) - prior * offset) / (speed2 + prior)
-        along = np.sum(course.velocity * left, axis=1) ** 2 / np.maximum(speed2, 1e-12)
-        across = np.sqrt(np.maximum(np.sum(left**2, axis=1) - np.where(speed2 > 1e-4, along, 0.0), 0.0))
-        sure = np.minimum(1.0, (_OUTLIER * noise / np.maximum(across, 1e-9)) ** 2)
-        sure = np.where(fresh, np.maximum(sure, _STALE), _STALE)
+        smoothed = smooth(time, position, noise**2 / weight, jerk_density)
+        residual = position - smoothed.position
+        speed2 = np.sum(smoothed.velocity**2, axis=1)
+        prior = noise**2 / (weight * jitter_s**2)
+        offset = offset + (np.sum(smoothed.velocity * residual, axis=1) - prior * offset) / (speed2 + prior)
+        along = np.sum(smoothed.velocity * residual, axis=1) ** 2 / np.maximum(speed2, 1e-12)
+        across = np.sqrt(np.maximum(np.sum(residual**2, axis=1) - np.where(speed2 > 1e-4, along, 0.0), 0.0))
+        weight = np.minimum(1.0, (_OUTLIER * noise / np.maximum(across, 1e-9)) ** 2)
+        weight = np.where(new_pose, np.maximum(weight, _REPEATED_WEIGHT), _REPEATED_WEIGHT)
     time = _increasing(grid + offset)
-    return RowTimes(time, offset, sure, broken, smooth(time, position, noise_m**2 / sure, jerk_density))
+    return RowTimes(time, offset, weight, broken, smooth(time, position, noise_m**2 / weight, jerk_density))
 
 
 def known_times(time_s: Floats, position: Floats, noise_m: float, jerk_density: float) -> RowTimes:
     """The same for rows with given times; broken where more than a second is missing."""
     n = len(time_s)
-    broken = np.append(False, np.diff(time_s) > _SILENCE_S)
-    course = smooth(time_s, position, noise_m**2, jerk_density)
-    return RowTimes(time_s, np.zeros(n), np.ones(n), broken, course)
+    broken = np.append(False, np.diff(time_s) > _MAX_GAP_S)
+    smoothed = smooth(time_s, position, noise_m**2, jerk_density)
+    return RowTimes(time_s, np.zeros(n), np.ones(n), broken, smoothed)
 
 
 def _increasing(time: Floats) -> Floats:
     """The same times, each at least the shortest step after the one before."""
-    floor = np.arange(len(time)) * _LEAST_STEP_S
+    floor = np.arange(len(time)) * _MIN_STEP_S
     rising: Floats = np.maximum.accumulate(time - floor) + floor
     return rising

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcs.recorded.estimates import Rows, filtered, load_position, predicted
+from gcs.recorded.estimates import FilterRows, filtered_estimates, load_position, predictions
 from gcs.recorded.load_model import LoadModel
 from gcs.recorded.motion import Motion
 from gcs.recorded.smoothing import Floats
 
 HORIZONS_S = (2.0, 5.0)
-EVERY_ROWS = 15  # between the beginnings of predictions
+ROWS_BETWEEN_PREDICTIONS = 15  # between the beginnings of predictions
 SETTLED_ROWS = 90  # with a measured load that the filter uses before the first prediction
 BOUND_95 = 5.991  # chi-square of two degrees of freedom
 
@@ -38,29 +38,30 @@ class Score(NamedTuple):
         return float(np.mean(known < BOUND_95)) if known.size else float("nan")
 
 
-def score_ahead(motion: Motion, rows: Rows, model: LoadModel) -> tuple[Score, ...]:
-    """Predictions that begin every `EVERY_ROWS` rows, for each horizon, compared with the measured load.
+def score_ahead(motion: Motion, rows: FilterRows, model: LoadModel) -> tuple[Score, ...]:
+    """Predictions that begin every `ROWS_BETWEEN_PREDICTIONS` rows, for each horizon, compared with the
+    measured load.
 
     Each begins with the estimate from load and vehicle up to this row, and continues with the vehicle's
     motion and attitude alone. Predictions across a break, whose duration is unknown, are left out.
     """
-    estimates = filtered(rows, model, load=True, tilt=True)
-    begins = np.arange(SETTLED_ROWS, len(rows.time_s), EVERY_ROWS)
-    windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=True)
+    estimates = filtered_estimates(rows, model, load=True, tilt=True)
+    starts = np.arange(SETTLED_ROWS, len(rows.time_s), ROWS_BETWEEN_PREDICTIONS)
+    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=True)
     breaks = np.cumsum(motion.times.broken)
     windows = [one for one in windows if breaks[one.begin] == breaks[one.ends[-1]]]
     scores = []
     for i in range(len(HORIZONS_S)):
-        at = np.array([one.ends[i] for one in windows], dtype=np.intp)
+        end_rows = np.array([one.ends[i] for one in windows], dtype=np.intp)
         direction = np.array([one.direction[i] for one in windows]).reshape(-1, 2)
         covariance = np.array([one.covariance[i] for one in windows]).reshape(-1, 3)
-        scores.append(_score(motion, model, at, direction, covariance))
+        scores.append(_score(motion, model, end_rows, direction, covariance))
     return tuple(scores)
 
 
-def score_pose_alone(motion: Motion, rows: Rows, model: LoadModel) -> Score:
+def score_pose_alone(motion: Motion, rows: FilterRows, model: LoadModel) -> Score:
     """Smoothed estimates of the whole flight from the pose alone, compared with the measured load."""
-    found = filtered(rows, model, load=False, tilt=True, smoothed=True)
+    found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
     at = np.arange(len(rows.time_s))
     covariance = found.covariances[:, [0, 0, 1], [0, 1, 1]]
     return _score(motion, model, at, found.states[:, :2], covariance)

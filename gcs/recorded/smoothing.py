@@ -16,10 +16,10 @@ from scipy.linalg import solveh_banded
 Floats = NDArray[np.float64]
 
 _HALF_BAND = 5  # entries beside the diagonal that neighbouring blocks of three reach
-_SHORTEST_S = 1e-4  # least step between rows; the motion is smooth over anything shorter
+_MIN_STEP_S = 1e-4  # least step between rows; the motion is smooth over anything shorter
 
 
-class Course(NamedTuple):
+class SmoothedMotion(NamedTuple):
     """A smoothed motion, one row per instant; shapes (n, d)."""
 
     position: Floats
@@ -27,38 +27,40 @@ class Course(NamedTuple):
     acceleration: Floats
 
 
-def smooth(time_s: Floats, measured: Floats, variance: Floats | float, jerk_density: float) -> Course:
+def smooth(time_s: Floats, measured: Floats, variance: Floats | float, jerk_density: float) -> SmoothedMotion:
     """The most probable course of `measured` (n, d) at increasing `time_s` (n,).
 
     `variance` is that of the measurement, a number or one per row; infinite for a row without information.
     `jerk_density` is the spectral density of the jerk's noise, in units of `measured`^2 / s^5.
     """
     n, d = measured.shape
-    step = np.maximum(np.diff(time_s), _SHORTEST_S)
+    step = np.maximum(np.diff(time_s), _MIN_STEP_S)
     unit = float(np.median(step))  # the states are position, unit x velocity, unit^2 x acceleration
-    moves, weights = _transitions(step / unit, jerk_density * unit**5)
-    carried = np.einsum("kji,kjl->kil", moves, weights)  # F' W
+    transitions, weights = _transitions(step / unit, jerk_density * unit**5)
+    weighted = np.einsum("kji,kjl->kil", transitions, weights)  # F' W
     diagonal = np.zeros((n, 3, 3))
-    diagonal[:-1] += np.einsum("kij,kjl->kil", carried, moves)
+    diagonal[:-1] += np.einsum("kij,kjl->kil", weighted, transitions)
     diagonal[1:] += weights
-    sure = 1.0 / np.broadcast_to(np.asarray(variance, dtype=np.float64), (n,))
-    diagonal[:, 0, 0] += sure
+    information = 1.0 / np.broadcast_to(np.asarray(variance, dtype=np.float64), (n,))
+    diagonal[:, 0, 0] += information
     band = np.zeros((_HALF_BAND + 1, 3 * n))  # lower form: band[i - j, j]
     for i in range(3):
         for j in range(3):
             if i >= j:
                 band[i - j, j::3] = diagonal[:, i, j]
-            band[3 + i - j, j : 3 * (n - 1) : 3] = -carried[:, j, i]
-    right = np.zeros((3 * n, d))
-    right[0::3] = sure[:, None] * np.where(np.isfinite(measured), measured, 0.0)
-    x = solveh_banded(band, right, lower=True, check_finite=False).reshape(n, 3, d)
-    return Course(x[:, 0], x[:, 1] / unit, x[:, 2] / unit**2)
+            band[3 + i - j, j : 3 * (n - 1) : 3] = -weighted[:, j, i]
+    right_side = np.zeros((3 * n, d))
+    right_side[0::3] = information[:, None] * np.where(np.isfinite(measured), measured, 0.0)
+    x = solveh_banded(band, right_side, lower=True, check_finite=False).reshape(n, 3, d)
+    return SmoothedMotion(x[:, 0], x[:, 1] / unit, x[:, 2] / unit**2)
 
 
 def _transitions(step: Floats, density: float) -> tuple[Floats, Floats]:
     """Transition matrices over steps (k,) and the inverses of the noise's covariances, (k, 3, 3)."""
     one, zero = np.ones_like(step), np.zeros_like(step)
-    moves = np.stack([one, step, 0.5 * step**2, zero, one, step, zero, zero, one], axis=1).reshape(-1, 3, 3)
+    transitions = np.stack([one, step, 0.5 * step**2, zero, one, step, zero, zero, one], axis=1).reshape(
+        -1, 3, 3
+    )
     # inverse of the covariance [[h^5/20, h^4/8, h^3/6], [h^4/8, h^3/3, h^2/2], [h^3/6, h^2/2, h]]
     h = step
     terms = [
@@ -72,4 +74,4 @@ def _transitions(step: Floats, density: float) -> tuple[Floats, Floats]:
         -36 / h**2,
         9 / h,
     ]
-    return moves, np.stack(terms, axis=1).reshape(-1, 3, 3) / density
+    return transitions, np.stack(terms, axis=1).reshape(-1, 3, 3) / density

@@ -56,24 +56,24 @@ def build_report(
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View
 
-    tell = progress or (lambda done, total, text: None)
+    report_progress = progress or (lambda done, total, text: None)
     if not tlog_path.is_file():
         raise ReportError(f"{tlog_path}: no such file; give a .tlog that `gcs fly` or `gcs capture` wrote")
     out_dir.mkdir(parents=True, exist_ok=True)
     if meta is None:
         meta = load_meta(tlog_path.parent / META_FILE)
     else:
-        forget_report(out_dir)
+        delete_report(out_dir)
 
     pictures = PICTURES if all_pictures else PICTURES[:1]
-    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
-    total = len(ahead)
+    remaining = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
+    total = len(remaining)
 
     def done(step: str) -> None:
-        ahead.remove(step)
-        tell(total - len(ahead), total, ahead[0] if ahead else "done")
+        remaining.remove(step)
+        report_progress(total - len(remaining), total, remaining[0] if remaining else "done")
 
-    tell(0, total, ahead[0])
+    report_progress(0, total, remaining[0])
     with Drawing(out_dir, pictures) as drawing:
         telemetry = load_telemetry(tlog_path)
         samples = samples_of(telemetry)
@@ -81,10 +81,10 @@ def build_report(
         record["report_dir"] = str(out_dir)
         _write_json(out_dir / META_FILE, meta.to_json())
         _write_json(out_dir / SUMMARY_FILE, record)
-        done(ahead[0])
+        done(remaining[0])
         if figures is not None:
             figures(record)
-        drawing.begin(View(telemetry, samples, record, meta))
+        drawing.start_drawing(View(telemetry, samples, record, meta))
 
         from gcs.analysis.parquet import write_flight
         from gcs.report.html import render_page
@@ -92,8 +92,8 @@ def build_report(
         from gcs.report.settings import changed_settings
 
         # the path of the directory is not a property of the flight
-        about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
-        write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
+        metadata = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
+        write_flight(out_dir / PARQUET_FILE, telemetry, samples, metadata)
         done(PARQUET_FILE)
         replay = replay_of(telemetry, samples, meta)
         drawing.finish(lambda picture: done(picture.file))
@@ -103,12 +103,12 @@ def build_report(
     return record
 
 
-def forget_report(directory: Path) -> None:
+def delete_report(directory: Path) -> None:
     """Delete the report of an earlier flight, including files that were made on demand."""
     from gcs.report.plots import PICTURES
 
-    made = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)
-    for name in (*made, *(picture.file for picture in PICTURES)):
+    files = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)
+    for name in (*files, *(picture.file for picture in PICTURES)):
         (directory / name).unlink(missing_ok=True)
 
 
@@ -120,10 +120,10 @@ def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -
     meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
     telemetry = load_telemetry(tlog_path)
     layout = layout_of(meta.vehicle)
-    places = tuple((x, -y) for x, y, _ in (rotor["position"] for rotor in layout["rotors"]))
+    rotor_positions = tuple((x, -y) for x, y, _ in (rotor["position"] for rotor in layout["rotors"]))
     out_dir.mkdir(parents=True, exist_ok=True)
     path = out_dir / MCAP_FILE
-    write_mcap(path, telemetry, samples_of(telemetry), Layout(places, layout["load_radius"]))
+    write_mcap(path, telemetry, samples_of(telemetry), Layout(rotor_positions, layout["load_radius"]))
     return path
 
 

@@ -16,7 +16,7 @@ from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.samples import AIRBORNE, MISSION, Samples, samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.analysis.tracks import Telemetry
-from gcs.report.html import mood
+from gcs.report.html import outcome_mood
 from gcs.report.replay import Json, replay_of
 from gcs.report.settings import changed_settings, unchanged_settings
 from gcs.report.steps import step_texts
@@ -26,7 +26,7 @@ from gcs.web.page import render
 if TYPE_CHECKING:
     from rich.table import Table
 
-_WAYS = (
+_CONDITIONS = (
     "mission",
     "law",
     "estimator",
@@ -35,17 +35,28 @@ _WAYS = (
     "vehicle",
     "seed",
 )  # keys of the record that state how it was flown
-_CLOCK = {"wall_s", "real_time_factor"}  # depend on the machine, not on the flight: no best
+_MACHINE_DEPENDENT = {"wall_s", "real_time_factor"}  # depend on the machine, not on the flight: no best
 STAR = "*: the best of the completed flights, and what is within 1 % of it."
 DEFAULT = "default"  # shown for an unchanged parameter whose default is not known, as with a custom law
 _LAW_PARAMETER = "CTL_LAW"  # the parameter that holds the law
-_AS_GOOD = 0.01  # as a share of the best value: a smaller difference counts as none
-_PARTS = 3  # of a label; further differences are in the table
+_TOLERANCE = 0.01  # as a share of the best value: a smaller difference counts as none
+_MAX_PARTS = 3  # of a label; further differences are in the table
 STEPS = "mission steps"
-_UNTOLD = {STEPS}  # differences that labels do not mention
+_NOT_IN_LABELS = {STEPS}  # differences that labels do not mention
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
 _LABELS = 32  # characters before the columns of the flights
-_DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
+_DRAWN_COLUMNS = {
+    "load",
+    "vehicle",
+    "asked",
+    "quat",
+    "cable",
+    "tension",
+    "rotor",
+    "taut",
+    "attached",
+    "scored",
+}
 SCRIPTS = (
     *PLOT_SCRIPTS,
     *SCENE_SCRIPTS,
@@ -75,7 +86,7 @@ class Difference:
 
     name: str
     values: tuple[str, ...]
-    usual: tuple[bool, ...]
+    unchanged: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -97,17 +108,21 @@ def load_run(name: str, tlog: Path, meta: FlightMeta) -> Run:
 def differences(runs: Sequence[Run]) -> list[Difference]:
     """What differs in how the runs were flown, as far as it is known: first the given settings, then the
     parameters that followed from them."""
-    rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
+    rows: dict[str, list[str]] = {
+        name: [_displayed(run.record[name]) for run in runs] for name in _CONDITIONS
+    }
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
-    asked = {name for run in runs for name in run.meta.settings}
-    names = sorted(set().union(*settings), key=lambda name: (name not in asked, name))
-    others = [_unchanged(run, names) for run in runs]
+    given = {name for run in runs for name in run.meta.settings}
+    names = sorted(set().union(*settings), key=lambda name: (name not in given, name))
+    defaults = [_unchanged(run, names) for run in runs]
     for name in names:
-        rows[name] = [found.get(name, other[name]) for found, other in zip(settings, others, strict=True)]
+        rows[name] = [
+            found.get(name, default[name]) for found, default in zip(settings, defaults, strict=True)
+        ]
     if len(set(rows["law"])) > 1 and UNKNOWN not in rows["law"]:
         rows.pop(_LAW_PARAMETER, None)
     rows[STEPS] = _different_steps(runs)
-    rows["version"] = [_shown(run.meta.version) for run in runs]
+    rows["version"] = [_displayed(run.meta.version) for run in runs]
     return [
         Difference(name, tuple(values), tuple(name in names and name not in found for found in settings))
         for name, values in rows.items()
@@ -129,9 +144,9 @@ def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
     found = []
     for group, metrics in GROUPS:
         rows = [
-            Figure(metric, metric.read_alike([run.record for run in runs]), _best(metric, runs))
+            Figure(metric, metric.formatted_alike([run.record for run in runs]), _best(metric, runs))
             for metric in metrics
-            if metric.name not in _WAYS and any(run.record[metric.name] for run in runs)
+            if metric.name not in _CONDITIONS and any(run.record[metric.name] for run in runs)
         ]
         if rows:
             found.append((group, rows))
@@ -139,20 +154,20 @@ def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
 
 
 def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
-    """The runs with the best value or one that counts as equal (`_AS_GOOD` or the same when displayed), among
-    the completed flights if there are any. Empty if all of these are equal."""
+    """The runs with the best value or one that counts as equal (`_TOLERANCE` or the same when displayed),
+    among the completed flights if there are any. Empty if all of these are equal."""
     completed = [i for i, run in enumerate(runs) if run.record["outcome"] == "completed"]
     rated = {
         i: value for i in completed or range(len(runs)) if (value := runs[i].record[metric.name]) is not None
     }
-    if metric.better is None or metric.name in _CLOCK or not rated:
+    if metric.better is None or metric.name in _MACHINE_DEPENDENT or not rated:
         return ()
     best = min(rated.values()) if metric.better == "less" else max(rated.values())
-    told = {metric.read(runs[i].record) for i, value in rated.items() if value == best}
+    best_texts = {metric.formatted(runs[i].record) for i, value in rated.items() if value == best}
     good = [
         i
         for i, value in rated.items()
-        if abs(value - best) <= _AS_GOOD * abs(best) or metric.read(runs[i].record) in told
+        if abs(value - best) <= _TOLERANCE * abs(best) or metric.formatted(runs[i].record) in best_texts
     ]
     return tuple(good) if len(good) < len(rated) else ()
 
@@ -160,28 +175,30 @@ def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
 def labels(runs: Sequence[Run]) -> list[str]:
     """The label of each flight on the page, from what differs: `thesis, SIM_ACT_DELAY_MS=72`. If several
     flights have the same label, or none, the flight's name is added, which is that of its folder."""
-    asked = {*_WAYS, *(name for run in runs for name in run.meta.settings)}
-    known = [one for one in differences(runs) if one.name not in _UNTOLD]
+    given = {*_CONDITIONS, *(name for run in runs for name in run.meta.settings)}
+    all_differences = [one for one in differences(runs) if one.name not in _NOT_IN_LABELS]
     # the given settings, without the parameters that follow from them; if none differ, as with captured
     # flights, what the vehicle reported
-    different = [one for one in known if one.name in asked] or known
+    different = [one for one in all_differences if one.name in given] or all_differences
     found = []
     for i in range(len(runs)):
-        parts = [part for one in different if (part := _part(one.name, one.values[i], one.usual[i]))]
-        more = f" and {len(parts) - _PARTS} more" if len(parts) > _PARTS else ""
-        found.append(", ".join(parts[:_PARTS]) + more)
-    told = [label or ("default settings" if different else "") for label in found]
+        parts = [
+            part for one in different if (part := _label_part(one.name, one.values[i], one.unchanged[i]))
+        ]
+        more = f" and {len(parts) - _MAX_PARTS} more" if len(parts) > _MAX_PARTS else ""
+        found.append(", ".join(parts[:_MAX_PARTS]) + more)
+    titles = [label or ("default settings" if different else "") for label in found]
     return [
-        label if told.count(label) == 1 else ", ".join(filter(None, (label, run.name)))
-        for label, run in zip(told, runs, strict=True)
+        label if titles.count(label) == 1 else ", ".join(filter(None, (label, run.name)))
+        for label, run in zip(titles, runs, strict=True)
     ]
 
 
-def _part(name: str, value: str, usual: bool) -> str:
+def _label_part(name: str, value: str, unchanged: bool) -> str:
     """A difference as part of a label; empty if the value is unchanged or unknown."""
-    if usual or value == UNKNOWN:
+    if unchanged or value == UNKNOWN:
         return ""
-    if name in _WAYS and name != "seed":
+    if name in _CONDITIONS and name != "seed":
         return value.rsplit("/", 1)[-1]  # of a file, its name without the folder
     return f"{name} {value}" if name in ("seed", "version") else f"{name}={value}"
 
@@ -198,7 +215,7 @@ def comparison(runs: Sequence[Run]) -> Json:
     }
 
 
-def in_columns(runs: Sequence[Run], width: int) -> bool:
+def fits_in_columns(runs: Sequence[Run], width: int) -> bool:
     """Whether a terminal of this width, in characters, has room for a column for each flight."""
     return _LABELS + len(runs) * (_HEADING + 2) <= width
 
@@ -215,7 +232,7 @@ def comparison_table(runs: Sequence[Run]) -> Table:
         table.add_column(Text(_heading(run.name)), justify="right", overflow="fold")
     different = differences(runs)
     for one in different:
-        cells = [Text(_brief(value)) for value in one.values]
+        cells = [Text(_shortened(value)) for value in one.values]
         table.add_row(Text(one.name), *cells, end_section=one is different[-1])
     for group, rows in figures(runs):
         table.add_row(Text(group.title, style="bold"))
@@ -244,44 +261,45 @@ def cell(value: str, best: bool) -> Any:
 
 def comparison_page(runs: Sequence[Run]) -> str:
     """The page: tables, all tracks in one scene, all errors in one plot."""
-    what, times = begins(runs)
-    called = labels(runs)
+    start_name, times = common_start(runs)
+    titles = labels(runs)
     return render(
         "gcs.report",
         "compare.html",
         SCRIPTS,
         STYLES,
-        [_embedded(run, *one) for run, one in zip(runs, zip(times, called, strict=True), strict=True)],
-        begun=what,
+        [_embedded(run, *one) for run, one in zip(runs, zip(times, titles, strict=True), strict=True)],
+        start_name=start_name,
         runs=[
-            {"name": run.name, "label": label, **_told(run)} for run, label in zip(runs, called, strict=True)
+            {"name": run.name, "label": label, **_outcome_entry(run)}
+            for run, label in zip(runs, titles, strict=True)
         ],
         differences=differences(runs),
         groups=[(group.title, rows) for group, rows in figures(runs)],
     )
 
 
-def _told(run: Run) -> dict[str, str]:
+def _outcome_entry(run: Run) -> dict[str, str]:
     outcome = str(run.record["outcome"])
-    return {"outcome": outcome, "mood": mood(outcome), "reason": run.meta.reason or ""}
+    return {"outcome": outcome, "mood": outcome_mood(outcome), "reason": run.meta.reason or ""}
 
 
 def _embedded(run: Run, begin_s: float, label: str) -> Json:
     """The flight, and the time in it that is aligned with that of the other flights."""
-    replay = replay_of(run.telemetry, run.samples, run.meta, _DRAWN)
+    replay = replay_of(run.telemetry, run.samples, run.meta, _DRAWN_COLUMNS)
     return {**replay, "name": run.name, "label": label, "begin": begin_s}
 
 
-def begins(runs: Sequence[Run]) -> tuple[str, list[float]]:
+def common_start(runs: Sequence[Run]) -> tuple[str, list[float]]:
     """The latest stage that all have begun (mission, flight or log), and the time when each began it."""
     for name, phases in (("mission", (MISSION,)), ("flight", AIRBORNE)):
-        found = [_first(run, phases) for run in runs]
+        found = [_phase_start(run, phases) for run in runs]
         if all(time is not None for time in found):
             return name, [time for time in found if time is not None]
     return "log", [(run.telemetry.span_s or (0.0, 0.0))[0] for run in runs]
 
 
-def _first(run: Run, phases: tuple[int, ...]) -> float | None:
+def _phase_start(run: Run, phases: tuple[int, ...]) -> float | None:
     setpoint = run.telemetry.setpoint
     times = setpoint.time_s[np.isin(setpoint.phase, phases)]
     return float(times[0]) if len(times) else None
@@ -290,22 +308,22 @@ def _first(run: Run, phases: tuple[int, ...]) -> float | None:
 def _different_steps(runs: Sequence[Run]) -> list[str]:
     """The steps of each mission without those at its beginning and end that are the same in all."""
     missions = [[step.text for step in step_texts(run.telemetry.mission, run.telemetry.home)] for run in runs]
-    first = _common(missions)
-    last = _common([list(reversed(steps[first:])) for steps in missions])
+    first = _common_length(missions)
+    last = _common_length([list(reversed(steps[first:])) for steps in missions])
     return [
         "; ".join(f"{i + 1}. {steps[i]}" for i in range(first, len(steps) - last)) or UNKNOWN
         for steps in missions
     ]
 
 
-def _common(lists: Sequence[Sequence[str]]) -> int:
+def _common_length(lists: Sequence[Sequence[str]]) -> int:
     """The number of entries at the beginning that are the same in all lists."""
     return sum(1 for _ in takewhile(lambda entries: len(set(entries)) == 1, zip(*lists, strict=False)))
 
 
-def _brief(text: str, most: int = 60) -> str:
-    return text if len(text) <= most else text[: most - 1] + "…"
+def _shortened(text: str, max_length: int = 60) -> str:
+    return text if len(text) <= max_length else text[: max_length - 1] + "…"
 
 
-def _shown(value: Any) -> str:
+def _displayed(value: Any) -> str:
     return UNKNOWN if value is None else str(value)

@@ -21,7 +21,8 @@ from gcs.report.warm import load_drawing
 
 
 class Drawing:
-    """Draws the pictures: the other process loads its libraries immediately, and draws from `begin` on."""
+    """Draws the pictures: the other process loads its libraries immediately, and draws after
+    `start_drawing`."""
 
     def __init__(self, directory: Path, pictures: Sequence[Picture]) -> None:
         self._directory = directory
@@ -34,12 +35,12 @@ class Drawing:
             return
         context = multiprocessing.get_context("fork")  # the child has everything that is loaded here
         self._taken = context.Value("i", 0)
-        self._pipe, theirs = context.Pipe()
-        self._helper = context.Process(target=self._help, args=(theirs,), daemon=True)
+        self._pipe, child_end = context.Pipe()
+        self._helper = context.Process(target=self._run_helper, args=(child_end,), daemon=True)
         self._helper.start()
-        theirs.close()
+        child_end.close()
 
-    def begin(self, view: View) -> None:
+    def start_drawing(self, view: View) -> None:
         """Give the process what is to be drawn; waits until it has loaded its libraries."""
         self._view = view
         if self._helper is not None:
@@ -49,7 +50,7 @@ class Drawing:
     def finish(self, done: Callable[[Picture], None]) -> None:
         """Wait until all are drawn, and call `done` for each. Of several, this process draws some too."""
         if self._helper is not None and len(self._pictures) > 1:
-            self._draw_here(self._next(), done)
+            self._draw_here(self._next_pictures(), done)
         while self._helper is not None:
             self._receive(done)
         if self._missing:  # there is no helper, or it was killed
@@ -60,11 +61,11 @@ class Drawing:
         with style():
             for picture in pictures:
                 self._draw(picture)
-                self._tell(picture.file, done)
+                self._report(picture.file, done)
                 while self._helper is not None and self._pipe.poll():
                     self._receive(done)
 
-    def _next(self) -> Iterator[Picture]:
+    def _next_pictures(self) -> Iterator[Picture]:
         """The pictures that no process has taken yet; taking one marks it as taken."""
         while True:
             with self._taken.get_lock():
@@ -77,24 +78,24 @@ class Drawing:
     def _draw(self, picture: Picture) -> None:
         picture.draw(self._view, self._directory / picture.file)
 
-    def _tell(self, file: str, done: Callable[[Picture], None]) -> None:
+    def _report(self, file: str, done: Callable[[Picture], None]) -> None:
         done(self._missing.pop(file))
 
     def _receive(self, done: Callable[[Picture], None]) -> None:
         """Receive the name of one picture that the helper has drawn, or note that the helper has ended."""
         try:
-            self._tell(self._pipe.recv(), done)
+            self._report(self._pipe.recv(), done)
         except (EOFError, OSError):
             self._helper.join()
             self._helper = None
 
-    def _help(self, parent: Connection) -> None:
+    def _run_helper(self, parent: Connection) -> None:
         self._pipe.close()  # our copy of the parent's end: with it open, we would not notice its closing
         with suppress(KeyboardInterrupt, OSError, EOFError):  # the parent has ended, or draws what is left
             load_drawing()
             self._view = parent.recv()
             with style():
-                for picture in self._next():
+                for picture in self._next_pictures():
                     self._draw(picture)
                     parent.send(picture.file)
 

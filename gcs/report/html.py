@@ -6,7 +6,7 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from gcs.analysis.definitions import HEADLINE, METRICS, Metric, told
+from gcs.analysis.definitions import HEADLINE, METRICS, Metric, known_groups
 from gcs.analysis.record import FlightMeta, Record
 from gcs.report.plots import PICTURES, headline
 from gcs.report.replay import Json
@@ -41,7 +41,7 @@ def render_page(
         replay,
         headline=headline(meta),
         outcome=outcome,
-        mood=mood(outcome),
+        mood=outcome_mood(outcome),
         reason=meta.reason,
         truth_missing=meta.truth_missing,
         subtitle=_subtitle(record),
@@ -49,15 +49,15 @@ def render_page(
         groups=_groups(record),
         settings=settings,
         still=_picture(directory, PICTURES[0].file, PICTURES[0].caption),
-        said=bool(replay["texts"]),
+        has_texts=bool(replay["texts"]),
         steps=bool(replay["steps"]),
-        believed=replay["source"] == "estimate",
+        shows_estimate=replay["source"] == "estimate",
         command=meta.command,
         version=meta.version,
     )
 
 
-def mood(outcome: str) -> str:
+def outcome_mood(outcome: str) -> str:
     """The style of an outcome: good, bad or wait."""
     return _MOODS.get(outcome, "wait")
 
@@ -73,7 +73,7 @@ def _figures(record: Record, replay: Json) -> list[Json]:
     return [
         {
             "label": label,
-            "value": METRICS[name].read(record),
+            "value": METRICS[name].formatted(record),
             "time": worst["time"] if worst and name == "load_error_max_m" else None,
         }
         for name, label in HEADLINE.items()
@@ -85,13 +85,13 @@ def _groups(record: Record) -> list[dict[str, Any]]:
     """The groups of figures, each with the figures that are known."""
     return [
         {"title": group.title, "window": group.window, "rows": [_row(metric, record) for metric in metrics]}
-        for group, metrics in told(record)
+        for group, metrics in known_groups(record)
     ]
 
 
 def _row(metric: Metric, record: Record) -> dict[str, str]:
     definition = f"{metric.name}: {metric.text}"
-    return {"label": metric.label, "value": metric.read(record), "definition": definition}
+    return {"label": metric.label, "value": metric.formatted(record), "definition": definition}
 
 
 def _picture(directory: Path, file: str, caption: str) -> dict[str, str]:

@@ -23,9 +23,9 @@ _MORE = {
     "mission_s": "mission",
     "estimator_error_max_m": "estimate max",
 }
-_LONGEST = 14  # characters of a value; a difference with a longer one has no column
-_LEAST_NAME, _NAME = 12, 36  # characters of a flight's name in a line, least and most
-_BETWEEN = 3
+_MAX_VALUE_CHARS = 14  # characters of a value; a difference with a longer one has no column
+_MIN_NAME_CHARS, _MAX_NAME_CHARS = 12, 36  # characters of a flight's name in a line, least and most
+_COLUMN_GAP = 3
 
 
 class _Column(NamedTuple):
@@ -38,7 +38,7 @@ class _Column(NamedTuple):
     @property
     def width(self) -> int:
         cells = (f"* {value}" if i in self.best else value for i, value in enumerate(self.values))
-        return max(map(len, (self.title, *cells))) + _BETWEEN
+        return max(map(len, (self.title, *cells))) + _COLUMN_GAP
 
 
 def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
@@ -47,21 +47,21 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
     from rich.table import Table
     from rich.text import Text
 
-    left = width - min(_NAME, max(_LEAST_NAME, *(len(run.name) for run in runs))) - _BETWEEN
-    columns, missed = [], [one.name for one in differences(runs)]
+    free = width - min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs))) - _COLUMN_GAP
+    columns, omitted = [], [one.name for one in differences(runs)]
     for column in _columns(runs):
-        if column.width <= left:
-            left -= column.width
+        if column.width <= free:
+            free -= column.width
             columns.append(column)
-            if column.title in missed:
-                missed.remove(column.title)
+            if column.title in omitted:
+                omitted.remove(column.title)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("flight", overflow="fold", min_width=_LEAST_NAME)
+    table.add_column("flight", overflow="fold", min_width=_MIN_NAME_CHARS)
     for column in columns:
         table.add_column(Text(column.title), justify="right", no_wrap=True)
     for i, run in enumerate(runs):
         table.add_row(Text(run.name), *(cell(one.values[i], i in one.best) for one in columns))
-    return table, missed
+    return table, omitted
 
 
 def _columns(runs: Sequence[Run]) -> Iterator[_Column]:
@@ -74,6 +74,6 @@ def _columns(runs: Sequence[Run]) -> Iterator[_Column]:
 
     yield from chosen(_MAIN)
     for one in differences(runs):
-        if max(map(len, one.values)) <= _LONGEST:
+        if max(map(len, one.values)) <= _MAX_VALUE_CHARS:
             yield _Column(one.name, one.values)
     yield from chosen(_MORE)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gcs.analysis.axes import Floats
 
-_MOST = float(2**30)  # steps from zero: whole numbers of 32 bits
-_BEYOND = 1e6  # numbers from here on belong to a lost flight and count as missing
+_MAX_STEPS = float(2**30)  # steps from zero: whole numbers of 32 bits
+_MISSING_FROM = 1e6  # numbers from here on belong to a lost flight and count as missing
 _LEVEL = 6
 
 
@@ -31,31 +31,31 @@ class Column(NamedTuple):
 def pack(columns: list[Column], count: int) -> dict[str, Any]:
     """JSON values: `count`, of each column its `name`, `step` and `gaps` ([first, last + 1] of each stretch
     of NaN), and `data`. Columns that contain only NaN are omitted."""
-    meant = [column._replace(values=_meant(column.values)) for column in columns]
-    known = [column for column in meant if np.isfinite(column.values).any()]
+    bounded = [column._replace(values=_without_large(column.values)) for column in columns]
+    known = [column for column in bounded if np.isfinite(column.values).any()]
     described, planes = [], []
-    for name, values, least in known:
+    for name, values, min_step in known:
         finite = np.isfinite(values)
-        step = _step(values[finite], least)
+        step = _step(values[finite], min_step)
         described.append({"name": name, "step": step, "gaps": _gaps(finite)})
-        whole = np.rint(_filled(values, finite) / step).astype(np.int32)
-        twice = np.diff(np.diff(whole, prepend=np.int32(0)), prepend=np.int32(0))
+        integers = np.rint(_filled(values, finite) / step).astype(np.int32)
+        second_differences = np.diff(np.diff(integers, prepend=np.int32(0)), prepend=np.int32(0))
         # bytes of the same significance are stored together: most of the upper ones are equal
-        planes.append(twice.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
-    squeezed = zlib.compress(b"".join(planes), _LEVEL, wbits=-zlib.MAX_WBITS)
-    return {"count": count, "columns": described, "data": base64.b64encode(squeezed).decode("ascii")}
+        planes.append(second_differences.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
+    compressed = zlib.compress(b"".join(planes), _LEVEL, wbits=-zlib.MAX_WBITS)
+    return {"count": count, "columns": described, "data": base64.b64encode(compressed).decode("ascii")}
 
 
-def _meant(values: Floats) -> Floats:
-    return np.where(np.abs(values) < _BEYOND, values, np.nan)
+def _without_large(values: Floats) -> Floats:
+    return np.where(np.abs(values) < _MISSING_FROM, values, np.nan)
 
 
-def _step(finite: Floats, least: float) -> float:
-    """`least`, or the power of ten with which the greatest number fits into 32 bits."""
-    greatest = float(np.abs(finite).max())
-    if greatest <= least * _MOST:
-        return least
-    return float(10.0 ** math.ceil(math.log10(greatest / _MOST)))
+def _step(finite: Floats, min_step: float) -> float:
+    """`min_step`, or the power of ten with which the greatest number fits into 32 bits."""
+    largest = float(np.abs(finite).max())
+    if largest <= min_step * _MAX_STEPS:
+        return min_step
+    return float(10.0 ** math.ceil(math.log10(largest / _MAX_STEPS)))
 
 
 def _filled(values: Floats, finite: NDArray[np.bool_]) -> Floats:

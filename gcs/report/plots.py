@@ -24,21 +24,23 @@ from gcs.report.style import (
     PURPLE,
     RED,
     Target,
-    bands,
     draw,
-    key,
+    draw_legend,
+    draw_phase_bands,
+    flagged_spans,
     length_scale,
+    new_axes_grid,
     new_figure,
     note_if_empty,
     phase_spans,
     rotor_colour,
-    rows,
     save,
-    true_spans,
 )
 from gcs.report.track import draw_track
 
-_SEEN = 0.004  # of the width of the axes: the least width of a mark, so that a single sample is visible
+_MIN_MARK_SHARE = (
+    0.004  # of the width of the axes: the least width of a mark, so that a single sample is visible
+)
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class View:
     meta: FlightMeta
 
     @property
-    def whole(self) -> tuple[float, float]:
+    def whole_flight(self) -> tuple[float, float]:
         """The time axis of the whole flight."""
         begin, end = self.telemetry.span_s or (0.0, 1.0)
         return begin, max(end, begin + 1e-3)
@@ -61,18 +63,18 @@ class View:
         """The time axis around the mission window; the whole flight if it has none."""
         inside = self.samples.time_s[self.samples.in_mission]
         if len(inside) < 2:
-            return self.whole
+            return self.whole_flight
         # with some of the hold on both sides, but without lifting and lowering, which would set the scale
         margin = max(0.5, 0.03 * float(inside[-1] - inside[0]))
         time_s = self.samples.time_s
         near = (time_s >= inside[0] - margin) & (time_s <= inside[-1] + margin)
-        calm = time_s[near & np.isin(self.samples.phase, CARRIED)]
-        return float(calm[0]), float(calm[-1])
+        carried = time_s[near & np.isin(self.samples.phase, CARRIED)]
+        return float(carried[0]), float(carried[-1])
 
     def shade(self, axes: Any, limits: tuple[float, float] | None = None) -> None:
         """Draw the phases and set the limits of the time axis, for axes above each other."""
         spans = phase_spans(self.telemetry.setpoint.time_s, self.telemetry.setpoint.phase)
-        bands(list(axes), spans, limits or self.window)
+        draw_phase_bands(list(axes), spans, limits or self.window)
 
     def visible(self, time_s: Floats) -> slice:
         """The samples inside the window, so that axes scale to what is visible."""
@@ -94,9 +96,9 @@ def track(view: View, path: Target) -> None:
 
 def position(view: View, path: Target) -> None:
     """Desired and true position and velocity of the load per axis."""
-    figure, axes = rows(11.0, 6.2, 3, 2)
+    figure, axes = new_axes_grid(11.0, 6.2, 3, 2)
     s = view.samples
-    seen = view.visible(s.time_s)
+    visible = view.visible(s.time_s)
     columns = (
         ("position (m)", s.actual_m, s.desired_m),
         ("velocity (m/s)", s.actual_m_s, s.desired_m_s),
@@ -104,33 +106,33 @@ def position(view: View, path: Target) -> None:
     for column, (what, actual, desired) in enumerate(columns):
         for i, axis in enumerate(AXES):
             ax = axes[i, column]
-            draw(ax, s.time_s[seen], actual[seen, i], color=BLUE, linewidth=1.8, label="true")
+            draw(ax, s.time_s[visible], actual[visible, i], color=BLUE, linewidth=1.8, label="true")
             draw(
                 ax,
-                s.time_s[seen],
-                desired[seen, i],
+                s.time_s[visible],
+                desired[visible, i],
                 color=INK,
                 linewidth=1.0,
                 linestyle=(0, (4, 3)),
                 label="desired",
             )
             ax.set_ylabel(f"{axis[0]} {what}" if column else f"{axis} (m)")
-            _least_range(ax, 0.1)
+            _set_min_range(ax, 0.1)
             note_if_empty(ax)
         axes[0, column].set_title("Load " + what.split(" ")[0])
         view.shade(axes[:, column])
-        key(axes[0, column])
+        draw_legend(axes[0, column])
     save(figure, path)
 
 
 def error(view: View, path: Target) -> None:
     """Position and velocity error of the load per axis."""
-    figure, axes = rows(11.0, 6.2, 3, 2)
+    figure, axes = new_axes_grid(11.0, 6.2, 3, 2)
     s = view.samples
-    seen = view.visible(s.time_s)
-    scale, unit = length_scale(s.error_m[seen])
-    believed, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
-    beside = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
+    visible = view.visible(s.time_s)
+    scale, unit = length_scale(s.error_m[visible])
+    estimate_error, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
+    has_filter = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
     columns = (
         ("position error", unit, scale * s.error_m),
         ("velocity error", f"{unit}/s", scale * s.error_m_s),
@@ -141,46 +143,46 @@ def error(view: View, path: Target) -> None:
             if column == 0:
                 draw(
                     ax,
-                    s.time_s[seen],
-                    believed[seen, i],
+                    s.time_s[visible],
+                    estimate_error[visible, i],
                     color=ORANGE,
                     linewidth=0.8,
                     alpha=0.8,
                     label="estimate − true",
                 )
-            if column == 0 and beside:
-                shown = filtered[seen, i]
-                draw(ax, s.time_s[seen], shown, color=GREEN, linewidth=0.8, label="built-in filter − true")
-            draw(ax, s.time_s[seen], values[seen, i], color=BLUE, label="true − desired")
+            if column == 0 and has_filter:
+                shown = filtered[visible, i]
+                draw(ax, s.time_s[visible], shown, color=GREEN, linewidth=0.8, label="built-in filter − true")
+            draw(ax, s.time_s[visible], values[visible, i], color=BLUE, label="true − desired")
             note_if_empty(ax)
             ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
             ax.set_ylabel(f"{axis} ({shown_unit})")
-            _least_range(ax, 1e-3 * scale)
+            _set_min_range(ax, 1e-3 * scale)
         axes[0, column].set_title("Load " + what)
         view.shade(axes[:, column])
-        key(axes[0, column])
+        draw_legend(axes[0, column])
     save(figure, path)
 
 
 def angles(view: View, path: Target) -> None:
     """Cable angles and attitude of the vehicle, both true."""
-    figure, axes = rows(10.0, 5.6, 2)
+    figure, axes = new_axes_grid(10.0, 5.6, 2)
     cable, vehicle = axes[:, 0]
     load, attitude = view.telemetry.load_truth, view.telemetry.attitude_truth
-    seen = view.visible(load.time_s)
-    swung = np.degrees(cable_angles(load.q_cable[seen]))
+    visible = view.visible(load.time_s)
+    cable_deg = np.degrees(cable_angles(load.q_cable[visible]))
     for i, (name, colour) in enumerate((("φ_L (towards y)", BLUE), ("θ_L (towards −x)", RED))):
-        draw(cable, load.time_s[seen], swung[:, i], color=colour, label=_letters(name))
-    seen = view.visible(attitude.time_s)
-    turned = np.degrees(roll_pitch_yaw(attitude.quat_wxyz[seen]))
+        draw(cable, load.time_s[visible], cable_deg[:, i], color=colour, label=_math_text(name))
+    visible = view.visible(attitude.time_s)
+    vehicle_deg = np.degrees(roll_pitch_yaw(attitude.quat_wxyz[visible]))
     for i, (name, colour) in enumerate((("roll", BLUE), ("pitch", RED), ("yaw", GREEN))):
-        draw(vehicle, attitude.time_s[seen], turned[:, i], color=colour, label=name)
+        draw(vehicle, attitude.time_s[visible], vehicle_deg[:, i], color=colour, label=name)
     for ax, title in ((cable, "Cable from vertical"), (vehicle, "Vehicle attitude")):
         ax.set_title(title)
         ax.set_ylabel("angle (°)")
-        _least_range(ax, 1.0)
+        _set_min_range(ax, 1.0)
         note_if_empty(ax)
-        key(ax)
+        draw_legend(ax)
     figure.subplots_adjust(hspace=0.3)
     view.shade((cable, vehicle))
     save(figure, path)
@@ -188,16 +190,16 @@ def angles(view: View, path: Target) -> None:
 
 def psi(view: View, path: Target) -> None:
     """Error functions of vehicle attitude and load attitude."""
-    figure, axes = rows(10.0, 5.0, 2)
+    figure, axes = new_axes_grid(10.0, 5.0, 2)
     cascade = view.telemetry.cascade
-    seen = view.visible(cascade.time_s)
+    visible = view.visible(cascade.time_s)
     for ax, values, name, title, colour in (
         (axes[0, 0], cascade.psi_R, "Ψ_R", "Vehicle attitude error function", BLUE),
         (axes[1, 0], cascade.psi_q, "Ψ_q", "Load attitude error function", RED),
     ):
-        draw(ax, cascade.time_s[seen], values[seen], color=colour)
+        draw(ax, cascade.time_s[visible], values[visible], color=colour)
         ax.set_title(title)
-        ax.set_ylabel(_letters(name))
+        ax.set_ylabel(_math_text(name))
         ax.set_ylim(bottom=0.0)
         note_if_empty(ax)
     figure.subplots_adjust(hspace=0.34)
@@ -209,7 +211,7 @@ def rotors(view: View, path: Target) -> None:
     """Commanded and true force of each rotor, its limits, and where a limit cut the command."""
     count = view.telemetry.rotors_truth.force_n.shape[1]
     lines = -(-count // 2)
-    figure, axes = rows(11.0, 2.9 * lines, lines, 2, share_y=True)
+    figure, axes = new_axes_grid(11.0, 2.9 * lines, lines, 2, share_y=True)
     for i, ax in enumerate(axes.flat):
         if i >= count:
             ax.set_visible(False)
@@ -221,15 +223,15 @@ def rotors(view: View, path: Target) -> None:
     figure.subplots_adjust(hspace=0.26)
     view.shade(axes[:, 0])
     view.shade(axes[: count // 2, 1])
-    key(axes[0, 1])
+    draw_legend(axes[0, 1])
     save(figure, path)
 
 
 def _rotor(view: View, ax: Any, i: int) -> None:
     true, commanded = view.telemetry.rotors_truth, view.telemetry.rotors_commanded
-    seen = view.visible(commanded.time_s)
-    t = commanded.time_s[seen]
-    draw(ax, t, commanded.force_n[seen, i], color=FAINT, linewidth=0.8, label="command")
+    visible = view.visible(commanded.time_s)
+    t = commanded.time_s[visible]
+    draw(ax, t, commanded.force_n[visible, i], color=FAINT, linewidth=0.8, label="command")
     of_truth = view.visible(true.time_s)
     draw(
         ax,
@@ -241,9 +243,9 @@ def _rotor(view: View, ax: Any, i: int) -> None:
     )
     note_if_empty(ax)
     _limits(view, ax)
-    cut = (commanded.saturated[seen] >> i & 1) == 1
-    least = _SEEN * (view.window[1] - view.window[0])
-    spans = true_spans(t, cut, least)
+    cut = (commanded.saturated[visible] >> i & 1) == 1
+    min_width_s = _MIN_MARK_SHARE * (view.window[1] - view.window[0])
+    spans = flagged_spans(t, cut, min_width_s)
     if spans:
         ax.broken_barh(
             spans,
@@ -269,12 +271,12 @@ def _limits(view: View, ax: Any) -> None:
 
 def tension(view: View, path: Target) -> None:
     """Cable tension over the whole flight, slack marked."""
-    figure, axes = rows(10.0, 3.6, 1)
+    figure, axes = new_axes_grid(10.0, 3.6, 1)
     ax = axes[0, 0]
     load, s = view.telemetry.load_truth, view.samples
     draw(ax, load.time_s, load.tension_n, color=PURPLE, label="tension")
-    begin, end = view.whole
-    slack = true_spans(load.time_s, load.taut == 0, _SEEN * (end - begin))
+    begin, end = view.whole_flight
+    slack = flagged_spans(load.time_s, load.taut == 0, _MIN_MARK_SHARE * (end - begin))
     if slack:
         ax.broken_barh(
             slack,
@@ -285,11 +287,11 @@ def tension(view: View, path: Target) -> None:
             linewidth=0.0,
             label="slack",
         )
-    went = np.append(False, np.diff(load.slack_events) != 0) & np.isin(s.phase, CARRIED)
-    if went.any():
+    went_slack = np.append(False, np.diff(load.slack_events) != 0) & np.isin(s.phase, CARRIED)
+    if went_slack.any():
         ax.plot(
-            load.time_s[went],
-            np.full(int(went.sum()), 0.08),
+            load.time_s[went_slack],
+            np.full(int(went_slack.sum()), 0.08),
             transform=ax.get_xaxis_transform(),
             linestyle="",
             marker="v",
@@ -301,8 +303,8 @@ def tension(view: View, path: Target) -> None:
     ax.set_ylabel("tension (N)")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     note_if_empty(ax)
-    key(ax)
-    view.shade((ax,), view.whole)
+    draw_legend(ax)
+    view.shade((ax,), view.whole_flight)
     save(figure, path)
 
 
@@ -313,10 +315,10 @@ def overview(view: View, path: Target) -> None:
     s = view.samples
     above = figure.add_axes((0.605, 0.51, 0.38, 0.32))
     below = figure.add_axes((0.605, 0.095, 0.38, 0.32), sharex=above)
-    seen = view.visible(s.time_s)
-    scale, unit = length_scale(s.error_m[seen])
+    visible = view.visible(s.time_s)
+    scale, unit = length_scale(s.error_m[visible])
     for i, colour in enumerate((RED, BLUE, GREEN)):
-        draw(above, s.time_s[seen], scale * s.error_m[seen, i], color=colour, label=AXES[i][0])
+        draw(above, s.time_s[visible], scale * s.error_m[visible, i], color=colour, label=AXES[i][0])
     above.set_title("Load position error")
     above.set_ylabel(f"true − desired ({unit})")
     above.tick_params(labelbottom=False)
@@ -334,7 +336,7 @@ def overview(view: View, path: Target) -> None:
         )
     for ax in (above, below):
         note_if_empty(ax)
-        key(ax)
+        draw_legend(ax)
     _limits(view, below)
     below.set_title("Rotor forces and limits")
     below.set_ylabel("force (N)")
@@ -356,7 +358,7 @@ def summary_line(record: Record) -> str:
     parts += [
         f"{name} {record[name]}" for name in ("law", "vehicle", "sensors", "seed") if record[name] is not None
     ]
-    worst, rms = (METRICS[name].read(record) for name in ("load_error_max_m", "load_error_rms_m"))
+    worst, rms = (METRICS[name].formatted(record) for name in ("load_error_max_m", "load_error_rms_m"))
     if record["load_error_max_m"] is not None:
         parts.append(f"load error max {worst}, RMS {rms}")
     if record["saturated_fraction"] is not None:
@@ -364,7 +366,7 @@ def summary_line(record: Record) -> str:
     return "  ·  ".join(parts)
 
 
-def _letters(name: str) -> str:
+def _math_text(name: str) -> str:
     """A letter with its subscript, Ψ_R, in the notation of matplotlib."""
     letters = {"Ψ": r"\Psi", "φ": r"\varphi", "θ": r"\theta"}
     symbol, _, rest = name.partition(" ")
@@ -372,12 +374,12 @@ def _letters(name: str) -> str:
     return f"${letters[letter]}_{index}$" + (f" {rest}" if rest else "")
 
 
-def _least_range(ax: Any, least: float) -> None:
-    """Make an axis span at least `least`, so that rounding noise does not fill the picture."""
+def _set_min_range(ax: Any, min_range: float) -> None:
+    """Make an axis span at least `min_range`, so that rounding noise does not fill the picture."""
     low, high = ax.get_ylim()
-    if high - low < least:
+    if high - low < min_range:
         middle = 0.5 * (low + high)
-        ax.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+        ax.set_ylim(middle - 0.5 * min_range, middle + 0.5 * min_range)
 
 
 class Picture:

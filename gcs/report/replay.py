@@ -21,7 +21,7 @@ from gcs.analysis.align import MAX_GAP_S, as_of, linear
 from gcs.analysis.axes import Floats, quat_enu_flu_from_ned_frd
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.samples import PHASE_NAMES, Samples, samples_of
-from gcs.analysis.tracks import Telemetry, numbers
+from gcs.analysis.tracks import Telemetry, rotor_names
 from gcs.report.packing import Column, pack
 from gcs.report.steps import step_texts
 from gcs.report.style import phase_spans
@@ -38,10 +38,10 @@ KINDS = {  # of phases: what the band behind a plot looks like
     mavlink.PLUMBLINE_PHASE_FAILSAFE: "alarm",
     mavlink.PLUMBLINE_PHASE_GUIDED: "busy",
 }
-MOST_ROWS = 30_000  # four minutes at 125 Hz
-_USUAL = "bebop"  # drawn if it is not known which vehicle flew
+MAX_ROWS = 30_000  # four minutes at 125 Hz
+_DEFAULT_VEHICLE = "bebop"  # drawn if it is not known which vehicle flew
 # steps to which numbers are rounded
-_PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
+_POSITION_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
 
 Json = dict[str, Any]
 
@@ -53,18 +53,18 @@ def replay_of(
 
     `columns` are the wanted columns, by the part of their name before the first underscore; None: all.
     """
-    true = bool(len(samples.time_s))
-    if not true:
-        telemetry = _believed(telemetry)
+    has_truth = bool(len(samples.time_s))
+    if not has_truth:
+        telemetry = _with_estimate_as_truth(telemetry)
         samples = samples_of(telemetry)
     setpoint = telemetry.setpoint
     return {
-        "source": "truth" if true else "estimate" if len(samples.time_s) else None,
+        "source": "truth" if has_truth else "estimate" if len(samples.time_s) else None,
         "span": list(telemetry.span_s or (0.0, 0.0)),
         "vehicle": layout_of(meta.vehicle),
-        "limits_n": _limits(telemetry),
+        "limits_n": _rotor_limits(telemetry),
         "phases": [
-            {"from": begin, "to": end, "name": _phase(phase), "kind": KINDS.get(phase, "none")}
+            {"from": begin, "to": end, "name": _phase_name(phase), "kind": KINDS.get(phase, "none")}
             for begin, end, phase in phase_spans(setpoint.time_s, setpoint.phase)
         ],
         "texts": [
@@ -94,17 +94,17 @@ def _tone(severity: int) -> str:
     return "warn" if severity == mavlink.MAV_SEVERITY_WARNING else ""
 
 
-def _phase(phase: int) -> str:
+def _phase_name(phase: int) -> str:
     return PHASE_NAMES.get(phase, str(phase)).replace("_", " ")
 
 
 def layout_of(vehicle: str | None) -> Json:
     """Positions of the rotors (body FRD, m), their directions of rotation (about the body's z axis) and
-    sizes; those of `_USUAL` if the vehicle's file no longer exists."""
+    sizes; those of `_DEFAULT_VEHICLE` if the vehicle's file no longer exists."""
     try:
-        flown: Vehicle = load_vehicle(vehicle or _USUAL)
+        flown: Vehicle = load_vehicle(vehicle or _DEFAULT_VEHICLE)
     except (VehicleFileError, OSError):
-        flown = load_vehicle(_USUAL)
+        flown = load_vehicle(_DEFAULT_VEHICLE)
     arm, z = flown.arm_m, -flown.rotor_height_m
     return {
         "rotors": [
@@ -128,7 +128,7 @@ def worst_moment(samples: Samples) -> Json | None:
     return {"time": round(float(samples.time_s[at]), 6), "error_m": float(distance[at])}
 
 
-def _believed(telemetry: Telemetry) -> Telemetry:
+def _with_estimate_as_truth(telemetry: Telemetry) -> Telemetry:
     return replace(
         telemetry,
         load_truth=telemetry.load_estimated,
@@ -137,7 +137,7 @@ def _believed(telemetry: Telemetry) -> Telemetry:
     )
 
 
-def _limits(telemetry: Telemetry) -> list[float] | None:
+def _rotor_limits(telemetry: Telemetry) -> list[float] | None:
     for track in (telemetry.rotors_commanded, telemetry.rotors_truth):
         if len(track.time_s) and np.isfinite(track.force_max_n[-1]) and np.isfinite(track.force_min_n[-1]):
             return [float(track.force_min_n[-1]), float(track.force_max_n[-1])]
@@ -167,59 +167,61 @@ def _wind(telemetry: Telemetry) -> list[list[float]]:
 
 
 def _columns(
-    telemetry: Telemetry, samples: Samples, wanted: Collection[str] | None
+    telemetry: Telemetry, samples: Samples, wanted_columns: Collection[str] | None
 ) -> tuple[list[Column], int]:
     """The columns, with a row without numbers within each gap, and the number of rows."""
     t, truth = samples.time_s, telemetry.load_truth
     rotors, commanded, cascade = telemetry.rotors_truth, telemetry.rotors_commanded, telemetry.cascade
     found = [
-        *_xyz("load", samples.actual_m, _PLACE_M),
-        *_xyz("vehicle", samples.vehicle_m, _PLACE_M),
-        *_xyz("asked", samples.asked_m, _PLACE_M),
-        *_xyz("flown_for", samples.desired_m, _PLACE_M),
-        *_xyz("believed", samples.estimated_m, _PLACE_M),
+        *_xyz("load", samples.actual_m, _POSITION_M),
+        *_xyz("vehicle", samples.vehicle_m, _POSITION_M),
+        *_xyz("asked", samples.requested_m, _POSITION_M),
+        *_xyz("flown_for", samples.desired_m, _POSITION_M),
+        *_xyz("believed", samples.estimated_m, _POSITION_M),
         *_xyz("velocity", samples.actual_m_s, _SPEED_M_S),
-        *_xyz("asked_velocity", samples.asked_m_s, _SPEED_M_S),
-        *_parts("quat", "wxyz", quat_enu_flu_from_ned_frd(samples.quat_wxyz), _UNIT),  # its own inverse
+        *_xyz("asked_velocity", samples.requested_m_s, _SPEED_M_S),
+        *_components("quat", "wxyz", quat_enu_flu_from_ned_frd(samples.quat_wxyz), _UNIT),  # its own inverse
         *_xyz("cable", truth.q_cable, _UNIT),
         Column("tension", np.where(samples.attached, truth.tension_n, np.nan), _FORCE_N),
-        *_parts("rotor", numbers(rotors), as_of(rotors.time_s, rotors.force_n, t), _FORCE_N),
-        *_parts("command", numbers(commanded), as_of(commanded.time_s, commanded.force_n, t), _FORCE_N),
+        *_components("rotor", rotor_names(rotors), as_of(rotors.time_s, rotors.force_n, t), _FORCE_N),
+        *_components(
+            "command", rotor_names(commanded), as_of(commanded.time_s, commanded.force_n, t), _FORCE_N
+        ),
         Column("psi_R", linear(cascade.time_s, cascade.psi_R, t), _PSI),
         Column("psi_q", linear(cascade.time_s, cascade.psi_q, t), _PSI),
         Column("taut", (truth.taut == 1).astype(np.float64), 1.0),
         Column("attached", samples.attached.astype(np.float64), 1.0),
         Column("scored", samples.position_tracked.astype(np.float64), 1.0),
     ]
-    kept = _kept(telemetry, samples)
+    kept = _kept_samples(telemetry, samples)
     t = t[kept]
-    gaps = np.flatnonzero(_ends(samples.time_s)[kept][:-1])
+    gaps = np.flatnonzero(_before_gaps(samples.time_s)[kept][:-1])
     columns = [
         Column("time", np.insert(t, gaps + 1, 0.5 * (t[gaps] + t[gaps + 1])), _TIME_S),
         *(
             Column(name, np.insert(values[kept], gaps + 1, np.nan), step)
             for name, values, step in found
-            if wanted is None or name.partition("_")[0] in wanted
+            if wanted_columns is None or name.partition("_")[0] in wanted_columns
         ),
     ]
     return columns, len(t) + len(gaps)
 
 
-def _ends(time_s: Floats) -> NDArray[np.bool_]:
+def _before_gaps(time_s: Floats) -> NDArray[np.bool_]:
     """(n,) True at the last sample before a gap."""
     return np.append(np.diff(time_s) > MAX_GAP_S, False)
 
 
-def _kept(telemetry: Telemetry, samples: Samples) -> NDArray[np.intp]:
+def _kept_samples(telemetry: Telemetry, samples: Samples) -> NDArray[np.intp]:
     """The samples that the page carries: all; of a long flight every `stride`-th, and besides the peaks of
     error and tension, both sides of each gap, and the moments at which the load leaves the cable."""
     n = len(samples.time_s)
-    stride = -(-n // MOST_ROWS)
+    stride = -(-n // MAX_ROWS)
     kept = np.zeros(n, dtype=np.bool_)
     kept[:: max(stride, 1)] = True
     if stride > 1:
-        ends = _ends(samples.time_s)
-        kept |= ends | np.roll(ends, 1)
+        before_gap = _before_gaps(samples.time_s)
+        kept |= before_gap | np.roll(before_gap, 1)
         kept[1:] |= np.diff(samples.attached)
         kept[-1] = True
         error = np.linalg.norm(samples.error_m, axis=1)
@@ -232,8 +234,8 @@ def _kept(telemetry: Telemetry, samples: Samples) -> NDArray[np.intp]:
 
 
 def _xyz(name: str, values: Floats, step: float) -> list[Column]:
-    return _parts(name, "xyz", values, step)
+    return _components(name, "xyz", values, step)
 
 
-def _parts(name: str, parts: Sequence[str], values: Floats, step: float) -> list[Column]:
+def _components(name: str, parts: Sequence[str], values: Floats, step: float) -> list[Column]:
     return [Column(f"{name}_{part}", values[:, i], step) for i, part in enumerate(parts)]

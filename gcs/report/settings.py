@@ -10,7 +10,7 @@ from autopilot.wire.parameter_table import ParameterTable
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.tracks import Telemetry
 
-_USUAL = "bebop"
+_DEFAULT_VEHICLE = "bebop"
 
 
 class Setting(NamedTuple):
@@ -23,12 +23,12 @@ class Setting(NamedTuple):
 
 def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
     """Parameters set on the command line, and those that the vehicle reported as not the default."""
-    told = {**telemetry.parameters, **meta.settings}
-    tables = _tables(meta.vehicle or _USUAL) if told else ()
+    values = {**telemetry.parameters, **meta.settings}
+    tables = _tables(meta.vehicle or _DEFAULT_VEHICLE) if values else ()
     found = []
-    for name, value in sorted(told.items()):
+    for name, value in sorted(values.items()):
         default = _default(name, tables)
-        if name not in meta.settings and (default is None or _same(value, default)):
+        if name not in meta.settings and (default is None or _is_equal(value, default)):
             continue
         found.append(Setting(name, _number(value), None if default is None else _number(default)))
     return found
@@ -36,7 +36,7 @@ def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
 
 def unchanged_settings(names: Iterable[str], telemetry: Telemetry, meta: FlightMeta) -> dict[str, str]:
     """The values of these parameters that the vehicle reported, else their defaults if known."""
-    tables = _tables(meta.vehicle or _USUAL)
+    tables = _tables(meta.vehicle or _DEFAULT_VEHICLE)
     known = {name: telemetry.parameters.get(name, _default(name, tables)) for name in names}
     return {name: _number(value) for name, value in known.items() if value is not None}
 
@@ -57,7 +57,7 @@ def _tables(vehicle: str) -> tuple[ParameterTable, ...]:
         return ()
 
 
-def _same(value: float | str, default: float) -> bool:
+def _is_equal(value: float | str, default: float) -> bool:
     """Whether they are equal except for the rounding to single precision on the wire; true for a text."""
     return isinstance(value, str) or abs(value - default) <= 1e-6 * max(abs(default), 1e-6)
 

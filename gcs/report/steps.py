@@ -24,7 +24,7 @@ from missions.model import (
     Winch,
 )
 
-_MOST_TERMS = 3  # of a signal: further terms are only counted
+_MAX_TERMS = 3  # of a signal: further terms are only counted
 
 
 class StepText(NamedTuple):
@@ -41,22 +41,22 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
         found = located_steps(items, home)
     except MissionItemError:
         return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
-    texts, alone = [], False
+    texts, released = [], False
     for one in found:
-        texts.append(StepText(one.first, one.last, describe(one.step, alone)))
-        alone = alone or isinstance(one.step, Release)
+        texts.append(StepText(one.first, one.last, describe(one.step, released)))
+        released = released or isinstance(one.step, Release)
     return texts
 
 
-def describe(step: Step, alone: bool) -> str:
-    """One step as a sentence without a full stop; `alone`: the vehicle has released the load."""
+def describe(step: Step, released: bool) -> str:
+    """One step as a sentence without a full stop; `released`: the vehicle has released the load."""
     match step:
         case Takeoff():
-            return f"Take off{'' if alone else ', lift the load'} to {_m(step.altitude_m)}"
+            return f"Take off{'' if released else ', lift the load'} to {_m(step.altitude_m)}"
         case Waypoint():
             place = f"{_m(step.east_m)} east, {_m(step.north_m)} north, {_m(step.altitude_m)} up"
             held = f", hold for {step.hold_s:g} s" if step.hold_s > 0.0 else ""
-            return f"{'Fly' if alone else 'Carry the load'} to {place}{held}"
+            return f"{'Fly' if released else 'Carry the load'} to {place}{held}"
         case Speed():
             return f"From here on at most {step.speed_m_s:g} m/s"
         case Delay():
@@ -64,20 +64,20 @@ def describe(step: Step, alone: bool) -> str:
         case ReturnHome():
             return "Return to home"
         case Land():
-            return "Land" if alone else "Set the load down and land"
+            return "Land" if released else "Set the load down and land"
         case Release():
             return "Release the load"
         case Winch():
-            pace = "" if step.speed_m_s is None else f" at {step.speed_m_s:g} m/s"
-            return f"Make the cable {_m(abs(step.length_m))} {_longer(step.length_m)}{pace}"
+            speed = "" if step.speed_m_s is None else f" at {step.speed_m_s:g} m/s"
+            return f"Make the cable {_m(abs(step.length_m))} {_longer(step.length_m)}{speed}"
         case Signals():
             return f"Fly signals for {step.duration_s:g} s: {_terms(step.terms)}"
         case AttitudeRun():
-            return _swing(step)
+            return _attitude_run(step)
 
 
 def _terms(terms: Sequence[Term]) -> str:
-    named = [_term(term) for term in terms[:_MOST_TERMS]]
+    named = [_term(term) for term in terms[:_MAX_TERMS]]
     more = len(terms) - len(named)
     return "; ".join([*named, *([f"and {more} more"] if more else [])])
 
@@ -87,7 +87,7 @@ def _term(term: Term) -> str:
     return f"{_m(term.amplitude_m)} along {term.axis}{sines}"
 
 
-def _swing(step: AttitudeRun) -> str:
+def _attitude_run(step: AttitudeRun) -> str:
     what = "cable" if step.controlled == "load" else "vehicle"
     tilt = math.degrees(math.hypot(step.tilt_north_rad, step.tilt_east_rad))
     return f"Lean the {what} by {tilt:.3g}° and back within {step.duration_s:g} s"

@@ -109,7 +109,9 @@ def save(figure: Any, path: Target) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
 
 
-def rows(width_in: float, height_in: float, count: int, columns: int = 1, *, share_y: bool = False) -> Any:
+def new_axes_grid(
+    width_in: float, height_in: float, count: int, columns: int = 1, *, share_y: bool = False
+) -> Any:
     """A figure and its (count, columns) axes over one time axis."""
     figure = new_figure(width_in, height_in)
     axes = figure.subplots(count, columns, sharex=True, sharey=share_y, squeeze=False)
@@ -126,11 +128,11 @@ def rows(width_in: float, height_in: float, count: int, columns: int = 1, *, sha
     return figure, axes
 
 
-def draw(ax: Any, time_s: Floats, values: Floats, **how: Any) -> None:
+def draw(ax: Any, time_s: Floats, values: Floats, **line_style: Any) -> None:
     """Draw a thinned line of the finite values; no line if there are none."""
     t, v = thinned(time_s, np.where(np.isfinite(values), values, np.nan))
     if np.isfinite(v).any():
-        ax.plot(t, v, **how)
+        ax.plot(t, v, **line_style)
 
 
 def thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -161,7 +163,7 @@ def note_if_empty(ax: Any, text: str = "not in the log") -> None:
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
-def key(ax: Any, columns: int = 4) -> None:
+def draw_legend(ax: Any, columns: int = 4) -> None:
     """Draw the legend above the right end of the axes, where it hides no data."""
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.25)
@@ -171,12 +173,14 @@ def phase_spans(time_s: Floats, phase: Ints) -> list[tuple[float, float, int]]:
     """(begin, end, phase) of each stretch of one phase; a stretch ends where the next one begins."""
     if len(time_s) == 0:
         return []
-    begins = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
-    ends = np.append(begins[1:], len(time_s) - 1)
-    return [(float(time_s[b]), float(time_s[e]), int(phase[b])) for b, e in zip(begins, ends, strict=True)]
+    starts = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
+    ends = np.append(starts[1:], len(time_s) - 1)
+    return [(float(time_s[b]), float(time_s[e]), int(phase[b])) for b, e in zip(starts, ends, strict=True)]
 
 
-def bands(axes: list[Any], spans: list[tuple[float, float, int]], limits: tuple[float, float]) -> None:
+def draw_phase_bands(
+    axes: list[Any], spans: list[tuple[float, float, int]], limits: tuple[float, float]
+) -> None:
     """Draw phases as shaded bands behind all axes; the first show their names above the data, if they fit."""
     low, high = axes[0].get_ylim()
     axes[0].set_ylim(low, high + _HEADROOM * (high - low))
@@ -204,14 +208,14 @@ def bands(axes: list[Any], spans: list[tuple[float, float, int]], limits: tuple[
             )
 
 
-def true_spans(time_s: Floats, flags: NDArray[np.bool_], least_s: float) -> list[tuple[float, float]]:
-    """(begin, width) of each stretch of set flags, at least `least_s` wide so that one sample is visible."""
+def flagged_spans(time_s: Floats, flags: NDArray[np.bool_], min_width_s: float) -> list[tuple[float, float]]:
+    """(begin, width) of each stretch of set flags, at least `min_width_s` wide so that one is visible."""
     if not flags.any():
         return []
     edges = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     last = len(time_s) - 1
     return [
-        (float(time_s[b]), max(float(time_s[int(e) if e < last else last] - time_s[b]), least_s))
-        for b, e in zip(begins, ends, strict=True)
+        (float(time_s[b]), max(float(time_s[int(e) if e < last else last] - time_s[b]), min_width_s))
+        for b, e in zip(starts, ends, strict=True)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gcs.analysis.definitions import told
+from gcs.analysis.definitions import known_groups
 from gcs.analysis.record import Record
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ def record_table(record: Record) -> Table:
     table.add_column(style="dim")
     table.add_column()
     table.add_column(justify="right")
-    for group, known in told(record):
+    for group, known in known_groups(record):
         for i, metric in enumerate(known):
             # values are data, not markup: a mission path may contain brackets
-            value = Text(metric.read(record))
+            value = Text(metric.formatted(record))
             if metric.name == "outcome":
                 value.stylize(_OUTCOME_STYLES.get(str(record[metric.name]), "bold yellow"))
             head = (group.title, group.window)[i] if i < 2 else ""

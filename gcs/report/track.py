@@ -12,54 +12,60 @@ from gcs.analysis.samples import Samples
 from gcs.report.style import GREY, INK, PALE, SHADOW, length_scale
 
 _SNAPSHOTS = 7
-_APART = 0.1  # of the diagonal of the box: least distance between two snapshots
+_MIN_DISTANCE = 0.1  # of the diagonal of the box: least distance between two snapshots
 _ARM = 0.05  # of the longest side of the box: length of the arms as drawn, longer than they are
 _POINTS = 1500  # of a line in space: each segment is projected and coloured separately
-_LONGEST = 3.5  # greatest ratio of the longest to the shortest side of the box; beyond, axes are not to scale
-_LEAST_M = 1.2  # least side of the box
+_MAX_ASPECT = (
+    3.5  # greatest ratio of the longest to the shortest side of the box; beyond, axes are not to scale
+)
+_MIN_SIDE_M = 1.2  # least side of the box
 _NEAR_GROUND = 0.25  # of the height of the box: a box that is closer to the ground extends to it
 _FAR_M = 1e3  # a flight that was lost may end anywhere; points farther away are not drawn
-_BESIDE, _ABOVE, _BELOW = 0.07, 0.03, 0.12  # of a room: the space around the box, for ticks and labels
+_SIDE_MARGIN, _TOP_MARGIN, _BOTTOM_MARGIN = (
+    0.07,
+    0.03,
+    0.12,
+)  # of a rectangle: the space around the box, for ticks and labels
 
 Indices = NDArray[np.intp]
-Room = tuple[float, float, float, float]  # left, bottom, width, height, as parts of the figure
+Rectangle = tuple[float, float, float, float]  # left, bottom, width, height, as parts of the figure
 
 
-def snapshots(position: Floats, apart: float) -> list[int]:
-    """Indices of positions (n, 3) more than `apart` from each other: each the farthest from all before it."""
+def snapshots(position: Floats, min_distance: float) -> list[int]:
+    """Indices of positions (n, 3) more than `min_distance` apart: each the farthest from all before it."""
     if len(position) == 0:
         return []
     chosen = [0]
     distance = np.linalg.norm(position - position[0], axis=1)
     while len(chosen) < _SNAPSHOTS:
         farthest = int(np.argmax(distance))
-        if distance[farthest] <= apart:
+        if distance[farthest] <= min_distance:
             break
         chosen.append(farthest)
         distance = np.minimum(distance, np.linalg.norm(position - position[farthest], axis=1))
     return chosen
 
 
-def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> None:
-    """Desired and true path of the load, coloured by error in the mission; rooms are parts of the figure."""
+def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangle: Rectangle) -> None:
+    """Desired and true path of the load, coloured by error; rectangles are shares of the figure."""
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    ax = figure.add_axes(room, projection="3d")
+    ax = figure.add_axes(rectangle, projection="3d")
     known = np.asarray((np.abs(samples.actual_m) < _FAR_M).all(axis=1))  # false for NaN
     mission = known & samples.in_mission
     if not known.any():
         ax.set_axis_off()
         ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
         return
-    low, high = _frame(ax, samples, np.flatnonzero(mission if mission.any() else known))
-    _fit(figure, ax, room, low, high)
+    low, high = _set_limits(ax, samples, np.flatnonzero(mission if mission.any() else known))
+    _fill_rectangle(figure, ax, rectangle, low, high)
 
-    whole = _thin(np.flatnonzero(known))
+    shown = _thin(np.flatnonzero(known))
     # matplotlib does not cut lines in space at the box
-    quiet = samples.actual_m[whole]
-    beyond = np.any((quiet < low) | (quiet > high), axis=1, keepdims=True)
-    ax.plot(*np.where(beyond, np.nan, quiet).T, color=GREY, linewidth=0.9, alpha=0.7)
+    whole_path = samples.actual_m[shown]
+    outside = np.any((whole_path < low) | (whole_path > high), axis=1, keepdims=True)
+    ax.plot(*np.where(outside, np.nan, whole_path).T, color=GREY, linewidth=0.9, alpha=0.7)
     path = samples.actual_m[_thin(np.flatnonzero(mission))]
     ax.plot(path[:, 0], path[:, 1], np.full(len(path), low[2]), color=SHADOW, linewidth=1.6, zorder=0)
     tracked = _thin(np.flatnonzero(mission & np.isfinite(samples.desired_m).all(axis=1)))
@@ -78,11 +84,11 @@ def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> Non
         )
         coloured.set_array(0.5 * (error[:-1] + error[1:]))
         ax.add_collection3d(coloured, autolim=False)
-        bar = figure.colorbar(coloured, cax=figure.add_axes(bar_room))
+        bar = figure.colorbar(coloured, cax=figure.add_axes(bar_rectangle))
         bar.set_label(f"load position error ({unit})", fontsize=9)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=8, length=0)
-    _hang(ax, samples, np.flatnonzero(mission if mission.any() else known), low, high)
+    _draw_vehicles(ax, samples, np.flatnonzero(mission if mission.any() else known), low, high)
     # the box is turned: its corners may be outside the rectangle of the axes, at which Matplotlib would cut
     for artist in (*ax.lines, *ax.collections):
         artist.set_clip_on(False)
@@ -92,13 +98,13 @@ def _thin(index: Indices) -> Indices:
     return index[:: max(1, len(index) // _POINTS)]
 
 
-def _frame(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
+def _set_limits(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
     """Set the limits around load and vehicle, to scale unless the scene is very long; return the least and
     the greatest corner."""
     points = np.concatenate((samples.actual_m[shown], samples.vehicle_m[shown]))
     points = points[(np.abs(points) < _FAR_M).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
-    size = np.maximum(1.1 * (high - low), _LEAST_M)
+    size = np.maximum(1.1 * (high - low), _MIN_SIDE_M)
     middle = 0.5 * (low + high)
     low, high = middle - 0.5 * size, middle + 0.5 * size
     if 0.0 < low[2] < _NEAR_GROUND * size[2]:
@@ -126,8 +132,8 @@ def _ticks() -> Any:
     return MaxNLocator(nbins=5, steps=[1, 2, 5, 10])
 
 
-def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
-    """Zoom and move the axes so that the box, whatever its shape, fills its room except for the labels."""
+def _fill_rectangle(figure: Any, ax: Any, rectangle: Rectangle, low: Floats, high: Floats) -> None:
+    """Zoom and move the axes so that the box, whatever its shape, fills its rectangle except for labels."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)]).T
@@ -140,29 +146,34 @@ def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
         return placed.min(axis=0), placed.max(axis=0)
 
     least, greatest = extent()
-    wanted = np.array(room[2:]) * (1.0 - 2.0 * _BESIDE, 1.0 - _ABOVE - _BELOW)
-    ax.set_box_aspect(ax._box_aspect, zoom=float((wanted / (greatest - least)).min()))
+    target_size = np.array(rectangle[2:]) * (1.0 - 2.0 * _SIDE_MARGIN, 1.0 - _TOP_MARGIN - _BOTTOM_MARGIN)
+    ax.set_box_aspect(ax._box_aspect, zoom=float((target_size / (greatest - least)).min()))
     # set_box_aspect normalises again: the shape stays the same, the size changes
     least, greatest = extent()
-    middle = np.array(room[:2]) + 0.5 * np.array(room[2:]) * (1.0, 1.0 + _BELOW - _ABOVE)
+    middle = np.array(rectangle[:2]) + 0.5 * np.array(rectangle[2:]) * (
+        1.0,
+        1.0 + _BOTTOM_MARGIN - _TOP_MARGIN,
+    )
     x, y = middle - 0.5 * (least + greatest)
-    ax.set_position((room[0] + x, room[1] + y, room[2], room[3]))
+    ax.set_position((rectangle[0] + x, rectangle[1] + y, rectangle[2], rectangle[3]))
 
 
-def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
+def _draw_vehicles(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
     """Draw vehicle, cable and load at some instants; after a release, the vehicle and its path."""
     box = _box(high - low)
     stretch = (high - low) / box
     mission = mission[np.isfinite(samples.vehicle_m[mission]).all(axis=1)]
-    apart = _APART * float(np.linalg.norm(box))
-    carried, alone = mission[samples.attached[mission]], mission[~samples.attached[mission]]
-    hanging = carried[snapshots(samples.actual_m[carried] / stretch, apart)]
+    min_distance = _MIN_DISTANCE * float(np.linalg.norm(box))
+    carried, released = mission[samples.attached[mission]], mission[~samples.attached[mission]]
+    hanging = carried[snapshots(samples.actual_m[carried] / stretch, min_distance)]
     for index in hanging:
         load, vehicle = samples.actual_m[index], samples.vehicle_m[index]
         ax.plot(*np.stack((load, vehicle)).T, color=GREY, linewidth=0.9, zorder=5)
         ax.plot(*load[:, None], marker="o", markersize=5, color=INK, zorder=6)
-    ax.plot(*samples.vehicle_m[_thin(alone)].T, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
-    chosen = np.concatenate((hanging, alone[snapshots(samples.vehicle_m[alone] / stretch, apart)]))
+    ax.plot(*samples.vehicle_m[_thin(released)].T, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
+    chosen = np.concatenate(
+        (hanging, released[snapshots(samples.vehicle_m[released] / stretch, min_distance)])
+    )
     # arms keep their shape in the picture if the axes are not to scale
     reach = _ARM * float(box.max()) * stretch
     forward, left = body_axes(samples.quat_wxyz[chosen])
@@ -177,4 +188,4 @@ def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats
 
 def _box(size: Floats) -> Floats:
     """(3,) sides of the box as drawn: those of the scene, the longest shortened."""
-    return np.asarray(np.minimum(size, _LONGEST * size.min()))
+    return np.asarray(np.minimum(size, _MAX_ASPECT * size.min()))

@@ -9,7 +9,7 @@ import io
 from collections.abc import Callable
 from importlib import import_module
 
-_NEEDED = (
+_LIBRARIES = (
     "gcs.analysis.parquet",
     "gcs.report.build",
     "gcs.report.draw",
@@ -19,27 +19,27 @@ _NEEDED = (
     "rich.console",
     "rich.table",
 )
-_DRAWN_WITH = ("matplotlib.backends.backend_agg", "mpl_toolkits.mplot3d")
+_DRAWING_LIBRARIES = ("matplotlib.backends.backend_agg", "mpl_toolkits.mplot3d")
 
 
-def load(enough: Callable[[], bool] = lambda: False) -> None:
-    """Import what a report is made with, until `enough` is true: the rest is imported when it is needed."""
-    for name in _NEEDED:
-        if enough():
+def load_libraries(is_enough: Callable[[], bool] = lambda: False) -> None:
+    """Import what a report is made with, until `is_enough` is true: the rest is imported when needed."""
+    for name in _LIBRARIES:
+        if is_enough():
             return
         import_module(name)
 
 
 def load_drawing() -> None:
     """Import what pictures are drawn with."""
-    for name in _DRAWN_WITH:
+    for name in _DRAWING_LIBRARIES:
         import_module(name)
 
 
 def main() -> None:
     """Import everything and draw an empty picture."""
     print("matplotlib", flush=True)
-    load()
+    load_libraries()
     load_drawing()
     from matplotlib.figure import Figure
 

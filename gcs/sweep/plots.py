@@ -8,7 +8,20 @@ from typing import Any
 import numpy as np
 
 from gcs.analysis.axes import Floats
-from gcs.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, RED, key, new_figure, save, style
+from gcs.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    PURPLE,
+    RED,
+    draw_legend,
+    new_figure,
+    save,
+    style,
+)
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Cells, Flights, cells
 
@@ -105,7 +118,7 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
         right.yaxis.set_minor_formatter(NullFormatter())
         for ax in (left, right):
             ax.set_xlabel(_label(name, units))
-            key(ax)
+            draw_legend(ax)
         figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
         save(figure, path)
 

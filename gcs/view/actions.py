@@ -18,15 +18,15 @@ from gcs.clients import command
 from gcs.clients.modes import change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterSet
-from gcs.view.controls import NAMES
+from gcs.view.controls import SLIDER_NAMES
 from gcs.view.vehicle import WatchedVehicle
 
 Arguments = Mapping[str, Any]
 Action = Callable[[WatchedVehicle, Arguments], list[Operation]]
 
-_FARTHEST_M = 1000.0
-_STRONGEST_M_S = 30.0
-_LONGEST_S = 10.0
+_MAX_DISTANCE_M = 1000.0
+_MAX_GUST_M_S = 30.0
+_MAX_GUST_S = 10.0
 _GRIPPER_RELEASE, _GRIPPER_GRAB = 0.0, 1.0
 _MOTOR, _OK, _OFF = 101.0, 0.0, 1.0  # of INJECT_FAILURE
 
@@ -54,11 +54,11 @@ def _number(arguments: Arguments, name: str, low: float, high: float) -> float:
     return float(value)
 
 
-def _single(make: Callable[..., Operation]) -> Action:
+def _command_action(make: Callable[..., Operation]) -> Action:
     return lambda vehicle, arguments: [make(vehicle.target)]
 
 
-def _begin(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
+def _start_mission(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     """Fly the mission; a vehicle on the ground is armed first."""
     start = command.start_mission(vehicle.target)
     return [start] if vehicle.view.armed else [command.arm(vehicle.target), start]
@@ -80,7 +80,7 @@ def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     if not isinstance(place, list) or len(place) != 3:
         raise ActionError("place: must be [north, east, down]")
     named = dict(zip(("north", "east", "down"), place, strict=True))
-    north, east, down = (_number(named, name, -_FARTHEST_M, _FARTHEST_M) for name in named)
+    north, east, down = (_number(named, name, -_MAX_DISTANCE_M, _MAX_DISTANCE_M) for name in named)
     places = zip(
         (north, east, down), vehicle.offset, strict=True
     )  # the place in the picture, and that of the vehicle's home
@@ -90,27 +90,27 @@ def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     return [command.reposition(vehicle.target, latitude, longitude, -down)]
 
 
-def _set(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
+def _set_parameter(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     """Set the parameter of one of the sliders."""
     name = arguments.get("name")
-    if not isinstance(name, str) or name not in NAMES:
+    if not isinstance(name, str) or name not in SLIDER_NAMES:
         raise ActionError("name: must be that of a slider")
     return [ParameterSet(vehicle.target, name, _number(arguments, "value", -1e4, 1e4))]
 
 
-def _push(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
+def _gust(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     """A gust of `seconds` with the speed `north`, `east` in m/s."""
     speed = {
-        "SIM_GUST_N": _number(arguments, "north", -_STRONGEST_M_S, _STRONGEST_M_S),
-        "SIM_GUST_E": _number(arguments, "east", -_STRONGEST_M_S, _STRONGEST_M_S),
+        "SIM_GUST_N": _number(arguments, "north", -_MAX_GUST_M_S, _MAX_GUST_M_S),
+        "SIM_GUST_E": _number(arguments, "east", -_MAX_GUST_M_S, _MAX_GUST_M_S),
         "SIM_GUST_U": 0.0,
-        "SIM_GUST_FOR_S": _number(arguments, "seconds", 0.1, _LONGEST_S),
+        "SIM_GUST_FOR_S": _number(arguments, "seconds", 0.1, _MAX_GUST_S),
     }
     settings: list[Operation] = [ParameterSet(vehicle.target, name, value) for name, value in speed.items()]
     return [*settings, ParameterSet(vehicle.target, "SIM_GUST_NOW", 1.0)]
 
 
-def _fail(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
+def _set_rotor_failure(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     """Stop `rotor` (counted from 1), or let it run again."""
     rotor = _number(arguments, "rotor", 1, MOST)
     failure = _OFF if arguments.get("failed") is True else _OK
@@ -128,18 +128,18 @@ def _gripper(name: str, action: float) -> Action:
 
 
 ACTIONS: dict[str, Action] = {
-    "arm": _single(command.arm),
-    "disarm": _single(command.disarm),
-    "start": _begin,
+    "arm": _command_action(command.arm),
+    "disarm": _command_action(command.disarm),
+    "start": _start_mission,
     "takeoff": _take_off,
-    "hold": _single(command.pause),
-    "resume": _single(command.resume),
+    "hold": _command_action(command.pause),
+    "resume": _command_action(command.resume),
     "return": _return,
-    "land": _single(command.land),
+    "land": _command_action(command.land),
     "goto": _go_to,
-    "set": _set,
-    "push": _push,
-    "fail": _fail,
+    "set": _set_parameter,
+    "push": _gust,
+    "fail": _set_rotor_failure,
     "release": _gripper("release", _GRIPPER_RELEASE),
     "grab": _gripper("grab", _GRIPPER_GRAB),
 }

@@ -32,6 +32,6 @@ SLIDERS = (
     Slider("SIM_NOISE_SCALE", "Noise of the sensors", "×", 0.0, 10.0, 0.5, 1.0),
     Slider("SIM_LOSS_PCT", "Losses of the ground link", "%", 0.0, 60.0, 5.0, 0.0),
 )
-NAMES = {slider.name for slider in SLIDERS}
+SLIDER_NAMES = {slider.name for slider in SLIDERS}
 # further parameters that the page shows or draws
-READ = ("VEH_ARM_LEN", "VEH_CABLE_LEN", "SIM_ENGINE_FAIL", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")
+SHOWN_PARAMETERS = ("VEH_ARM_LEN", "VEH_CABLE_LEN", "SIM_ENGINE_FAIL", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")

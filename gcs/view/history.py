@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 SAMPLE_S = 0.05  # of the vehicle's clock
-MOST = 12_000  # samples; beyond this, every other one of the older half is deleted
+MAX_SAMPLES = 12_000  # samples; beyond this, every other one of the older half is deleted
 FIELDS = (
     *("time", "load", "position", "asked", "error", "tension"),
     *("swing", "velocity", "use", "estimator_error", "pace"),
@@ -18,7 +18,7 @@ class History:
     def __init__(self) -> None:
         self.samples: list[list[Any]] = []
 
-    def due(self, time_s: float | None) -> bool:
+    def is_due(self, time_s: float | None) -> bool:
         """Whether the next sample is due.
 
         If the clock jumps back, the vehicle was restarted, and the samples so far are deleted.
@@ -29,7 +29,7 @@ class History:
             self.samples.clear()
         return not self.samples or time_s >= self.samples[-1][0] + SAMPLE_S - 1e-6
 
-    def take(self, state: dict[str, Any]) -> list[Any]:
+    def add(self, state: dict[str, Any]) -> list[Any]:
         """Store a sample of a vehicle's state and return it, in the order of FIELDS."""
         load, rotors = state["load"], state["rotors"]
         sample = [
@@ -46,7 +46,7 @@ class History:
             state["link"]["pace"],
         ]
         self.samples.append(sample)
-        if len(self.samples) > MOST:
-            older = self.samples[: MOST // 2]
-            self.samples[: MOST // 2] = older[::2]
+        if len(self.samples) > MAX_SAMPLES:
+            older = self.samples[: MAX_SAMPLES // 2]
+            self.samples[: MAX_SAMPLES // 2] = older[::2]
         return sample

@@ -13,33 +13,33 @@ _GAP = 128  # of sequence numbers: a gap of this size or more is a restart
 
 
 class LinkQuality:
-    """Updated by `heard` and `clock`; `record` gives the figures."""
+    """Updated by `on_message` and `on_clock`; `record` gives the figures."""
 
     def __init__(self) -> None:
-        self.heard_us: int | None = None
+        self.last_received_us: int | None = None
         self._sequences: dict[int, int] = {}  # the last of each component
         self._window_us = 0
-        self._came = self._missed = 0  # in this window
+        self._received = self._missed = 0  # in this window
         self._rate = 0.0
         self._loss = 0.0
         self._clocks: deque[tuple[int, int]] = deque(maxlen=512)  # our time, the vehicle's
 
-    def heard(self, one: Received, now_us: int) -> None:
+    def on_message(self, one: Received, now_us: int) -> None:
         """Count one message."""
-        self.heard_us = now_us
+        self.last_received_us = now_us
         last = self._sequences.get(one.component)
         self._sequences[one.component] = one.sequence
         if last is not None:
             gap = (one.sequence - last - 1) & 0xFF
             self._missed += gap if gap < _GAP else 0
-        self._came += 1
+        self._received += 1
         if now_us - self._window_us >= _SPAN_US:
             span_s = (now_us - self._window_us) * 1e-6
-            self._rate = self._came / span_s if self._window_us else 0.0
-            self._loss = self._missed / (self._came + self._missed)
-            self._window_us, self._came, self._missed = now_us, 0, 0
+            self._rate = self._received / span_s if self._window_us else 0.0
+            self._loss = self._missed / (self._received + self._missed)
+            self._window_us, self._received, self._missed = now_us, 0, 0
 
-    def clock(self, vehicle_us: int, now_us: int) -> None:
+    def on_clock(self, vehicle_us: int, now_us: int) -> None:
         """Note the time of the vehicle's clock."""
         if self._clocks and (vehicle_us < self._clocks[-1][1] or now_us < self._clocks[-1][0]):
             self._clocks.clear()
@@ -53,14 +53,14 @@ class LinkQuality:
         """Seconds of the vehicle's clock per second of ours."""
         if len(self._clocks) < 2:
             return None
-        (began_us, first_us), (now_us, last_us) = self._clocks[0], self._clocks[-1]
-        if now_us - began_us < 100_000:
+        (start_us, first_us), (now_us, last_us) = self._clocks[0], self._clocks[-1]
+        if now_us - start_us < 100_000:
             return None
-        return (last_us - first_us) / (now_us - began_us)
+        return (last_us - first_us) / (now_us - start_us)
 
     def record(self, now_us: int) -> dict[str, Any]:
         """age (s), loss (0 ... 1), rate (messages per second), pace, lost (whether silent for too long)."""
-        age_us = 0 if self.heard_us is None else max(0, now_us - self.heard_us)
+        age_us = 0 if self.last_received_us is None else max(0, now_us - self.last_received_us)
         pace = self.pace
         return {
             "age": round(age_us * 1e-6, 2),

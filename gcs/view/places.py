@@ -15,13 +15,13 @@ _POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: "inclusion",
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: "exclusion",
 }
-_PLACED = {
+_POSITION_COMMANDS = {
     mavlink.MAV_CMD_NAV_TAKEOFF,
     mavlink.MAV_CMD_NAV_WAYPOINT,
     mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
     mavlink.MAV_CMD_NAV_LAND,
 }
-_HEIGHTS = {  # by frame: whether its heights are above home
+_HEIGHT_ABOVE_HOME = {  # by frame: whether its heights are above home
     mavlink.MAV_FRAME_GLOBAL: False,
     mavlink.MAV_FRAME_GLOBAL_INT: False,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
@@ -41,14 +41,14 @@ def fence_record(
     corners: list[list[float]] = []
     for item in items:
         if item.command in _POLYGONS:
-            corners.append(_spot(item, home))
+            corners.append(_north_east(item, home))
             if len(corners) == item.param1:
                 zones.append({"kind": _POLYGONS[item.command], "polygon": corners})
                 corners = []
         elif item.command in _CIRCLES and 0.0 < item.param1 < inf:
             zone = {
                 "kind": _CIRCLES[item.command],
-                "centre": _spot(item, home),
+                "centre": _north_east(item, home),
                 "radius": round(item.param1, 3),
             }
             zones.append(zone)
@@ -61,22 +61,28 @@ def fence_record(
 
 def rally_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
     """Positions of the rally points on the ground: their heights are not used."""
-    return [[*_spot(item, home), 0.0] for item in items if item.command == mavlink.MAV_CMD_NAV_RALLY_POINT]
+    return [
+        [*_north_east(item, home), 0.0] for item in items if item.command == mavlink.MAV_CMD_NAV_RALLY_POINT
+    ]
 
 
 def waypoints_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
     """The positions that a mission specifies, in order, beginning with home; not the path between them."""
     places: list[list[float]] = [[0.0, 0.0, 0.0]]
     for item in items:
-        if item.command not in _PLACED or item.frame not in _HEIGHTS or not -inf < item.z < inf:
+        if (
+            item.command not in _POSITION_COMMANDS
+            or item.frame not in _HEIGHT_ABOVE_HOME
+            or not -inf < item.z < inf
+        ):
             continue
-        north, east = _spot(item, home) if item.x or item.y else places[-1][:2]
-        ground = 0.0 if _HEIGHTS[item.frame] else home.altitude_m
+        north, east = _north_east(item, home) if item.x or item.y else places[-1][:2]
+        ground = 0.0 if _HEIGHT_ABOVE_HOME[item.frame] else home.altitude_m
         height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else item.z - ground
         places.append([north, east, round(-height, 3)])
     return places if len(places) > 1 else []
 
 
-def _spot(item: WireItem, home: Home) -> list[float]:
+def _north_east(item: WireItem, home: Home) -> list[float]:
     north, east, _ = ned_from_enu(enu_from_geodetic(round(item.x), round(item.y), 0, home))
     return [round(north, 3), round(east, 3)]

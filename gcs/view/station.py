@@ -3,7 +3,7 @@
     datagrams of vehicles and of the world  ->  Station  ->  records for pages
                           requests of pages  ->          ->  datagrams for vehicles
 
-A passive station (`speaks` False) gets its datagrams from another ground station: it sends no heartbeat,
+A passive station (`active` False) gets its datagrams from another ground station: it sends no heartbeat,
 requests nothing by itself, and sends to a vehicle only what a user requested on the page.
 """
 
@@ -23,7 +23,7 @@ from gcs.clients.missions import MissionDownload
 from gcs.clients.operation import Operation, Status, Target
 from gcs.clients.parameter_transfer import ParameterGet
 from gcs.view.actions import ActionError, operations_of
-from gcs.view.controls import READ, SLIDERS
+from gcs.view.controls import SHOWN_PARAMETERS, SLIDERS
 from gcs.view.history import History
 from gcs.view.places import fence_record, rally_record, waypoints_record
 from gcs.view.vehicle import WatchedVehicle
@@ -37,9 +37,9 @@ FAST_MESSAGES = (
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
 )
-MOST_REQUESTS = 32  # that wait for one vehicle; further ones are refused
+MAX_REQUESTS = 32  # that wait for one vehicle; further ones are refused
 _REASON_US = 300_000  # a refusal is explained by a STATUSTEXT that may arrive a little later
-_ASK_AGAIN_US = 2_000_000
+_RUN_REQUEST_INTERVAL_US = 2_000_000
 _TEXTS = 60  # kept for pages that open later
 
 
@@ -60,25 +60,25 @@ class _Task:
         self.operations = deque(operations)
         self.texts_before: int | None = None
         self.refused_us: int | None = None
-        self.said: list[str] = []
+        self.replies: list[str] = []
 
 
 class Station:
     """All vehicles from which something was received."""
 
-    def __init__(self, speaks: bool = True, signing: Signing | None = None) -> None:
+    def __init__(self, active: bool = True, signing: Signing | None = None) -> None:
         self.vehicles: dict[int, WatchedVehicle] = {}
         self.known_parameters: dict[str, float] = {}  # of vehicles that a passive station does not ask
         self.known_waypoints: list[list[float]] = []
         self._histories: dict[int, History] = {}
-        self._fresh: dict[str, list[list[Any]]] = {}  # samples that were not sent to pages yet
-        self._speaks = speaks
+        self._new_samples: dict[str, list[list[Any]]] = {}  # samples that were not sent to pages yet
+        self._active = active
         self._signing = signing
         self._tasks: dict[int, deque[_Task]] = {}
         self._news: list[dict[str, Any]] = []
         self._texts: deque[dict[str, Any]] = deque(maxlen=_TEXTS)
-        self._unknown_run = False  # truth was received of a world in which no vehicle reports to fly
-        self._next_ask_us = 0
+        self._unassigned_truth = False  # truth was received of a world in which no vehicle reports to fly
+        self._next_run_request_us = 0
 
     # ---- what comes in
 
@@ -86,19 +86,19 @@ class Station:
         """Process a datagram of a vehicle; return the system ids of the vehicles that sent messages in it."""
         for one in messages(datagram)[0]:
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles:
-                self._meet(one, datagram, now_us)
-        heard: list[int] = []
+                self._add_vehicle(one, datagram, now_us)
+        senders: list[int] = []
         for system, vehicle in self.vehicles.items():
             for one in vehicle.connection.receive(datagram, now_us):
-                if not heard or heard[-1] != system:
-                    heard.append(system)
+                if not senders or senders[-1] != system:
+                    senders.append(system)
                 vehicle.receive(one, now_us)
-                self._listen(vehicle, one, now_us)
-                if self._speaks and one.id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
+                self._receive_for_task(vehicle, one, now_us)
+                if self._active and one.id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
                     current = one.message
                     ids = current.mission_id, current.fence_id, current.rally_points_id
                     self._fetch_plans(vehicle, ids)
-        return heard
+        return senders
 
     def receive_truth(self, datagram: bytes, run: int | None = None, alone: bool = True) -> None:
         """Process a datagram of a simulated world, for the vehicle that reports to fly in this run of it.
@@ -108,51 +108,51 @@ class Station:
         """
         for vehicle in self.vehicles.values():
             boot = vehicle.view.latest.get("SIM_BOOT")
-            unsaid = boot is None and alone and len(self.vehicles) == 1
-            if unsaid or (boot is not None and boot.boot_id == run):
+            unreported = boot is None and alone and len(self.vehicles) == 1
+            if unreported or (boot is not None and boot.boot_id == run):
                 for one in messages(datagram)[0]:
-                    vehicle.truth.put(one)
+                    vehicle.truth.receive(one)
                 return
-        self._unknown_run = True
+        self._unassigned_truth = True
 
-    def ask(self, page: Any, request: Any) -> None:
+    def handle_request(self, page: Any, request: Any) -> None:
         """Begin what a page requests; its result is reported by `news`."""
         if not isinstance(request, dict):
             return
         number = request.get("request")
-        who = (page, number if isinstance(number, int) else None)
+        sender = (page, number if isinstance(number, int) else None)
         system = request.get("vehicle")
         vehicle = self.vehicles.get(system) if isinstance(system, int) else None
         name = request.get("action")
         if vehicle is None:
-            self._answer(who, str(name), False, "there is no such vehicle")
+            self._report_result(sender, str(name), False, "there is no such vehicle")
             return
         tasks = self._tasks[vehicle.target.system]
-        if len(tasks) >= MOST_REQUESTS:
-            self._answer(who, str(name), False, "too much was asked for at once")
+        if len(tasks) >= MAX_REQUESTS:
+            self._report_result(sender, str(name), False, "too much was asked for at once")
             return
         try:
             operations = operations_of(vehicle, name, request.get("arguments", {}))
         except ActionError as error:
-            self._answer(who, str(name), False, str(error))
+            self._report_result(sender, str(name), False, str(error))
             return
-        tasks.append(_Task(who, str(name), operations))
+        tasks.append(_Task(sender, str(name), operations))
 
     # ---- what goes out
 
     def poll(self, now_us: int) -> Iterator[Outgoing]:
         """The datagrams to send now."""
-        if self._unknown_run and self._speaks and now_us >= self._next_ask_us:
+        if self._unassigned_truth and self._active and now_us >= self._next_run_request_us:
             # one of the vehicles may have been restarted with its simulator
-            self._unknown_run, self._next_ask_us = False, now_us + _ASK_AGAIN_US
+            self._unassigned_truth, self._next_run_request_us = False, now_us + _RUN_REQUEST_INTERVAL_US
             for system, vehicle in self.vehicles.items():
-                self._tasks[system].append(_Task(None, "", [_which_run(vehicle)]))
+                self._tasks[system].append(_Task(None, "", [_run_request(vehicle)]))
         for system, vehicle in self.vehicles.items():
             connection = vehicle.connection
-            if self._speaks:
+            if self._active:
                 for datagram in connection.poll(now_us):
                     yield Outgoing(system, datagram)
-            task = self._present(vehicle, now_us)
+            task = self._current_task(vehicle, now_us)
             if task is not None and task.operations:
                 for message in task.operations[0].poll(now_us):
                     yield Outgoing(system, connection.frame(message))
@@ -165,20 +165,20 @@ class Station:
             vehicle.origin = origin  # all vehicles are shown in one picture
             time_us = vehicle.time_us
             history = self._histories[system]
-            if time_us is not None and history.due(time_us * 1e-6):
-                sample = history.take(vehicle.state(now_us))
-                self._fresh.setdefault(str(system), []).append(sample)
+            if time_us is not None and history.is_due(time_us * 1e-6):
+                sample = history.add(vehicle.state(now_us))
+                self._new_samples.setdefault(str(system), []).append(sample)
 
     def state(self, now_us: int) -> dict[str, Any]:
         """What is known now of all vehicles, and the samples that were taken since the last call."""
         self.sample(now_us)
-        fresh, self._fresh = self._fresh, {}
+        new_samples, self._new_samples = self._new_samples, {}
         states = [vehicle.state(now_us) for vehicle in self.vehicles.values()]
-        return {"type": "state", "vehicles": states, "samples": fresh}
+        return {"type": "state", "vehicles": states, "samples": new_samples}
 
-    def forget_samples(self) -> None:
+    def discard_samples(self) -> None:
         """Discard samples that were not sent, while no page is open: a page that opens later receives all."""
-        self._fresh.clear()
+        self._new_samples.clear()
 
     def news(self) -> list[dict[str, Any]]:
         """What is new since the last call; a record with "page" is for that page only."""
@@ -189,15 +189,15 @@ class Station:
                 vehicle.changed_parameters = {}
                 news.append(self._vehicle_record(vehicle))
             texts = vehicle.view.texts
-            for text in texts[vehicle.told_texts :]:
+            for text in texts[vehicle.sent_texts :]:
                 time_s = None if vehicle.time_us is None else round(vehicle.time_us * 1e-6, 2)
                 record = {"type": "text", "vehicle": vehicle.target.system, "time": time_s}
                 self._texts.append({**record, "severity": text.severity, "text": text.text})
                 news.append(self._texts[-1])
-            vehicle.told_texts = len(texts)
+            vehicle.sent_texts = len(texts)
         return news
 
-    def greeting(self) -> list[dict[str, Any]]:
+    def initial_records(self) -> list[dict[str, Any]]:
         """The records that a page receives when it opens."""
         vehicles = [self._vehicle_record(vehicle) for vehicle in self.vehicles.values()]
         histories = [
@@ -212,7 +212,7 @@ class Station:
 
     # ---- vehicles
 
-    def _meet(self, one: Received, datagram: bytes, now_us: int) -> None:
+    def _add_vehicle(self, one: Received, datagram: bytes, now_us: int) -> None:
         connection = Connection()
         if self._signing is not None:
             connection.sign_with(self._signing)
@@ -228,9 +228,9 @@ class Station:
         self._histories[system] = History()
         self._tasks[system] = deque()
         self._news.append(self._vehicle_record(vehicle))
-        if self._speaks:
+        if self._active:
             self._tasks[system].extend(
-                _Task(None, "", [operation]) for operation in _first_questions(vehicle)
+                _Task(None, "", [operation]) for operation in _initial_requests(vehicle)
             )
 
     def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int, int]) -> None:
@@ -243,7 +243,7 @@ class Station:
                 self._tasks[vehicle.target.system].append(_Task(None, "", [download]))
 
     def _vehicle_record(self, vehicle: WatchedVehicle) -> dict[str, Any]:
-        shown = {slider.name for slider in SLIDERS} | set(READ)
+        shown = {slider.name for slider in SLIDERS} | set(SHOWN_PARAMETERS)
         return {
             "type": "vehicle",
             "id": vehicle.target.system,
@@ -256,26 +256,26 @@ class Station:
 
     # ---- exchanges
 
-    def _present(self, vehicle: WatchedVehicle, now_us: int) -> _Task | None:
+    def _current_task(self, vehicle: WatchedVehicle, now_us: int) -> _Task | None:
         """The present task of the vehicle; requests of pages take precedence over those of the station."""
         tasks = self._tasks[vehicle.target.system]
         if not tasks:
             return None
-        if tasks[0].request is None and not _begun(tasks[0]):
-            asked = next((task for task in tasks if task.request is not None), None)
-            if asked is not None:
-                tasks.remove(asked)
-                tasks.appendleft(asked)
+        if tasks[0].request is None and not _has_started(tasks[0]):
+            requested = next((task for task in tasks if task.request is not None), None)
+            if requested is not None:
+                tasks.remove(requested)
+                tasks.appendleft(requested)
         task = tasks[0]
         if task.texts_before is None:
             task.texts_before = len(vehicle.view.texts)
         if task.refused_us is not None and now_us - task.refused_us >= _REASON_US:
             reasons = vehicle.view.complaints_since(task.texts_before)
-            self._close(vehicle, task, False, "; ".join([*task.said, *reasons]))
+            self._close(vehicle, task, False, "; ".join([*task.replies, *reasons]))
             return None
         return task
 
-    def _listen(self, vehicle: WatchedVehicle, one: Received, now_us: int) -> None:
+    def _receive_for_task(self, vehicle: WatchedVehicle, one: Received, now_us: int) -> None:
         tasks = self._tasks[vehicle.target.system]
         if tasks and tasks[0].operations and tasks[0].texts_before is not None:
             tasks[0].operations[0].receive(one.message, now_us)
@@ -287,27 +287,27 @@ class Station:
         if result is None:
             return
         task.operations.popleft()
-        task.said.append(result.text)
-        self._take(vehicle, operation)
+        task.replies.append(result.text)
+        self._use_result(vehicle, operation)
         if result.status is Status.REFUSED and task.request is not None:
             task.operations.clear()
             task.refused_us = now_us
         elif not result.done:
             self._close(vehicle, task, False, result.text)
         elif not task.operations:
-            self._close(vehicle, task, True, task.said[-1])
+            self._close(vehicle, task, True, task.replies[-1])
 
     def _close(self, vehicle: WatchedVehicle, task: _Task, done: bool, text: str) -> None:
         self._tasks[vehicle.target.system].remove(task)
         if task.request is not None:
-            self._answer(task.request, task.name, done, text)
+            self._report_result(task.request, task.name, done, text)
 
-    def _answer(self, who: tuple[Any, Any], action: str, done: bool, text: str) -> None:
-        page, number = who
+    def _report_result(self, sender: tuple[Any, Any], action: str, done: bool, text: str) -> None:
+        page, number = sender
         record = {"type": "result", "page": page, "request": number, "action": action[:40]}
         self._news.append({**record, "ok": done, "text": text})
 
-    def _take(self, vehicle: WatchedVehicle, operation: Operation) -> None:
+    def _use_result(self, vehicle: WatchedVehicle, operation: Operation) -> None:
         """Use the result of an exchange: a downloaded mission, fence or list of rally points."""
         if (
             not isinstance(operation, MissionDownload)
@@ -325,21 +325,21 @@ class Station:
         self._news.append(self._vehicle_record(vehicle))
 
 
-def _begun(task: _Task) -> bool:
+def _has_started(task: _Task) -> bool:
     return task.texts_before is not None
 
 
-def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
+def _initial_requests(vehicle: WatchedVehicle) -> list[Operation]:
     """The exchanges with which the station begins for a new vehicle."""
     target = vehicle.target
     streams = [command.message_interval(target, message, INTERVAL_US) for message in FAST_MESSAGES]
     home = command.request_message(target, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-    names = (*READ, *(slider.name for slider in SLIDERS))
+    names = (*SHOWN_PARAMETERS, *(slider.name for slider in SLIDERS))
     parameters = [ParameterGet(target, name) for name in names]
-    return [*streams, home, _which_run(vehicle), *parameters]
+    return [*streams, home, _run_request(vehicle), *parameters]
 
 
-def _which_run(vehicle: WatchedVehicle) -> Operation:
+def _run_request(vehicle: WatchedVehicle) -> Operation:
     """The request for the run of the simulated world in which the vehicle flies."""
     return command.request_message(vehicle.target, mavlink.MAVLINK_MSG_ID_SIM_BOOT)
 

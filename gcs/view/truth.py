@@ -10,12 +10,12 @@ from autopilot.wire.codec import Received
 from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.analysis.release import BEYOND_M
+from gcs.analysis.release import RELEASE_MARGIN_M
 from gcs.view.tether import Tether
 
-Place = tuple[float, float, float]  # NED, m
+PositionNED = tuple[float, float, float]  # NED, m
 
-_KEPT = 80  # positions of the load: half a second of the fastest truth
+_MAX_POSITIONS = 80  # positions of the load: half a second of the fastest truth
 
 
 class Truth:
@@ -23,11 +23,11 @@ class Truth:
 
     def __init__(self) -> None:
         self.newest: dict[int, Received] = {}
-        self.tether = Tether(BEYOND_M)
-        self._times_us: deque[int] = deque(maxlen=_KEPT)
-        self._places: deque[Place] = deque(maxlen=_KEPT)
+        self.tether = Tether(RELEASE_MARGIN_M)
+        self._times_us: deque[int] = deque(maxlen=_MAX_POSITIONS)
+        self._positions: deque[PositionNED] = deque(maxlen=_MAX_POSITIONS)
 
-    def put(self, one: Received) -> None:
+    def receive(self, one: Received) -> None:
         """Process one message of the simulated world."""
         self.newest[one.id] = one
         if one.id != mavlink.MAVLINK_MSG_ID_LOAD_STATE:
@@ -35,33 +35,34 @@ class Truth:
         message = one.message
         if self._times_us and message.time_usec <= self._times_us[-1]:  # the simulator was restarted
             self._times_us.clear()
-            self._places.clear()
-            self.tether = Tether(BEYOND_M)
-        self.tether.see(message)
+            self._positions.clear()
+            self.tether = Tether(RELEASE_MARGIN_M)
+        self.tether.update(message)
         self._times_us.append(message.time_usec)
-        self._places.append((message.x, message.y, message.z))
+        self._positions.append((message.x, message.y, message.z))
 
     def message(self, message_id: int) -> Any:
         """The newest message of that id, or None."""
         received = self.newest.get(message_id)
         return None if received is None else received.message
 
-    def load_at(self, time_us: int) -> Place | None:
+    def load_at(self, time_us: int) -> PositionNED | None:
         """Position of the load at that time, interpolated between two messages; None if it is not known."""
         if not self._times_us or not self._times_us[0] <= time_us <= self._times_us[-1]:
             return None
         after = bisect_left(self._times_us, time_us)
         if self._times_us[after] == time_us:
-            return self._places[after]
+            return self._positions[after]
         first, last = self._times_us[after - 1], self._times_us[after]
         share = (time_us - first) / (last - first)
         x, y, z = (
-            a + share * (b - a) for a, b in zip(self._places[after - 1], self._places[after], strict=True)
+            a + share * (b - a)
+            for a, b in zip(self._positions[after - 1], self._positions[after], strict=True)
         )
         return x, y, z
 
     @property
-    def wind(self) -> Place | None:
+    def wind(self) -> PositionNED | None:
         """Mean wind plus gust, m/s, NED."""
         message = self.message(mavlink.MAVLINK_MSG_ID_WIND_STATE)
         if message is None:
@@ -69,7 +70,7 @@ class Truth:
         north, east, down = (w + g for w, g in zip(message.wind, message.gust, strict=True))
         return north, east, down
 
-    def pose(self, home: Home) -> tuple[Place, tuple[float, ...]] | None:
+    def pose(self, home: Home) -> tuple[PositionNED, tuple[float, ...]] | None:
         """Position and attitude quaternion (w, x, y, z) of the vehicle; the position is rounded to 11 mm."""
         message = self.message(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
         if message is None:

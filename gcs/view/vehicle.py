@@ -19,11 +19,11 @@ from gcs.clients.operation import Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.view.link_quality import LinkQuality
 from gcs.view.tether import Tether
-from gcs.view.truth import Place, Truth
+from gcs.view.truth import PositionNED, Truth
 
-_LONGEST_SHOWN = 1.25  # of the cable's length: a load that is farther away is no longer attached
-_BEYOND_M = 0.2  # the same for an estimate, beyond the cable; the estimator may not notice a release
-_ESTIMATES = 8  # estimates that are kept until the truth of their time arrives
+_MAX_CABLE_RATIO = 1.25  # of the cable's length: a load that is farther away is no longer attached
+_RELEASE_MARGIN_M = 0.2  # the same for an estimate, beyond the cable; the estimator may not notice a release
+_MAX_ESTIMATES = 8  # estimates that are kept until the truth of their time arrives
 _NOT_CARRIED = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 
 
@@ -35,7 +35,7 @@ class WatchedVehicle:
         self.connection = connection
         self.origin: Home | None = None  # of the picture
         self._home: Home | None = None
-        self._tether = Tether(_BEYOND_M)  # as the vehicle estimates it
+        self._tether = Tether(_RELEASE_MARGIN_M)  # as the vehicle estimates it
         self.view = VehicleView()
         self.truth = Truth()
         self.link = LinkQuality()
@@ -44,15 +44,17 @@ class WatchedVehicle:
         self.fence: dict[str, Any] | None = None
         self.rally: list[list[float]] = []
         self.waypoints: list[list[float]] = []
-        self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # load positions as estimated
+        self._estimated_positions: deque[tuple[int, PositionNED]] = deque(
+            maxlen=_MAX_ESTIMATES
+        )  # load positions as estimated
         self.plan_ids: tuple[int, int, int] | None = None  # versions of mission, fence and rally points
-        self.told_texts = 0  # number of view.texts that were sent to the page
+        self.sent_texts = 0  # number of view.texts that were sent to the page
 
     def receive(self, one: Received, now_us: int) -> None:
         """Process one message of the vehicle."""
         if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.component != self.target.component:
             return
-        self.link.heard(one, now_us)
+        self.link.on_message(one, now_us)
         if one.id == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN or (
             one.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self._home is None
         ):
@@ -61,15 +63,15 @@ class WatchedVehicle:
         self.view.update(one, now_us)
         if one.id == mavlink.MAVLINK_MSG_ID_LOAD_STATE:
             load = one.message
-            self._tether.see(load)
-            self._believed.append((load.time_usec, (load.x, load.y, load.z)))
+            self._tether.update(load)
+            self._estimated_positions.append((load.time_usec, (load.x, load.y, load.z)))
         if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             message = one.message
             value = from_the_wire(message.param_value, message.param_type)
             self.set_parameter(message.param_id, decimal_from_float32(value))
         time_us = self.time_us
         if time_us is not None:
-            self.link.clock(time_us, now_us)
+            self.link.on_clock(time_us, now_us)
 
     def set_parameter(self, name: str, value: float) -> None:
         """Note the value of a parameter."""
@@ -87,12 +89,12 @@ class WatchedVehicle:
         return self._home or Home()
 
     @property
-    def offset(self) -> Place:
+    def offset(self) -> PositionNED:
         """Position of `home` in the picture, whose origin is `origin`, NED."""
         if self.origin is None or self.home == self.origin:
             return 0.0, 0.0, 0.0
-        spot = round(self.home.latitude_deg * 1e7), round(self.home.longitude_deg * 1e7)
-        return ned_from_enu(enu_from_geodetic(*spot, round(self.home.altitude_m * 1e3), self.origin))
+        home_deg_e7 = round(self.home.latitude_deg * 1e7), round(self.home.longitude_deg * 1e7)
+        return ned_from_enu(enu_from_geodetic(*home_deg_e7, round(self.home.altitude_m * 1e3), self.origin))
 
     def layout(self) -> dict[str, float]:
         """Sizes of the vehicle that the picture needs, in m."""
@@ -116,26 +118,26 @@ class WatchedVehicle:
             "mode": view.mode,
             "phase": view.phase_name,
             "mission": view.mission_state,
-            "item": self._of("MISSION_CURRENT", "seq"),
-            "items": self._of("MISSION_CURRENT", "total"),
-            "position": _moved(position, offset),
-            "attitude": _places(attitude, 5),
+            "item": self._latest("MISSION_CURRENT", "seq"),
+            "items": self._latest("MISSION_CURRENT", "total"),
+            "position": _translated(position, offset),
+            "attitude": _rounded_values(attitude, 5),
             "velocity": self._velocity(),
             "load": load,
             "taut": taut,
             "cable": round(self.cable, 3),
-            "asked": self._asked(offset),
+            "asked": self._desired(offset),
             "error": _rounded(view.load_error_m),
             "tension": self._tension(),
             "swing": self._swing(),
             "rotors": rotors,
             "force_max": force_max,
             "estimator_error": self._estimator_error(),
-            "wind": _places(self._wind()),
+            "wind": _rounded_values(self._wind()),
             "link": self.link.record(now_us),
         }
 
-    def _of(self, message: str, field: str) -> Any:
+    def _latest(self, message: str, field: str) -> Any:
         found = self.view.latest.get(message)
         return None if found is None else getattr(found, field)
 
@@ -144,14 +146,17 @@ class WatchedVehicle:
         true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
         return true if true is not None else self.view.latest.get("LOAD_STATE")
 
-    def _load(self, offset: Place) -> tuple[dict[str, Any] | None, bool | None]:
+    def _load(self, offset: PositionNED) -> tuple[dict[str, Any] | None, bool | None]:
         message = self._load_message()
         if message is None or not math.isfinite(message.x):
             return None, None
         taut = bool(message.taut)
-        far = message.distance > _LONGEST_SHOWN * self.cable
+        far = message.distance > _MAX_CABLE_RATIO * self.cable
         attached = taut or (self._known_tether.attached and not far)
-        return {"position": _moved((message.x, message.y, message.z), offset), "attached": attached}, taut
+        return {
+            "position": _translated((message.x, message.y, message.z), offset),
+            "attached": attached,
+        }, taut
 
     @property
     def cable(self) -> float:
@@ -186,11 +191,11 @@ class WatchedVehicle:
         message = self._load_message()
         return None if message is None else _rounded(math.hypot(message.vx, message.vy, message.vz), 3)
 
-    def _asked(self, offset: Place) -> list[float] | None:
+    def _desired(self, offset: PositionNED) -> list[float] | None:
         message = self.view.latest.get("LOAD_SETPOINT")
         if message is None or message.phase in _NOT_CARRIED:
             return None
-        return _moved((message.x, message.y, message.z), offset)
+        return _translated((message.x, message.y, message.z), offset)
 
     def _tension(self) -> float | None:
         message = self._load_message()
@@ -217,29 +222,33 @@ class WatchedVehicle:
 
     def _estimator_error(self) -> float | None:
         """Distance between an estimated position of the load and the true one at the same time."""
-        for time_us, believed in reversed(self._believed):  # the newest may be ahead of the truth
+        for time_us, estimated in reversed(self._estimated_positions):  # the newest may be ahead of the truth
             true = self.truth.load_at(time_us)
             if true is not None:
-                return _rounded(math.dist(true, believed))
+                return _rounded(math.dist(true, estimated))
         return None
 
     def _wind(self) -> Sequence[float] | None:
         true = self.truth.wind
         if true is not None:
             return true
-        felt = self.view.latest.get("WIND_COV")
-        return None if felt is None or not self.view.armed else (felt.wind_x, felt.wind_y, felt.wind_z)
+        estimated = self.view.latest.get("WIND_COV")
+        return (
+            None
+            if estimated is None or not self.view.armed
+            else (estimated.wind_x, estimated.wind_y, estimated.wind_z)
+        )
 
 
-def _moved(place: Sequence[float] | None, offset: Place) -> list[float] | None:
-    return None if place is None else _places([a + b for a, b in zip(place, offset, strict=True)])
+def _translated(place: Sequence[float] | None, offset: PositionNED) -> list[float] | None:
+    return None if place is None else _rounded_values([a + b for a, b in zip(place, offset, strict=True)])
 
 
 def _rounded(value: float | None, digits: int = 4) -> float | None:
     return round(value, digits) if value is not None and math.isfinite(value) else None
 
 
-def _places(values: Sequence[float] | None, digits: int = 4) -> list[float] | None:
+def _rounded_values(values: Sequence[float] | None, digits: int = 4) -> list[float] | None:
     if values is None or not all(map(math.isfinite, values)):
         return None
     return [round(float(value), digits) for value in values]

@@ -11,10 +11,17 @@ from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running
 from gcs.errors import StoppedError
 from gcs.experiments.plan import Experiment, experiments
-from gcs.experiments.run import Ended, fly_missing, missing, start
+from gcs.experiments.run import EndedFlight, fly_missing, missing, start
 from gcs.experiments.store import experiment_origin
 from gcs.experiments.table import tables
-from gcs.experiments.thesis import FLIGHTS, Report, around_tables, make_directory, write_docs, write_report
+from gcs.experiments.thesis import (
+    FLIGHTS,
+    Report,
+    make_output_directory,
+    text_around_tables,
+    write_docs,
+    write_report,
+)
 from gcs.folders import reserved
 from gcs.shell.display import StepDisplay
 from gcs.shell.processes import Child
@@ -29,8 +36,8 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
     renew.
     """
     if docs is not None:
-        around_tables(docs)  # raises before the flights what would otherwise be raised after them
-    make_directory(out)
+        text_around_tables(docs)  # raises before the flights what would otherwise be raised after them
+    make_output_directory(out)
     plan, flights = experiments(), out / FLIGHTS
     with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:
         waiting = missing(plan, flights, fresh)
@@ -39,7 +46,7 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
             def begin(experiment: Experiment, core: int) -> Child:
                 return start(experiment, flights / experiment.name, core)
 
-            def tell(ended: Sequence[Ended], running: Running) -> None:
+            def tell(ended: Sequence[EndedFlight], running: Running) -> None:
                 display.add(len(ended), sum(met for _, met in ended), running)
 
             if not fly_missing(waiting, flights, ProgramCrew(cores(jobs), begin), tell, lambda: bool(stop)):

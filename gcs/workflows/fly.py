@@ -152,7 +152,7 @@ def _fly_own(
 
         check_mission(mission, options)
         if options.speed is None:
-            from gcs.report.warm import load as load_report
+            from gcs.report.warm import load_libraries as load_report
 
             load_report(lambda: own.vehicle.waiting)  # a core is idle until the vehicle sends
         return fly_own(mission, options, log, own, stop, watch, page)
@@ -261,9 +261,9 @@ class FlightFolder:
             text = f"--out {self._path}: holds a flight already; name another, or add --overwrite"
             raise InputError(text) from None
         if self._overwrite:
-            from gcs.report.build import forget_report
+            from gcs.report.build import delete_report
 
-            forget_report(self._path)
+            delete_report(self._path)
             for name in LOGS:
                 (self._path / name).unlink(missing_ok=True)
         return self

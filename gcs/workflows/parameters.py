@@ -11,7 +11,7 @@ from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 from gcs.errors import GcsError, InputError, NoVehicleError, RefusedError
-from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
+from gcs.formats.params import QGC_ENDING, parameter_lines, qgc_parameters
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -83,7 +83,7 @@ def save_parameters(file: Path, address: Address) -> int:
         target = session.find()
         values = _listed(session, target)
     is_qgc = file.suffix.lower() == QGC_ENDING
-    text = qgc_of(values, target) if is_qgc else lines_of(values)
+    text = qgc_parameters(values, target) if is_qgc else parameter_lines(values)
     partial = file.with_name(file.name + ".part")
     try:
         partial.write_text(text, encoding="utf-8")

@@ -27,12 +27,12 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     """The properties of cable, load and vehicle that the recording determines, with half the widths of their
     95 % intervals, and those that it does not determine."""
     from gcs.recorded.identification import (
-        LEAST_S,
+        MIN_DURATION_S,
         NoLoadError,
         TooLittleMotionError,
         identify_load,
         identify_vehicle,
-        map_doubt,
+        map_warning,
         tracked_length,
     )
 
@@ -42,9 +42,9 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         asked, motion, model = _read(path, columns)
         _needs_load(path, motion)
         duration_s = float(motion.time_s[-1] - motion.time_s[0])
-        if duration_s < LEAST_S:
+        if duration_s < MIN_DURATION_S:
             raise InputError(
-                f"{path}: {duration_s:.1f} s; at least {LEAST_S:.0f} s are needed to identify anything"
+                f"{path}: {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are needed to identify anything"
             )
         try:
             vehicle = identify_vehicle(motion, model)
@@ -62,8 +62,8 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     return {
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
-        "not_told": [one.name for one in found if not one.is_told],
-        "doubt": map_doubt(vehicle),
+        "not_told": [one.name for one in found if not one.is_determined],
+        "doubt": map_warning(vehicle),
     }
 
 
@@ -71,22 +71,27 @@ def replay(
     path: Path, columns: str | None, out: Path | None, quiet: bool = False
 ) -> tuple[dict[str, Any], Path]:
     """Estimate the load in a recording; return the scores, and the folder with table and picture."""
-    from gcs.recorded.estimates import filtered, load_position, rows_of
-    from gcs.recorded.identification import LEAST_S, TooLittleMotionError, identify_vehicle, map_doubt
+    from gcs.recorded.estimates import filter_rows, filtered_estimates, load_position
+    from gcs.recorded.identification import (
+        MIN_DURATION_S,
+        TooLittleMotionError,
+        identify_vehicle,
+        map_warning,
+    )
     from gcs.recorded.replay_files import write_picture, write_table
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
     path = find_recording(path)
     with told_if_slow("estimating the load", quiet):
         _, motion, model = _read(path, columns)
-        rows = rows_of(motion, model)
+        rows = filter_rows(motion, model)
         seen = bool(np.isfinite(motion.load).all())
         record: dict[str, Any] = {**_rows_record(path, motion), "doubt": ""}
-        if seen and record["duration_s"] >= LEAST_S:
+        if seen and record["duration_s"] >= MIN_DURATION_S:
             with suppress(TooLittleMotionError):
-                record["doubt"] = map_doubt(identify_vehicle(motion, model))
+                record["doubt"] = map_warning(identify_vehicle(motion, model))
         if seen:
-            squares = filtered(rows, model, load=True, tilt=True).squares
+            squares = filtered_estimates(rows, model, load=True, tilt=True).squares
             record["innovations"] = {
                 name: {
                     "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
@@ -102,7 +107,7 @@ def replay(
                 "nees_per_axis": float(np.mean(alone.square) / 2.0),
                 "inside_95": alone.inside,
             }
-        found = filtered(rows, model, load=False, tilt=True, smoothed=True)
+        found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
         load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
         sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
     folder = out or FOLDER / name_of(path)
@@ -117,12 +122,12 @@ def replay(
 
 def find_recording(source: Path) -> Path:
     """The given recording; for the folder of a flight, its telemetry log."""
-    from gcs.recorded.recording import READ
+    from gcs.recorded.recording import ACCEPTED_FILES
 
     if not source.is_dir():
         return source
     if not (source / TLOG_FILE).is_file():
-        raise InputError(f"{source}: holds no {TLOG_FILE}; {READ}")
+        raise InputError(f"{source}: holds no {TLOG_FILE}; {ACCEPTED_FILES}")
     return source / TLOG_FILE
 
 
@@ -136,11 +141,11 @@ def name_of(path: Path) -> str:
 def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel]:
     from gcs.recorded.column_map import MAPS, MapError, load_map
     from gcs.recorded.motion import distances, motion_of
-    from gcs.recorded.recording import READ, RecordingError, is_log, is_table, read_recording
+    from gcs.recorded.recording import ACCEPTED_FILES, RecordingError, is_log, is_table, read_recording
 
     if columns is None and not is_log(path) and path.is_file():
         if not is_table(path):
-            raise InputError(f"{path}: no recording of a flight; {READ}")
+            raise InputError(f"{path}: no recording of a flight; {ACCEPTED_FILES}")
         raise InputError(f"{path}: say what its columns are by --columns: {MAPS.choice()}")
     try:
         asked = load_map(columns or OWN_MAP)

@@ -9,7 +9,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.errors import GcsError
-from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
+from gcs.formats.missions import PLAN_ENDING, CheckedPlan, check_plan, is_foreign, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_items import items_of
 from gcs.shell.display import say, told_if_slow
@@ -58,7 +58,7 @@ def checked_upload(
 def _upload_foreign(
     session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, tell: Tell
 ) -> None:
-    items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
+    items = _flown(path, check_plan(plan, home := vehicle_home(session)), skip)
     if not force:
         with told_if_slow(CHECKING):
             check_items(path.name, items, home, vehicle)
@@ -71,7 +71,7 @@ def _upload_foreign(
     tell(session.run(MissionUpload(session.target, items), "upload").text)
 
 
-def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
+def _flown(path: Path, judged: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:
     """The items to upload. Prints what cannot be flown as in the file; GcsError if something must be left out
     without `skip`, or if nothing remains."""
     for line in (*judged.kept, *judged.left_out):

@@ -162,7 +162,7 @@ def view(options: ViewOptions) -> None:
 def serve_feed(descriptor: int, options: ViewOptions) -> None:
     """Serve the page of a flight that the parent process flies, until that ends this process."""
     feed = inherited(descriptor)
-    station = Station(speaks=False)
+    station = Station(active=False)
     session, site = _Session(), Site(_texts())
     servers: list[PageServer] = []
 
@@ -203,14 +203,14 @@ async def _serve(
     def opened() -> list[dict[str, Any]]:
         controls = [slider.record() for slider in SLIDERS]
         hello = {"type": "hello", "controls": controls}
-        return [hello, *station.greeting(), session.record]
+        return [hello, *station.initial_records(), session.record]
 
     def count_changed(count: int) -> None:
         if feed is not None:
             feed.tell_event({"readers": count})
 
     async with PageServer(
-        site, Pages(opened, station.ask, count_changed), options.host, options.port
+        site, Pages(opened, station.handle_request, count_changed), options.host, options.port
     ) as server:
         if servers is not None:
             servers.append(server)
@@ -234,7 +234,7 @@ async def _serve(
                     server.tell_all(station.state(now_us))
                 else:
                     station.sample(now_us)
-                    station.forget_samples()
+                    station.discard_samples()
             if isinstance(links, FedLinks) and links.ended:
                 return
             try:

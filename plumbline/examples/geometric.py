@@ -66,8 +66,8 @@ class Geometric(Gains):
         x_d, v_d, a_d, jerk_d, snap_d = now.reference.jet[:5]
 
         e_x, e_v = sub(now.state.x_load, x_d), sub(now.state.v_load, v_d)
-        wanted = axpy(-self.k_v, e_v, axpy(-self.k_x, e_x, add(a_d, up)))
-        A = axpy(m_Q * length * dot(q_dot, q_dot), q, scale(mass, wanted))
+        commanded = axpy(-self.k_v, e_v, axpy(-self.k_x, e_x, add(a_d, up)))
+        A = axpy(m_Q * length * dot(q_dot, q_dot), q, scale(mass, commanded))
         q_c = scale(-1.0 / norm(A), A)
         _, q_c_dot, q_c_ddot = unit_derivatives(
             scale(-1.0, add(a_d, up)), scale(-1.0, jerk_d), scale(-1.0, snap_d)

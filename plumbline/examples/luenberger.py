@@ -55,7 +55,7 @@ PARAMETERS = {
 class Memory(NamedTuple):
     """The model's state."""
 
-    begun: bool
+    started: bool
     x: Vec3
     v: Vec3
     R: Mat3
@@ -97,7 +97,7 @@ class Luenberger(Tuning):
     def estimate(self, m: Memory, now: Sensed) -> tuple[Memory, Estimate]:
         """The model one tick later, corrected by new readings."""
         pose, load, dt = now.pose, now.load, now.period_s
-        if not m.begun:
+        if not m.started:
             if pose.new and load.new:
                 m = Memory(
                     True, pose.x_quad, ZERO, pose.R, ZERO, ZERO, load.x_load, ZERO, pose.time_s, load.time_s

@@ -24,8 +24,8 @@ from autopilot.vehicle.rotors import STRENGTH
 from plumbline.learning.records import ACCELERATION, RATES, ROTORS, ActionModel
 from sitl.world import Floats
 
-_LEAST_PULL = 0.2  # of the weight, so that the cable stays taut
-_LEAST_ACCEL = 1e-3  # m/s^2; a shorter A has no direction
+_MIN_PULL = 0.2  # of the weight, so that the cable stays taut
+_MIN_ACCEL = 1e-3  # m/s^2; a shorter A has no direction
 
 
 class Mixing(NamedTuple):
@@ -36,43 +36,43 @@ class Mixing(NamedTuple):
     hover: Floats  # (MOST,) N: force of each rotor that holds vehicle and load
 
 
-def size_of_action(kind: int, rotors: int) -> int:
+def action_size(kind: int, rotors: int) -> int:
     """How many numbers an action has."""
     return {ROTORS: rotors, RATES: 4, ACCELERATION: 3}[kind]
 
 
 @kernel
-def within(number: float) -> float:
+def clipped(number: float) -> float:
     """A number of an action, clipped to -1 ... 1; NaN becomes -1."""
     return if_above(number, -1.0, min(number, 1.0), -1.0)
 
 
 @kernel
-def between(number: float, least: float, middle: float, most: float) -> float:
-    """The value that -1 ... 1 commands: `least`, `middle` at 0, `most`, linear in between."""
+def scaled(number: float, low: float, middle: float, high: float) -> float:
+    """The value that -1 ... 1 commands: `low`, `middle` at 0, `high`, linear in between."""
     if number > 0.0:
-        return middle + number * (most - middle)
-    return middle + number * (middle - least)
+        return middle + number * (high - middle)
+    return middle + number * (middle - low)
 
 
 @kernel
-def number_of(value: float, least: float, middle: float, most: float) -> float:
-    """The number, -1 ... 1, that commands a value: the inverse of `between`."""
+def unscaled(value: float, low: float, middle: float, high: float) -> float:
+    """The number, -1 ... 1, that commands a value: the inverse of `scaled`."""
     if value > middle:
-        return min((value - middle) / (most - middle), 1.0)
-    return max((value - middle) / (middle - least), -1.0)
+        return min((value - middle) / (high - middle), 1.0)
+    return max((value - middle) / (middle - low), -1.0)
 
 
 @kernel
-def rate_moment(wanted: Vec3, state: State, model: ActionModel) -> Vec3:
+def rate_moment(rates: Vec3, state: State, model: ActionModel) -> Vec3:
     """Moment (N m, body) that tracks body rates (rad/s)."""
     J, Omega = model.vehicle.inertia, state.omega_body
-    turning = times(J, times(model.rate_gain, sub(wanted, Omega)))
+    turning = times(J, times(model.rate_gain, sub(rates, Omega)))
     return add(turning, cross(Omega, times(J, Omega)))
 
 
 @kernel
-def carry_out(
+def apply_action(
     action: Any, state: State, memory: ThesisMemory, model: ActionModel, mixing: Mixing
 ) -> tuple[ThesisMemory, MixerResult]:
     """Write the rotor forces for an action at this tick into `mixing.rotors`; the memory is that of the law
@@ -80,39 +80,41 @@ def carry_out(
     vehicle, table, rotors = model.vehicle, mixing.table, mixing.rotors
     if model.kind == ROTORS:
         for i in range(table.shape[0] - 1):
-            least, most = table[i, STRENGTH] * model.least, table[i, STRENGTH] * model.most
-            rotors[FORCE, i] = between(action[i], least, mixing.hover[i], most)
+            low, high = table[i, STRENGTH] * model.min_force, table[i, STRENGTH] * model.max_force
+            rotors[FORCE, i] = scaled(action[i], low, mixing.hover[i], high)
         thrust, moment = thrust_and_moment(rotors, vehicle, table)
         return memory, MixerResult(0, thrust, moment)
     if model.kind == RATES:
-        least, most = model.strength * model.least, model.strength * model.most
-        thrust = between(action[0], least, model.weight, most)
+        low, high = model.strength * model.min_force, model.strength * model.max_force
+        thrust = scaled(action[0], low, model.weight, high)
         moment = rate_moment(times(model.rates, (action[1], action[2], action[3])), state, model)
         return memory, mix(thrust, moment, vehicle, model.limited, table, rotors)
     A = times(model.accel, (action[0], action[1], action[2]))
     A = (A[0], A[1], A[2] + vehicle.gravity)
     size = norm(A)
-    q_d = scale(-1.0 / size, A) if size > _LEAST_ACCEL else state.q_cable
+    q_d = scale(-1.0 / size, A) if size > _MIN_ACCEL else state.q_cable
     mass = vehicle.quad_mass + vehicle.load_mass
-    pull = mass * max(-dot(A, state.q_cable), _LEAST_PULL * vehicle.gravity)
+    pull = mass * max(-dot(A, state.q_cable), _MIN_PULL * vehicle.gravity)
     memory, command = load_attitude(memory, state, q_d, E1, pull, model.gains, model.filters, vehicle)
     return memory, mix(command.thrust, command.moment, vehicle, model.limited, table, rotors)
 
 
 @kernel
-def numbers_for(mixed: MixerResult, state: State, model: ActionModel, mixing: Mixing, out: Any) -> None:
+def write_equivalent_action(
+    mixed: MixerResult, state: State, model: ActionModel, mixing: Mixing, out: Any
+) -> None:
     """Write the action that is equivalent to the command of a law at this tick: rotor forces, or thrust and
     body rates."""
     if model.kind == ROTORS:
         table = mixing.table
         for i in range(table.shape[0] - 1):
-            least, most = table[i, STRENGTH] * model.least, table[i, STRENGTH] * model.most
-            out[i] = number_of(mixing.rotors[FORCE, i], least, mixing.hover[i], most)
+            low, high = table[i, STRENGTH] * model.min_force, table[i, STRENGTH] * model.max_force
+            out[i] = unscaled(mixing.rotors[FORCE, i], low, mixing.hover[i], high)
         return
     J, Omega = model.vehicle.inertia, state.omega_body
     turning = sub(mixed.moment_done, cross(Omega, times(J, Omega)))
-    least, most = model.strength * model.least, model.strength * model.most
-    out[0] = number_of(mixed.thrust_done, least, model.weight, most)
+    low, high = model.strength * model.min_force, model.strength * model.max_force
+    out[0] = unscaled(mixed.thrust_done, low, model.weight, high)
     for i in range(3):
-        wanted = Omega[i] + turning[i] / (J[i] * model.rate_gain[i])
-        out[1 + i] = within(wanted / model.rates[i])
+        commanded = Omega[i] + turning[i] / (J[i] * model.rate_gain[i])
+        out[1 + i] = clipped(commanded / model.rates[i])

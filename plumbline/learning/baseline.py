@@ -16,7 +16,7 @@ from autopilot.control.records import Cable, Reference
 from autopilot.geometry.linear import E1
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import GcsError
-from plumbline.learning.actions import Mixing, numbers_for
+from plumbline.learning.actions import Mixing, write_equivalent_action
 from plumbline.learning.env import LoadEnv
 from plumbline.learning.records import ACCELERATION
 from plumbline.learning.vector import LoadVectorEnv
@@ -45,15 +45,15 @@ class LawPolicy:
     def predict(self, observation: Array, *_: Any, **__: Any) -> tuple[Array, None]:
         """The actions for the present states of the environments, and None, as in Stable-Baselines3. The
         observation is not used."""
-        actions = np.zeros((self._episodes.count, self._scenario.task.sight.actions), np.float32)
+        actions = np.zeros((self._episodes.count, self._scenario.task.observation_model.actions), np.float32)
         for i in range(self._episodes.count):
-            if self._episodes.begins(i) or self._pilots[i] is None:
+            if self._episodes.is_at_start(i) or self._pilots[i] is None:
                 self._pilots[i] = _LawPilot(self._setup, self._episodes.mixing)
             pilot = self._pilots[i]
             assert pilot is not None
             state = self._episodes.state(i)
             mixed = pilot.step(state, self._episodes, i, self._scenario.ticks)
-            numbers_for(mixed, state, self._scenario.task.action, pilot.mixing, actions[i])
+            write_equivalent_action(mixed, state, self._scenario.task.action, pilot.mixing, actions[i])
         return (actions[0] if self._single else actions), None
 
 

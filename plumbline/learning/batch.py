@@ -25,31 +25,31 @@ from autopilot.vehicle.layout import MOST
 from autopilot.vehicle.rotors import allocate
 from gcs.sweep.kernel import Code, code_of_autopilot, code_of_world
 from plumbline.learning.actions import Mixing
-from plumbline.learning.beginning import (
+from plumbline.learning.initial_world import (
     V_LOAD,
     V_QUAD,
     X_LOAD,
     X_QUAD,
-    Beginning,
-    beginning_of,
-    depends_on_chance,
+    InitialWorld,
     hover_forces,
+    initial_world,
+    worlds_differ,
 )
 from plumbline.learning.records import (
     FEATURES,
     Actions,
     Batch,
     Episode,
+    EstimatorRows,
     Observations,
-    Senses,
 )
 from plumbline.learning.scenario import Draw, Scenario
-from plumbline.learning.step import LAW_EVERY, jet_at, run_some, true_state
+from plumbline.learning.step import LAW_EVERY, jet_at, step_or_start, true_state
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World
 
 Numbers = NDArray[np.int64]
-_LEAST_SHARE = 2000  # ticks per thread from which on another thread is worthwhile
+_MIN_TICKS_PER_THREAD = 2000  # ticks per thread from which on another thread is worthwhile
 
 
 class Episodes:
@@ -62,17 +62,21 @@ class Episodes:
         self.ends = np.zeros(count, np.int64)
         self.observations: Observations = np.zeros((count, scenario.size), np.float32)
         self._all = np.arange(count)
-        self._actions = np.zeros((count, scenario.task.sight.actions), np.float32)
-        self._nowhere = np.zeros((1, 3))
-        self._batch = self._memory()
-        self._alike: Beginning | None = None  # of all episodes, if they differ only in position and velocity
-        if not depends_on_chance(scenario):
-            self._alike = beginning_of(scenario, scenario.draw(np.random.default_rng(0)))
+        self._actions = np.zeros((count, scenario.task.observation_model.actions), np.float32)
+        self._no_places = np.zeros((1, 3))
+        self._batch = self._new_batch()
+        self._common_world: InitialWorld | None = (
+            None  # of all episodes, if they differ only in position and velocity
+        )
+        if not worlds_differ(scenario):
+            self._common_world = initial_world(scenario, scenario.draw(np.random.default_rng(0)))
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         work = count * scenario.ticks * (10 if scenario.estimated else 1)
-        self._threads = max(1, min(cores, work // _LEAST_SHARE)) if threads is None else threads
+        self._threads = max(1, min(cores, work // _MIN_TICKS_PER_THREAD)) if threads is None else threads
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
-        self._run = entry_of(run_some, *self._job(self._all[:0], False, self._nowhere, self._nowhere))
+        self._run = entry_of(
+            step_or_start, *self._job(self._all[:0], False, self._no_places, self._no_places)
+        )
 
     def close(self) -> None:
         """End the threads."""
@@ -86,13 +90,13 @@ class Episodes:
         """Step all episodes, or those that are `chosen`, with their actions (count, size)."""
         self._actions[:] = actions
         shares = np.array_split(self._all if chosen is None else chosen, self._threads)
-        self._share([self._job(share, False, self._nowhere, self._nowhere) for share in shares])
+        self._run_jobs([self._job(share, False, self._no_places, self._no_places) for share in shares])
 
-    def _job(self, chosen: Numbers, begins: bool, places: Floats, velocities: Floats) -> tuple[Any, ...]:
+    def _job(self, chosen: Numbers, starting: bool, places: Floats, velocities: Floats) -> tuple[Any, ...]:
         return (
             self._batch,
             chosen,
-            begins,
+            starting,
             places,
             velocities,
             self._actions,
@@ -101,7 +105,7 @@ class Episodes:
             self.ends,
         )
 
-    def _share(self, jobs: Sequence[tuple[Any, ...]]) -> None:
+    def _run_jobs(self, jobs: Sequence[tuple[Any, ...]]) -> None:
         """Call machine code once for each job, the last one in this thread."""
         futures = [] if self._pool is None else [self._pool.submit(self._run, *job) for job in jobs[:-1]]
         self._run(*jobs[-1])
@@ -110,67 +114,74 @@ class Episodes:
 
     # ---- beginnings
 
-    def begin(self, chosen: Sequence[int], draws: Sequence[Draw]) -> None:
+    def start(self, chosen: Sequence[int], draws: Sequence[Draw]) -> None:
         """Begin an episode in each chosen environment; its first observation is in `observations`."""
-        jets = self.scenario.reference[[draw.begin for draw in draws]]
+        jets = self.scenario.reference[[draw.first_row for draw in draws]]
         velocities = np.ascontiguousarray(jets[:, 3:6])
         places = jets[:, :3] + np.array([draw.offset for draw in draws])
         lead_s = self.scenario.task.settle * self.scenario.tick_us * 1e-6
-        begins = places - lead_s * velocities
-        if self._alike:
-            self._lay_out(chosen, draws, begins, velocities)
+        start_places = places - lead_s * velocities
+        if self._common_world:
+            self._fill(chosen, draws, start_places, velocities)
         else:
             for k in range(len(chosen)):
                 one = slice(k, k + 1)
-                self._lay_out(chosen[one], draws[one], begins[one], velocities[one])
+                self._fill(chosen[one], draws[one], start_places[one], velocities[one])
         shares = self._threads if self.scenario.estimated else 1
-        splits = [np.array_split(rows, shares) for rows in (np.asarray(chosen), places, velocities)]
-        self._share([self._job(own, True, *where) for own, *where in zip(*splits, strict=True)])
+        parts = [np.array_split(rows, shares) for rows in (np.asarray(chosen), places, velocities)]
+        self._run_jobs([self._job(some, True, *where) for some, *where in zip(*parts, strict=True)])
 
-    def _lay_out(
-        self, chosen: Sequence[int], draws: Sequence[Draw], places: Floats, velocities: Floats
-    ) -> None:
+    def _fill(self, chosen: Sequence[int], draws: Sequence[Draw], places: Floats, velocities: Floats) -> None:
         """Fill the memory of episodes that begin alike: load and vehicle move together, cable vertical."""
-        made = self._alike or beginning_of(self.scenario, draws[0])
-        batch, rows, waiting, at = self._batch, made.rows, len(made.commands), np.asarray(chosen)
-        batch.world[at] = made.world
-        batch.world[at, X_LOAD] = places
-        batch.world[at, X_QUAD] = places
-        batch.world[at, X_QUAD.stop - 1] += made.cable_length
-        batch.world[at, V_LOAD] = velocities
-        batch.world[at, V_QUAD] = velocities
-        batch.model[at], batch.fate[at], batch.errors[at] = rows.model, rows.fate, rows.errors
-        batch.clock[at] = made.clock
-        batch.seed[at, 0] = [draw.seed for draw in draws]
-        batch.ring[at] = 0, waiting
-        batch.commands[at, :waiting] = made.commands
-        batch.rotors[at], batch.rotor_table[at] = rows.rotors, rows.rotor_table
-        batch.action[at] = 0.0
-        batch.episode[at] = 0.0
-        batch.episode[at, 0] = [draw.begin for draw in draws]  # the first field of Episode
-        batch.past[at] = 0.0
+        initial = self._common_world or initial_world(self.scenario, draws[0])
+        batch, rows, in_transit, chosen_rows = (
+            self._batch,
+            initial.rows,
+            len(initial.commands),
+            np.asarray(chosen),
+        )
+        batch.world[chosen_rows] = initial.world
+        batch.world[chosen_rows, X_LOAD] = places
+        batch.world[chosen_rows, X_QUAD] = places
+        batch.world[chosen_rows, X_QUAD.stop - 1] += initial.cable_length
+        batch.world[chosen_rows, V_LOAD] = velocities
+        batch.world[chosen_rows, V_QUAD] = velocities
+        batch.model[chosen_rows], batch.fate[chosen_rows], batch.errors[chosen_rows] = (
+            rows.model,
+            rows.fate,
+            rows.errors,
+        )
+        batch.clock[chosen_rows] = initial.clock
+        batch.seed[chosen_rows, 0] = [draw.seed for draw in draws]
+        batch.ring[chosen_rows] = 0, in_transit
+        batch.commands[chosen_rows, :in_transit] = initial.commands
+        batch.rotors[chosen_rows], batch.rotor_table[chosen_rows] = rows.rotors, rows.rotor_table
+        batch.action[chosen_rows] = 0.0
+        batch.episode[chosen_rows] = 0.0
+        batch.episode[chosen_rows, 0] = [draw.first_row for draw in draws]  # the first field of Episode
+        batch.past[chosen_rows] = 0.0
         if self.scenario.estimated:
             for i in chosen:
-                self._forget(i)
+                self._reset_estimator(i)
 
-    def _forget(self, i: int) -> None:
-        senses = self._batch.senses
+    def _reset_estimator(self, i: int) -> None:
+        estimators = self._batch.estimators
         for name in ("estimator", "pilot", "seen", "commands"):
-            getattr(senses, name)[i] = getattr(self._blank, name)
-        for row, blank in zip(senses.history, new_history(), strict=True):
+            getattr(estimators, name)[i] = getattr(self._initial_rows, name)
+        for row, blank in zip(estimators.history, new_history(), strict=True):
             row[i] = blank
 
     # ---- memory
 
-    def _memory(self) -> Batch:
+    def _new_batch(self) -> Batch:
         scenario, n = self.scenario, self.count
-        room, capacity = scenario.roomiest()
+        command_capacity, capacity = scenario.max_capacities()
         rows = scenario.world(scenario.draw(np.random.default_rng(0)))[0]
-        senses, autopilot = None, 0
+        estimators, autopilot = None, 0
         if scenario.estimated:
             core = FlightCore(scenario.cell.setup)
-            senses = self._senses(core, rows.queue.shape[0] * capacity + len(rows.rotor_table))
-            autopilot = code_of_autopilot(core.rows, senses.law)
+            estimators = self._estimators(core, rows.queue.shape[0] * capacity + len(rows.rotor_table))
+            autopilot = code_of_autopilot(core.rows, estimators.law)
         return Batch(
             world=np.zeros((n, width(World))),
             model=np.zeros((n, len(rows.model))),
@@ -179,7 +190,7 @@ class Episodes:
             fate=np.zeros((n, *rows.fate.shape)),
             errors=np.zeros((n, *rows.errors.shape)),
             queue=np.zeros((n, rows.queue.shape[0], capacity, rows.queue.shape[2])),
-            commands=np.zeros((n, room, rows.commands.shape[1])),
+            commands=np.zeros((n, command_capacity, rows.commands.shape[1])),
             ring=np.zeros((n, 2), np.int64),
             rotors=np.zeros((n, *rows.rotors.shape)),
             rotor_table=np.zeros((n, *rows.rotor_table.shape)),
@@ -192,11 +203,11 @@ class Episodes:
             past=np.zeros((n, scenario.options.history, FEATURES + MOST)),
             task=scenario.row,
             reference=scenario.reference,
-            senses=senses,
+            estimators=estimators,
             code=Code(code_of_world(rows), autopilot),
         )
 
-    def _senses(self, core: FlightCore, readings: int) -> Senses:
+    def _estimators(self, core: FlightCore, readings: int) -> EstimatorRows:
         """The memory of the estimators before the first reading, for an autopilot whose law runs every second
         tick."""
         n = self.count
@@ -206,19 +217,19 @@ class Episodes:
         pack(pilot._replace(thrust=weight, observed=pilot.observed._replace(support=0.0)), core.rows.pilot, 0)
         constants = unpack(CoreConstants, core.rows.constants, 0)
         pack(constants._replace(control_every=LAW_EVERY), core.rows.constants, 0)
-        self._blank = core.rows
+        self._initial_rows = core.rows
         inbox = new_inbox(readings)
 
-        def many(row: NDArray[Any]) -> NDArray[Any]:
+        def repeated(row: NDArray[Any]) -> NDArray[Any]:
             return np.repeat(row[None], n, axis=0)
 
-        return Senses(
-            estimator=many(core.rows.estimator),
-            pilot=many(core.rows.pilot),
-            seen=many(core.rows.seen),
-            commands=many(core.rows.commands),
-            history=History._make(many(part) for part in new_history()),
-            inbox=many(inbox),
+        return EstimatorRows(
+            estimator=repeated(core.rows.estimator),
+            pilot=repeated(core.rows.pilot),
+            seen=repeated(core.rows.seen),
+            commands=repeated(core.rows.commands),
+            history=History._make(repeated(part) for part in new_history()),
+            inbox=repeated(inbox),
             constants=core.rows.constants,
             winch=core.rows.winch,
             stretch=core.rows.stretch,
@@ -241,10 +252,10 @@ class Episodes:
     def state(self, i: int) -> State:
         """The observed state of an episode: the true or the estimated one."""
         if self.scenario.estimated:
-            return unpack(Seen, self._batch.senses.seen[i], 0).state
+            return unpack(Seen, self._batch.estimators.seen[i], 0).state
         return true_state(self.plant(i))
 
-    def begins(self, i: int) -> bool:
+    def is_at_start(self, i: int) -> bool:
         """Whether an episode has not been stepped yet."""
         return unpack(Episode, self._batch.episode[i], 0).tick == 0
 
@@ -252,4 +263,4 @@ class Episodes:
         """Desired position of the load, with six derivatives, `ahead_s` seconds from now."""
         episode = unpack(Episode, self._batch.episode[i], 0)
         later = round(ahead_s * 1e6 / self.scenario.tick_us)
-        return jet_at(self.scenario.reference, episode.begin + episode.tick + later)
+        return jet_at(self.scenario.reference, episode.first_row + episode.tick + later)

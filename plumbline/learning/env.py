@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
-from plumbline.learning.ready import make_ready
+from plumbline.learning.ready import compile_step
 from plumbline.learning.scenario import Scenario
 from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
@@ -30,18 +30,18 @@ class LoadEnv(gymnasium.Env[Array, Array]):
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
         self.render_mode = render_mode
         self.scenario = Scenario(options_of(options))
-        make_ready(self.scenario)
+        compile_step(self.scenario)
         self.episodes = Episodes(self.scenario, 1, threads=1)
         self.action_space = action_space(self.scenario)
         self.observation_space = observation_space(self.scenario)
-        self._shape = (self.scenario.task.sight.actions,)
+        self._shape = (self.scenario.task.observation_model.actions,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Begin a new episode and return its first observation; the same seed gives the same episode."""
         super().reset(seed=seed)
-        self.episodes.begin([0], [self.scenario.draw(self.np_random)])
+        self.episodes.start([0], [self.scenario.draw(self.np_random)])
         return self.episodes.observations[0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:

@@ -25,63 +25,65 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, sub
 from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MOST
-from plumbline.learning.records import FEATURES, ViewModel
+from plumbline.learning.records import FEATURES, ObservationModel
 
-AHEAD = 6  # numbers of an instant of the preview
+PREVIEW_SIZE = 6  # numbers of an instant of the preview
 
 
-def size_of(view: ViewModel) -> int:
+def observation_size(model: ObservationModel) -> int:
     """How many numbers an observation has."""
-    return (FEATURES + view.actions) * (1 + view.past) + AHEAD * view.ahead
+    return (FEATURES + model.actions) * (1 + model.past) + PREVIEW_SIZE * model.ahead
 
 
 @kernel
-def _put(vector: Vec3, out: Any, at: int) -> None:
+def _write_vector(vector: Vec3, out: Any, at: int) -> None:
     for i in range(3):
         out[at + i] = vector[i]
 
 
 @kernel
-def _features(state: State, jet: Jet, out: Any) -> None:
-    _put(sub(state.x_load, jet[0]), out, 0)
-    _put(sub(state.v_load, jet[1]), out, 3)
-    _put(state.q_cable, out, 6)
-    _put(state.q_cable_dot, out, 9)
+def _write_features(state: State, jet: Jet, out: Any) -> None:
+    _write_vector(sub(state.x_load, jet[0]), out, 0)
+    _write_vector(sub(state.v_load, jet[1]), out, 3)
+    _write_vector(state.q_cable, out, 6)
+    _write_vector(state.q_cable_dot, out, 9)
     for i in range(3):
-        _put(state.R[i], out, 12 + 3 * i)
-    _put(state.omega_body, out, 21)
+        _write_vector(state.R[i], out, 12 + 3 * i)
+    _write_vector(state.omega_body, out, 21)
 
 
 @kernel
-def _preview(jet: Jet, ahead: int, ahead_s: float, out: Any, at: int) -> None:
+def _write_preview(jet: Jet, ahead: int, ahead_s: float, out: Any, at: int) -> None:
     for k in range(ahead):
         t = (k + 1) * ahead_s
         for i in range(3):
             # Horner's scheme of the two Taylor series
-            way, speed = 0.0, 0.0
+            displacement, speed = 0.0, 0.0
             for n in range(6, 0, -1):
-                way = (jet[n][i] + way) * t / n
+                displacement = (jet[n][i] + displacement) * t / n
                 speed = jet[n][i] + speed * t / n
-            out[at + AHEAD * k + i] = way
-            out[at + AHEAD * k + 3 + i] = speed
+            out[at + PREVIEW_SIZE * k + i] = displacement
+            out[at + PREVIEW_SIZE * k + 3 + i] = speed
 
 
 @kernel
-def look(state: State, jet: Jet, action: Any, past: Any, view: ViewModel, out: Any) -> None:
+def write_observation(
+    state: State, jet: Jet, action: Any, past: Any, model: ObservationModel, out: Any
+) -> None:
     """Write the observation after a step with `action` into `out`, and insert it into `past` (steps,
     FEATURES + MOST), which has the newest of the earlier steps first."""
-    _features(state, jet, out)
-    for i in range(view.actions):
+    _write_features(state, jet, out)
+    for i in range(model.actions):
         out[FEATURES + i] = action[i]
-    at = FEATURES + view.actions
-    for k in range(view.past):
-        for i in range(FEATURES + view.actions):
+    at = FEATURES + model.actions
+    for k in range(model.past):
+        for i in range(FEATURES + model.actions):
             out[at + i] = past[k, i]
-        at += FEATURES + view.actions
-    _preview(jet, view.ahead, view.ahead_s, out, at)
-    for k in range(view.past - 1, -1, -1):
+        at += FEATURES + model.actions
+    _write_preview(jet, model.ahead, model.ahead_s, out, at)
+    for k in range(model.past - 1, -1, -1):
         for i in range(FEATURES + MOST):
             past[k, i] = past[k - 1, i] if k > 0 else 0.0
-    if view.past > 0:
-        for i in range(FEATURES + view.actions):
+    if model.past > 0:
+        for i in range(FEATURES + model.actions):
             past[0, i] = out[i]

@@ -13,13 +13,13 @@ from gcs.errors import GcsError
 from missions.model import Mission
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
-    by_parameter,
     number,
     numbers,
+    parameter_mapping,
     positive,
-    setting_words,
-    shown,
-    whole,
+    setting_arguments,
+    shown_value,
+    whole_number,
 )
 from plumbline.learning.records import ACTIONS, Reward
 from plumbline.made_files import name_or_path
@@ -70,22 +70,22 @@ class EnvOptions:
         _one_of("observation", self.observation, OBSERVATIONS)
         _one_of("start", self.start, STARTS)
         for name in ("history", "preview"):
-            whole(name, getattr(self, name), 0, 1000)
+            whole_number(name, getattr(self, name), 0, 1000)
         for name in ("rate_hz", "preview_s", "reach_m"):
             positive(name, getattr(self, name))
         if not 0.0 <= number("start_m", self.start_m) < self.reach_m:
             raise GcsError(f"start_m = {self.start_m!r}; must be at least 0 and below reach_m")
         for name in ("max_rate_rad_s", "max_accel_m_s2"):
             _three_positive(name, getattr(self, name))
-        setting_words(self.settings)
-        for name, weight in by_parameter("reward", self.reward, "{'crash': -10}").items():
+        setting_arguments(self.settings)
+        for name, weight in parameter_mapping("reward", self.reward, "{'crash': -10}").items():
             if name not in Reward._fields:
                 hint = did_you_mean(name, Reward._fields)
                 raise GcsError(f"reward: there is no {name!r}; {hint}there are {', '.join(Reward._fields)}")
             number(f"reward[{name!r}]", weight)
-        for name, limits in by_parameter("randomise", self.randomise, "{'SIM_WIND_E': (0, 3)}").items():
+        for name, limits in parameter_mapping("randomise", self.randomise, "{'SIM_WIND_E': (0, 3)}").items():
             if not _is_range(limits):
-                raise GcsError(f"randomise {name}: {shown(limits)}; must be (least, greatest)")
+                raise GcsError(f"randomise {name}: {shown_value(limits)}; must be (least, greatest)")
 
 
 def options_of(given: Mapping[str, Any]) -> EnvOptions:
@@ -100,13 +100,13 @@ def options_of(given: Mapping[str, Any]) -> EnvOptions:
 
 def _one_of(name: str, value: object, known: tuple[str, ...]) -> None:
     if not isinstance(value, str) or value not in known:
-        raise GcsError(f"{name} = {shown(value)}; must be one of {', '.join(known)}")
+        raise GcsError(f"{name} = {shown_value(value)}; must be one of {', '.join(known)}")
 
 
 def _three_positive(name: str, values: Any) -> None:
     found = numbers(name, values)
     if len(found) != 3 or min(found) <= 0.0:
-        raise GcsError(f"{name} = {shown(values)}; must be three numbers above 0")
+        raise GcsError(f"{name} = {shown_value(values)}; must be three numbers above 0")
 
 
 def _is_range(limits: Any) -> bool:

@@ -17,7 +17,7 @@ from gcs.errors import GcsError
 from missions.model import AttitudeRun, Land, Release, Speed, Takeoff, Winch
 from sitl.world import Floats
 
-_LATER = (Land, Release, AttitudeRun, Winch)  # the first of these steps ends the path of the load
+_ENDING_STEPS = (Land, Release, AttitudeRun, Winch)  # the first of these steps ends the path of the load
 
 
 def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: float, name: str) -> Floats:
@@ -25,24 +25,24 @@ def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: flo
     autopilot flies it. `Error` if the mission has no such leg."""
     flight = with_plan(Flight(), plan)
     flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
-    here: Vec3 = ZERO
+    position: Vec3 = ZERO
     tables: list[Floats] = []
     for number, step in enumerate(plan.steps):
         flight = replace(flight, mission=replace(flight.mission, step=number))
         if isinstance(step, Takeoff):
-            here = destination(step, here, flight)
+            position = destination(step, position, flight)
         elif isinstance(step, Speed):
             flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
-        elif isinstance(step, _LATER):
+        elif isinstance(step, _ENDING_STEPS):
             break
         else:
-            for leg in step_legs(step, here, flight, settings):
+            for leg in step_legs(step, position, flight, settings):
                 if leg.control_mode != LOAD_POSITION:
                     break
                 tables.append(
                     jets(leg, np.asarray(np.arange(round(leg.duration_s / tick_s)) * tick_s, np.float64))
                 )
-                here = leg.jet(leg.duration_s)[0]
+                position = leg.jet(leg.duration_s)[0]
     table = np.concatenate(tables) if tables else np.zeros((0, COLUMNS))
     if not len(table):
         raise GcsError(f"mission {name}: there is no path of the load to follow")

@@ -22,9 +22,9 @@ from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MOST
 from autopilot.vehicle.rotors import allocate
 from gcs.errors import GcsError
-from plumbline.learning.actions import Mixing, carry_out, within
-from plumbline.learning.beginning import hover_forces
-from plumbline.learning.observations import look, size_of
+from plumbline.learning.actions import Mixing, apply_action, clipped
+from plumbline.learning.initial_world import hover_forces
+from plumbline.learning.observations import observation_size, write_observation
 from plumbline.learning.options import options_of
 from plumbline.learning.records import FEATURES
 from plumbline.learning.scenario import Scenario
@@ -32,7 +32,7 @@ from plumbline.learning.scenario import Scenario
 Floats = NDArray[np.float32]
 Layers = Sequence[tuple[Floats, Floats]]  # (weights (outputs, inputs), biases) of each layer
 
-SHOWN = (  # options that determine the observations and actions of a policy
+KEPT_OPTIONS = (  # options that determine the observations and actions of a policy
     "action",
     "rate_hz",
     "history",
@@ -47,12 +47,12 @@ _AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 
 
 class Policy:
-    """A network with tanh between its layers. Of the `options` of its environment, those in `SHOWN` are
-    kept."""
+    """A network with tanh between its layers. Of the `options` of its environment, those in `KEPT_OPTIONS`
+    are kept."""
 
     def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
         self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
-        self.options = {name: options[name] for name in SHOWN if name in options}
+        self.options = {name: options[name] for name in KEPT_OPTIONS if name in options}
         if "vehicle" in self.options:
             self.options["vehicle"] = options_of(self.options).vehicle_file
 
@@ -111,11 +111,18 @@ class PolicyPilot:
     def __init__(self, policy: Policy) -> None:
         scenario = Scenario(options_of(policy.options))
         task = scenario.task
-        self._policy, self._model, self._sight, self._ticks = policy, task.action, task.sight, task.ticks
-        size = size_of(task.sight)
-        if policy.layers[0][0].shape[1] != size or policy.layers[-1][1].shape != (task.sight.actions,):
+        self._policy, self._model, self._observation_model, self._ticks = (
+            policy,
+            task.action,
+            task.observation_model,
+            task.ticks,
+        )
+        size = observation_size(task.observation_model)
+        if policy.layers[0][0].shape[1] != size or policy.layers[-1][1].shape != (
+            task.observation_model.actions,
+        ):
             raise GcsError(f"the policy does not fit its options: they show {size} numbers")
-        self._past = np.zeros((task.sight.past, FEATURES + MOST))
+        self._past = np.zeros((task.observation_model.past, FEATURES + MOST))
         self.observation: Floats = np.zeros(size, np.float32)
         self._action, self._tick = np.zeros(MOST), 0
         self._memory: ThesisMemory | None = None
@@ -135,11 +142,13 @@ class PolicyPilot:
         """Thrust (N) and moment (N m, body) at this tick, for the known state and the reference of the
         load."""
         if self._tick % self._ticks == 0:
-            look(state, reference, self._action, self._past, self._sight, self.observation)
+            write_observation(
+                state, reference, self._action, self._past, self._observation_model, self.observation
+            )
             for k, number in enumerate(self._policy(self.observation).tolist()):
-                self._action[k] = within(number)
+                self._action[k] = clipped(number)
         self._tick += 1
         if self._memory is None:
             self._memory = start(state, state.x_load, state.v_load)
-        self._memory, mixed = carry_out(self._action, state, self._memory, self._model, self._mixing)
+        self._memory, mixed = apply_action(self._action, state, self._memory, self._model, self._mixing)
         return mixed.thrust_done, mixed.moment_done

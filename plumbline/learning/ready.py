@@ -22,7 +22,7 @@ def part_of(observation: str) -> Part:
     )
 
 
-def make_ready(scenario: Scenario) -> None:
+def compile_step(scenario: Scenario) -> None:
     """Compile what is not compiled yet, with messages on stderr."""
     warm_up([part_of(scenario.options.observation)])
 

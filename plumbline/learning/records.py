@@ -31,8 +31,8 @@ class ActionModel(NamedTuple):
     vehicle: Vehicle
     limited: float  # 1.0: the rotors have limits
     weight: float  # N, of vehicle and load
-    least: float  # N, smallest force that can be commanded of a rotor of strength 1
-    most: float  # N, greatest
+    min_force: float  # N, smallest force that can be commanded of a rotor of strength 1
+    max_force: float  # N, greatest
     strength: float  # of all rotors together
     rates: Vec3  # rad/s, greatest that can be commanded, body
     rate_gain: Vec3  # 1/s, of the loop that tracks them
@@ -41,7 +41,7 @@ class ActionModel(NamedTuple):
     filters: ThesisFilters
 
 
-class ViewModel(NamedTuple):
+class ObservationModel(NamedTuple):
     """What an observation contains."""
 
     actions: int  # numbers of an action
@@ -67,7 +67,7 @@ class TaskModel(NamedTuple):
     """The numbers that all environments of a batch share."""
 
     action: ActionModel
-    sight: ViewModel
+    observation_model: ObservationModel
     reward: Reward
     ticks: int  # of a step
     reach: float  # m, from the reference; further away is a crash
@@ -77,11 +77,11 @@ class TaskModel(NamedTuple):
 class Episode(NamedTuple):
     """How far an environment is in its episode."""
 
-    begin: int  # row of the reference at its first tick
+    first_row: int  # row of the reference at its first tick
     tick: int
 
 
-class Senses(NamedTuple):
+class EstimatorRows(NamedTuple):
     """The memory of each environment's estimator, as in `autopilot.core.tick.CoreRows`."""
 
     estimator: Floats
@@ -122,7 +122,7 @@ class Batch(NamedTuple):
     past: Floats  # (n, past, FEATURES + MOST), newest first
     task: Row  # TaskModel
     reference: Floats  # (ticks, 21) desired position of the load and its derivatives
-    senses: Any  # Senses; None: the truth is observed
+    estimators: Any  # EstimatorRows; None: the truth is observed
     code: Code  # of the ticks of world and autopilot
 
 

@@ -27,12 +27,12 @@ from gcs.workflows.mission_file import load
 from missions.model import Mission
 from missions.nearest import did_you_mean
 from missions.toml_files import FileError
-from plumbline.arguments import told_in_python
-from plumbline.learning.actions import size_of_action
-from plumbline.learning.observations import size_of
+from plumbline.arguments import errors_for_python
+from plumbline.learning.actions import action_size
+from plumbline.learning.observations import observation_size
 from plumbline.learning.options import EnvOptions
 from plumbline.learning.paths import path_of
-from plumbline.learning.records import ACTIONS, ActionModel, Reward, TaskModel, ViewModel
+from plumbline.learning.records import ACTIONS, ActionModel, ObservationModel, Reward, TaskModel
 from sitl.plant.records import Truth
 from sitl.settings import Settings, settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
@@ -53,7 +53,7 @@ class Draw:
 
     seed: int
     offset: Vec3  # m, of the load from its desired position
-    begin: int  # row of the path
+    first_row: int  # row of the path
     values: tuple[float, ...]  # of the randomised parameters
 
 
@@ -78,14 +78,14 @@ class Scenario:
 
     def draw(self, rng: np.random.Generator) -> Draw:
         """Draw the next episode; each draw takes the same number of random numbers, used or not."""
-        one, two, three, where, seed, *rest = rng.random(5 + len(self._names)).tolist()
+        u_x, u_y, u_z, u_row, seed, *others = rng.random(5 + len(self._names)).tolist()
         width = 2.0 * self.options.start_m
-        offset = (width * (one - 0.5), width * (two - 0.5), width * (three - 0.5))
-        begin = 0
+        offset = (width * (u_x - 0.5), width * (u_y - 0.5), width * (u_z - 0.5))
+        first_row = 0
         if self.options.start == "random":
-            begin = int(where * len(self.reference)) // self.ticks * self.ticks
-        values = tuple(low + span * u for low, span, u in zip(self._lows, self._spans, rest, strict=True))
-        return Draw(int(seed * 2**31), offset, begin, values)
+            first_row = int(u_row * len(self.reference)) // self.ticks * self.ticks
+        values = tuple(low + span * u for low, span, u in zip(self._lows, self._spans, others, strict=True))
+        return Draw(int(seed * 2**31), offset, first_row, values)
 
     def world(self, draw: Draw) -> tuple[WorldRows, Truth, Settings]:
         """The world of an episode before it begins, the load at rest on the ground."""
@@ -96,15 +96,15 @@ class Scenario:
             )
         return new_world(truth, self.cell.profile, settings, draw.seed, self.cell.layout), truth, settings
 
-    def roomiest(self) -> tuple[int, int]:
+    def max_capacities(self) -> tuple[int, int]:
         """How many commands, and readings of one sensor, can be in transit at most in any episode."""
-        rooms, queues = [], []
+        commands, readings = [], []
         for share in (0.0, 1.0):
             values = tuple(a + share * b for a, b in zip(self._lows, self._spans, strict=True))
             rows, _, settings = self.world(Draw(1, HOVER_AT, 0, values))
-            rooms.append(command_room(settings))
-            queues.append(rows.queue.shape[1])
-        return max(rooms), max(queues)
+            commands.append(command_room(settings))
+            readings.append(rows.queue.shape[1])
+        return max(commands), max(readings)
 
     def _conditions(self, values: tuple[float, ...]) -> tuple[Truth, Settings]:
         """The true vehicle, and the settings of the simulator, in an episode."""
@@ -116,8 +116,8 @@ class Scenario:
                 raise GcsError(f"randomise {unknown_parameter(name, table.names)}")
             if name not in table or name in _FIXED:
                 hint = "" if name in table else did_you_mean(name, table.names)
-                told = f"{hint}must be a parameter of the simulator that may change"
-                raise GcsError(f"randomise {name}: {told}")
+                reason = f"{hint}must be a parameter of the simulator that may change"
+                raise GcsError(f"randomise {name}: {reason}")
             try:
                 table.set(name, value)
             except ParameterError as error:
@@ -148,10 +148,12 @@ class Scenario:
         options = self.options
         given = {name: float(value) for name, value in options.settings.items()}
         given = {"CTL_RATE_HZ": given.get("SIM_RATE_HZ", 250.0), **given}
-        with told_in_python():
+        with errors_for_python():
             check_flight_inputs(options.vehicle_file, options.sensors_file, given.items())
-        every = {**given, "CTL_LAW": float(LAWS.index(law))}
-        conditions = Conditions(vehicle=options.vehicle_file, sensors=options.sensors_file, settings=every)
+        all_settings = {**given, "CTL_LAW": float(LAWS.index(law))}
+        conditions = Conditions(
+            vehicle=options.vehicle_file, sensors=options.sensors_file, settings=all_settings
+        )
         try:
             cell = cell_of(self._mission(), conditions)
         except FileError as error:
@@ -197,25 +199,25 @@ class Scenario:
             vehicle=vehicle,
             limited=setup.limited,
             weight=weight,
-            least=vehicle.rotor_min if limited else 0.0,
-            most=vehicle.rotor_max if limited else 2.0 * weight / strength,
+            min_force=vehicle.rotor_min if limited else 0.0,
+            max_force=vehicle.rotor_max if limited else 2.0 * weight / strength,
             strength=strength,
-            rates=_three(options.max_rate_rad_s),
+            rates=_vec3(options.max_rate_rad_s),
             rate_gain=RATE_GAIN,
-            accel=_three(options.max_accel_m_s2),
+            accel=_vec3(options.max_accel_m_s2),
             gains=setup.law.gains,
             filters=setup.law.filters,
         )
-        numbers = size_of_action(kind, len(setup.layout))
-        sight = ViewModel(numbers, options.history, options.preview, options.preview_s)
+        numbers = action_size(kind, len(setup.layout))
+        observation_model = ObservationModel(numbers, options.history, options.preview, options.preview_s)
         reward = Reward(**{name: float(value) for name, value in options.reward.items()})
         settle = round(SETTLE_S * 1e6 / self.tick_us) if self.estimated else 0
-        return TaskModel(action, sight, reward, self.ticks, options.reach_m, settle)
+        return TaskModel(action, observation_model, reward, self.ticks, options.reach_m, settle)
 
     @property
     def size(self) -> int:
         """How many numbers an observation has."""
-        return size_of(self.task.sight)
+        return observation_size(self.task.observation_model)
 
     @property
     def row(self) -> Floats:
@@ -223,6 +225,6 @@ class Scenario:
         return packed(self.task)
 
 
-def _three(values: Any) -> Vec3:
+def _vec3(values: Any) -> Vec3:
     x, y, z = (float(value) for value in values)
     return (x, y, z)

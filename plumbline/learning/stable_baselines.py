@@ -42,13 +42,13 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc]
 
     def step_wait(self) -> Any:
         """Step with the stored actions: observations, rewards, which episodes have ended, and their infos."""
-        seen, rewards, crashed, ended, infos = self.envs.step(self._actions)
+        observations, rewards, crashed, ended, infos = self.envs.step(self._actions)
         done = crashed | ended
-        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        episode_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(done).tolist():
-            told[i]["terminal_observation"] = infos["final_obs"][i]
-            told[i]["TimeLimit.truncated"] = bool(ended[i] and not crashed[i])
-        return seen, rewards.astype(np.float32), done, told
+            episode_infos[i]["terminal_observation"] = infos["final_obs"][i]
+            episode_infos[i]["TimeLimit.truncated"] = bool(ended[i] and not crashed[i])
+        return observations, rewards.astype(np.float32), done, episode_infos
 
     def close(self) -> None:
         """End the threads."""

@@ -25,9 +25,9 @@ from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.signals import Jet
 from gcs.sweep.kernel import Code, fly_autopilot, move_world
 from gcs.sweep.wire import Wire, deliver, put_forces
-from plumbline.learning.actions import Mixing, carry_out, within
-from plumbline.learning.observations import look
-from plumbline.learning.records import Actions, Batch, Episode, Observations, Reward, Senses, TaskModel
+from plumbline.learning.actions import Mixing, apply_action, clipped
+from plumbline.learning.observations import write_observation
+from plumbline.learning.records import Actions, Batch, Episode, EstimatorRows, Observations, Reward, TaskModel
 from sitl.plant.records import PlantState
 from sitl.world import World, WorldModel, WorldRows
 
@@ -54,8 +54,8 @@ def _world(batch: Batch, i: int) -> WorldRows:
 
 
 @kernel
-def _core(senses: Senses, i: int, mixing: Mixing) -> CoreRows:
-    h = senses.history
+def _core(estimators: EstimatorRows, i: int, mixing: Mixing) -> CoreRows:
+    h = estimators.history
     history = History(
         h.ring[i],
         h.covariance[i],
@@ -67,17 +67,17 @@ def _core(senses: Senses, i: int, mixing: Mixing) -> CoreRows:
         h.consistency[i],
     )
     return CoreRows(
-        senses.estimator[i],
-        senses.pilot[i],
-        senses.seen[i],
-        senses.commands[i],
+        estimators.estimator[i],
+        estimators.pilot[i],
+        estimators.seen[i],
+        estimators.commands[i],
         history,
-        senses.inbox[i],
-        senses.constants,
-        senses.winch,
-        senses.stretch,
-        senses.none,
-        senses.none,
+        estimators.inbox[i],
+        estimators.constants,
+        estimators.winch,
+        estimators.stretch,
+        estimators.none,
+        estimators.none,
         mixing.rotors,
         mixing.table,
     )
@@ -105,11 +105,11 @@ def true_state(plant: PlantState) -> State:
 
 
 @kernel
-def _known(senses: Any, plant: PlantState, i: int) -> State:
+def _observed_state(estimators: Any, plant: PlantState, i: int) -> State:
     """The observed state: the true or the estimated one."""
-    if senses is None:
+    if estimators is None:
         return true_state(plant)
-    return unpack(Seen, senses.seen[i], 0).state
+    return unpack(Seen, estimators.seen[i], 0).state
 
 
 @kernel
@@ -133,11 +133,11 @@ def jet_at(reference: Any, row: int) -> Jet:
 
 
 @kernel
-def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
+def _update_actuation(estimators: EstimatorRows, i: int, mixed: MixerResult) -> None:
     """Update what the autopilot assumes of rotors and disturbances after a command."""
-    constants = unpack(CoreConstants, senses.constants, 0)
-    pilot, seen = unpack(Pilot, senses.pilot[i], 0), unpack(Seen, senses.seen[i], 0)
-    cable = unpack(Winch, senses.winch, 0).cable
+    constants = unpack(CoreConstants, estimators.constants, 0)
+    pilot, seen = unpack(Pilot, estimators.pilot[i], 0), unpack(Seen, estimators.seen[i], 0)
+    cable = unpack(Winch, estimators.winch, 0).cable
     observed = observe(
         pilot.observed,
         seen.state,
@@ -148,35 +148,39 @@ def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
         constants.drag,
         with_length(constants.vehicle, cable.length),
     )
-    actuation = Actuation(senses.commands[i], pilot.thrust, pilot.moment)
+    actuation = Actuation(estimators.commands[i], pilot.thrust, pilot.moment)
     actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
     pilot = with_field(with_field(pilot, "mixed", mixed), "observed", observed)
     pilot = with_field(with_field(pilot, "thrust", actuation.thrust), "moment", actuation.moment)
-    pack(pilot, senses.pilot[i], 0)
+    pack(pilot, estimators.pilot[i], 0)
 
 
 @kernel
-def _tick(senses: Any, code: Code, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing) -> PlantState:
+def _tick(
+    estimators: Any, code: Code, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing
+) -> PlantState:
     """Advance the world, and the estimate of it, by one tick; returns the true state."""
     put_forces(mixing.rotors, mixing.table, rows)
-    if senses is not None:
-        _believe(senses, i, mixed)
+    if estimators is not None:
+        _update_actuation(estimators, i, mixed)
     move_world(code, rows, False, 0.0, None)
-    if senses is not None:
+    if estimators is not None:
         now = unpack(World, rows.world, 0)
-        readings = deliver(rows, now.now_us, unpack(Wire, senses.wire, 0), senses.inbox[i])
+        readings = deliver(rows, now.now_us, unpack(Wire, estimators.wire, 0), estimators.inbox[i])
         dt = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
-        fly_autopilot(code, _core(senses, i, mixing), senses.law, readings, now.now_us, _ODD, dt, False)
+        fly_autopilot(
+            code, _core(estimators, i, mixing), estimators.law, readings, now.now_us, _ODD, dt, False
+        )
     return unpack(World, rows.world, 0).plant
 
 
 @kernel
 def _reward(state: State, jet: Jet, change: float, crashed: bool, weights: Reward) -> float:
     error = norm(sub(state.x_load, jet[0]))
-    near = error / weights.width
+    relative = error / weights.width
     reward = (
         weights.alive
-        + weights.position / (1.0 + near * near)
+        + weights.position / (1.0 + relative * relative)
         - weights.velocity * norm(sub(state.v_load, jet[1]))
         - weights.swing * norm(state.q_cable_dot)
         - weights.spin * norm(state.omega_body)
@@ -188,8 +192,15 @@ def _reward(state: State, jet: Jet, change: float, crashed: bool, weights: Rewar
 @kernel
 def _observe(batch: Batch, i: int, task: TaskModel, episode: Episode, out: Observations) -> None:
     plant = unpack(World, batch.world[i], 0).plant
-    jet = jet_at(batch.reference, episode.begin + episode.tick)
-    look(_known(batch.senses, plant, i), jet, batch.action[i], batch.past[i], task.sight, out[i])
+    jet = jet_at(batch.reference, episode.first_row + episode.tick)
+    write_observation(
+        _observed_state(batch.estimators, plant, i),
+        jet,
+        batch.action[i],
+        batch.past[i],
+        task.observation_model,
+        out[i],
+    )
 
 
 @kernel
@@ -199,36 +210,40 @@ def _step_one(
     rows = _world(batch, i)
     episode = unpack(Episode, batch.episode[i], 0)
     action, mixing, change = batch.action[i], _mixing(batch, i), 0.0
-    for k in range(task.sight.actions):
-        number = within(float(actions[i, k]))
+    for k in range(task.observation_model.actions):
+        number = clipped(float(actions[i, k]))
         change += (number - action[k]) * (number - action[k])
         action[k] = number
     memory = unpack(ThesisMemory, batch.law[i], 0)
     plant = unpack(World, rows.world, 0).plant
     crashed, tick = False, 0
     while tick < task.ticks and not crashed:
-        memory, mixed = carry_out(action, _known(batch.senses, plant, i), memory, task.action, mixing)
-        plant = _tick(batch.senses, batch.code, i, rows, mixed, mixing)
+        memory, mixed = apply_action(
+            action, _observed_state(batch.estimators, plant, i), memory, task.action, mixing
+        )
+        plant = _tick(batch.estimators, batch.code, i, rows, mixed, mixing)
         down = plant.vehicle_on_ground > 0.0 or plant.load_on_ground > 0.0
         crashed = down or plant.diverged > 0.0
         tick += 1
     pack(memory, batch.law[i], 0)
     state = true_state(plant)
     tick = episode.tick + task.ticks
-    jet = jet_at(batch.reference, episode.begin + tick)
+    jet = jet_at(batch.reference, episode.first_row + tick)
     crashed = crashed or not norm(sub(plant.x_load, jet[0])) < task.reach or state.R[2][2] < 0.0
     rewards[i] = _reward(state, jet, change, crashed, task.reward)
-    rest = batch.reference.shape[0] - episode.begin - tick
-    ends[i] = CRASHED if crashed else ENDED if rest <= 0 and batch.reference.shape[0] > 1 else FLYING
-    episode = Episode(episode.begin, tick)
+    rows_left = batch.reference.shape[0] - episode.first_row - tick
+    ends[i] = CRASHED if crashed else ENDED if rows_left <= 0 and batch.reference.shape[0] > 1 else FLYING
+    episode = Episode(episode.first_row, tick)
     pack(episode, batch.episode[i], 0)
     _observe(batch, i, task, episode, out)
 
 
 @kernel
-def _settle(senses: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3) -> None:
+def _fly_until_settled(
+    estimators: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3
+) -> None:
     """Fly so that the load arrives at `end` with `velocity`, while the estimate converges."""
-    if senses is None:
+    if estimators is None:
         return
     rows, model, mixing = _world(batch, i), task.action, _mixing(batch, i)
     tick_s = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
@@ -242,22 +257,22 @@ def _settle(senses: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, veloc
             memory, true_state(plant), reference, model.gains, model.filters, model.vehicle
         )
         mixed = mix(command.thrust, command.moment, model.vehicle, model.limited, mixing.table, mixing.rotors)
-        plant = _tick(senses, batch.code, i, rows, mixed, mixing)
+        plant = _tick(estimators, batch.code, i, rows, mixed, mixing)
 
 
 @kernel
-def _begin_one(batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3, out: Observations) -> None:
-    _settle(batch.senses, batch, i, task, end, velocity)
+def _start_one(batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3, out: Observations) -> None:
+    _fly_until_settled(batch.estimators, batch, i, task, end, velocity)
     plant = unpack(World, batch.world[i], 0).plant
-    pack(start(_known(batch.senses, plant, i), plant.x_load, plant.v_load), batch.law[i], 0)
+    pack(start(_observed_state(batch.estimators, plant, i), plant.x_load, plant.v_load), batch.law[i], 0)
     _observe(batch, i, task, unpack(Episode, batch.episode[i], 0), out)
 
 
 @threaded
-def run_some(
+def step_or_start(
     batch: Batch,
     chosen: Any,
-    begins: bool,
+    starting: bool,
     places: Any,
     velocities: Any,
     actions: Actions,
@@ -276,9 +291,9 @@ def run_some(
     task = unpack(TaskModel, batch.task, 0)
     for k in range(chosen.shape[0]):
         i = chosen[k]
-        if begins:
+        if starting:
             end = (places[k, 0], places[k, 1], places[k, 2])
             velocity = (velocities[k, 0], velocities[k, 1], velocities[k, 2])
-            _begin_one(batch, i, task, end, velocity, out)
+            _start_one(batch, i, task, end, velocity, out)
         else:
             _step_one(batch, i, task, actions, out, rewards, ends)

@@ -12,10 +12,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from gcs.errors import GcsError
-from plumbline.arguments import whole
+from plumbline.arguments import whole_number
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
-from plumbline.learning.ready import make_ready
+from plumbline.learning.ready import compile_step
 from plumbline.learning.scenario import Scenario
 from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
@@ -42,26 +42,26 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        self.num_envs = num_envs = whole_number("num_envs", num_envs, 1)
         if max_episode_steps is not None:
-            max_episode_steps = whole("max_episode_steps", max_episode_steps, 1)
+            max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
         if threads is not None:
-            threads = whole("threads", threads, 1)
+            threads = whole_number("threads", threads, 1)
         self.render_mode = render_mode
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.scenario = Scenario(options_of(options))
-        make_ready(self.scenario)
+        compile_step(self.scenario)
         self.episodes = Episodes(self.scenario, num_envs, threads)
         self.single_action_space = action_space(self.scenario)
         self.single_observation_space = observation_space(self.scenario)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._shape = (num_envs, self.scenario.task.sight.actions)
-        self._limit = max_episode_steps
+        self._shape = (num_envs, self.scenario.task.observation_model.actions)
+        self._max_steps = max_episode_steps
         self._steps = np.zeros(num_envs, np.int64)
-        self._over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not reset yet
-        self._randoms: list[np.random.Generator | None] = [None] * num_envs
+        self._is_over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not reset yet
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
 
     def reset(
         self,
@@ -79,52 +79,52 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if options is not None and "reset_mask" in options:
             chosen = np.flatnonzero(_checked(options["reset_mask"], self.num_envs))
         for i in chosen.tolist():
-            if seeds[i] is not None or self._randoms[i] is None:
-                self._randoms[i] = np_random(seeds[i])[0]
-        self._begin(chosen)
+            if seeds[i] is not None or self._generators[i] is None:
+                self._generators[i] = np_random(seeds[i])[0]
+        self._start(chosen)
         return self.episodes.observations.copy(), {}
 
     def step(self, actions: Array) -> Stepped:
         """Observations, rewards, which episodes crashed, which reached the end of their path or their time
         limit, and what `autoreset_mode` adds."""
         episodes, next_step = self.episodes, self.autoreset_mode == AutoresetMode.NEXT_STEP
-        if self.autoreset_mode == AutoresetMode.DISABLED and self._over.any():
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._is_over.any():
             raise GcsError("an episode is over; reset it with options={'reset_mask': ...}")
-        begun = self._over.copy()
+        was_over = self._is_over.copy()
         actions = checked_actions("actions", actions, self._shape)
-        episodes.step(actions, np.flatnonzero(~begun) if begun.any() else None)
+        episodes.step(actions, np.flatnonzero(~was_over) if was_over.any() else None)
         self._steps += 1
-        rewards = np.where(begun, 0.0, episodes.rewards)
-        crashed = (episodes.ends == CRASHED) & ~begun
-        ended = (episodes.ends == ENDED) & ~begun
-        if self._limit is not None:
-            ended |= (self._steps >= self._limit) & ~begun
-        if next_step and begun.any():
-            self._begin(np.flatnonzero(begun))
-        self._over = crashed | ended
+        rewards = np.where(was_over, 0.0, episodes.rewards)
+        crashed = (episodes.ends == CRASHED) & ~was_over
+        ended = (episodes.ends == ENDED) & ~was_over
+        if self._max_steps is not None:
+            ended |= (self._steps >= self._max_steps) & ~was_over
+        if next_step and was_over.any():
+            self._start(np.flatnonzero(was_over))
+        self._is_over = crashed | ended
         infos: dict[str, Any] = {}
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
-            over = np.flatnonzero(self._over)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._is_over.any():
+            over = np.flatnonzero(self._is_over)
             for i in over.tolist():
                 final = {"final_obs": episodes.observations[i].copy(), "final_info": {}}
                 infos = self._add_info(infos, final, i)
-            self._begin(over)
+            self._start(over)
         return episodes.observations.copy(), rewards, crashed, ended, infos
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
         self.episodes.close()
 
-    def _begin(self, chosen: NDArray[np.intp]) -> None:
+    def _start(self, chosen: NDArray[np.intp]) -> None:
         numbers = chosen.tolist()
         draws = []
         for i in numbers:
-            rng = self._randoms[i]
+            rng = self._generators[i]
             assert rng is not None, "reset comes before step"
             draws.append(self.scenario.draw(rng))
-        self.episodes.begin(numbers, draws)
+        self.episodes.start(numbers, draws)
         self._steps[chosen] = 0
-        self._over[chosen] = False
+        self._is_over[chosen] = False
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None or isinstance(seed, int | np.integer):

@@ -61,7 +61,7 @@ def test_margin_ends_where_the_loop_is_lost() -> None:
     left = cascade_margin.margin(settings).delay
     law = cascade_margin.linearised_law(settings, cascade_margin.BEBOP)
     for delay, holds in ((left, True), (left + 2e-4, False)):
-        closed = cascade_margin.joined(
+        closed = cascade_margin.closed_loop(
             cascade_margin.plant_of(settings, cascade_margin.BEBOP, delay), law, np.ones(4)
         )
-        assert (cascade_margin.radius(closed) < cascade_margin.LOST) is holds
+        assert (cascade_margin.radius(closed) < cascade_margin.UNSTABLE_RADIUS) is holds

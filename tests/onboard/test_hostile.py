@@ -13,9 +13,9 @@ COUNT, EACH = 20_000, 8  # datagrams, and how many a tick: ten seconds of flight
 
 @pytest.mark.parametrize(
     ("key", "strangers"),
-    [(hostile.KEY, hostile.for_a_vehicle_with_a_key), (None, hostile.for_a_vehicle_without)],
+    [(hostile.KEY, hostile.datagrams_without_its_key), (None, hostile.datagrams_for_unsigned_vehicle)],
     ids=["with a signing key", "without"],
 )
 def test_a_flight_under_fire_is_the_flight_in_peace(key, strangers, capsys):
-    hostile.fly_under_fire("flight", key, strangers(random.Random(1)), COUNT, EACH)
+    hostile.fly_under_attack("flight", key, strangers(random.Random(1)), COUNT, EACH)
     assert f"{COUNT} datagrams" in capsys.readouterr().out

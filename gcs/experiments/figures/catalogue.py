@@ -35,7 +35,7 @@ class Figure(NamedTuple):
         return f"fig-{number}-{self.slug}-{self.case}{ending}.png"
 
 
-class Drawn(NamedTuple):
+class DrawnFigure(NamedTuple):
     """A figure that has been drawn into a file."""
 
     figure: Figure
@@ -66,7 +66,7 @@ def _psi(number: str, case: str) -> Figure:
     )
 
 
-def _compared(number: str, case: str) -> Figure:
+def _comparison(number: str, case: str) -> Figure:
     text = "Load position and error; solid: NGC, dash-dot: LQR"
     return Figure(number, "comparison", case, comparison.position, text)
 
@@ -89,7 +89,7 @@ FIGURES: tuple[Figure, ...] = (
     _tracking("4-7", "case-a"),
     _errors("4-8", "case-a"),
     _psi("4-9", "case-a"),
-    _compared("4-10", "case-a"),
+    _comparison("4-10", "case-a"),
     Figure(
         "4-11",
         "percentage",
@@ -101,15 +101,15 @@ FIGURES: tuple[Figure, ...] = (
     _tracking("4-13", "case-b"),
     _errors("4-14", "case-b"),
     _psi("4-15", "case-b"),
-    _compared("4-16", "case-b"),
+    _comparison("4-16", "case-b"),
     _angles("4-17", "case-b"),
     Figure("4-18", "desired", "case-b-extended", desired.product_path, _PATH, flown=False),
-    _compared("4-19", "case-b-extended"),
+    _comparison("4-19", "case-b-extended"),
     _angles("4-20", "case-b-extended"),
     _tracking("4-21", "case-c"),
     _errors("4-22", "case-c"),
     _psi("4-23", "case-c"),
-    _compared("4-24", "case-c"),
+    _comparison("4-24", "case-c"),
     _angles("4-25", "case-c"),
     Figure("A-1", "signals", "case-c", desired.signals, "Signals for trajectory generation", flown=False),
     _inputs("A-2", "case-a"),
@@ -119,20 +119,20 @@ FIGURES: tuple[Figure, ...] = (
 )
 
 
-def wanted(case: str, vehicle: str) -> Iterator[Figure]:
+def figures_of(case: str, vehicle: str) -> Iterator[Figure]:
     """The figures that show this case flown by this vehicle; a desired path only with the first vehicle."""
     for figure in FIGURES:
         if figure.case == case and (figure.flown or vehicle == VEHICLES[0]):
             yield figure
 
 
-def draw_figures(scene: Scene, directory: Path, drawn: Callable[[Drawn], None]) -> None:
+def draw_figures(scene: Scene, directory: Path, drawn: Callable[[DrawnFigure], None]) -> None:
     """Draw the figures of this scene into `directory`; `drawn` is called with each."""
     from gcs.report.style import save, style
 
     directory.mkdir(parents=True, exist_ok=True)
     with style():
-        for figure in wanted(scene.case, scene.vehicle):
+        for figure in figures_of(scene.case, scene.vehicle):
             file = figure.file(scene.vehicle)
             save(figure.draw(figure.heading, scene), directory / file)
-            drawn(Drawn(figure, scene.vehicle, file))
+            drawn(DrawnFigure(figure, scene.vehicle, file))

@@ -12,15 +12,15 @@ from gcs.analysis.axes import Floats
 from gcs.experiments.figures.canvas import (
     AXES,
     COMPONENTS,
-    TIME,
+    TIME_LABEL,
     Scene,
-    heading,
-    least_range,
-    line,
+    draw_heading,
+    draw_line,
+    draw_title,
     panels,
-    place,
-    span,
-    titled,
+    set_margins,
+    set_min_range,
+    set_time_axis,
 )
 from gcs.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, draw, new_figure
 from missions.fileformat import load_mission
@@ -38,23 +38,23 @@ _STEP_S = 0.01
 def step_path(number: str, scene: Scene) -> Any:
     """4-1: position, velocity and acceleration along y."""
     figure, axes = panels(8.0, 6.4, 3, 1)
-    _along_y(axes[:, 0], scene)
-    heading(figure, number, "Desired load trajectory, y-direction", scene.case, "", ())
+    _draw_along_y(axes[:, 0], scene)
+    draw_heading(figure, number, "Desired load trajectory, y-direction", scene.case, "", ())
     return figure
 
 
 def product_path(number: str, scene: Scene) -> Any:
     """4-2, 4-18: (a) two signals and their product, (b) position, velocity and acceleration along y."""
     figure, axes = panels(12.0, 6.4, 3, 2)
-    _along_y(axes[:, 1], scene)
+    _draw_along_y(axes[:, 1], scene)
     term = next(t for t in _signals(scene.case).terms if t.axis == "y")
-    time_s = np.arange(0.0, scene.ngc.length_s, _STEP_S)
+    time_s = np.arange(0.0, scene.ngc.duration_s, _STEP_S)
     envelope = Term("y", 1.0, term.start_s, term.rise_s, term.hold_s, term.fall_s)
     first, *others = term.factors
-    made = Term("y", term.amplitude_m, *_edges(term), (first,))
+    sine_step = Term("y", term.amplitude_m, *_term_timing(term), (first,))
     if others:
         parts = [
-            ("C  Case B", _values(made, time_s)),
+            ("C  Case B", _values(sine_step, time_s)),
             (f"D  sine of {_period(others[0])}", _sine(others[0], time_s)),
             ("E  product of C and D (m)", _values(term, time_s)),
         ]
@@ -62,14 +62,14 @@ def product_path(number: str, scene: Scene) -> Any:
         parts = [
             (f"A  sine of {_period(first)}", _sine(first, time_s)),
             ("B  smooth step up and down", _values(envelope, time_s)),
-            ("C  product of A and B (m)", _values(made, time_s)),
+            ("C  product of A and B (m)", _values(sine_step, time_s)),
         ]
     for ax, (label, values), color in zip(axes[:, 0], parts, (ORANGE, GREEN, BLUE), strict=True):
         draw(ax, time_s, values, color=color, linewidth=1.4)
-        titled(ax, f"Signal {label}", legend=False)
+        draw_title(ax, f"Signal {label}", legend=False)
     axes[0, 1].set_title("Desired trajectory", fontsize=10.5)
-    span(axes, (scene.ngc,))
-    heading(figure, number, "Desired load trajectory, y-direction", scene.case, "", ())
+    set_time_axis(axes, (scene.ngc,))
+    draw_heading(figure, number, "Desired load trajectory, y-direction", scene.case, "", ())
     return figure
 
 
@@ -78,17 +78,17 @@ def position_in_space(number: str, scene: Scene) -> Any:
     figure = new_figure(12.0, 5.6)
     grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25))
     flight, setpoint = scene.ngc, scene.ngc.telemetry.setpoint
-    seen = flight.seen(setpoint.time_s)
-    path = _from_start(setpoint.position_m, seen)
+    window = flight.signal_window(setpoint.time_s)
+    path = _relative_to_start(setpoint.position_m, window)
     for i, axis in enumerate(AXES):
         ax = figure.add_subplot(grid[i, 0])
-        draw(ax, flight.clock(setpoint.time_s[seen]), path[:, i], color=COMPONENTS[i], linewidth=1.4)
+        draw(ax, flight.since_start(setpoint.time_s[window]), path[:, i], color=COMPONENTS[i], linewidth=1.4)
         ax.set_ylabel(f"${axis}_{{L,d}}$ (m)")
-        ax.set_xlim(0.0, flight.length_s)
+        ax.set_xlim(0.0, flight.duration_s)
         if i < 2:
             ax.tick_params(labelbottom=False)
         else:
-            ax.set_xlabel(TIME)
+            ax.set_xlabel(TIME_LABEL)
     space = figure.add_subplot(grid[:, 1], projection="3d")
     space.plot(*path[::5].T, color=BLUE, linewidth=1.0)
     space.set_xlabel("x (m)", labelpad=14)
@@ -101,8 +101,8 @@ def position_in_space(number: str, scene: Scene) -> Any:
     space.locator_params(axis="y", nbins=5)
     for axis in (space.xaxis, space.yaxis, space.zaxis):
         axis.set_pane_color((0.965, 0.97, 0.975, 1.0))
-    place(figure, hspace=0.2, wspace=0.02)
-    heading(figure, number, "Desired load position", scene.case, "", ())
+    set_margins(figure, hspace=0.2, wspace=0.02)
+    draw_heading(figure, number, "Desired load position", scene.case, "", ())
     return figure
 
 
@@ -110,16 +110,16 @@ def velocity_and_acceleration(number: str, scene: Scene) -> Any:
     """4-4: desired velocity and acceleration in all directions."""
     figure, axes = panels(12.0, 6.4, 3, 2)
     setpoint = scene.ngc.telemetry.setpoint
-    for column, (field, label, least) in enumerate(_QUANTITIES[1:]):
+    for column, (field, label, min_range) in enumerate(_QUANTITIES[1:]):
         values = getattr(setpoint, field)
         for i, axis in enumerate(AXES):
             ax = axes[i, column]
-            line(ax, scene.ngc, setpoint.time_s, values[:, i], color=COMPONENTS[i], linewidth=1.4)
+            draw_line(ax, scene.ngc, setpoint.time_s, values[:, i], color=COMPONENTS[i], linewidth=1.4)
             ax.set_ylabel(f"{axis} {label}")
-            least_range(ax, least)
-        titled(axes[0, column], f"Desired {label.split(' ', maxsplit=1)[0]}", legend=False)
-    span(axes, (scene.ngc,))
-    heading(figure, number, "Desired load velocity and acceleration", scene.case, "", ())
+            set_min_range(ax, min_range)
+        draw_title(axes[0, column], f"Desired {label.split(' ', maxsplit=1)[0]}", legend=False)
+    set_time_axis(axes, (scene.ngc,))
+    draw_heading(figure, number, "Desired load velocity and acceleration", scene.case, "", ())
     return figure
 
 
@@ -128,37 +128,37 @@ def signals(number: str, scene: Scene) -> Any:
     figure, axes = panels(12.0, 5.2, 2, 2)
     terms: dict[str, Term] = {term.axis: term for term in _signals(scene.case).terms}
     x, y, z = (terms[axis] for axis in AXES)
-    time_s = np.arange(0.0, scene.ngc.length_s, _STEP_S)
-    up_and_down = Term("y", 1.0, *_edges(y))
+    time_s = np.arange(0.0, scene.ngc.duration_s, _STEP_S)
+    step_signal = Term("y", 1.0, *_term_timing(y))
     parts = (
         (f"A  x of Case C, half a period of {2.0 * x.rise_s:g} s (m)", _values(x, time_s), BLUE),
         (f"B  sine of {_period(y.factors[0])}", _sine(y.factors[0], time_s), ORANGE),
         (f"C  sine of {_period(z.factors[0])}", _sine(z.factors[0], time_s), GREEN),
-        (f"D  up {y.rise_s:g} s, constant, down {y.fall_s:g} s", _values(up_and_down, time_s), PURPLE),
+        (f"D  up {y.rise_s:g} s, constant, down {y.fall_s:g} s", _values(step_signal, time_s), PURPLE),
     )
     for ax, (label, values, color) in zip(axes.flat, parts, strict=True):
         draw(ax, time_s, values, color=color, linewidth=1.2)
-        titled(ax, f"Signal {label}", legend=False)
-    span(axes, (scene.ngc,))
-    heading(figure, number, "Signals for trajectory generation", scene.case, "", ())
+        draw_title(ax, f"Signal {label}", legend=False)
+    set_time_axis(axes, (scene.ngc,))
+    draw_heading(figure, number, "Signals for trajectory generation", scene.case, "", ())
     return figure
 
 
-def _along_y(axes: Sequence[Any], scene: Scene) -> None:
+def _draw_along_y(axes: Sequence[Any], scene: Scene) -> None:
     flight, setpoint = scene.ngc, scene.ngc.telemetry.setpoint
-    seen = flight.seen(setpoint.time_s)
-    time_s = flight.clock(setpoint.time_s[seen])
+    window = flight.signal_window(setpoint.time_s)
+    time_s = flight.since_start(setpoint.time_s[window])
     for ax, letter, (field, label, _) in zip(axes, _LETTERS, _QUANTITIES, strict=True):
         values = getattr(setpoint, field)
-        shown = _from_start(values, seen) if field == "position_m" else values[seen]
+        shown = _relative_to_start(values, window) if field == "position_m" else values[window]
         draw(ax, time_s, shown[:, 1], color=INK, linewidth=1.5)
         ax.set_ylabel(f"${letter}$ y {label[label.index('(') :]}")
-    span(axes, (flight,))
+    set_time_axis(axes, (flight,))
 
 
-def _from_start(position_m: Floats, seen: slice) -> Floats:
+def _relative_to_start(position_m: Floats, window: slice) -> Floats:
     """Positions relative to the position when the signals began, as in the thesis."""
-    shown = position_m[seen]
+    shown = position_m[window]
     return shown - shown[:1]
 
 
@@ -166,7 +166,7 @@ def _signals(case: str) -> Signals:
     return next(step for step in load_mission(case).steps if isinstance(step, Signals))
 
 
-def _edges(term: Term) -> tuple[float, float, float | None, float]:
+def _term_timing(term: Term) -> tuple[float, float, float | None, float]:
     return term.start_s, term.rise_s, term.hold_s, term.fall_s
 
 

@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from gcs.experiments.figures.canvas import Scene, components, heading, line, panels, span, titled
+from gcs.experiments.figures.canvas import (
+    Scene,
+    draw_components,
+    draw_heading,
+    draw_line,
+    draw_title,
+    panels,
+    set_time_axis,
+)
 from gcs.experiments.results import ERROR_FUNCTIONS, decays, error_values
 from gcs.report.style import BLUE, GREY, RED, draw
 
@@ -25,13 +33,13 @@ def error_functions(number: str, scene: Scene) -> Any:
     figure, axes = panels(14.0, 6.2, 2, 3)
     flight, cascade = scene.ngc, scene.ngc.telemetry.cascade
     for column, (title, *pair) in enumerate(_FAMILIES):
-        for ax, (field, symbol, unit, least) in zip(axes[:, column], pair, strict=True):
+        for ax, (field, symbol, unit, min_range) in zip(axes[:, column], pair, strict=True):
             labels = ["x", "y", "z"] if column else ["1", "2", "3"]
-            components(ax, flight, cascade.time_s, getattr(cascade, field), labels, least)
+            draw_components(ax, flight, cascade.time_s, getattr(cascade, field), labels, min_range)
             ax.set_ylabel(f"${symbol}$ {unit}", fontsize=12)
-        titled(axes[0, column], title)
-    span(axes, (flight,))
-    heading(figure, number, "Error functions, NGC", scene.case, scene.vehicle, (flight,))
+        draw_title(axes[0, column], title)
+    set_time_axis(axes, (flight,))
+    draw_heading(figure, number, "Error functions, NGC", scene.case, scene.vehicle, (flight,))
     return figure
 
 
@@ -47,7 +55,7 @@ def configuration_errors(number: str, scene: Scene) -> Any:
         above, below = axes[:, column]
         for ax in (above, below):
             ax.set_ylabel(f"${symbol}$")
-            line(ax, flight, time_s, values, color=BLUE, linewidth=1.4, label=f"${symbol}$")
+            draw_line(ax, flight, time_s, values, color=BLUE, linewidth=1.4, label=f"${symbol}$")
         above.set_ylim(bottom=0.0)
         positive = values[values > _FLOOR]
         if positive.size:
@@ -64,7 +72,7 @@ def configuration_errors(number: str, scene: Scene) -> Any:
             label = rf"$\alpha e^{{-\beta t}}$, $\beta$ = {decay.rate_1_s:.2f} 1/s"
             draw(
                 below,
-                flight.clock(time_s[after]),
+                flight.since_start(time_s[after]),
                 bound,
                 color=RED,
                 linewidth=1.2,
@@ -72,8 +80,8 @@ def configuration_errors(number: str, scene: Scene) -> Any:
                 label=label,
             )
         below.axvline(flight.rest_s - flight.start_s, color=GREY, linewidth=0.8, linestyle=":")
-        titled(above, title, legend=False)
-        titled(below, "", columns=2)
-    span(axes, (flight,))
-    heading(figure, number, "Tracking error functions, NGC", scene.case, scene.vehicle, (flight,))
+        draw_title(above, title, legend=False)
+        draw_title(below, "", columns=2)
+    set_time_axis(axes, (flight,))
+    draw_heading(figure, number, "Tracking error functions, NGC", scene.case, scene.vehicle, (flight,))
     return figure

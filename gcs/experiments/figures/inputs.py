@@ -6,8 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from gcs.experiments.figures.canvas import COMPONENTS, TIME, Scene, heading, least_range, line, place, span
-from gcs.experiments.figures.canvas import titled as _titled
+from gcs.experiments.figures.canvas import (
+    COMPONENTS,
+    TIME_LABEL,
+    Scene,
+    draw_heading,
+    draw_line,
+    set_margins,
+    set_min_range,
+    set_time_axis,
+)
+from gcs.experiments.figures.canvas import draw_title as _draw_title
 from gcs.report.style import GREY, INK, new_figure, rotor_colour
 
 _MOMENTS = (r"M_\phi", r"M_\theta", r"M_\psi")
@@ -21,12 +30,12 @@ def control_inputs(number: str, scene: Scene) -> Any:
     grid = figure.add_gridspec(6, 2)
     total, each = figure.add_subplot(grid[:3, 0]), figure.add_subplot(grid[3:, 0])
     moments = [figure.add_subplot(grid[2 * i : 2 * i + 2, 1]) for i in range(3)]
-    line(total, flight, cascade.time_s, cascade.thrust_n, color=INK, linewidth=1.4)
+    draw_line(total, flight, cascade.time_s, cascade.thrust_n, color=INK, linewidth=1.4)
     total.set_ylabel("$f$ (N)")
-    least_range(total, 2.0)
-    _titled(total, "(a) total force", legend=False)
+    set_min_range(total, 2.0)
+    _draw_title(total, "(a) total force", legend=False)
     for i in range(rotors.force_n.shape[1]):
-        line(
+        draw_line(
             each,
             flight,
             rotors.time_s,
@@ -36,22 +45,22 @@ def control_inputs(number: str, scene: Scene) -> Any:
             label=f"$F_{i + 1}$",
         )
     each.set_ylabel("rotor forces (N)")
-    least_range(each, 1.0)
-    _titled(each, "(b) forces per rotor", columns=4)
-    seen = flight.seen(rotors.time_s)
-    for limit in (rotors.force_min_n[seen], rotors.force_max_n[seen]):
+    set_min_range(each, 1.0)
+    _draw_title(each, "(b) forces per rotor", columns=4)
+    window = flight.signal_window(rotors.time_s)
+    for limit in (rotors.force_min_n[window], rotors.force_max_n[window]):
         if len(limit) and np.isfinite(limit[0]):
             each.axhline(float(limit[0]), color=GREY, linewidth=0.9, linestyle=":")
     for i, (ax, symbol) in enumerate(zip(moments, _MOMENTS, strict=True)):
-        line(ax, flight, cascade.time_s, cascade.moment_n_m[:, i], color=COMPONENTS[i], linewidth=1.2)
+        draw_line(ax, flight, cascade.time_s, cascade.moment_n_m[:, i], color=COMPONENTS[i], linewidth=1.2)
         ax.set_ylabel(f"${symbol}$ (N m)")
-        least_range(ax, 0.02)
-    _titled(moments[0], "(c) moments", legend=False)
+        set_min_range(ax, 0.02)
+    _draw_title(moments[0], "(c) moments", legend=False)
     for ax in (total, *moments[:2]):
         ax.tick_params(labelbottom=False)
     for ax in (each, moments[2]):
-        ax.set_xlabel(TIME)
-    span([total, each, *moments], (flight,))
-    place(figure, hspace=1.1, wspace=0.2)
-    heading(figure, number, "Control inputs, NGC", scene.case, scene.vehicle, (flight,))
+        ax.set_xlabel(TIME_LABEL)
+    set_time_axis([total, each, *moments], (flight,))
+    set_margins(figure, hspace=1.1, wspace=0.2)
+    draw_heading(figure, number, "Control inputs, NGC", scene.case, scene.vehicle, (flight,))
     return figure

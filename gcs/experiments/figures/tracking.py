@@ -12,20 +12,20 @@ from gcs.experiments.figures.canvas import (
     COMPONENTS,
     DESIRED,
     Scene,
-    heading,
-    least_range,
-    line,
+    draw_heading,
+    draw_line,
+    draw_title,
     panels,
-    span,
-    titled,
+    set_min_range,
+    set_time_axis,
 )
 
 
 def tracking(number: str, scene: Scene) -> Any:
     """(a) position, (b) velocity and acceleration, desired and actual; (c) position and velocity error."""
-    figure, axes = panels(13.0, 10.5, 5, 3, wide=0.3)
+    figure, axes = panels(13.0, 10.5, 5, 3, wspace=0.3)
     flight, samples, setpoint = scene.ngc, scene.ngc.samples, scene.ngc.telemetry.setpoint
-    origin = samples.desired_m[flight.seen(samples.time_s)][:1]
+    origin = samples.desired_m[flight.signal_window(samples.time_s)][:1]
     t = samples.time_s
     # the true acceleration is not sent; the true velocity has no noise, so it can be differentiated
     rate = np.gradient(samples.actual_m_s, t, axis=0)
@@ -35,29 +35,29 @@ def tracking(number: str, scene: Scene) -> Any:
     )
     for i, axis in enumerate(AXES):
         column = axes[:, i]
-        for ax, (letter, unit, time_s, desired, actual, least) in zip(column[:2], compared, strict=True):
-            line(ax, flight, time_s, actual[:, i], **ACTUAL)
-            line(ax, flight, time_s, desired[:, i], **DESIRED)
+        for ax, (letter, unit, time_s, desired, actual, min_range) in zip(column[:2], compared, strict=True):
+            draw_line(ax, flight, time_s, actual[:, i], **ACTUAL)
+            draw_line(ax, flight, time_s, desired[:, i], **DESIRED)
             ax.set_ylabel(f"${letter}$ {axis} {unit}")
-            least_range(ax, least)
-        line(column[2], flight, t, rate[:, i], **ACTUAL)
-        line(column[2], flight, setpoint.time_s, setpoint.acceleration_m_s2[:, i], **DESIRED)
+            set_min_range(ax, min_range)
+        draw_line(column[2], flight, t, rate[:, i], **ACTUAL)
+        draw_line(column[2], flight, setpoint.time_s, setpoint.acceleration_m_s2[:, i], **DESIRED)
         column[2].set_ylabel(f"$a_L$ {axis} (m/s²)")
-        least_range(column[2], 1.0)
+        set_min_range(column[2], 1.0)
         for ax, values, letter, unit in (
             (column[3], samples.error_m, "e_x", "(m)"),
             (column[4], samples.error_m_s, "e_v", "(m/s)"),
         ):
-            line(ax, flight, t, values[:, i], color=COMPONENTS[1], linewidth=1.4)
+            draw_line(ax, flight, t, values[:, i], color=COMPONENTS[1], linewidth=1.4)
             ax.set_ylabel(f"${letter}$ {axis} {unit}")
-            least_range(ax, 0.02)
+            set_min_range(ax, 0.02)
     for ax, text in zip(
         axes[:, 0],
         ("(a) position", "(b) velocity", "(b) acceleration", "(c) position error", "(c) velocity error"),
         strict=True,
     ):
-        titled(ax, text, legend=False)
-    titled(axes[0, 2], "", columns=2)
-    span(axes, (flight,))
-    heading(figure, number, "Load position tracking, NGC", scene.case, scene.vehicle, (flight,))
+        draw_title(ax, text, legend=False)
+    draw_title(axes[0, 2], "", columns=2)
+    set_time_axis(axes, (flight,))
+    draw_heading(figure, number, "Load position tracking, NGC", scene.case, scene.vehicle, (flight,))
     return figure

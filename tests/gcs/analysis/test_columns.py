@@ -36,7 +36,7 @@ def test_every_field_is_read_as_pymavlink_reads_it(message_id: int) -> None:
         expected = np.array([getattr(message, name) for message in messages], dtype=np.float64)
         np.testing.assert_array_equal(columns[name], expected)
         if "int" in type_name and "64" not in type_name:
-            np.testing.assert_array_equal(columns.whole(name), expected.astype(np.int64))
+            np.testing.assert_array_equal(columns.integers(name), expected.astype(np.int64))
 
 
 def test_several_fields_stand_side_by_side() -> None:

@@ -75,7 +75,7 @@ def test_the_phases_are_seen_in_the_truth(setpoint: SetpointTrack) -> None:
 
 
 def test_what_is_asked_is_the_nearest_point_of_the_line_that_is_flown(setpoint: SetpointTrack) -> None:
-    asked = setpoint.asked_m
+    asked = setpoint.requested_m
     assert asked[2] == pytest.approx((0.0, 0.0, 1.0), abs=LATTICE_M)  # straight up
     assert asked[3] == pytest.approx((1.0, 0.0, 2.0), abs=LATTICE_M)  # along the line
     assert asked[4] == pytest.approx((4.0, 0.0, 2.0), abs=LATTICE_M)  # not beyond its end

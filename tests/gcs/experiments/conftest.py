@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from gcs.analysis.record import FlightMeta
-from gcs.experiments.flown import Flown, flown_of
+from gcs.experiments.flight import ExperimentFlight, experiment_flight
 from gcs.experiments.plan import Experiment
 from tests.doubles import recorded_flights
 
 
 @pytest.fixture(scope="session")
-def step_flight() -> Callable[..., Flown]:
+def step_flight() -> Callable[..., ExperimentFlight]:
     """A step of 0.25 m along y followed by a swing that decays or grows."""
 
-    def fly(experiment: Experiment, runs_away: bool = False) -> Flown:
+    def fly(experiment: Experiment, runs_away: bool = False) -> ExperimentFlight:
         def error(t: np.ndarray) -> np.ndarray:
             after = np.clip(t - 0.4, 0.0, None)
             e = np.zeros((len(t), 3))
@@ -29,6 +29,6 @@ def step_flight() -> Callable[..., Flown]:
         meta = FlightMeta(
             mission=experiment.case, law=experiment.law, vehicle=experiment.vehicle, outcome="completed"
         )
-        return flown_of(made.telemetry(), experiment, meta)
+        return experiment_flight(made.telemetry(), experiment, meta)
 
     return fly

@@ -12,7 +12,7 @@ from gcs.batch.programs import ProgramCrew
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_NOT_MET, GcsError
 from gcs.experiments import run
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, experiments
-from gcs.experiments.store import begin, experiment_origin, is_flown
+from gcs.experiments.store import experiment_origin, is_flown, prepare
 
 CODE = "0123456789abcdef"
 CORES = (0, 3)
@@ -41,7 +41,7 @@ class Sky:
         self.terminated = []
 
     def start(self, experiment, directory, core):
-        begin(directory)
+        prepare(directory)
         assert core not in self.in_the_air, "two flights on one core"
         self.begun.append(experiment)
         flight = Flight(self, experiment, directory, core)

@@ -14,10 +14,10 @@ from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.experiments import thesis
 from gcs.experiments.figures.canvas import Scene
-from gcs.experiments.figures.catalogue import FIGURES, Drawn, draw_figures, wanted
+from gcs.experiments.figures.catalogue import FIGURES, DrawnFigure, draw_figures, figures_of
 from gcs.experiments.page import render_page
-from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, experiments, printed
-from gcs.experiments.results import ERROR_FUNCTIONS, result, write_results
+from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, experiments, printed_results
+from gcs.experiments.results import ERROR_FUNCTIONS, experiment_record, write_results
 from gcs.experiments.table import (
     better,
     comparison_table,
@@ -41,7 +41,7 @@ def scene(step_flight):
 
 @pytest.fixture(scope="module")
 def records(scene):
-    return [result(scene.ngc, "flights/a"), result(scene.lqr, "flights/b")]
+    return [experiment_record(scene.ngc, "flights/a"), experiment_record(scene.lqr, "flights/b")]
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +62,9 @@ def test_a_flight_is_cut_where_the_signals_begin_and_the_reference_rests(scene):
 
 def test_a_flight_that_is_lost_ends_where_it_is(scene):
     assert scene.lqr.lost
-    assert scene.lqr.length_s < scene.ngc.length_s
+    assert scene.lqr.duration_s < scene.ngc.duration_s
     s = scene.lqr.samples
-    error = np.linalg.norm(s.error_m[scene.lqr.seen(s.time_s)], axis=1)
+    error = np.linalg.norm(s.error_m[scene.lqr.signal_window(s.time_s)], axis=1)
     assert error[-1] > 2.0 and error[:-1].max() <= 2.0
 
 
@@ -94,8 +94,8 @@ def test_results_are_json_without_nan(records, tmp_path):
 
 def test_the_thesis_prints_what_it_prints_for_both_vehicles():
     for vehicle in VEHICLES:
-        assert printed(Experiment("case-b", "lqr", vehicle)) == {"load_error_max_m": 1.1}
-    assert printed(Experiment("case-c", "thesis", "thesis")) == {}
+        assert printed_results(Experiment("case-b", "lqr", vehicle)) == {"load_error_max_m": 1.1}
+    assert printed_results(Experiment("case-c", "thesis", "thesis")) == {}
 
 
 def test_tables_show_the_printed_value_and_the_difference(records):
@@ -123,7 +123,7 @@ def test_every_figure_family_is_there_for_every_case_and_vehicle():
     numbers = [figure.number for figure in FIGURES]
     expected = [f"4-{n}" for n in (*range(1, 5), *range(7, 26))] + [f"A-{n}" for n in range(1, 6)]
     assert sorted(numbers) == sorted(expected)
-    files = [f.file(v) for v in VEHICLES for c in CASES for f in wanted(c, v)]
+    files = [f.file(v) for v in VEHICLES for c in CASES for f in figures_of(c, v)]
     assert len(set(files)) == len(files) == 50
     assert "fig-4-07-tracking-case-a.png" in files
     assert "fig-a-5-inputs-case-c-bebop.png" in files
@@ -137,7 +137,7 @@ def test_every_figure_of_a_step_is_drawn_also_when_one_flight_is_lost(drawn):
 
 
 def test_the_page_holds_every_table_and_figure_and_nothing_from_elsewhere(records):
-    drawn = [Drawn(f, v, f.file(v)) for v in VEHICLES for c in CASES for f in wanted(c, v)]
+    drawn = [DrawnFigure(f, v, f.file(v)) for v in VEHICLES for c in CASES for f in figures_of(c, v)]
     page = render_page(records, drawn, "figures", "1.0", "abc")
     assert all(f'src="figures/{d.file}"' in page for d in drawn)
     assert all(table.title in page for table in tables(records))

@@ -18,9 +18,9 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
-from gcs.formats.items import NO_INT, FormatError
-from gcs.formats.missions import judge, read_foreign, write_foreign
-from gcs.formats.params import lines_of, qgc_of
+from gcs.formats.items import NO_COORDINATE, FormatError
+from gcs.formats.missions import check_plan, read_foreign, write_foreign
+from gcs.formats.params import parameter_lines, qgc_parameters
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import read_waypoints, write_waypoints
 from missions.fileformat import load_mission, shipped
@@ -76,7 +76,7 @@ def test_a_survey_is_taken_apart_in_its_order() -> None:
     plan = read_plan(plan_text(TAKEOFF, survey(WAYPOINTS[0], TRIGGER, WAYPOINTS[1]), simple(20, 2)))
     assert [one.item.command for one in plan.items] == [22, 16, 206, 16, 20]
     assert plan.items[2].where == "mission.items[1].TransectStyleComplexItem.Items[1]"
-    assert plan.lost == []
+    assert plan.not_converted == []
     first = plan.items[1].item
     assert (first.x, first.y, first.z, first.frame) == (473977000, 85456000, 3.5, 3)
     assert math.isnan(first.param4)
@@ -84,7 +84,7 @@ def test_a_survey_is_taken_apart_in_its_order() -> None:
 
 def test_what_is_no_item_is_told() -> None:
     structure = {"type": "ComplexItem", "complexItemType": "StructureScan", "Layers": 2}
-    lost = read_plan(plan_text(structure)).lost
+    lost = read_plan(plan_text(structure)).not_converted
     assert len(lost) == 1
     assert "mission.items[0]: StructureScan" in lost[0]
 
@@ -121,7 +121,7 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     text = plan_text(
         TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(201, 2)
     )
-    judged = judge(read_plan(text), HOME)
+    judged = check_plan(read_plan(text), HOME)
     lines = judged.left_out
     assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 4"]
     assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
@@ -135,7 +135,7 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
 
 
 def test_what_is_refused_is_left_out_and_not_kept() -> None:
-    judged = judge(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(203, 2), simple(21))), HOME)
+    judged = check_plan(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(203, 2), simple(21))), HOME)
     (line,) = judged.left_out
     assert line.startswith("item 1 (") and "DO_PARACHUTE (208)" in line
     assert judged.kept == ["item 2, DO_DIGICAM_CONTROL (203): kept on the vehicle but not done"]
@@ -143,7 +143,7 @@ def test_what_is_refused_is_left_out_and_not_kept() -> None:
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
-    judged = judge(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
+    judged = check_plan(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
     assert judged.left_out == judged.kept == []
     assert [item.command for item in judged.items] == [22, 16, 16, 16, 21]
 
@@ -154,7 +154,7 @@ def test_shipped_missions_pass_through_files_unchanged(name: str, ending: str, t
     items = encode_mission(load_mission(name), HOME)
     path = tmp_path / f"mission{ending}"
     write_foreign(path, items, HOME)
-    judged = judge(read_foreign(path), HOME)
+    judged = check_plan(read_foreign(path), HOME)
     assert judged.left_out == judged.kept == []
     assert judged.items == items
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
@@ -183,7 +183,7 @@ def test_any_items_come_back_bit_for_bit(items: list[WireItem]) -> None:
 
 
 def test_what_is_not_given_is_null() -> None:
-    item = WireItem(6, 16, 0, 1, 0.1, 0.0, 0.0, math.nan, NO_INT, 85455940, 2.0)
+    item = WireItem(6, 16, 0, 1, 0.1, 0.0, 0.0, math.nan, NO_COORDINATE, 85455940, 2.0)
     (entry,) = json.loads(write_plan([item], HOME))["mission"]["items"]
     assert entry["params"] == [0.1, 0.0, 0.0, None, None, 8.545594, 2.0]
 
@@ -219,11 +219,11 @@ def test_a_home_row_of_another_place_is_not_flown() -> None:
         text = f"QGC WPL 110\n0\t{current}\t0\t16\t0\t0\t0\t0\t{latitude}\t8.545594\t0\t1\n"
         return Plan(read_waypoints(text + "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t2\t1\n"), [])
 
-    at_home = judge(rows(47.397742), HOME)
+    at_home = check_plan(rows(47.397742), HOME)
     assert at_home.left_out == []
     assert len(at_home.items) == 2
     for current in (0, 1):
-        elsewhere = judge(rows(47.39, current), HOME)
+        elsewhere = check_plan(rows(47.39, current), HOME)
         assert len(elsewhere.left_out) == 1
         assert "home row" in elsewhere.left_out[0]
         assert [item.command for item in elsewhere.items] == [22]
@@ -296,7 +296,7 @@ def test_any_text_is_a_mission_or_a_format_error(text: str) -> None:
 
 def test_parameter_files_of_both_kinds_are_read_back() -> None:
     values = {"NGC_KX": 6.0, "SIXTEEN_LETTERS1": 0.1, "TINY": 1e-7}
-    assert parse_text(lines_of(values)) == values
-    text = qgc_of(values, Target(1, 1))
+    assert parse_text(parameter_lines(values)) == values
+    text = qgc_parameters(values, Target(1, 1))
     assert parse_text(text) == values
     assert "1\t1\tNGC_KX\t6\t9\n" in text

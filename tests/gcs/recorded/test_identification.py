@@ -56,21 +56,23 @@ def swinging(start: float) -> Motion:
     return motion_of(Recording("swing", STEP_S * np.arange(ROWS), np.zeros((ROWS, 3)), level, load), COLUMNS)
 
 
-@pytest.mark.parametrize(("start", "is_told"), [(0.3, True), (1e-4, False)])
-def test_drag_is_told_of_a_load_that_swings_and_not_of_one_that_hangs(start: float, is_told: bool) -> None:
+@pytest.mark.parametrize(("start", "is_determined"), [(0.3, True), (1e-4, False)])
+def test_drag_is_told_of_a_load_that_swings_and_not_of_one_that_hangs(
+    start: float, is_determined: bool
+) -> None:
     told: list[tuple[int, int]] = []
     model = TRUTH._replace(drag_per_m=0.0)
     (drag,) = identify_load(swinging(start), model, ["drag_per_m"], lambda *now: told.append(now))
-    assert drag.is_told == is_told
+    assert drag.is_determined == is_determined
     assert drag.value == pytest.approx(TRUTH.drag_per_m, abs=drag.half_width)
     assert [done for done, _ in told] == list(range(1, len(told) + 1))
     assert told[-1][0] <= told[-1][1]
 
 
 def test_a_number_is_told_if_its_interval_leaves_anything_of_it() -> None:
-    assert Identified("push_x_m_s2", 0.0, 1e-3).is_told  # identified: there is no push
-    assert not Identified("drag_per_m", 0.0035, 0.004).is_told
-    assert not Identified("length_m", 0.7, math.nan).is_told
+    assert Identified("push_x_m_s2", 0.0, 1e-3).is_determined  # identified: there is no push
+    assert not Identified("drag_per_m", 0.0035, 0.004).is_determined
+    assert not Identified("length_m", 0.7, math.nan).is_determined
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcs.recorded.column_map import load_map
-from gcs.recorded.estimates import Rows, filtered
+from gcs.recorded.estimates import FilterRows, filtered_estimates
 from gcs.recorded.load_model import LoadModel, step_load, thrust_tilt
 from gcs.recorded.smoothing import Floats
 
@@ -68,11 +68,11 @@ def test_a_filter_that_sees_the_load_is_consistent() -> None:
     model = CALM._replace(seen_m=5e-3, turbulence_m_s2=1e-3, force_density=1e-3)
     truth = swing(model, 40.0, 0.3)
     n = len(truth)
-    sight = np.zeros((n, 6))
-    sight[:, :2] = model.length_m * truth[:, :2] + rng.normal(0.0, model.seen_m, (n, 2))
-    sight[:, 4] = 1.0
-    rows = Rows(0.02 * np.arange(n), np.zeros((n, 8)), np.zeros((n, 8)), sight)
-    found = filtered(rows, model, load=True, tilt=False)
+    measurements = np.zeros((n, 6))
+    measurements[:, :2] = model.length_m * truth[:, :2] + rng.normal(0.0, model.seen_m, (n, 2))
+    measurements[:, 4] = 1.0
+    rows = FilterRows(0.02 * np.arange(n), np.zeros((n, 8)), np.zeros((n, 8)), measurements)
+    found = filtered_estimates(rows, model, load=True, tilt=False)
     assert np.mean(found.squares[100:, 0]) == pytest.approx(2.0, abs=0.25)
     error = found.states[100:, :2] - truth[100:, :2]
     variance = found.covariances[100:, [0, 1], [0, 1]]
@@ -82,11 +82,11 @@ def test_a_filter_that_sees_the_load_is_consistent() -> None:
 
 def test_nothing_is_carried_over_a_break() -> None:
     n = 400
-    sight = np.zeros((n, 6))
-    sight[:, 4] = 1.0
-    sight[200:, 0] = 1.0  # the load is suddenly elsewhere
-    sight[200, 5] = 1.0
-    rows = Rows(0.02 * np.arange(n), np.zeros((n, 8)), np.zeros((n, 8)), sight)
-    found = filtered(rows, CALM, load=True, tilt=False)
+    measurements = np.zeros((n, 6))
+    measurements[:, 4] = 1.0
+    measurements[200:, 0] = 1.0  # the load is suddenly elsewhere
+    measurements[200, 5] = 1.0
+    rows = FilterRows(0.02 * np.arange(n), np.zeros((n, 8)), np.zeros((n, 8)), measurements)
+    found = filtered_estimates(rows, CALM, load=True, tilt=False)
     assert (found.squares[[199, 200], 0] >= 0.0).all()
     assert found.states[200, 0] == pytest.approx(1.0 / CALM.length_m)

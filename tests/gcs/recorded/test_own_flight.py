@@ -15,7 +15,7 @@ from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
 from gcs.commands.options import spoken
 from gcs.errors import EXIT_USAGE
-from gcs.recorded.identification import Identified, map_doubt
+from gcs.recorded.identification import Identified, map_warning
 from gcs.workflows.recorded import name_of
 from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff
@@ -99,9 +99,9 @@ def test_a_load_that_was_never_carried_is_told(tmp_path: Path) -> None:
 
 
 def test_a_tilt_that_does_not_show_the_acceleration_casts_doubt_on_the_map() -> None:
-    assert map_doubt([Identified("tilt_share", 0.95, 0.05)]) == ""
-    assert map_doubt([Identified("tilt_share", 0.1, 0.6)]) == ""  # too uncertain to say
-    assert map_doubt([Identified("tilt_share", 0.001, 0.02)]).startswith("the tilt shows 0.00 of the")
+    assert map_warning([Identified("tilt_share", 0.95, 0.05)]) == ""
+    assert map_warning([Identified("tilt_share", 0.1, 0.6)]) == ""  # too uncertain to say
+    assert map_warning([Identified("tilt_share", 0.001, 0.02)]).startswith("the tilt shows 0.00 of the")
 
 
 def test_a_flight_goes_by_its_folder_and_any_other_recording_by_its_file(tmp_path: Path) -> None:

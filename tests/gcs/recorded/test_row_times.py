@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcs.recorded.gaps import gaps
+from gcs.recorded.gaps import find_gaps
 from gcs.recorded.row_times import infer_times
 from gcs.recorded.smoothing import Floats, smooth
 
@@ -35,13 +35,13 @@ def test_times_of_jittered_rows_are_found_where_the_vehicle_moves() -> None:
     error = (found.time_s - time)[inner]
     # an error common to neighbouring rows looks like another course and remains; between rows little remains
     assert np.std(error) < 0.6 * JITTER_S
-    moving = np.linalg.norm(found.course.velocity[inner], axis=1)[1:] > 1.0
+    moving = np.linalg.norm(found.smoothed.velocity[inner], axis=1)[1:] > 1.0
     assert np.std(np.diff(error)[moving]) < 0.2 * np.std(np.diff(time[inner])[moving])
     assert np.std(found.time_s[inner] - grid[inner]) > 0.8 * JITTER_S
     assert not found.broken.any()
     velocity = np.gradient(course(grid), grid, axis=0)[inner]
     even = smooth(grid, position, (4e-4) ** 2, 400.0)
-    wrong = [np.linalg.norm(c.velocity[inner] - velocity, axis=1) for c in (found.course, even)]
+    wrong = [np.linalg.norm(c.velocity[inner] - velocity, axis=1) for c in (found.smoothed, even)]
     assert np.median(wrong[0]) < 0.4 * np.median(wrong[1])
 
 
@@ -51,7 +51,7 @@ def test_missing_rows_are_counted() -> None:
     kept = np.ones(600, dtype=bool)
     kept[200:204] = False
     kept[425:434] = False
-    missing, broken = gaps(recorded(time[kept] + rng.normal(0.0, 3e-3, kept.sum()), rng))
+    missing, broken = find_gaps(recorded(time[kept] + rng.normal(0.0, 3e-3, kept.sum()), rng))
     assert {int(k): int(missing[k]) for k in np.flatnonzero(missing)} == {200: 4, 421: 9}
     assert not broken.any()
 
@@ -61,7 +61,7 @@ def test_a_stalled_tracker_misses_no_rows() -> None:
     time = np.arange(400) / RATE_HZ
     position = recorded(time, rng)
     position[200:203] = position[199]
-    missing, broken = gaps(position)
+    missing, broken = find_gaps(position)
     assert not missing.any()
     assert not broken.any()
 
@@ -70,7 +70,7 @@ def test_a_jump_that_no_course_explains_breaks_the_recording() -> None:
     rng = np.random.default_rng(4)
     position = recorded(np.arange(400) / RATE_HZ, rng)
     position[200:, 2] += 0.5
-    _, broken = gaps(position)
+    _, broken = find_gaps(position)
     assert np.flatnonzero(broken).tolist() == [200]
 
 

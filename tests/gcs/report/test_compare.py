@@ -18,12 +18,12 @@ from gcs.cli import gcs
 from gcs.report.compare import (
     STEPS,
     Run,
-    begins,
+    common_start,
     comparison,
     comparison_table,
     differences,
     figures,
-    in_columns,
+    fits_in_columns,
     labels,
     load_run,
 )
@@ -182,8 +182,8 @@ def test_flights_meet_where_all_have_begun(runs: list[Path], tmp_path: Path) -> 
     grounded.phase[grounded.mission] = 2  # never beyond TAUTEN
     path = grounded.write(tmp_path / "grounded.tlog")
     one, other = loaded(runs[0]), load_run("grounded", path, FlightMeta())
-    assert begins([one, one]) == ("mission", pytest.approx([flights.BEFORE_S] * 2))
-    assert begins([one, other]) == ("flight", pytest.approx([0.504] * 2))
+    assert common_start([one, one]) == ("mission", pytest.approx([flights.BEFORE_S] * 2))
+    assert common_start([one, other]) == ("flight", pytest.approx([0.504] * 2))
 
 
 def test_the_table_has_a_star_at_the_best(runs: list[Path]) -> None:
@@ -213,7 +213,7 @@ def test_headings_of_the_table_are_whole_in_a_narrow_terminal(runs: list[Path]) 
 def test_a_dozen_flights_are_a_row_each_in_a_narrow_terminal(runs: list[Path], width: int) -> None:
     three = [loaded(run) for run in runs]
     found = [replace(three[i % 3], name=f"case-b-20260301-1000{i:02}") for i in range(12)]
-    assert not in_columns(found, 80) and in_columns(found[:3], 80)
+    assert not fits_in_columns(found, 80) and fits_in_columns(found[:3], 80)
     table, missed = overview(found, width)
     console = Console(width=width, record=True, file=io.StringIO())
     console.print(table)

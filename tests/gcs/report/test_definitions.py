@@ -36,7 +36,7 @@ def test_every_metric_is_in_one_group_in_the_order_of_the_record():
     ],
 )
 def test_values_as_people_read_them(key, value, text):
-    assert METRICS[key].read({key: value}) == text
+    assert METRICS[key].formatted({key: value}) == text
 
 
 def test_a_scale_belongs_to_another_unit():

@@ -32,7 +32,7 @@ def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
     pictures = [Picture("one", "", asked_to_stop)]
     drawn: list[str] = []
     with StopRequest("stopping") as stop, Drawing(Path(), pictures) as drawing:
-        drawing.begin(view)
+        drawing.start_drawing(view)
         assert os.read(heard, 5) == b"drawn"
         drawing.finish(lambda picture: drawn.append(picture.file))
         assert not stop

@@ -79,7 +79,7 @@ def test_a_long_flight_is_thinned_and_keeps_its_peaks(monkeypatch: pytest.Monkey
     flight.drop = lambda i, kind: 12.0 < flight.time_s[i] < 13.0
     telemetry = flight.telemetry()
     samples = samples_of(telemetry)
-    monkeypatch.setattr("gcs.report.replay.MOST_ROWS", 200)
+    monkeypatch.setattr("gcs.report.replay.MAX_ROWS", 200)
     replay = replay_of(telemetry, samples, FlightMeta())
     columns = unpacked(replay["samples"])
     assert 200 <= replay["samples"]["count"] < 900

@@ -346,8 +346,8 @@ def test_phase_spans_meet():
 
 def test_flags_become_spans_that_can_be_seen():
     t = np.arange(6) * 1.0
-    assert style.true_spans(t, np.array((0, 1, 1, 0, 0, 1)) == 1, 0.5) == [(1.0, 2.0), (5.0, 0.5)]
-    assert style.true_spans(t[:0], np.zeros(0, dtype=bool), 0.5) == []
+    assert style.flagged_spans(t, np.array((0, 1, 1, 0, 0, 1)) == 1, 0.5) == [(1.0, 2.0), (5.0, 0.5)]
+    assert style.flagged_spans(t[:0], np.zeros(0, dtype=bool), 0.5) == []
 
 
 def test_snapshots_stand_apart():

@@ -15,7 +15,7 @@ from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.view.controls import SLIDERS
-from gcs.view.station import FAST_MESSAGES, INTERVAL_US, MOST_REQUESTS, Outgoing, Station
+from gcs.view.station import FAST_MESSAGES, INTERVAL_US, MAX_REQUESTS, Outgoing, Station
 
 MAP = (473977420, 85455940)
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
@@ -41,7 +41,7 @@ class Watched:
         """Send a request as a page does, and wait for the result."""
         before = len(self.results)
         request = {"vehicle": 1, "request": 5, "action": action, "arguments": arguments or {}, **more}
-        self.station.ask("page", request)
+        self.station.handle_request("page", request)
         self.news += self.station.news()
         while len(self.results) == before:
             self.run(0.1)
@@ -76,7 +76,7 @@ def test_a_vehicle_that_is_met_is_asked_for_fast_telemetry_and_for_the_parameter
 
 
 def test_one_that_only_looks_on_says_no_word_until_a_person_asks(world: Any) -> None:
-    watched = Watched(world, speaks=False)
+    watched = Watched(world, active=False)
     watched.run(5.0)
     assert list(watched.station.vehicles) == [1]
     assert world.vehicle.commands == []
@@ -100,7 +100,7 @@ def test_a_refusal_is_answered_with_the_reason_that_the_vehicle_gives(watched: W
     answer = watched.ask("arm")
     assert not answer["ok"]
     vehicle.command_results[mavlink.MAV_CMD_COMPONENT_ARM_DISARM] = [mavlink.MAV_RESULT_DENIED]
-    watched.station.ask("page", {"vehicle": 1, "request": 6, "action": "arm", "arguments": {}})
+    watched.station.handle_request("page", {"vehicle": 1, "request": 6, "action": "arm", "arguments": {}})
     watched.run(0.1)
     vehicle.say("Arming denied: in the air")
     watched.run(1.0)
@@ -158,7 +158,9 @@ def test_what_is_no_action_is_refused_with_a_reason_and_not_sent(
     watched: Watched, action: Any, arguments: Any, says: str
 ) -> None:
     before = len(watched.world.vehicle.commands)
-    watched.station.ask("page", {"vehicle": 1, "request": 1, "action": action, "arguments": arguments})
+    watched.station.handle_request(
+        "page", {"vehicle": 1, "request": 1, "action": action, "arguments": arguments}
+    )
     watched.run(0.5)
     assert not watched.results[-1]["ok"]
     assert says in watched.results[-1]["text"]
@@ -176,18 +178,22 @@ JSON = st.recursive(
 def test_no_request_at_all_raises(anything: Any, action: str) -> None:
     station = Station()
     station.receive(heartbeat(1), 0)
-    station.ask("page", anything)
-    station.ask("page", {"vehicle": 1, "request": anything, "action": action, "arguments": anything})
-    station.ask("page", {"vehicle": anything, "action": anything})
+    station.handle_request("page", anything)
+    station.handle_request(
+        "page", {"vehicle": 1, "request": anything, "action": action, "arguments": anything}
+    )
+    station.handle_request("page", {"vehicle": anything, "action": anything})
     list(station.poll(0))
     json.dumps(station.news(), allow_nan=False)
 
 
 def test_a_page_that_asks_too_much_is_told_so(watched: Watched) -> None:
-    for number in range(MOST_REQUESTS + 1):
-        watched.station.ask("page", {"vehicle": 1, "request": number, "action": "hold", "arguments": {}})
+    for number in range(MAX_REQUESTS + 1):
+        watched.station.handle_request(
+            "page", {"vehicle": 1, "request": number, "action": "hold", "arguments": {}}
+        )
     watched.news += watched.station.news()
-    assert [record["request"] for record in watched.results if not record["ok"]] == [MOST_REQUESTS]
+    assert [record["request"] for record in watched.results if not record["ok"]] == [MAX_REQUESTS]
 
 
 def heartbeat(system: int) -> bytes:
@@ -202,7 +208,7 @@ def test_several_vehicles_are_told_apart_and_each_is_spoken_to_by_its_own_number
     station = Station()
     assert station.receive(heartbeat(3), 0) == [3]
     assert station.receive(heartbeat(7), 0) == [7]
-    station.ask("page", {"vehicle": 7, "request": 1, "action": "land", "arguments": {}})
+    station.handle_request("page", {"vehicle": 7, "request": 1, "action": "land", "arguments": {}})
     sent = [out for out in station.poll(0) if isinstance(out, Outgoing)]
     assert {out.system for out in sent} == {3, 7}
     assert [state["id"] for state in station.state(0)["vehicles"]] == [3, 7]
@@ -299,7 +305,7 @@ def test_whatever_numbers_a_vehicle_says_the_page_gets_json(sent: list[Any]) -> 
         station.receive(frame, step * 20_000)
         station.receive_truth(frame)
         json.dumps(station.state(step * 20_000), allow_nan=False)
-    json.dumps([station.news(), station.greeting()], allow_nan=False)
+    json.dumps([station.news(), station.initial_records()], allow_nan=False)
 
 
 TRUTH, ESTIMATE = mavlink.PLUMBLINE_SOURCE_TRUTH, mavlink.PLUMBLINE_SOURCE_ESTIMATED

@@ -15,14 +15,14 @@ from benchmarks.cable_convergence import (
     TICK,
     ChainPlant,
     chain_model,
-    flown_frequencies,
     frequency_errors,
-    hanging,
     hover,
     massless_difference,
     mujoco_difference,
+    simulated_frequencies,
     step_errors,
-    swinging,
+    suspended,
+    swinging_plant,
     without_drag,
 )
 from sitl.plant.chain.records import lay
@@ -49,7 +49,7 @@ def test_hanging_chain_has_the_frequencies_of_bessel(mass: float, load: float) -
 
 
 def test_a_mode_that_the_step_resolves_is_not_damped() -> None:
-    slowest = flown_frequencies(8, CORD, LOAD)[0]
+    slowest = simulated_frequencies(8, CORD, LOAD)[0]
     assert abs(slowest.real) < 1e-6 * slowest.imag
 
 
@@ -79,11 +79,11 @@ def test_an_attachment_beside_the_centre_of_mass_is_that_of_the_taut_plant() -> 
 
 
 def test_a_light_cable_is_the_massless_one() -> None:
-    """To first order in its mass: its weight is not carried by the thrust of `swinging`."""
-    massless = swinging(chain_model(1, mass=0.0)).fly(0.5).x_load
+    """To first order in its mass: its weight is not carried by the thrust of `swinging_plant`."""
+    massless = swinging_plant(chain_model(1, mass=0.0)).fly(0.5).x_load
     off = []
     for mass in (2e-4, 1e-4):
-        light = swinging(chain_model(4, mass=mass))
+        light = swinging_plant(chain_model(4, mass=mass))
         off.append(float(np.linalg.norm(np.subtract(light.fly(0.5).x_load, massless))))
     assert off[0] < 1e-3
     assert off[0] / off[1] == pytest.approx(2.0, rel=0.1)
@@ -102,7 +102,7 @@ def test_energy_stays_without_damping() -> None:
     """Vehicle and load turn about each other on a cable so soft that the step resolves its stretch; after
     settling, the damping is switched off."""
     model = chain_model(2, stiffness=50.0, damping=2.0, hook=0.05, gyration=0.02, gyration_upright=0.02)
-    begun = swinging(model)
+    begun = swinging_plant(model)
     settled = ChainPlant(begun.truth._replace(gravity=1e-9), begun.state)
     settled.fly(0.3, 1.25e-4)
     lost = []
@@ -121,7 +121,7 @@ def test_energy_stays_without_damping() -> None:
 def test_vehicle_cable_and_load_fall_freely(bebop: Truth) -> None:
     model = chain_model(5, mass=0.01, hook=0.05, gyration=0.02, gyration_upright=0.02)
     truth = without_drag(bebop)._replace(chain=model)
-    slack = hanging(truth, x_load=(0.1, 0.0, 30.0), x_quad=(0.0, 0.0, 30.4))
+    slack = suspended(truth, x_load=(0.1, 0.0, 30.0), x_quad=(0.0, 0.0, 30.4))
     plant = ChainPlant(truth, slack)
     begin = plant.rows.x.copy()
     end = plant.fly(1.0)
@@ -138,7 +138,7 @@ def snapped(truth: Truth, damping: float, seconds: float) -> tuple[float, float,
     model = chain_model(1, mass=0.0, stiffness=7e3, damping=damping)
     free = without_drag(truth)._replace(chain=model, gravity=1e-9)
     share = truth.load_mass / (truth.load_mass + truth.quad_mass)
-    start = hanging(free, x_load=(0.0, 0.0, 50.0), x_quad=(0.0, 0.0, 50.0 + truth.cable_length - 1e-3))
+    start = suspended(free, x_load=(0.0, 0.0, 50.0), x_quad=(0.0, 0.0, 50.0 + truth.cable_length - 1e-3))
     start = start._replace(
         v_quad=(0.0, 0.0, share * CLOSING), v_load=(0.0, 0.0, (share - 1.0) * CLOSING), taut=0.0
     )
@@ -180,7 +180,7 @@ def test_a_cable_in_the_wind_is_dragged(bebop: Truth) -> None:
         model = chain_model(links, drag_coefficient=drag_coefficient)
         air = bebop.air._replace(cable_diameter=0.002)
         truth = without_drag(bebop)._replace(chain=model, air=air)
-        plant = ChainPlant(truth, hanging(truth), hover(truth), (0.0, speed, 0.0))
+        plant = ChainPlant(truth, suspended(truth), hover(truth), (0.0, speed, 0.0))
         state = plant.fly(1e-3, 1e-3)
         masses = np.full(links + 1, model.mass * truth.cable_length / links)
         masses[[0, -1]] = 0.5 * masses[1] + np.array([truth.quad_mass, truth.load_mass])
@@ -205,7 +205,7 @@ def test_a_load_that_turns_swings_as_a_double_pendulum(bebop: Truth) -> None:
     phi, theta = (0.01 * modes[:, slow] / modes[0, slow]).tolist()
     down = (0.0, length * np.sin(phi) + h * np.sin(theta), -length * np.cos(phi) - h * np.cos(theta))
     x_load = (down[0], float(down[1]), float(3.0 + down[2]))
-    plant = ChainPlant(truth, hanging(truth, x_quad=(0.0, 0.0, 3.0), x_load=x_load), hover(truth))
+    plant = ChainPlant(truth, suspended(truth, x_quad=(0.0, 0.0, 3.0), x_load=x_load), hover(truth))
     plant.rows.body[:2] = np.cos(0.5 * theta), np.sin(0.5 * theta)
     lay(plant.rows, truth, plant.state)
     tilts = np.array([plant.rows.body[1] for _ in range(4000) if plant.fly(1e-3, 1e-3)])
@@ -220,7 +220,7 @@ def test_a_load_turns_its_drag_downwind(bebop: Truth) -> None:
     """Its drag acts forward of its centre: the wind from the left turns the nose to the right."""
     model = chain_model(2, hook=0.03, gyration=0.02, gyration_upright=0.02, pressure=0.01, spin_drag=1e-6)
     truth = bebop._replace(chain=model)
-    plant = ChainPlant(truth, hanging(truth), hover(truth), (0.0, -5.0, 0.0))
+    plant = ChainPlant(truth, suspended(truth), hover(truth), (0.0, -5.0, 0.0))
     plant.fly(0.2)
     assert plant.rows.body[6] < -0.1
 
@@ -243,7 +243,7 @@ def test_at_rest_on_the_ground_everything_stays(bebop: Truth) -> None:
 def test_a_cable_let_go_falls_with_its_load(bebop: Truth) -> None:
     model = chain_model(6, hook=0.015, gyration=0.02, gyration_upright=0.02, damping=10.0)
     truth = without_drag(bebop)._replace(chain=model)
-    plant = ChainPlant(truth, hanging(truth), hover(truth))
+    plant = ChainPlant(truth, suspended(truth), hover(truth))
     plant.fly(0.5)
     held = plant.state
     plant.truth = without_cable(truth)
@@ -260,7 +260,7 @@ def test_a_cable_let_go_falls_with_its_load(bebop: Truth) -> None:
 def test_a_winch_reels_the_links_in(bebop: Truth) -> None:
     model = chain_model(6, damping=10.0)
     truth = without_drag(bebop)._replace(chain=model)
-    plant = ChainPlant(truth, hanging(truth), hover(truth))
+    plant = ChainPlant(truth, suspended(truth), hover(truth))
     plant.fly(0.3)
     for _ in range(125):  # 0.5 s at 0.2 m/s
         plant.truth = plant.truth._replace(reel_rate=-0.2)

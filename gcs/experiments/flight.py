@@ -22,7 +22,7 @@ _AT_REST_M_S = 1e-6  # desired speeds are single precision
 
 
 @dataclass(frozen=True)
-class Flown:
+class ExperimentFlight:
     """A flown experiment. Times are on the vehicle's clock; in figures they count from `start_s`."""
 
     experiment: Experiment
@@ -34,54 +34,57 @@ class Flown:
     end_s: float  # the load begins to be lowered, or the flight is lost
     lost: bool  # the error exceeded DIVERGED_M, or the autopilot gave up
 
-    def clock(self, time_s: Floats) -> Floats:
+    def since_start(self, time_s: Floats) -> Floats:
         """Seconds since the signals began."""
         return np.asarray(time_s - self.start_s)
 
-    def seen(self, time_s: Floats) -> slice:
+    def signal_window(self, time_s: Floats) -> slice:
         """The samples from the beginning of the signals to the end."""
         return slice(*np.searchsorted(time_s, (self.start_s, np.nextafter(self.end_s, np.inf))))
 
     @property
-    def length_s(self) -> float:
+    def duration_s(self) -> float:
         """From the beginning of the signals to the end."""
         return self.end_s - self.start_s
 
 
-def read_flown(directory: Path, experiment: Experiment) -> Flown:
+def read_flight(directory: Path, experiment: Experiment) -> ExperimentFlight:
     """The flight in `directory`."""
     telemetry = load_telemetry(directory / TLOG_FILE)
-    return flown_of(telemetry, experiment, load_meta(directory / META_FILE))
+    return experiment_flight(telemetry, experiment, load_meta(directory / META_FILE))
 
 
-def flown_of(telemetry: Telemetry, experiment: Experiment, meta: FlightMeta) -> Flown:
+def experiment_flight(telemetry: Telemetry, experiment: Experiment, meta: FlightMeta) -> ExperimentFlight:
     """The flight from telemetry that has already been read."""
     samples = samples_of(telemetry)
     setpoint = telemetry.setpoint
     speed = np.linalg.norm(setpoint.velocity_m_s, axis=1)
     in_mission = setpoint.phase == MISSION
     moving = np.flatnonzero(in_mission & (speed > _AT_REST_M_S))
-    whole = telemetry.span_s or (0.0, 0.0)
+    span = telemetry.span_s or (0.0, 0.0)
     if len(moving):
         first = moving[0]
         start = float(setpoint.time_s[first] - setpoint.elapsed_s[first])
-        after = min(int(moving[-1]) + 1, len(setpoint.time_s) - 1)
-        rest = float(setpoint.time_s[after])
+        next_sample = min(int(moving[-1]) + 1, len(setpoint.time_s) - 1)
+        rest = float(setpoint.time_s[next_sample])
     else:
-        start, rest = whole
-    end, lost = _end(telemetry, samples, start, whole[1])
-    return Flown(experiment, meta, telemetry, samples, start, rest, end, lost)
+        start, rest = span
+    end, lost = _end(telemetry, samples, start, span[1])
+    return ExperimentFlight(experiment, meta, telemetry, samples, start, rest, end, lost)
 
 
 def _end(telemetry: Telemetry, samples: Samples, start_s: float, last_s: float) -> tuple[float, bool]:
     """The end of the flight, and whether it was lost: the last time at which the load is carried or, if
     earlier, the time at which it diverged."""
     setpoint = telemetry.setpoint
-    over = (setpoint.time_s >= start_s) & ~np.isin(setpoint.phase, CARRIED)
-    end = float(setpoint.time_s[int(np.argmax(over)) - 1]) if over.any() else last_s
-    gave_up = bool(over.any()) and setpoint.phase[int(np.argmax(over))] == mavlink.PLUMBLINE_PHASE_FAILSAFE
+    not_carried = (setpoint.time_s >= start_s) & ~np.isin(setpoint.phase, CARRIED)
+    end = float(setpoint.time_s[int(np.argmax(not_carried)) - 1]) if not_carried.any() else last_s
+    gave_up = (
+        bool(not_carried.any())
+        and setpoint.phase[int(np.argmax(not_carried))] == mavlink.PLUMBLINE_PHASE_FAILSAFE
+    )
     error = np.linalg.norm(samples.error_m, axis=1)
-    away = (samples.time_s >= start_s) & (samples.time_s <= end) & (error > DIVERGED_M)
-    if away.any():
-        return float(samples.time_s[int(np.argmax(away))]), True
+    diverged = (samples.time_s >= start_s) & (samples.time_s <= end) & (error > DIVERGED_M)
+    if diverged.any():
+        return float(samples.time_s[int(np.argmax(diverged))]), True
     return end, gave_up

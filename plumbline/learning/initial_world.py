@@ -20,16 +20,16 @@ from sitl.world import DUE, LENGTH, Floats, Ints, World, WorldRows
 _NEVER = 2**62
 
 
-def _place(field: str) -> slice:
+def _vector_slice(field: str) -> slice:
     first = place_of(World, "plant") + place_of(PlantState, field)
     return slice(first, first + 3)
 
 
-X_LOAD, V_LOAD, X_QUAD, V_QUAD = (_place(name) for name in ("x_load", "v_load", "x_quad", "v_quad"))
+X_LOAD, V_LOAD, X_QUAD, V_QUAD = (_vector_slice(name) for name in ("x_load", "v_load", "x_quad", "v_quad"))
 
 
 @dataclass(frozen=True)
-class Beginning:
+class InitialWorld:
     """A world except for its position and velocity: the load rests at the origin."""
 
     world: Row
@@ -39,25 +39,25 @@ class Beginning:
     cable_length: float  # m
 
 
-def beginning_of(scenario: Scenario, draw: Draw) -> Beginning:
+def initial_world(scenario: Scenario, draw: Draw) -> InitialWorld:
     """The world of an episode. The rotors carry the weight, and have been commanded to for a long time."""
     rows, truth, settings = scenario.world(draw)
     hover = hover_forces(scenario, (truth.quad_mass + truth.load_mass) * truth.gravity)
     for row in (ASKED, COMMAND, TARGET, FORCE):
         rows.rotors[row] = hover
-    world = unpack(World, rows.world, 0)._replace(plant=_hanging(truth))
+    world = unpack(World, rows.world, 0)._replace(plant=_suspended(truth))
     clock = rows.clock.copy()
     clock[:, LENGTH] = 0  # readings taken on the ground are discarded
     if not scenario.estimated:
         clock[:, DUE] = _NEVER
-    waiting = settings.actuator_delay_us // settings.tick_us
-    due_us = [settings.actuator_delay_us - (waiting - k) * settings.tick_us for k in range(waiting)]
-    commands = np.zeros((waiting, rows.commands.shape[1]))
+    in_transit = settings.actuator_delay_us // settings.tick_us
+    due_us = [settings.actuator_delay_us - (in_transit - k) * settings.tick_us for k in range(in_transit)]
+    commands = np.zeros((in_transit, rows.commands.shape[1]))
     commands[:, 0], commands[:, 1:] = due_us, hover[: commands.shape[1] - 1]
-    return Beginning(packed(world), rows, clock, commands, truth.cable_length)
+    return InitialWorld(packed(world), rows, clock, commands, truth.cable_length)
 
 
-def depends_on_chance(scenario: Scenario) -> bool:
+def worlds_differ(scenario: Scenario) -> bool:
     """Whether two episodes differ in more than position and velocity."""
     gusts = scenario.cell.settings.gust_std != 0.0
     return scenario.estimated or gusts or bool(scenario.options.randomise)
@@ -71,16 +71,16 @@ def hover_forces(scenario: Scenario, weight: float) -> Floats:
     return forces
 
 
-def _hanging(truth: Truth) -> PlantState:
+def _suspended(truth: Truth) -> PlantState:
     """The load at the origin, the cable's attachment above it, the vehicle level and heading east."""
     x, y, z = truth.attachment
-    over: Vec3 = (0.0 - x, 0.0 - y, truth.cable_length - z)
+    above: Vec3 = (0.0 - x, 0.0 - y, truth.cable_length - z)
     return PlantState(
         x_load=ZERO,
         v_load=ZERO,
         q_cable=(0.0, 0.0, -1.0),
         q_cable_dot=ZERO,
-        x_quad=over,
+        x_quad=above,
         v_quad=ZERO,
         quat_wxyz=IDENTITY_QUAT,
         omega_body=ZERO,

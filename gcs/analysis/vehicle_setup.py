@@ -11,7 +11,7 @@ from autopilot.wire.items.records import WireItem
 from autopilot.wire.parameter_encoding import from_the_wire
 
 VEHICLE_SYSTEM = 1
-ASKED = (
+SETUP_MESSAGES = (
     mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
@@ -19,8 +19,8 @@ ASKED = (
 )
 
 
-class Asked:
-    """Collects messages of the kinds `ASKED` from all senders, in the order of the log."""
+class VehicleSetup:
+    """Collects messages of the kinds `SETUP_MESSAGES` from all senders, in the order of the log."""
 
     def __init__(self) -> None:
         self.parameters: dict[str, float] = {}
@@ -28,7 +28,7 @@ class Asked:
         self._items: dict[int, WireItem] = {}
         self._count = 0
 
-    def take(self, received: Received) -> None:
+    def receive(self, received: Received) -> None:
         """Process one message. A parameter or home of another system, and a value that is not finite, are
         ignored."""
         message = received.message
@@ -40,9 +40,9 @@ class Asked:
             if received.system == VEHICLE_SYSTEM:
                 self.home = Home(1e-7 * message.latitude, 1e-7 * message.longitude, 1e-3 * message.altitude)
         elif message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION:
-            self._take_mission(received)
+            self._receive_mission(received)
 
-    def _take_mission(self, received: Received) -> None:
+    def _receive_mission(self, received: Received) -> None:
         message = received.message
         if received.id == mavlink.MAVLINK_MSG_ID_MISSION_COUNT:
             self._items, self._count = {}, message.count
