@@ -2,8 +2,8 @@
 
 The length is found twice: from the distance between the tracked points, and from the swing alone. The
 parameters of the load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's
-weights) by Gauss-Newton. Those of the vehicle come from a linear regression: its thrust lies along its axis,
-so the horizontal acceleration of vehicle and load shows in the tilt.
+weights) by Gauss-Newton. Those of the vehicle come from a regression: its thrust lies along its axis, so the
+horizontal acceleration of vehicle and load shows in the tilt.
 
 Intervals come from a jackknife: the recording is cut into blocks of ten seconds (neighbouring residuals are
 correlated, those of different blocks are not), and the parameters are estimated again without each block, by
@@ -37,6 +37,9 @@ _DIFFERENCE_SHARE = 0.3  # share of a step, for finite differences
 _DAMPING_STEPS = 100.0  # damping, in steps: an undetermined parameter stays where it began
 _STEP_FACTORS = (1.0, 0.5, 0.25)
 _CUTOFF_RATIO = 4.0  # times the pendulum's frequency: cut-off of the low-pass
+# of the regression for the vehicle; each multiplies the error by about r / (1 + r), r the mass ratio
+_MAX_VEHICLE_ITERATIONS = 60
+_CONVERGED = 1e-6  # change of each parameter in an iteration
 _EDGE_S = 5.0  # left out at both ends of the filtered signals
 
 _STEPS = {
@@ -172,6 +175,14 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     """Mass ratio (load / vehicle), linear drag of the vehicle, share of its acceleration in the tilt, delay
     of the attitude, quadratic drag of the vehicle.
 
+    With r the mass ratio, v and v_L the velocities of vehicle and load, d = d_1 + d_2 |v| the vehicle's drag
+    over its mass and c that of the load, the thrust over m_Q is
+
+        share a + g e_3 + d v + r (a_L + g e_3 + c |v_L| v_L),
+
+    so its horizontal part is its vertical part times the tilt. The vertical part depends on r and d, too: the
+    regression is repeated with those that it found.
+
     TooLittleMotionError if the recording does not determine them separately.
     """
     time, slow = motion.time_s, motion.slow
@@ -179,31 +190,38 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     cut = _CUTOFF_RATIO * np.sqrt(model.gravity_m_s2 / model.length_m) / (2.0 * np.pi)
     rate = 1.0 / float(np.median(np.diff(time)))
     b, a = butter(3, min(0.9, 2.0 * cut / rate))
-    up = (
-        slow.acceleration[:, 2]
-        + model.gravity_m_s2
-        + model.mass_ratio * (load.acceleration[:, 2] + model.gravity_m_s2)
-    )
-    speed = np.linalg.norm(slow.velocity, axis=1)
+    speed = np.linalg.norm(slow.velocity, axis=1)[:, None]
+    load_drag = model.drag_per_m * np.linalg.norm(load.velocity, axis=1)[:, None] * load.velocity
+    cable_force = load.acceleration + load_drag + np.array([0.0, 0.0, model.gravity_m_s2])
     tilt_rate = np.gradient(motion.tilt, time, axis=0)
-    one, zero = np.ones_like(up), np.zeros_like(up)
-    terms = [
-        load.acceleration[:, :2],
-        slow.velocity[:, :2],
-        slow.acceleration[:, :2],
-        -up[:, None] * tilt_rate,
-        speed[:, None] * slow.velocity[:, :2],
-        np.column_stack([one, zero]) * up[:, None],
-        np.column_stack([zero, one]) * up[:, None],
-    ]
     edge = int(_EDGE_S * rate)
     kept = slice(edge, len(time) - edge)
-    rows = np.stack([filtfilt(b, a, term, axis=0)[kept] for term in terms], axis=-1)
-    target = filtfilt(b, a, up[:, None] * motion.tilt, axis=0)[kept]
-    flat = rows.reshape(-1, len(terms))
-    if np.linalg.matrix_rank(flat) < len(terms):
-        raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
-    found = np.linalg.solve(flat.T @ flat, flat.T @ target.ravel())
+    found = np.array([model.mass_ratio, model.vehicle_drag_per_s, model.tilt_share, 0.0, 0.0])
+    for _ in range(_MAX_VEHICLE_ITERATIONS):
+        drag = found[1] + found[4] * speed[:, 0]
+        up = (
+            slow.acceleration[:, 2]
+            + model.gravity_m_s2
+            + drag * slow.velocity[:, 2]
+            + found[0] * cable_force[:, 2]
+        )[:, None]
+        terms = [
+            cable_force[:, :2],
+            slow.velocity[:, :2],
+            slow.acceleration[:, :2],
+            -up * tilt_rate,
+            speed * slow.velocity[:, :2],
+            up * np.array([1.0, 0.0]),
+            up * np.array([0.0, 1.0]),
+        ]
+        rows = np.stack([filtfilt(b, a, term, axis=0)[kept] for term in terms], axis=-1)
+        target = filtfilt(b, a, up * motion.tilt, axis=0)[kept]
+        flat = rows.reshape(-1, len(terms))
+        if np.linalg.matrix_rank(flat) < len(terms):
+            raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
+        before, found = found, np.linalg.solve(flat.T @ flat, flat.T @ target.ravel())
+        if np.max(np.abs(found[:5] - before[:5])) < _CONVERGED:
+            break
     gradients = np.einsum("kij,ki->kj", rows, rows @ found - target)
     spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), gradients, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")

@@ -106,29 +106,34 @@ def _advanced(s: LoadState, rate: LoadState, h: float) -> LoadState:
 
 
 @kernel
-def _interpolated(a: Drive, b: Drive, part: float) -> Drive:
+def _parabola(v0: float, v1: float, a0: float, a1: float, h: float, part: float) -> tuple[float, float]:
+    """Acceleration and velocity at a part of a step h: the acceleration is the parabola with the values a0
+    and a1 at the ends and the integral v1 - v0."""
+    bend = 6.0 * ((v1 - v0) / h - 0.5 * (a0 + a1))
     rest = 1.0 - part
-    return (
-        rest * a[0] + part * b[0],
-        rest * a[1] + part * b[1],
-        rest * a[2] + part * b[2],
-        rest * a[3] + part * b[3],
-        rest * a[4] + part * b[4],
-        rest * a[5] + part * b[5],
-        rest * a[6] + part * b[6],
-        rest * a[7] + part * b[7],
-    )
+    accel = rest * a0 + part * a1 + part * rest * bend
+    square = 0.5 * part * part
+    return accel, v0 + h * ((part - square) * a0 + square * a1 + square * (1.0 - part / 1.5) * bend)
+
+
+@kernel
+def _interpolated(a: Drive, b: Drive, h: float, part: float) -> Drive:
+    rest = 1.0 - part
+    ax, vx = _parabola(a[3], b[3], a[0], b[0], h, part)
+    ay, vy = _parabola(a[4], b[4], a[1], b[1], h, part)
+    az, vz = _parabola(a[5], b[5], a[2], b[2], h, part)
+    return (ax, ay, az, vx, vy, vz, rest * a[6] + part * b[6], rest * a[7] + part * b[7])
 
 
 @kernel
 def step_load(s: LoadState, h: float, before: Drive, after: Drive, m: LoadModel) -> LoadState:
-    """The state a time h later, while the drive changes linearly from `before` to `after` (Runge-Kutta 4)."""
+    """The state a time h later, while the drive changes from `before` to `after` (Runge-Kutta 4)."""
     part = 1.0 / _STEPS
     e = h * part
     for i in range(_STEPS):
-        first = _interpolated(before, after, i * part)
-        middle = _interpolated(before, after, (i + 0.5) * part)
-        last = _interpolated(before, after, (i + 1) * part)
+        first = _interpolated(before, after, h, i * part)
+        middle = _interpolated(before, after, h, (i + 0.5) * part)
+        last = _interpolated(before, after, h, (i + 1) * part)
         k1 = _rates(s, first, m)
         k2 = _rates(_advanced(s, k1, 0.5 * e), middle, m)
         k3 = _rates(_advanced(s, k2, 0.5 * e), middle, m)

@@ -46,17 +46,16 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
             raise InputError(
                 f"{path}: {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are needed to identify anything"
             )
-        try:
-            vehicle = identify_vehicle(motion, model)
-        except TooLittleMotionError as error:
-            raise InputError(f"{path}: {error}") from None
 
         def tell(done: int, total: int) -> None:
             display.update(done, total, "fitting predictions of the load")
 
         try:
+            identify_vehicle(motion, model)  # too little motion is reported before the load is fitted
             load = identify_load(motion, model, asked.identify.parameters, tell)
-        except NoLoadError as error:
+            known = {one.name: one.value for one in load if one.is_told}
+            vehicle = identify_vehicle(motion, model._replace(**known))
+        except (NoLoadError, TooLittleMotionError) as error:
             raise InputError(f"{path}: {error}") from None
         found: list[Identified] = [tracked_length(motion, asked.attachment.below_m), *load, *vehicle]
     return {

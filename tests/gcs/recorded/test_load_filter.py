@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -40,6 +41,28 @@ def test_a_small_swing_has_the_period_of_a_pendulum() -> None:
     assert 2 * 0.02 * (down[1] - down[0]) == pytest.approx(
         2 * math.pi * math.sqrt(CALM.length_m / CALM.gravity_m_s2), abs=0.05
     )
+
+
+def accelerated(rows_hz: float, seconds: float = 8.0) -> tuple[float, float]:
+    """The cable's direction after a sinusoidal motion of the vehicle that so many rows a second specify."""
+    omega, size = 5.0, 4.0
+    state, step = (0.05, 0.0, 0.0, 0.0, 0.0, 0.0), 1.0 / rows_hz
+    times = np.arange(round(seconds * rows_hz) + 1) * step
+    drives = [
+        (size * math.sin(omega * t), 0.0, 0.0, -size / omega * math.cos(omega * t), 0.0, 0.0, 0.0, 0.0)
+        for t in times
+    ]
+    for before, after in itertools.pairwise(drives):
+        state = step_load(state, step, before, after, CALM)
+    return state[0], state[1]
+
+
+def test_the_motion_between_two_rows_is_known_from_both_ends() -> None:
+    """The acceleration has the integral that the velocities specify."""
+    exact = accelerated(1000.0)
+    errors = [abs(accelerated(rate)[0] - exact[0]) for rate in (10.0, 20.0)]
+    assert errors[0] < 2e-4
+    assert errors[1] < errors[0] / 8.0
 
 
 def test_wash_pushes_outwards_and_drag_brakes() -> None:
