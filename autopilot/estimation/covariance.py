@@ -28,6 +28,7 @@ from autopilot.estimation.records import (
     PUSH,
     RATE,
     SIZE,
+    TEST_RATIO,
     VARIANCE,
     VELOCITY,
     Array,
@@ -287,6 +288,15 @@ def farness(history: History, count: int) -> float:
         off = history.scalars[k, INNOVATION]
         total += off * off / (shared(history, k, k) + history.scalars[k, VARIANCE])
     return total
+
+
+@kernel
+def within_gate(history: History, sensor: int, count: int, gate_sigma: float) -> bool:
+    """Whether the first `count` scalars, whose rows are gathered, are together within `gate_sigma` standard
+    deviations; NaN is not. Keeps the ratio for this row of `consistency`."""
+    far, limit = farness(history, count), count * gate_sigma * gate_sigma
+    history.consistency[sensor, TEST_RATIO] = far / limit
+    return far <= limit
 
 
 @kernel

@@ -40,6 +40,7 @@ RING_COLUMNS = 20
 # sensors, as rows of `History.consistency`
 POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST, PULL = 0, 1, 2, 3, 4, 5, 6, 7
 SENSORS = 8
+TEST_RATIO = 2  # column: normalised innovation squared over the gate's limit; above 1 it is refused
 
 NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what measures the position of the vehicle
 PLAIN, RTK_FLOAT, RTK_FIXED = 0.0, 1.0, 2.0  # GnssReading.rtk: what is known of the carrier's whole waves
@@ -60,7 +61,7 @@ class History(NamedTuple):
     shares: Array  # SCALARS x ENTRIES: the entries, from column 1 on
     gain: Array  # SCALARS x ROOM: Jacobian times covariance
     scalars: Array  # SCALARS x 2: innovation and variance
-    consistency: Array  # SENSORS x 2: how many readings were absorbed, and the sum of their NIS
+    consistency: Array  # SENSORS x 3: readings absorbed, the sum of their NIS, and the last TEST_RATIO
 
 
 class ImuReading(NamedTuple):
@@ -277,7 +278,7 @@ def new_history() -> History:
         np.zeros((SCALARS, ENTRIES)),
         np.zeros((SCALARS, ROOM)),
         np.zeros((SCALARS, 2)),
-        np.zeros((SENSORS, 2)),
+        np.zeros((SENSORS, 3)),
     )
 
 

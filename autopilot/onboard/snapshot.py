@@ -14,7 +14,18 @@ from autopilot.control.drag import Drag
 from autopilot.core.flight_core import FlightCore, LaidOut, Setup
 from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
 from autopilot.core.sensor_inbox import SensorInbox, SlowSensors
-from autopilot.estimation.records import TRACKER, Array, EstimatorState, ImuReading
+from autopilot.estimation.records import (
+    FIX,
+    MAGNETIC,
+    POSE,
+    PRESSURE,
+    RECEIVER,
+    TEST_RATIO,
+    TRACKER,
+    Array,
+    EstimatorState,
+    ImuReading,
+)
 from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
@@ -25,7 +36,7 @@ from autopilot.own.chosen import NOTHING_OWN, Own
 from autopilot.services import identity, snapshot
 from autopilot.services.instant import Instant
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.snapshot import GpsFix, Sensed, Snapshot, Sortie
+from autopilot.services.snapshot import UNTESTED, GpsFix, Sensed, Snapshot, Sortie, TestRatios
 from autopilot.supervisor.requests.arming import arming_complaints
 from autopilot.supervisor.state import (
     CARRYING,
@@ -485,6 +496,20 @@ def _sensed(m: Moment) -> tuple[Any, ...]:
         return (None,)
     _, _, field_us, pressure_us = m.condition.heard_us
     return (Sensed(imu.gyro, imu.accel, *slow, field_us, pressure_us),)
+
+
+@_makes("test_ratios")
+def _test_ratios(m: Moment) -> tuple[Any, ...]:
+    if m.built_in is not None:
+        return (UNTESTED,)  # a custom estimator flies
+    ratios, source = m.core.rows.history.consistency[:, TEST_RATIO], m.estimator.vehicle.source
+    if source == TRACKER:
+        pose = float(ratios[POSE])
+        return (TestRatios(nan, pose, pose, nan),)  # the test is of the position
+    if source == RECEIVER:
+        fix = float(ratios[FIX])  # of position and velocity together
+        return (TestRatios(fix, fix, max(fix, float(ratios[PRESSURE])), float(ratios[MAGNETIC])),)
+    return (UNTESTED,)
 
 
 @_makes("rotor_rpm", "rotors_lost")

@@ -62,6 +62,18 @@ class Sensed(NamedTuple):
     pressure_us: int
 
 
+class TestRatios(NamedTuple):
+    """Squared innovations of the last readings over the limits above which they are refused; NaN: none."""
+
+    velocity: float
+    horizontal: float
+    vertical: float
+    magnetic: float
+
+
+UNTESTED = TestRatios(math.nan, math.nan, math.nan, math.nan)
+
+
 class Sortie(NamedTuple):
     """The present or the last flight, by the vehicle's clock in us; 0: not yet."""
 
@@ -109,6 +121,7 @@ class Snapshot:
     estimator_flags: int = 0  # ESTIMATOR_STATUS_FLAGS
     horizontal_std: float = math.nan  # m
     vertical_std: float = math.nan  # m
+    test_ratios: TestRatios = UNTESTED
 
     # estimate of load and cable
     x_load: Vec3 = ZERO

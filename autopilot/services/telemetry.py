@@ -223,14 +223,19 @@ def _system_time(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _estimator_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    ratios = (math.nan,) * 6  # the filter has no innovation tests of this kind
+    unknown = math.nan  # of height above the ground and of airspeed, which are not measured
+    ratios = (*s.test_ratios, unknown, unknown)
     accuracy = (s.horizontal_std, s.vertical_std)
     return (mavlink.MAVLink_estimator_status_message(s.now_us, s.estimator_flags, *ratios, *accuracy),)
 
 
 def _ekf_status_report(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    flags = s.estimator_flags & _UINT16
-    return (mavlink.MAVLink_ekf_status_report_message(flags, *(0.0,) * 5),)  # no tests of innovations
+    flags, tested = s.estimator_flags & _UINT16, s.test_ratios
+    # as ArduPilot, the roots; 0 is unknown
+    roots = [math.sqrt(ratio) if ratio > 0.0 else 0.0 for ratio in tested]
+    velocity, horizontal, vertical, magnetic = roots
+    report = (velocity, horizontal, vertical, magnetic, 0.0)
+    return (mavlink.MAVLink_ekf_status_report_message(flags, *report),)
 
 
 def _vibration(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

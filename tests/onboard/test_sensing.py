@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 import pytest
 
 from autopilot.onboard.snapshot import Moment
@@ -46,6 +48,19 @@ def test_a_sensor_that_is_not_carried_never_read() -> None:
     sensed = moment(craft).sensed
     assert sensed is not None
     assert (sensed.field_us, sensed.pressure_us) == (-1, -1)
+
+
+def test_the_test_ratios_are_those_of_the_readings_that_are_used() -> None:
+    nothing = moment(Craft(sensors="gps")).test_ratios
+    assert all(isnan(ratio) for ratio in nothing)
+    craft = Craft(sensors="gps")
+    craft.wait(3.0)
+    assert all(0.0 < ratio < 1.0 for ratio in moment(craft).test_ratios)
+    craft = Craft(sensors="lab")
+    craft.wait(1.0)
+    velocity, horizontal, vertical, magnetic = moment(craft).test_ratios
+    assert 0.0 < horizontal == vertical < 1.0
+    assert isnan(velocity) and isnan(magnetic)
 
 
 def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:

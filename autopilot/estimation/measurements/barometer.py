@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autopilot.estimation.correction import enter_position, heard, inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.records import (
     BAROMETER,
     PRESSURE,
@@ -54,7 +54,7 @@ def correct_barometer(
     enter_position(history, 0, past, 2)
     enter(history, 0, BAROMETER, 1.0)
     gather(history, 0, 1, n)
-    if not farness(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
+    if not within_gate(history, PRESSURE, 1, tuning.gate_sigma):
         return state
     begin(history)
     nis = absorb(history, 1, n)

@@ -17,7 +17,7 @@ from autopilot.estimation.correction import (
     look_back,
     with_load,
 )
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.records import (
     CAMERA,
     DIRECTION,
@@ -129,9 +129,7 @@ def correct_direction(
         scalar(history, i, innovation[i], variance)
         enter_sight(history, i, past, R)
     gather(history, 0, 2, n)
-    far = farness(history, 2)
-    # written so that NaN is refused
-    if not (far <= 2.0 * tuning.gate_sigma * tuning.gate_sigma and dot(sight, q) > 0.0):
+    if not (within_gate(history, SIGHT, 2, tuning.gate_sigma) and dot(sight, q) > 0.0):
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
         widen(history)

@@ -21,7 +21,7 @@ from autopilot.estimation.correction import (
     with_load,
     with_vehicle,
 )
-from autopilot.estimation.covariance import absorb, begin, enter, farness, forget, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, forget, gather, scalar, within_gate
 from autopilot.estimation.history import renew
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import spread_out
@@ -322,8 +322,7 @@ def correct_gnss(
         scalar(history, 3 + i, difference[i], velocity_var[i])
         enter_velocity(history, 3 + i, past, i)
     gather(history, 0, 6, n)
-    # written so that NaN is refused
-    if not farness(history, 6) <= 6.0 * tuning.gate_sigma * tuning.gate_sigma:
+    if not within_gate(history, FIX, 6, tuning.gate_sigma):
         vehicle = state.vehicle
         if vehicle.rejected + 1.0 < FIXES_BEFORE_RESET:
             refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)

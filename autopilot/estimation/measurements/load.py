@@ -13,7 +13,7 @@ from autopilot.estimation.correction import (
     look_back,
     with_load,
 )
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.measurements.pose import (
     KNOCK_STD,
     KNOCK_WHEN,
@@ -199,7 +199,7 @@ def correct_load(
     gather(history, 0, 3, n)
     distance = norm(sub(reading.x_load, past.x_quad)) / tuning.cable_length
     short = SLACK_FROM < distance < SLACK_BELOW
-    refused = not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
+    refused = not within_gate(history, LOAD, 3, tuning.gate_sigma)
     if refused or short:
         # closer to the threshold, rejections show that the load is no pendulum any more; the longer they
         # last, the closer

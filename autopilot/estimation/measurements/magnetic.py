@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 
 from autopilot.estimation.correction import enter_attitude, heard, inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.records import (
     HEADING,
     MAGNETIC,
@@ -81,7 +81,7 @@ def correct_magnetic(
     enter_attitude(history, 0, past, (-steep * north[0], -steep * north[1], 1.0))
     enter(history, 0, HEADING, 1.0)
     gather(history, 0, 1, n)
-    if not farness(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
+    if not within_gate(history, MAGNETIC, 1, tuning.gate_sigma):
         return state
     begin(history)
     nis = absorb(history, 1, n)

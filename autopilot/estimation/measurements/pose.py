@@ -14,7 +14,7 @@ from autopilot.estimation.correction import (
     with_load,
     with_vehicle,
 )
-from autopilot.estimation.covariance import absorb, begin, farness, forget, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, forget, gather, scalar, within_gate
 from autopilot.estimation.history import renew
 from autopilot.estimation.records import (
     ACCEL_BIAS,
@@ -151,8 +151,7 @@ def correct_pose(
         scalar(history, i, innovation[i], position_var)
         enter_position(history, i, past, i)
     gather(history, 0, 3, n)
-    # written so that NaN is refused
-    if not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma:
+    if not within_gate(history, POSE, 3, tuning.gate_sigma):
         vehicle = state.vehicle
         if vehicle.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             if vehicle.rejected + 1.0 == REFUSED_BY_KNOCK:

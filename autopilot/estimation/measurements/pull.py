@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from autopilot.control.drag import air_force
 from autopilot.estimation.correction import enter_attitude, enter_direction, heard, inject, look_back
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     CAMERA,
@@ -101,7 +101,7 @@ def correct_pull(
         enter(history, i, PUSH, share * axis[0])
         enter(history, i, PUSH + 1, share * axis[1])
     gather(history, 0, 2, n)
-    if not farness(history, 2) <= 2.0 * tuning.gate_sigma * tuning.gate_sigma:
+    if not within_gate(history, PULL, 2, tuning.gate_sigma):
         return state
     begin(history)
     nis = absorb(history, 2, n)
