@@ -15,7 +15,7 @@ import numpy as np
 from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.samples import PHASE_NAMES, Samples
-from gcs.analysis.tracks import Telemetry, rotor_names
+from gcs.analysis.tracks import LoadTrack, Telemetry, rotor_names
 from gcs.formats.arrow import array_of, text_array
 
 if TYPE_CHECKING:
@@ -34,12 +34,25 @@ def _component_columns(
     return {f"{name}_{part}{suffix}": values[:, i] for i, part in enumerate(parts)}
 
 
+def vehicle_velocity(truth: LoadTrack) -> Floats:
+    """(n, 3) of x_load - distance q; the distance, constant while the cable is taut, is differentiated."""
+    if len(truth.time_s) < 2:
+        return np.full_like(truth.velocity_m_s, np.nan)
+    reeled = np.gradient(truth.distance_m, truth.time_s)[:, None]
+    moved = truth.velocity_m_s - truth.distance_m[:, None] * truth.q_cable_dot - reeled * truth.q_cable
+    return np.asarray(moved)
+
+
 def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     """The columns of flight.parquet except the name of the phase; ENU and FLU, SI and rad."""
     t = samples.time_s
     truth, cascade = telemetry.load_truth, telemetry.cascade
     true_rotors, commanded = telemetry.rotors_truth, telemetry.rotors_commanded
-    attitude = telemetry.attitude_truth
+    attitude, estimated_attitude = telemetry.attitude_truth, telemetry.attitude_estimated
+    estimate, setpoint, wind = telemetry.load_estimated, telemetry.setpoint, telemetry.wind
+    estimated_vehicle_m = estimate.position_m - estimate.distance_m[:, None] * estimate.q_cable
+    estimated_quat = linear(estimated_attitude.time_s, estimated_attitude.quat_wxyz, t)
+    wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 
     def interpolated(values: Floats) -> Floats:
         return linear(cascade.time_s, values, t)
@@ -60,19 +73,36 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_component_columns("load_error", "m", samples.error_m),
         **_component_columns("load_velocity_desired", "m_s", samples.desired_m_s),
         **_component_columns("load_velocity_true", "m_s", samples.actual_m_s),
+        **_component_columns(
+            "load_velocity_estimated", "m_s", linear(estimate.time_s, estimate.velocity_m_s, t)
+        ),
+        **_component_columns(
+            "load_acceleration_desired", "m_s2", linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
+        ),
         **_component_columns("cable_true", "", truth.q_cable),
+        **_component_columns("cable_estimated", "", linear(estimate.time_s, estimate.q_cable, t)),
+        **_component_columns("cable_commanded", "", as_of(setpoint.time_s, setpoint.q_cable_c, t)),
         **_component_columns("cable_rate_true", "per_s", truth.q_cable_dot),
+        **_component_columns(
+            "cable_rate_estimated", "per_s", linear(estimate.time_s, estimate.q_cable_dot, t)
+        ),
         **_component_columns("cable_angle", "rad", cable_angles(truth.q_cable), cable),
         "cable_distance_m": truth.distance_m,
         "cable_tension_n": truth.tension_n,
         "cable_taut": truth.taut == 1,
         "cable_slack_events": truth.slack_events,
         **_component_columns("vehicle_true", "m", samples.vehicle_m),
+        **_component_columns("vehicle_estimated", "m", linear(estimate.time_s, estimated_vehicle_m, t)),
+        **_component_columns("vehicle_velocity_true", "m_s", vehicle_velocity(truth)),
         **_component_columns("vehicle_quaternion", "", samples.quat_wxyz, ("w", "x", "y", "z")),
         **_component_columns(
             "vehicle_angle", "rad", roll_pitch_yaw(samples.quat_wxyz), ("roll", "pitch", "yaw")
         ),
+        **_component_columns(
+            "vehicle_angle_estimated", "rad", roll_pitch_yaw(estimated_quat), ("roll", "pitch", "yaw")
+        ),
         **_component_columns("vehicle_rate", "rad_s", linear(attitude.time_s, attitude.omega_body, t)),
+        **_component_columns("wind", "m_s", wind_m_s),
         **_component_columns(
             "rotor_force", "n", as_of(true_rotors.time_s, true_rotors.force_n, t), rotor_names(true_rotors)
         ),

@@ -53,7 +53,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         try:
             identify_vehicle(motion, model)  # too little motion is reported before the load is fitted
             load = identify_load(motion, model, asked.identify.parameters, tell)
-            known = {one.name: one.value for one in load if one.is_told}
+            known = {one.name: one.value for one in load if one.is_determined}
             vehicle = identify_vehicle(motion, model._replace(**known))
         except (NoLoadError, TooLittleMotionError) as error:
             raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,43 @@
+"""The columns of flight.parquet that are computed from several messages, in a flight of the simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from autopilot.wire.tlog import TlogWriter
+from gcs.analysis.parquet import flight_columns
+from gcs.analysis.samples import samples_of
+from gcs.analysis.telemetry import load_telemetry
+from gcs.closed_loop import Conditions, fly
+from missions.fileformat import load_mission
+
+
+def test_velocity_estimates_command_and_wind_belong_to_the_true_motion(tmp_path: Path) -> None:
+    log = tmp_path / "flight.tlog"
+    wind = {"SIM_WIND_E": 1.5, "SIM_WIND_N": -0.5}
+    with log.open("wb") as file:
+        assert fly(load_mission("case-b"), Conditions(settings=wind), TlogWriter(file)).name == "completed"
+    telemetry = load_telemetry(log)
+    table = flight_columns(telemetry, samples_of(telemetry))
+    inside = table["in_mission"]
+
+    def column(name: str) -> np.ndarray:
+        return np.asarray(table[name][inside])
+
+    for axis, blown in zip("xyz", (1.5, -0.5, 0.0), strict=True):
+        moved = np.gradient(column(f"vehicle_true_{axis}_m"), column("time_s"))[1:-1]
+        assert column(f"vehicle_velocity_true_{axis}_m_s")[1:-1] == pytest.approx(moved, abs=1e-3)
+        assert column(f"vehicle_estimated_{axis}_m") == pytest.approx(
+            column(f"vehicle_true_{axis}_m"), abs=5e-3
+        )
+        for known in ("estimated", "commanded"):
+            assert column(f"cable_{known}_{axis}") == pytest.approx(column(f"cable_true_{axis}"), abs=0.05), (
+                known
+            )
+        assert (column(f"wind_{axis}_m_s") == blown).all()
+    for angle in ("roll", "pitch", "yaw"):
+        estimated = column(f"vehicle_angle_estimated_{angle}_rad")
+        assert estimated == pytest.approx(column(f"vehicle_angle_{angle}_rad"), abs=5e-3)
