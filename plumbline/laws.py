@@ -5,7 +5,7 @@ World ENU, body FLU, SI.
 
 from __future__ import annotations
 
-from autopilot.control.law_desk import Asked, Believed, Held, Now
+from autopilot.control.law_exchange import Asked, Believed, Held, Now
 from autopilot.control.records import Cable, Reference, State
 from autopilot.own.asking import attitude, force, rates, wrench
 from autopilot.own.brought import Parameter

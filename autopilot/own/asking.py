@@ -7,7 +7,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from autopilot.control.law_desk import ATTITUDE, FORCE, RATES, WRENCH, Asked
+from autopilot.control.law_exchange import ATTITUDE, FORCE, RATES, WRENCH, Asked
 from autopilot.geometry.compiler import INLINED
 from autopilot.geometry.linear import IDENTITY, ZERO
 from autopilot.own.vectors import three_numbers

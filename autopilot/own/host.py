@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.control.law_desk import (
+from autopilot.control.law_exchange import (
     ASKED,
     OWN,
     RATES,

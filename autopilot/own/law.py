@@ -9,7 +9,7 @@ It is a class with at least one of the four modes as a method:
         def start(self, now): ...                    # memory of a mode that begins; without it None
         def load_position(self, memory, now): ...    # (memory, command)
 
-`now` is `autopilot.control.law_desk.Now`; the command is made by `wrench`, `force`, `attitude` or `rates` of
+`now` is `autopilot.control.law_exchange.Now`; the command is made by `wrench`, `force`, `attitude` or `rates` of
 `autopilot.own.asking`. A law whose class is a NamedTuple of numbers, and whose methods are compiled by
 `kernel`, is called as machine code.
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.control.law_desk import Asked, Now
+from autopilot.control.law_exchange import Asked, Now
 from autopilot.own.asking import force
 
 REFERENCE = f"{__name__}:Rehearsal"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from autopilot.control.law_desk import Asked, Believed, Held, Now
+from autopilot.control.law_exchange import Asked, Believed, Held, Now
 from autopilot.control.records import Cable, Reference, State
 from autopilot.estimation.desk import (
     NO_FORCES,

@@ -147,7 +147,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.templates": ("plumbline",),  # files of users, which import what scripts import
     "plumbline.estimators": ("autopilot.estimation.desk", RECORDS, "autopilot.own"),
-    "plumbline.laws": ("autopilot.control.law_desk", RECORDS, "autopilot.own"),
+    "plumbline.laws": ("autopilot.control.law_exchange", RECORDS, "autopilot.own"),
     "plumbline.planners": ("autopilot.trajectory", "autopilot.own"),
     "plumbline.vectors": ("autopilot.geometry",),
     "plumbline": (
@@ -187,7 +187,6 @@ TOP: dict[str, tuple[str, ...]] = {
 WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "asyncio", "subprocess", "signal"}
 SHELLS = (
     "autopilot.shell",
-    "sitl.__main__",
     "sitl.shell",
     "gcs.__main__",
     "gcs.commands",
@@ -334,7 +333,7 @@ BAD = {
     "sitl/vehicles/truth.py": "from autopilot.vehicle.parameters import autopilot_parameters",
     "sitl/sensors/files.py": "from missions.model import Step",
     "sitl/sensors/imu.py": "from gcs.analysis import align",
-    "sitl/vehicles/loader.py": "from sitl.__main__ import main",
+    "sitl/vehicles/loader.py": "from sitl.shell.program import main",
     "gcs/clients/flight.py": "from autopilot.core.tick import fly_tick",
     "gcs/analysis/align.py": "from sitl.plant.records import Truth",
     "gcs/commands/fly.py": "from sitl.sensors.files import load_profile",
@@ -368,7 +367,7 @@ GOOD = {
         "import subprocess, signal\nfrom sitl.sensors.shipped import PROFILES\n"
         "from autopilot.vehicle.file import VEHICLES\nfrom autopilot.vehicle.parameters import LAWS"
     ),
-    "sitl/__main__.py": "import selectors\nfrom sitl.hil import HilSimulator",
+    "sitl/shell/program.py": "import selectors\nfrom sitl.hil import HilSimulator",
     "missions/fileformat.py": "import pydantic, datetime, timeit",
 }
 

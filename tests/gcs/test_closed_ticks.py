@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.control.law_desk import Now
+from autopilot.control.law_exchange import Now
 from autopilot.own.chosen import Own
 from gcs import closed_loop
 from gcs.clients.flight import Outcome

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numba
 import pytest
 
-from autopilot.control.law_desk import Asked, Now
+from autopilot.control.law_exchange import Asked, Now
 from autopilot.own.asking import attitude, force, rates, wrench
 from autopilot.own.calls import CALL
 from autopilot.own.compiled import is_compiled, kernel

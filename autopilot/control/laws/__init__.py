@@ -7,7 +7,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from autopilot.control.believed import believed_vehicle
-from autopilot.control.law_desk import Link
+from autopilot.control.law_exchange import Link
 from autopilot.control.laws.interface import Law, register
 from autopilot.control.laws.own import OWN
 from autopilot.geometry.packed import pack, place_of

@@ -1,4 +1,4 @@
-"""The custom law: it calls a function at an address for its command (`autopilot.control.law_desk`).
+"""The custom law: it calls a function at an address for its command (`autopilot.control.law_exchange`).
 
 The law `plumbline` flies the modes that the custom law does not define, and all modes after a command of the
 custom law was not a number. If the custom law commands a force or an attitude, the innermost loop of
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from autopilot.control.actuators.disturbance_observer import Observed, lying, standing
 from autopilot.control.actuators.rotor_model import Actuation
-from autopilot.control.law_desk import (
+from autopilot.control.law_exchange import (
     FORCE,
     RATES,
     UNLINKED,

@@ -52,7 +52,7 @@ def test_a_copy_of_the_sources_has_the_same_fingerprint(tree: Path, entries: tup
         ("sweep", "gcs/workflows/flight_loops.py", False),
         ("experiment", "autopilot/shell/program.py", True),
         ("experiment", "autopilot/wire/dialect/plumbline.xml", True),
-        ("experiment", "sitl/__main__.py", True),
+        ("experiment", "sitl/shell/program.py", True),
         ("experiment", "missions/fileformat.py", True),
         ("experiment", "missions/case-a.toml", True),
         ("experiment", "gcs/workflows/flight_loops.py", True),

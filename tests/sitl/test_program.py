@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from autopilot.shell.options import Stop, stop_signals
 from gcs.shell.link import free_port
-from sitl import __main__ as program
 from sitl.pacing import Pacing
+from sitl.shell import program
 
 LOCKSTEP, REAL_TIME = "lockstep", "real time"
 

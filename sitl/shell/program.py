@@ -1,0 +1,265 @@
+"""The `sitl` program: sockets, clock and signals around `sitl.hil`."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import signal
+import sys
+
+import click
+
+from autopilot.shell.compiling import ONCE, SIMULATOR
+from autopilot.shell.options import (
+    EXIT_ERROR,
+    EXIT_USAGE,
+    MOST_SEED,
+    MOST_SPEED,
+    Address,
+    ProgramCommand,
+    Stop,
+    StopRequest,
+    WholeNumber,
+    address_option,
+    be_punctual,
+    complain,
+    home_option,
+    setting_option,
+    shown,
+)
+from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.parameter_table import ParameterError
+from sitl.hil import HilSimulator
+from sitl.pacing import Pacing
+from sitl.sensors.shipped import PROFILES, ProfileError
+from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
+from sitl.shell.link import Link
+from sitl.shell.loops import SPIN_NS, meet, run_lockstep, run_real_time
+from sitl.shell.tick_loop import rehearse
+
+
+def _run_on(cpu: int) -> None:
+    try:
+        os.sched_setaffinity(0, {cpu})
+    except (AttributeError, OSError):
+        text = f"--cpu {cpu}: cannot run on this core; leave --cpu out, or name another"
+        raise click.UsageError(text) from None
+
+
+@click.command("sitl", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--for",
+    "interface",
+    type=click.Choice(list(AUTOPILOTS)),
+    default=PLUMBLINE,
+    show_default=True,
+    help="The autopilot that flies; see docs/autopilots.md.",
+)
+@click.option(
+    "--sensors",
+    default="lab",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"Sensor profile: {PROFILES.choice()}.",
+)
+@click.option(
+    "--vehicle",
+    default="bebop",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"The simulated vehicle: {VEHICLES.choice()}.",
+)
+@click.option(
+    "--seed", default=1, show_default=True, type=WholeNumber(0, MOST_SEED), help="Seed of all noise."
+)
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.0, MOST_SPEED, min_open=True),
+    metavar="NUMBER",
+    help="Maximum speed, as a multiple of real time.  [default: 1; with --lockstep: no limit]",
+)
+@click.option("--lockstep", is_flag=True, help="Run as fast as the autopilot answers.")
+@click.option(
+    "--real-time",
+    is_flag=True,
+    help="Keep to the wall clock: a late command of the autopilot is missed, and counted.",
+)
+@click.option(
+    "--listen",
+    type=address_option,
+    metavar="[HOST:]PORT",
+    help="Address for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
+)
+@click.option(
+    "--truth",
+    type=address_option,
+    metavar="[HOST:]PORT",
+    default="127.0.0.1:14560",
+    show_default=True,
+    help="Address to send the true state to, for logs and reports.",
+)
+@click.option(
+    "--truth-every",
+    type=WholeNumber(1, 1000),
+    metavar="N",
+    help="Send the true state every N ticks.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
+)
+@click.option(
+    "--set",
+    "settings",
+    type=setting_option,
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.",
+)
+@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
+@click.option(
+    "--parameters",
+    is_flag=True,
+    help="Print the path of the parameter file for the third-party autopilot, and exit.",
+)
+@click.option("--quiet", is_flag=True, help="Print errors only.")
+@click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
+def main(
+    interface: str,
+    sensors: str,
+    vehicle: str,
+    seed: int,
+    speed: float | None,
+    lockstep: bool,
+    real_time: bool,
+    listen: Address | None,
+    truth: Address,
+    truth_every: int | None,
+    settings: tuple[tuple[str, float], ...],
+    home: Home | None,
+    cpu: int | None,
+    parameters: bool,
+    quiet: bool,
+) -> None:
+    """Simulate a quadrotor with a load on a cable, and its sensors.
+
+    Waits for an autopilot, sends it sensor readings and receives rotor commands, by MAVLink over UDP (with
+    third-party autopilots by their own protocols). The world waits for the answer to every tick: on a busy
+    machine its clock is slower, and nothing is lost.
+    """
+    if lockstep and real_time:
+        raise click.UsageError("--lockstep and --real-time exclude each other")
+    kind = AUTOPILOTS[interface]
+    if parameters:
+        if kind.run is None:
+            raise click.UsageError("--parameters is for third-party autopilots: add --for")
+        click.echo(parameter_file(interface))
+        return
+    if real_time and kind.run is not None and not kind.real_time:
+        raise click.UsageError(
+            f"--real-time is for {PLUMBLINE}: {interface} waits for the world, and it for it"
+        )
+    if kind.real_time and (lockstep or speed not in {None, 1.0}):
+        raise click.UsageError(
+            f"{interface} runs on the wall clock and does not wait: leave --lockstep and --speed out"
+        )
+    real_time = real_time or kind.real_time
+    listen = listen or kind.listen
+    truth_every = truth_every or kind.truth_every
+
+    if settings:
+        from autopilot.shell.setting_names import check_names
+
+        check_names(settings)
+
+    def say(text: str) -> None:
+        if not quiet:
+            print(f"sitl: {text}", flush=True)
+
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to end in order
+    link: Link | None = None
+    factor = 1.0 if speed is None else speed
+    unlimited = lockstep and speed is None
+    pacing = Pacing(factor)
+    simulator: HilSimulator | None = None
+    try:
+        # first, so that no message of an autopilot is lost while kernels are compiled
+        link = Link(listen, truth, say)
+
+        def build() -> HilSimulator:
+            return HilSimulator.build(
+                vehicle,
+                sensors,
+                seed,
+                {**kind.settings, **dict(settings)},
+                home,
+                not real_time,
+                truth_every,
+                boot_id=secrets.randbits(63),
+            )
+
+        compiled = SIMULATOR.ready
+        if not compiled:
+            say(ONCE)
+        warm = build()  # compiles, or loads, every kernel
+        rehearse(warm)
+        warm.truth_datagram()
+        warm.receive(b"")
+        warm.advance()
+        if not compiled:
+            SIMULATOR.done()
+        simulator = build()
+        if cpu is not None:
+            _run_on(cpu)
+        # not if it would spin for most of the time, which would keep other programs from running
+        be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
+        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, slower on a busy machine"
+        if real_time:
+            mode = f"at {factor:g} x real time, without waiting for answers"
+        say(
+            f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
+            f"waiting for {kind.awaited} on {shown(listen)}"
+        )
+        with StopRequest() as stop:
+            paced = None if unlimited else pacing
+            if kind.run is not None:
+                kind.run(link, simulator, stop, say, paced)
+                return
+            meet(link, simulator, stop)
+            if real_time:
+                run_real_time(
+                    link,
+                    simulator,
+                    pacing,
+                    stop,
+                    say,
+                    ask=lambda: link.send(simulator.sensor_datagram()),
+                    take=lambda datagram, sender: link.take(datagram, sender, simulator),
+                )
+            else:
+                run_lockstep(link, simulator, stop, say, paced)
+    except (VehicleFileError, ProfileError) as error:
+        sys.exit(complain("sitl", EXIT_USAGE, *error.problems))
+    except ParameterError as error:
+        sys.exit(complain("sitl", EXIT_USAGE, str(error)))
+    except ValueError as error:
+        sys.exit(complain("sitl", EXIT_ERROR, str(error)))
+    except Stop:
+        pass
+    finally:
+        if link is not None:
+            link.close()
+    if simulator is not None and link is not None:
+        say(_summary(simulator, real_time, pacing, link.served_s))
+
+
+def _summary(simulator: HilSimulator, real_time: bool, pacing: Pacing, wall_s: float) -> str:
+    simulated_s = simulator.now_us / 1e6
+    text = f"stopped at t = {simulated_s:.3f} s; "
+    if real_time:
+        text += pacing.summary(simulator.missed)
+    else:
+        text += f"{simulated_s / max(wall_s, 1e-9):.2f} x real time"
+    if simulator.rejected:
+        text += f"; {simulator.rejected} commands were not numbers"
+    if simulator.diverged:
+        text += "; the vehicle left the domain of the model"
+    return text
