@@ -25,7 +25,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from sitl.plant.by_value import advance as advance_taut
 from sitl.plant.by_value import initial_state as initial_taut
 from sitl.plant.by_value import rotors_of
-from sitl.plant.chain.records import ChainRows, lay, new_chain
+from sitl.plant.chain.records import ChainRows, lay_straight, new_chain
 from sitl.plant.chain.step import advance_chain_many
 from sitl.plant.records import ChainModel, PlantState, Truth
 from sitl.plant.rotors import RotorRows
@@ -313,7 +313,7 @@ def mujoco_difference(links: int, stiffness: float, seconds: float = 1.0) -> tup
     plant = ChainPlant(truth, start, hover(truth))
     plant.rows.body[:4] = data.xquat[load]
     plant.rows.body[4:] = data.xmat[load].reshape(3, 3).T @ spin
-    lay(plant.rows, truth, start)
+    lay_straight(plant.rows, truth, start)
     for i, body in enumerate(points, 1):
         plant.rows.x[i], plant.rows.v[i] = data.xipos[body], velocity(body)[0]
     differences = []

@@ -35,18 +35,18 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control import thesis_cascade as thesis
-from autopilot.control.actuators.disturbance_observer import aloft
+from autopilot.control.actuators.disturbance_observer import nominal_in_flight
 from autopilot.control.actuators.lag_compensation import lag_gain
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants, advance
 from autopilot.control.command_filter import FilterState
-from autopilot.control.design import Timing, Wanted, design
+from autopilot.control.design import Requirements, Timing, design
 from autopilot.control.drag import Drag
 from autopilot.control.laws.plumbline import PlumblineConstants, PlumblineLaw, PlumblineMemory, load_position
 from autopilot.control.laws.thesis import ThesisLaw
 from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Cable, Reference, Vehicle
-from gcs.sweep.margin import sampled_plant, state_at
+from gcs.sweep.margin import sampled_plant, state_near_hover
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ STEP = 1e-5
 # position of the law `plumbline`
 LOOPS = ("attitude", "position", "vehicle", "plumbline")
 TARGET_TAU = 0.010  # s, PLB_LAG_TO_MS
-TARGETS = Wanted(
+TARGETS = Requirements(
     0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0
 )  # PLB_ defaults
 FILTERS = (
@@ -143,7 +143,7 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
-        memory, state = _memory(numbers[:-MOTION]), state_at(numbers[-MOTION:], vehicle)
+        memory, state = _memory(numbers[:-MOTION]), state_near_hover(numbers[-MOTION:], vehicle)
         if settings.loop == "attitude":
             after, command = thesis.quad_attitude(
                 memory, state, level, weight, settings.gains, filters, vehicle
@@ -208,14 +208,14 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
     """
     law = built_law(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
-    observed, cable = aloft(vehicle), Cable(vehicle.cable_length)
-    others = thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO)
+    observed, cable = nominal_in_flight(vehicle), Cable(vehicle.cable_length)
+    others = thesis.start(state_near_hover(np.zeros(MOTION), vehicle), ZERO, ZERO)
     assumed_rotors = law.constants.actuation
-    rows = assumed_rotors.whole + 1
+    rows = assumed_rotors.whole_periods + 1
     weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
-        state = state_at(numbers[-MOTION:], vehicle)
+        state = state_near_hover(numbers[-MOTION:], vehicle)
         queue = np.zeros((rows + 1, 4))
         queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
         actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
@@ -248,7 +248,7 @@ def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, 
         tick, hover = plumbline_law(settings, vehicle)
     else:
         tick = law(settings, vehicle)
-        hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))
+        hover = _flat(thesis.start(state_near_hover(np.zeros(MOTION), vehicle), ZERO, ZERO))
     n = len(hover)
     at = np.concatenate([hover, np.zeros(MOTION)])
     jacobian = np.empty((n + 4, n + MOTION))

@@ -39,7 +39,7 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from gcs.closed_loop import Conditions
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import Boarding, SweptFlight, boarding
+from gcs.sweep.flight import StartTimes, SweepFlight, start_times
 from missions.fileformat import load_mission
 from missions.model import Mission
 from sitl.sensors.imu import ImuState
@@ -61,7 +61,7 @@ Array = NDArray[np.float64]
 Nees = dict[str, dict[str, list[tuple[float, int]]]]
 
 
-def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
+def error_of(flight: SweepFlight, estimate: EstimatorState) -> Array:
     """Truth minus estimate, in the axes of the error state."""
     plant = unpack(World, flight.world.world, 0).plant
     biases = unpack(ImuState, flight.world.errors[IMU], 0)
@@ -81,7 +81,7 @@ def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
     )
 
 
-def add_nees(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> float:
+def add_nees(flight: SweepFlight, found: dict[str, list[tuple[float, int]]]) -> float:
     """Add the NEES of this instant to `found`; returns the error of the cable's direction, rad."""
     estimate = unpack(EstimatorState, flight.core.rows.estimator, 0)
     error, P = error_of(flight, estimate), flight.core.rows.history.covariance
@@ -105,14 +105,14 @@ def add_nees(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> 
     return float(np.hypot(error[DIRECTION], error[DIRECTION + 1]))
 
 
-def fly_nees(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Nees, dict[str, object]]:
+def fly_nees(mission: Mission, conditions: Conditions, start: StartTimes) -> tuple[Nees, dict[str, object]]:
     """The NEES of one flight by phase, and its result."""
     found: Nees = defaultdict(lambda: defaultdict(list))
-    flight = SweptFlight(cell_of(mission, conditions), conditions.seed, start)
+    flight = SweepFlight(cell_of(mission, conditions), conditions.seed, start)
     interval = round(INTERVAL_S * 1e6 / flight.tick_us)
     next_tick, direction_errors = interval, [0.0]
-    while not flight.flown.outcome:
-        flight.turn(next_tick)
+    while not flight.result.outcome:
+        flight.advance(next_tick)
         if flight.tick >= next_tick:
             next_tick += interval
             phase = flight.core.flight.phase
@@ -165,7 +165,7 @@ def table(title: str, found: Nees) -> str:
     return "\n".join(rows)
 
 
-def _fly_nees(task: tuple[Mission, Conditions, Boarding]) -> tuple[Nees, dict[str, object]]:
+def _fly_nees(task: tuple[Mission, Conditions, StartTimes]) -> tuple[Nees, dict[str, object]]:
     return fly_nees(*task)
 
 
@@ -173,7 +173,7 @@ def measure(
     mission: Mission, sensors: str, settings: dict[str, float], seeds: int, pool: ProcessPoolExecutor
 ) -> tuple[Nees, list[dict[str, object]]]:
     """The NEES of `seeds` flights together, and the result of each."""
-    start = boarding(mission, Conditions(sensors=sensors, settings=settings))
+    start = start_times(mission, Conditions(sensors=sensors, settings=settings))
     tasks = [
         (mission, Conditions(sensors=sensors, seed=s + 1, settings=settings), start) for s in range(seeds)
     ]

@@ -248,7 +248,7 @@ class SimulatedVehicle:
         if link == SENSORS:
             return self.onboard.receive_sensors(datagram)
         if link == ANSWERS:
-            return self.simulator.receive(datagram) or self.simulator.greets(datagram)
+            return self.simulator.receive(datagram) or self.simulator.has_heartbeat(datagram)
         events = self.onboard.receive_ground(datagram, link)
         return [event for event in events if not isinstance(event, TimesyncAnswered)]
 

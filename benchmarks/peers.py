@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.learning_speed import TIMESTEP_S, mujoco_model
 from gcs.closed_loop import Conditions
-from gcs.sweep.flight import boarding, fly
+from gcs.sweep.flight import fly, start_times
 from missions.fileformat import load_mission
 from sitl.vehicles.truth import load_truth
 
@@ -57,7 +57,7 @@ def circle(t: float) -> tuple[Any, Any, Any]:
 def plumbline_peer() -> Peer:
     """Case B with the sensors `lab`, without messages."""
     mission, conditions = load_mission("case-b"), Conditions()
-    board = boarding(mission, conditions)
+    board = start_times(mission, conditions)
     return Peer(
         "**Plumbline**, Case B",
         "load, slack cable, ground, rotors, sensors with noise and delay, estimator, law: 250 Hz",

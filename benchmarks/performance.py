@@ -29,7 +29,7 @@ from pathlib import Path
 
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.sweep.flight import boarding, fly
+from gcs.sweep.flight import fly, start_times
 from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff, Waypoint
 
@@ -219,7 +219,7 @@ def sweep_rows(repeat: int, flights: int) -> Rows:
     """One flight without messages, and many on all cores."""
     mission = load_mission(MISSION)
     for sensors in ("lab", "ideal"):
-        board = boarding(mission, Conditions(sensors=sensors))
+        board = start_times(mission, Conditions(sensors=sensors))
         flown = fly(mission, Conditions(sensors=sensors), board)
         timed = [
             processor_s(partial(fly, mission, Conditions(sensors=sensors, seed=2 + k), board))
@@ -255,7 +255,7 @@ def light_rows(repeat: int) -> Rows:
 def linear_rows() -> Rows:
     """Microseconds per tick over three decades of flights and of ticks, and over the possible rates."""
     mission, conditions = load_mission(MISSION), Conditions()
-    board = boarding(mission, conditions)
+    board = start_times(mission, conditions)
 
     def us_per_tick(flights: Iterable[tuple[Mission, Conditions]], ticks_per_s: float) -> str:
         start_s = time.process_time()

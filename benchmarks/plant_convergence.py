@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.linear import axpy
 from autopilot.geometry.so3 import quat_exp
-from sitl.plant.by_value import Flown, Forces, advance_many, initial_state
+from sitl.plant.by_value import Forces, StateWithRotors, advance_many, initial_state
 from sitl.plant.records import Truth
 from sitl.vehicles.truth import load_truth
 
@@ -31,10 +31,10 @@ STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 STEPS_CONTACT = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5, 3.125e-5)
 WIND = (2.0, -1.0, 0.5)
 
-Case = tuple[Truth, Flown, Callable[[int], Forces], float]
+Case = tuple[Truth, StateWithRotors, Callable[[int], Forces], float]
 
 
-def _hovering(truth: Truth) -> Flown:
+def _hovering(truth: Truth) -> StateWithRotors:
     """Hanging at rest, 5 m up, rotors at hover."""
     hover = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
     return initial_state(truth)._replace(
@@ -113,7 +113,7 @@ CASES: dict[str, Callable[[], Case]] = {
 }
 
 
-def fly(case: Case, h: float) -> tuple[NDArray[np.float64], Flown]:
+def fly(case: Case, h: float) -> tuple[NDArray[np.float64], StateWithRotors]:
     """Positions (m) and attitude after every tick, shape (ticks, 10), and the last state."""
     truth, state, command, duration = case
     per_tick = round(TICK / h)

@@ -196,7 +196,7 @@ def fly_firmware_payload(program: Path, mission: Path, vehicle: Vehicle, out: Pa
         ]
         processes.start_program(ARDUPILOT.title, command, out / "firmware.log", out, {})
         capture = Capture(TlogWriter(file), unix_us())
-        run_wall_clock(client, capture, link, truth, processes.ended, display, stop, lambda: None)
+        run_wall_clock(client, capture, link, truth, processes.end_reason, display, stop, lambda: None)
     if client.outcome is None or client.outcome.name != "completed":
         sys.exit(f"the firmware with its own payload: {client.outcome}")
     return flight_from_log(next((out / "logs").glob("*.BIN")))
@@ -256,7 +256,7 @@ def with_stop_at_zero(
     return RecordedFlight(time_s - stop_s, vehicle, below, velocity, tension)
 
 
-def swing_of(flight: RecordedFlight, cable_m: float) -> Swing:
+def reference_swing(flight: RecordedFlight, cable_m: float) -> Swing:
     """The damped oscillation that fits load and vehicle best, after the stop."""
     period_s = 2.0 * pi * sqrt(cable_m / GRAVITY)
     start_s = WAIT_PERIODS * period_s
@@ -339,12 +339,12 @@ def velocity_mismatch_m_s(flight: RecordedFlight) -> float:
     return float(np.linalg.norm(rate - reported, axis=1)[carried(flight)[1:-1]].max())
 
 
-def rows_of(cable_m: float, vehicle: Vehicle, flights: Sequence[RecordedFlight]) -> list[str]:
+def queue_rows(cable_m: float, vehicle: Vehicle, flights: Sequence[RecordedFlight]) -> list[str]:
     """The table's rows of one cable; the flights are theirs and ours."""
     m, M = vehicle.load_mass_kg, vehicle.quad_mass_kg
     fixed, moving = pendulum(0.0, cable_m).period_s, pendulum(-m / (M + m), cable_m).period_s
     weight_n = m * GRAVITY
-    swings = [swing_of(flight, cable_m) for flight in flights]
+    swings = [reference_swing(flight, cable_m) for flight in flights]
     ideal = [pendulum(swing.k, cable_m) for swing in swings]
     lifts = [lift_of(flight, cable_m, weight_n) for flight in flights]
     same_pendulum = "the same of a pendulum under that vehicle"
@@ -421,7 +421,7 @@ def main() -> None:
         vehicle.save(file)
         firmware_flight = fly_firmware_payload(program, mission, vehicle, out / f"theirs-{cable_m:g}m")
         plumbline_flight = fly_plumbline(program, mission, file, out / f"ours-{cable_m:g}m")
-        rows = rows_of(cable_m, vehicle, (firmware_flight, plumbline_flight))
+        rows = queue_rows(cable_m, vehicle, (firmware_flight, plumbline_flight))
         print("\n".join(rows), flush=True)
         lines += rows
         if options.docs and cable_m == CABLES_M[0]:

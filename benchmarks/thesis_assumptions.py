@@ -52,7 +52,7 @@ from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.signals import Jet, SignalTable, evaluate, signal_table
 from autopilot.vehicle.layout import PLUS
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.rotors import mixer_table
 from gcs.analysis.step import Step, StepResponse, step_response
 from missions.fileformat import load_mission
 from missions.model import Signals, Term
@@ -252,7 +252,7 @@ def fly(truth: Truth, terms: Sequence[Term], duration_s: float, sources: ErrorSo
         thesis.thesis_filters(1.0 / hz),
         vehicle,
         1.0 if np.isfinite(truth.rotor_max) else 0.0,
-        allocate(PLUS),
+        mixer_table(PLUS),
         new_rotors(),
         rotors,
         1.0 / hz,

@@ -29,8 +29,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import TRACE_COLUMNS, SweptFlight, boarding, fly
-from gcs.sweep.group import FEWEST, Group, suits
+from gcs.sweep.flight import TRACE_COLUMNS, SweepFlight, fly, start_times
+from gcs.sweep.group import MIN_FLIGHTS, LaneGroup, fits_in_lanes
 from missions.fileformat import load_mission
 
 RECORD = Path(__file__).with_name("yardstick.json")
@@ -98,7 +98,7 @@ def measure(name: str) -> dict[str, str]:
     }
     trace = np.full((MAX_TICKS, TRACE_COLUMNS), np.nan)
     try:
-        swept = fly(mission, conditions, boarding(mission, conditions), trace)
+        swept = fly(mission, conditions, start_times(mission, conditions), trace)
     except ValueError as error:
         return {**found, "sweep": str(error)}
     figures = {key: value for key, value in asdict(swept).items() if key not in ("texts", "reason")}
@@ -115,18 +115,18 @@ def measure_lanes(name: str) -> dict[str, str]:
     mission_name, conditions = FLIGHTS[name]
     mission = load_mission(mission_name)
     try:
-        start = boarding(mission, conditions)
+        start = start_times(mission, conditions)
     except ValueError as error:
         return {"outcome": str(error)}
-    seeds = range(conditions.seed, conditions.seed + FEWEST)
-    flights = [SweptFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
-    if not suits(flights[0]):
+    seeds = range(conditions.seed, conditions.seed + MIN_FLIGHTS)
+    flights = [SweepFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    if not fits_in_lanes(flights[0]):
         return {"outcome": "alone"}
-    group = Group(flights)
+    group = LaneGroup(flights)
     group.run()
     alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
-    differing = sum(repr(one) != repr(flight.flown) for one, flight in zip(alone, flights, strict=True))
-    share = group.in_lanes / sum(flight.tick for flight in flights)
+    differing = sum(repr(one) != repr(flight.result) for one, flight in zip(alone, flights, strict=True))
+    share = group.lane_ticks / sum(flight.tick for flight in flights)
     found = {"outcome": alone[0].outcome, "in lanes": f"{share:.0%}"}
     return {**found, "differ": str(differing)} if differing else found
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import click
 
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_trouble
-from gcs.shell.display import give_stdout_back, say
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_problem
+from gcs.shell.display import notify, restore_stdout
 from missions.nearest import nearest
 
 # name: (module in gcs.commands, summary)
@@ -69,9 +69,9 @@ class Gcs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         word = args[0]
-        near = "" if word in COMMANDS else nearest(word, COMMANDS)
-        if near:
-            ctx.fail(f"No such command {word!r}; did you mean {near}?")
+        similar = "" if word in COMMANDS else nearest(word, COMMANDS)
+        if similar:
+            ctx.fail(f"No such command {word!r}; did you mean {similar}?")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -85,37 +85,37 @@ class Gcs(click.Group):
 
             open_closed_streams()
         if sys.stdout.isatty() or sys.stderr.isatty():
-            from autopilot.shell.options import outlive_terminal
+            from autopilot.shell.options import tolerate_closed_terminal
 
-            outlive_terminal()
+            tolerate_closed_terminal()
         try:
             code = super().main(args, standalone_mode=False, **extra)
         except GcsError as error:
             for line in error.lines:
-                say(line)
+                notify(line)
             code = error.exit_code
         except click.UsageError as error:
             if isinstance(error, click.exceptions.NoArgsIsHelpError):
                 click.echo(error.format_message(), err=True)
             else:
-                say(_usage(error))
+                notify(_usage(error))
             code = EXIT_USAGE
         except click.ClickException as error:
-            say(error.format_message())
+            notify(error.format_message())
             code = error.exit_code
         except (click.Abort, KeyboardInterrupt):
-            say("stopped")
+            notify("stopped")
             code = EXIT_INTERRUPTED
         except BrokenPipeError:  # `gcs ... | head`
             sys.stderr.close()
             code = EXIT_DONE
         except OSError as error:
-            if not disk_trouble(error):
+            if not disk_problem(error):
                 raise
-            say(f"{disk_trouble(error)}; nothing more can be written")
+            notify(f"{disk_problem(error)}; nothing more can be written")
             code = EXIT_ERROR
         finally:
-            give_stdout_back()
+            restore_stdout()
         sys.exit(code if isinstance(code, int) else EXIT_DONE)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
-from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.trajectory.timeline import expected_duration_s
@@ -37,7 +37,7 @@ class Conditions:
     sensors: str = "lab"
     seed: int = 1
     settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
-    own: Own = NOTHING_OWN  # references to custom code; a law in it determines CTL_LAW
+    own: OwnCode = NO_OWN_CODE  # references to custom code; a law in it determines CTL_LAW
 
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
@@ -65,13 +65,13 @@ def fly(
     log: FrameLog,
     watch: Watch | None = None,
     client: FlightClient | None = None,
-    shown: Callable[[], None] = lambda: None,
+    on_turn: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Fly a mission from take-off to landing; the log receives what `gcs fly --lockstep` writes.
 
     `watch` is called with the cores at every tick, before the world advances; if it returns False, the flight
     ends. Without `watch`, ticks at which nothing is to be decided are flown in machine code. `client`
-    replaces the usual ground station client; `shown` is called after each of its turns.
+    replaces the usual ground station client; `on_turn` is called after each of its turns.
     """
     home = Home()
     onboard = build_onboard(conditions, home)
@@ -81,47 +81,47 @@ def fly(
     capture = Capture(log)
     turns = LockstepTurns()
     ticks = ClosedTicks(onboard, simulator) if watch is None else None
-    told: list[bytes] = []  # truth of the open window
-    said: list[bytes] = []  # datagrams of the vehicle in the open window
+    truth_datagrams: list[bytes] = []  # truth of the open window
+    vehicle_datagrams: list[bytes] = []  # datagrams of the vehicle in the open window
     silent_until_us = 0  # until when the ground station has promised to send nothing
 
-    def turn(now_us: int) -> None:
+    def ground_station_turn(now_us: int) -> None:
         """The ground station's turn at the end of a window; the vehicle receives what it sends."""
         nonlocal silent_until_us
-        for datagram in ground_turn(client, capture, told, said, now_us):
+        for datagram in ground_turn(client, capture, truth_datagrams, vehicle_datagrams, now_us):
             onboard.receive_ground(datagram, _GROUND)
         if now_us >= silent_until_us:  # before that, the vehicle does not wait for an answer
             onboard.receive_ground(turns.answer(now_us * 1000, client.silent_until_us), _GROUND)
             silent_until_us = client.silent_until_us
-        told.clear()
-        said.clear()
+        truth_datagrams.clear()
+        vehicle_datagrams.clear()
         capture.flush(now_us)
-        shown()
+        on_turn()
 
     while client.outcome is None:
         truth = simulator.truth_datagram()
         if truth is not None:
-            told.append(truth)
-        flown = NOTHING if ticks is None else ticks.run(b"".join(said), silent_until_us)
+            truth_datagrams.append(truth)
+        flown = NOTHING if ticks is None else ticks.run(b"".join(vehicle_datagrams), silent_until_us)
         for window in flown.windows:
-            told.append(window.truth)
-            said[:] = [window.said]
+            truth_datagrams.append(window.truth)
+            vehicle_datagrams[:] = [window.vehicle_datagrams]
             if window.ends_us and client.outcome is None:
-                turn(window.ends_us)
-        if flown.moved or client.outcome is not None:
+                ground_station_turn(window.ends_us)
+        if flown.world_moved or client.outcome is not None:
             continue
         if flown.decide is not None:
             answer: bytes | None = onboard.complete(flown.decide)
         else:
             answer = onboard.receive_sensors(simulator.sensor_datagram())
-        said += [datagram for _, datagram in onboard.ground_datagrams()]
-        question = onboard.question(_GROUND)
+        vehicle_datagrams += [datagram for _, datagram in onboard.ground_datagrams()]
+        question = onboard.timesync_request(_GROUND)
         if question is not None:
-            said.append(question)
-            turn(onboard.now_us)
+            vehicle_datagrams.append(question)
+            ground_station_turn(onboard.now_us)
         if watch is not None and not watch(onboard, simulator):
             client.interrupt("stopped by who watched it")
         if answer is not None:
             simulator.receive(answer)
         simulator.advance()
-    return client.outcome.of_mission(mission)
+    return client.outcome.in_mission_terms(mission)

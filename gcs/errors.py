@@ -62,7 +62,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _DISK = (*_FULL, errno.EIO, errno.EROFS)
 
 
-def disk_trouble(error: BaseException | None) -> str:
+def disk_problem(error: BaseException | None) -> str:
     """The file, if known, and the reason, if the error is a failure of the disk; else empty."""
     if not isinstance(error, OSError) or error.errno not in _DISK:
         return ""
@@ -75,10 +75,10 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
 
 
-def not_written(error: OSError, told: object, kind: str = "folder", by: str = "--out") -> GcsError:
-    """The error that `told` cannot be written: a GcsError if the disk is full, else an InputError. The text
-    asks for another folder (or other `kind`), `by` an option if there is one."""
-    other = f"name another {kind}{f' by {by}' if by else ''}"
+def write_error(error: OSError, target: object, kind: str = "folder", option: str = "--out") -> GcsError:
+    """The error that `target` cannot be written: a GcsError if the disk is full, else an InputError. The text
+    asks for another folder (or other `kind`), `option` an option if there is one."""
+    other = f"name another {kind}{f' by {option}' if option else ''}"
     if error.errno in _FULL:
-        return GcsError(f"{told}: {reason(error)}; free some space, or {other}")
-    return InputError(f"{told}: {reason(error)}; {other}")
+        return GcsError(f"{target}: {reason(error)}; free some space, or {other}")
+    return InputError(f"{target}: {reason(error)}; {other}")

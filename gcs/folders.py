@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from gcs.errors import InputError, not_written, reason
+from gcs.errors import InputError, reason, write_error
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
 LOCK_FILE = ".lock"  # of a folder into which several flights are written
 # every folder of results contains exactly one of these three files, which identifies its kind
-_HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
+_CONTENTS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
 
 def fresh_folder(name: str) -> Path:
@@ -35,17 +35,17 @@ def fresh_folder(name: str) -> Path:
             return folder
 
 
-def make_folder(path: Path, told: Path | None = None) -> None:
+def make_folder(path: Path, shown_path: Path | None = None) -> None:
     """Create a folder and its parents, unless it exists.
 
-    GcsError, which names it or `told`, if it cannot be created or nothing can be written into it.
+    GcsError, which names it or `shown_path`, if it cannot be created or nothing can be written into it.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
         if not os.access(path, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        raise not_written(error, told or path) from None
+        raise write_error(error, shown_path or path) from None
 
 
 @contextmanager
@@ -71,8 +71,9 @@ def reserved(path: Path, what: str) -> Iterator[None]:
         lock.release()
 
 
-def check_writable(path: Path, is_folder: bool, told: str) -> None:
-    """InputError, which names the path as `told`, unless the file, or files in the folder, can be written.
+def check_writable(path: Path, is_folder: bool, shown_name: str) -> None:
+    """InputError, which names the path as `shown_name`, unless the file, or files in the folder, can be
+    written.
 
     Writing is tried, because permissions are not sufficient (/proc); what is created for it is removed.
     """
@@ -83,15 +84,15 @@ def check_writable(path: Path, is_folder: bool, told: str) -> None:
             _try_file(path)
     except OSError as error:
         kind = "folder" if is_folder else "file in a folder"
-        raise InputError(f"{told}: {reason(error)}; name a {kind} that can be written") from None
+        raise InputError(f"{shown_name}: {reason(error)}; name a {kind} that can be written") from None
 
 
 def _try_folder(path: Path) -> None:
     """Create and remove a folder in the nearest existing folder."""
-    there = next(one for one in (path, *path.absolute().parents) if one.exists())
-    if not there.is_dir():
+    existing = next(one for one in (path, *path.absolute().parents) if one.exists())
+    if not existing.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-    Path(tempfile.mkdtemp(dir=there)).rmdir()
+    Path(tempfile.mkdtemp(dir=existing)).rmdir()
 
 
 def _try_file(path: Path) -> None:
@@ -104,16 +105,16 @@ def _try_file(path: Path) -> None:
         path.unlink()
 
 
-def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:
+def check_no_other_results(path: Path, kind: str, written: Iterable[str] = ()) -> None:
     """InputError if a folder contains results of another kind than `kind` (the name of the identifying file)
     or, if it contains none of this kind yet, a file with one of the names in `written`."""
-    for mark, what in _HOLDS.items():
-        if mark != kind and (path / mark).exists():
+    for kind_file, what in _CONTENTS.items():
+        if kind_file != kind and (path / kind_file).exists():
             raise InputError(f"{path}: holds {what}; name another folder by --out")
     if (path / kind).exists():
         return
     for name in written:
         if (path / name).exists():
             raise InputError(
-                f"{path}: holds a {name} that is not of {_HOLDS[kind]}; name another folder by --out"
+                f"{path}: holds a {name} that is not of {_CONTENTS[kind]}; name another folder by --out"
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import MissionItemError, WireItem, encode_mission, step_of
+from autopilot.wire.items import MissionItemError, WireItem, encode_mission, step_index
 from gcs.errors import InputError
 from missions.model import KINDS, Mission
 
@@ -18,17 +18,17 @@ def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
     try:
         return encode_mission(mission, home)
     except MissionItemError as error:
-        at = step_of(error.seq, mission.steps)
-        kind = KINDS[type(mission.steps[at])]
-        raise InputError(f"{mission.name}: items[{at}] ({kind}): {error.text}") from None
+        step = step_index(error.seq, mission.steps)
+        kind = KINDS[type(mission.steps[step])]
+        raise InputError(f"{mission.name}: items[{step}] ({kind}): {error.text}") from None
 
 
-def of_mission(said: str, mission: Mission) -> str:
+def in_mission_terms(text: str, mission: Mission) -> str:
     """A text of the vehicle, which counts uploaded items. Where the mission file counts differently, because
     signals are uploaded as several items, the number in the file is added."""
 
-    def named(found: re.Match[str]) -> str:
-        at = step_of(int(found[1]), mission.steps)
-        return found[0] if at == int(found[1]) else f"{found[0]} (items[{at}] of the mission)"
+    def with_file_number(match: re.Match[str]) -> str:
+        step = step_index(int(match[1]), mission.steps)
+        return match[0] if step == int(match[1]) else f"{match[0]} (items[{step}] of the mission)"
 
-    return _ITEM.sub(named, said)
+    return _ITEM.sub(with_file_number, text)

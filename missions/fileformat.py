@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from missions.model import Mission
 from missions.nearest import nearest
 from missions.schema import ITEMS, FileSpec, Item
-from missions.toml_files import FileError, TomlFiles, problems, shown
+from missions.toml_files import FileError, TomlFiles, format_value, problems
 
 
 class MissionFileError(FileError):
@@ -55,7 +55,7 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
     `text` is the content of the file, if there is one: errors in an item are then reported with the line of
     its [[items]].
     """
-    misplaced = [f"{where}: {key}: {says}" for key, says in _MISPLACED.items() if key in table]
+    misplaced = [f"{where}: {key}: {message}" for key, message in _MISPLACED.items() if key in table]
     if isinstance(table.get("items"), Mapping):
         misplaced.append(
             f"{where}: items is a single table; write [[items]], in two brackets, before each item"
@@ -68,22 +68,22 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
     if misplaced:
         raise MissionFileError(misplaced)
     head = MISSIONS.record(FileSpec, table, where)
-    places = _places(text, where, len(head.items))
+    locations = _item_locations(text, where, len(head.items))
     items: list[Item] = []
-    wrong: list[str] = []
+    errors: list[str] = []
     for index, item in enumerate(head.items):
         at = f"items[{index}]"
         kind = item.get("type")
         if not isinstance(kind, str) or kind not in ITEMS:
-            wrong.append(f"{places[index]}: {at}.type {_kind_problem(item)}")
+            errors.append(f"{locations[index]}: {at}.type {_kind_problem(item)}")
             continue
         try:
             items.append(ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"}))
         except ValidationError as error:
-            wrong += problems(error, ITEMS[kind], places[index], at, item)
-    wrong = wrong or _order_problems([item["type"] for item in head.items], places)
-    if wrong:
-        raise MissionFileError(wrong)
+            errors += problems(error, ITEMS[kind], locations[index], at, item)
+    errors = errors or _order_problems([item["type"] for item in head.items], locations)
+    if errors:
+        raise MissionFileError(errors)
     steps = tuple(item.step() for item in items)
     return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
 
@@ -95,7 +95,7 @@ def _is_misnamed_item(key: str, value: Any) -> bool:
     return has_tables and key.isprintable() and bool(nearest(key, ("items", *ITEMS)))
 
 
-def _places(text: str, where: str, count: int) -> list[str]:
+def _item_locations(text: str, where: str, count: int) -> list[str]:
     """`FILE:LINE` of each item, from the `[[items]]` lines; `where` alone if their number is not `count`."""
     lines = [number for number, line in enumerate(text.split("\n"), 1) if _HEADER.match(line)]
     return [f"{where}:{line}" for line in lines] if len(lines) == count else [where] * count
@@ -108,23 +108,23 @@ def _kind_problem(table: Mapping[str, Any]) -> str:
     kind = table["type"]
     near = nearest(str(kind), ITEMS)
     hint = f" (did you mean {near}?)" if near else ""
-    return f"= {shown(kind)}; must be one of {allowed}{hint}"
+    return f"= {format_value(kind)}; must be one of {allowed}{hint}"
 
 
-def _order_problems(kinds: Sequence[str], places: Sequence[str]) -> list[str]:
+def _order_problems(kinds: Sequence[str], locations: Sequence[str]) -> list[str]:
     """The rules between items: the first is a take-off, the last a landing; some need a load not released."""
     last = len(kinds) - 1
-    wrong = []
+    errors = []
     for index, kind in enumerate(kinds):
-        at = f'{places[index]}: items[{index}].type = "{kind}"; '
+        at = f'{locations[index]}: items[{index}].type = "{kind}"; '
         if index == 0 and kind != "takeoff":
-            wrong.append(at + 'must be "takeoff": a mission begins on the ground')
+            errors.append(at + 'must be "takeoff": a mission begins on the ground')
         elif index > 0 and kind == "takeoff":
-            wrong.append(at + "only the first item may be a take-off")
+            errors.append(at + "only the first item may be a take-off")
         if index == last and kind != "land":
-            wrong.append(at + 'must be "land": a mission ends on the ground')
+            errors.append(at + 'must be "land": a mission ends on the ground')
         elif index < last and kind == "land":
-            wrong.append(at + "only the last item may be a landing")
+            errors.append(at + "only the last item may be a landing")
         if kind in ("signals", "attitude", "winch") and "release" in kinds[:index]:
-            wrong.append(at + "needs the load, which an item before it has released")
-    return wrong
+            errors.append(at + "needs the load, which an item before it has released")
+    return errors

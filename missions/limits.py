@@ -12,13 +12,13 @@ SHORTEST_RUN_S = 1e-3  # signals and delays; times travel in milliseconds
 # The vehicle evaluates its path every few milliseconds: a faster wave or a steeper edge is a typing mistake.
 SHORTEST_EDGE_S = 0.1
 SHORTEST_PERIOD_S = 0.1
-LEAST_REELED_M = 0.3  # height of the load after a winch item
+MIN_REELED_HEIGHT_M = 0.3  # height of the load after a winch item
 
 # greatest values, the same in a file and on the wire
 FASTEST_REEL_M_S = 1.0
 LONGEST_CABLE_M = 100.0
-MOST_TERMS = 32  # of signals
-MOST_FACTORS = 3  # of a term
+MAX_TERMS = 32  # of signals
+MAX_FACTORS = 3  # of a term
 
 # of a file only: a value beyond them is probably a typing mistake
 LONGEST_S = 3600.0
@@ -28,5 +28,5 @@ FASTEST_M_S = 20.0
 SLOWEST_REEL_M_S = 0.01
 LARGEST_PHASE_DEG = 360.0
 LARGEST_TILT_DEG = 89.0
-MOST_ITEMS = 1000
+MAX_ITEMS = 1000
 LONGEST_TITLE = 120  # characters

@@ -130,7 +130,7 @@ class AttitudeRun:
 
 
 @dataclass(frozen=True, slots=True)
-class TurnNose:
+class TurnHeading:
     """Turn to a heading, from east to north, or by an angle (`relative`). `sense`: 1 counter-clockwise seen
     from above, -1 clockwise, 0 whichever is shorter; `rate_rad_s` None: as fast as MPC_YAWRAUTO_MAX."""
 
@@ -142,13 +142,13 @@ class TurnNose:
 
 @dataclass(frozen=True, slots=True)
 class LookAt:
-    """Keep the nose pointed at a place, ENU from home; None: stop doing so."""
+    """Keep the heading towards a place, ENU from home; None: stop doing so."""
 
     east_m: float | None
     north_m: float | None
 
 
-NoseAim = TurnNose | LookAt  # items between steps, which take effect as the next step begins
+HeadingCommand = TurnHeading | LookAt  # items between steps, which take effect as the next step begins
 Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
 KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",

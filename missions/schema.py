@@ -120,7 +120,7 @@ class TermSpec(Spec):
     rise_s: EdgeSeconds = Field(description="duration of the half-cosine rise")
     hold_s: Seconds | None = Field(None, description="time at the top; leave out with fall_s to stay there")
     fall_s: EdgeSeconds | None = Field(None, description="duration of the half-cosine fall")
-    factors: list[SineSpec] = Field(default_factory=list, max_length=limits.MOST_FACTORS)
+    factors: list[SineSpec] = Field(default_factory=list, max_length=limits.MAX_FACTORS)
     rise_90_by_s: EdgeSeconds | None = Field(
         None, description="time after start_s by which nine tenths of the rise are to be made"
     )
@@ -154,7 +154,7 @@ class TermSpec(Spec):
 
 class SignalsItem(Item):
     duration_s: RunSeconds = Field(description="duration of the whole trajectory")
-    terms: list[TermSpec] = Field(min_length=1, max_length=limits.MOST_TERMS)
+    terms: list[TermSpec] = Field(min_length=1, max_length=limits.MAX_TERMS)
 
     def step(self) -> model.Step:
         return model.Signals(self.duration_s, tuple(term.term() for term in self.terms))
@@ -192,7 +192,7 @@ class FileSpec(Spec):
     description: str = Field("", description="what the mission is for")
     assumptions: list[str] = Field(default_factory=list, description="values chosen, one sentence each")
     items: list[dict[str, Any]] = Field(
-        min_length=1, max_length=limits.MOST_ITEMS, description="the [[items]] in order"
+        min_length=1, max_length=limits.MAX_ITEMS, description="the [[items]] in order"
     )
 
     @field_validator("title")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 
-MOST_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle accepts
+MAX_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle accepts
 
 
 class TextFileError(ValueError):
@@ -21,9 +21,9 @@ def text_of(path: Path) -> str:
         if path.exists() and not path.is_file():
             raise TextFileError("cannot be read: a device or a pipe, which may have no end")
         with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise TextFileError(f"cannot be read: more than {MOST_BYTES // 2**20} MiB")
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise TextFileError(f"cannot be read: more than {MAX_BYTES // 2**20} MiB")
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         utf_16 = error.object.startswith((BOM_UTF16_LE, BOM_UTF16_BE))

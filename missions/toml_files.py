@@ -1,7 +1,7 @@
 """TOML files that a pydantic schema describes: the list of the shipped ones, reading, and error messages.
 
 Missions, vehicles and sensor profiles are such files. Of each kind, this module knows only where the shipped
-files are and a key that identifies it, so that every room may use it.
+files are and a key that identifies it, so that every package may use it.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 Spec = TypeVar("Spec", bound="BaseModel")
 
 _SUFFIX = ".toml"
-_LONGEST_SHOWN = 40  # characters of a value
+_MAX_VALUE_CHARS = 40  # characters of a value
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
 _DECIMAL_COMMA = re.compile(r"\s*(\w+)\s*=\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
-_CAPITAL_TRUTH = re.compile(r"\s*(\w+)\s*=\s*(?i:true|false)\s*(?:#.*)?$")
+_CAPITAL_BOOLEAN = re.compile(r"\s*(\w+)\s*=\s*(?i:true|false)\s*(?:#.*)?$")
 _BARE_TEXT = re.compile(r"\s*(\w+)\s*=\s*([^\W\d][^\"'#\\\x00-\x1f]*?)\s*(?:#.*)?$")
 # plainer texts for what the parser says in its own terms
-_TWICE = {
+_DUPLICATES = {
     "Cannot overwrite": "{key} is given twice in this table",
     "Cannot declare": "[{key}] stands there twice; each table of a list is written [[{key}]]",
 }
@@ -46,7 +46,9 @@ class _Kind(NamedTuple):
     """What this module knows of a kind of file."""
 
     package: str  # folder of the shipped files
-    mark: str  # a key that all files of this kind have and no others: it identifies files of another kind
+    marker_key: (
+        str  # a key that all files of this kind have and no others: it identifies files of another kind
+    )
 
 
 _KINDS = {
@@ -124,7 +126,7 @@ class TomlFiles:
         """The table as a validated `spec`."""
         from pydantic import ValidationError  # listing names needs no schema
 
-        found = [kind for kind, known in _KINDS.items() if known.mark in table]
+        found = [kind for kind, known in _KINDS.items() if known.marker_key in table]
         if found and self.kind in _KINDS and self.kind not in found:
             raise self.error([f"{where}: is a {found[0]} file; a {self.kind} file is wanted here"])
         try:
@@ -133,7 +135,7 @@ class TomlFiles:
             raise self.error(problems(error, spec, where, given=table)) from None
 
     def _hint(self, given: str) -> str:
-        other = of_another_kind(given, self.kind)
+        other = other_kind_hint(given, self.kind)
         if other:
             return other
         beside = given + _SUFFIX
@@ -144,7 +146,7 @@ class TomlFiles:
         return self.package or _KINDS[self.kind].package
 
 
-def of_another_kind(name: str, kind: str) -> str:
+def other_kind_hint(name: str, kind: str) -> str:
     """The beginning of a hint if a file of another kind is shipped by that name, otherwise empty."""
     for other, known in _KINDS.items():
         if other != kind and name in _names(known.package):
@@ -176,28 +178,28 @@ def problems(
     `where` names the file, `at` the table within it that was validated against `spec`, and `given` is that
     table: a key that it already has is not suggested for an unknown one.
     """
-    unknown, others, meant = [], [], set()
+    unknown, others, suggested = [], [], set()
     listed: set[type[BaseModel]] = set()
     for finding in error.errors(include_url=False):
         path, key, owner = _place(finding["loc"], spec, at)
         if finding["type"] == "extra_forbidden":
-            near = _meant_key(key, owner, _keys_of(given or {}, finding["loc"][:-1]))
-            meant.add(path.removesuffix(key) + near)
-            unknown.append(f"{where}: {path}: {_unknown_key(near, owner, owner in listed)}")
+            near = _suggested_key(key, owner, _keys_of(given or {}, finding["loc"][:-1]))
+            suggested.add(path.removesuffix(key) + near)
+            unknown.append(f"{where}: {path}: {_unknown_key_text(near, owner, owner in listed)}")
             if not near:
                 listed.add(owner)
         else:
             others.append((path, _problem(dict(finding), path, owner.model_fields.get(key))))
-    return unknown + [f"{where}: {line}" for path, line in others if path not in meant]
+    return unknown + [f"{where}: {line}" for path, line in others if path not in suggested]
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """The value as the file would write it, cut to fit a line."""
     if isinstance(value, bool):
         return "true" if value else "false"
     text = f'"{value}"' if isinstance(value, str) else str(value)
     text = " ".join(text.split())
-    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+    return text if len(text) <= _MAX_VALUE_CHARS else text[: _MAX_VALUE_CHARS - 3] + "..."
 
 
 def bounds(field: FieldInfo) -> str:
@@ -221,11 +223,11 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
         line, column = str(text.count("\n") + 1), str(len(text) - text.rfind("\n"))
     lines = text.splitlines()
     at = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
-    said = message.split(" (at ", maxsplit=1)[0]
-    twice = next((instead for begins, instead in _TWICE.items() if said.startswith(begins)), "")
-    if twice:
-        said = twice.format(key=re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip())
-    return f"{where}:{line}:{column}: not TOML: {said}{'' if twice else _toml_hint(at)}"
+    reason = message.split(" (at ", maxsplit=1)[0]
+    duplicate = next((instead for begins, instead in _DUPLICATES.items() if reason.startswith(begins)), "")
+    if duplicate:
+        reason = duplicate.format(key=re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip())
+    return f"{where}:{line}:{column}: not TOML: {reason}{'' if duplicate else _toml_hint(at)}"
 
 
 def _toml_hint(line: str) -> str:
@@ -236,11 +238,11 @@ def _toml_hint(line: str) -> str:
     if found := _DECIMAL_COMMA.match(line):
         key, whole, decimals = found.groups()
         return f"; a decimal point is needed: {key} = {whole}.{decimals}"
-    if _CAPITAL_TRUTH.match(line):
+    if _CAPITAL_BOOLEAN.match(line):
         return "; true and false are written in lower case"
     if found := _BARE_TEXT.match(line):
         key, text = found.groups()
-        return f"; text is written in quotes: {key} = {shown(text)}"
+        return f"; text is written in quotes: {key} = {format_value(text)}"
     return ""
 
 
@@ -276,7 +278,7 @@ def _problem(error: dict[str, Any], path: str, field: FieldInfo | None) -> str:
         return f"{path} has {len(error['input'])} entries; must be {_allowed(error, field)}{about}"
     if error["type"] == "value_error":
         return f"{path} {error['ctx']['error']}".lstrip()
-    return f"{path} = {shown(error['input'])}; must be {_allowed(error, field)}{about}"
+    return f"{path} = {format_value(error['input'])}; must be {_allowed(error, field)}{about}"
 
 
 def _keys_of(table: Any, location: Sequence[str | int]) -> Collection[str]:
@@ -289,7 +291,7 @@ def _keys_of(table: Any, location: Sequence[str | int]) -> Collection[str]:
     return table if isinstance(table, Mapping) else ()
 
 
-def _meant_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
+def _suggested_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
     """The key that was meant, or "": the same quantity in another unit, or a similar key that is not
     given."""
     known = list(owner.model_fields)
@@ -298,10 +300,10 @@ def _meant_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
     if "_" not in key and same:  # a word alone, such as cable: related keys are listed in order of importance
         return same[0]
-    return nearest(key, same, likeness=0.0) or nearest(key, [one for one in known if one not in given])
+    return nearest(key, same, min_similarity=0.0) or nearest(key, [one for one in known if one not in given])
 
 
-def _unknown_key(near: str, owner: type[BaseModel], listed: bool) -> str:
+def _unknown_key_text(near: str, owner: type[BaseModel], listed: bool) -> str:
     """`listed`: an earlier line lists the allowed keys."""
     if near:
         return f"unknown key; write {near}{_unit_note(near)}"

@@ -18,9 +18,9 @@ from autopilot.estimation.desk import (
     PoseSample,
     Sensed,
 )
-from autopilot.own.brought import Parameter
 from autopilot.own.compiled import kernel
-from autopilot.own.estimating import estimated, no_estimate
+from autopilot.own.estimates import estimated, no_estimate
+from autopilot.own.loaded_class import Parameter
 
 __all__ = [
     "Cable",

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
-from gcs.errors import GcsError, not_written
-from gcs.folders import PAGE_FILE, TLOG_FILE, keep_others, make_folder
+from gcs.errors import GcsError, write_error
+from gcs.folders import PAGE_FILE, TLOG_FILE, check_no_other_results, make_folder
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
@@ -75,8 +75,8 @@ def fly(
     profile, law, estimator, planner or parameter, if a value is not a number or out of its range, if a custom
     law, estimator or planner fails before the flight, or if the vehicle cannot fly the mission.
     """
-    from autopilot.shell.options import MOST_SEED
-    from gcs.workflows.flight_here import fly_here
+    from autopilot.shell.options import MAX_SEED
+    from gcs.workflows.in_process_flight import fly_in_process
 
     known = isinstance(mission, model.Mission)
     flown = mission if isinstance(mission, model.Mission) else Mission.load(name_or_path("mission", mission))
@@ -85,7 +85,7 @@ def fly(
         law=law_reference(law),
         sensors=name_or_path("sensors", sensors),
         vehicle=name_or_path("vehicle", vehicle),
-        seed=whole_number("seed", seed, 0, MOST_SEED),
+        seed=whole_number("seed", seed, 0, MAX_SEED),
         speed=None,
         real_time=False,
         out=None,
@@ -101,7 +101,7 @@ def fly(
     log = io.BytesIO()
     started_s = time.perf_counter()
     with errors_for_python():
-        outcome = fly_here(flown, options, TlogWriter(log), _warn)
+        outcome = fly_in_process(flown, options, TlogWriter(log), _warn)
     wall_s = time.perf_counter() - started_s
     return Flight(log.getvalue(), meta_of(flown, options, outcome, wall_s), flown)
 
@@ -191,13 +191,13 @@ class Flight:
         `Error` if the directory holds another flight, unless `overwrite=True`, which replaces that flight.
         The same flight may be written again.
         """
-        from gcs.workflows.own_vehicle import LOGS
         from gcs.workflows.report import make_report
+        from gcs.workflows.vehicle_processes import LOGS
 
         folder = file_path("out", out)
         with errors_for_python():
             make_folder(folder)
-            keep_others(folder, TLOG_FILE)
+            check_no_other_results(folder, TLOG_FILE)
             if not overwrite and _holds_another(folder / TLOG_FILE, self.tlog):
                 raise GcsError(
                     f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
@@ -235,7 +235,7 @@ def _holds_another(file: Path, tlog: bytes) -> bool:
     try:
         return file.exists() and file.read_bytes() not in (b"", tlog)
     except OSError as error:
-        raise not_written(error, file, by="") from None
+        raise write_error(error, file, option="") from None
 
 
 class Picture:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from autopilot.control.law_exchange import Asked, Believed, Held, Now
 from autopilot.control.records import Cable, Reference, State
-from autopilot.own.asking import attitude, force, rates, wrench
-from autopilot.own.brought import Parameter
 from autopilot.own.compiled import kernel
+from autopilot.own.law_commands import attitude, force, rates, wrench
+from autopilot.own.loaded_class import Parameter
 
 __all__ = [
     "Asked",

@@ -5,7 +5,7 @@ World ENU from home, SI.
 
 from __future__ import annotations
 
-from autopilot.own.brought import Parameter
+from autopilot.own.loaded_class import Parameter
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import Path, PlanError, Route, polynomials, samples, slower, use

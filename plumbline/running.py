@@ -299,7 +299,7 @@ class RunningVehicle:
         session.watch(is_over, None)
         if found:
             return found[-1]
-        reasons = session.view.complaints_since(texts_before)
+        reasons = session.view.problems_since(texts_before)
         raise NoVehicleError("; ".join([f"waiting for {what}: {problems[0]}", *reasons]))
 
     # ---- the thread of the link

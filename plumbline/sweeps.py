@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
-from gcs.workflows.flight_options import own_words
+from gcs.workflows.flight_options import own_part_options
 from plumbline.arguments import (
     checks_argument_names,
     errors_for_python,
@@ -86,7 +86,7 @@ def sweep(
         arguments += ["--vehicle", name_or_path("vehicle", vehicle)]
         for law in _laws(laws):
             arguments += ["--law", law_reference(law)]
-        arguments += own_words(estimator_reference(estimator), planner_reference(planner))
+        arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
         for name, values in parameter_mapping("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
             arguments += ["--vary", f"{name}={_values(name, values)}"]
         if sample is not None:

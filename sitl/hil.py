@@ -20,40 +20,40 @@ from autopilot.vehicle.battery import open_voltage
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
+from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import BatteryReading, battery_status_message
 from autopilot.wire.convert.flight import wind_state_message
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.convert.simulator import padded, read_hil_actuator_controls
+from autopilot.wire.convert.simulator import padded_forces, read_hil_actuator_controls
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.periods import next_multiple
-from autopilot.wire.simulator_frames import Answer, answer_in
+from autopilot.wire.simulator_frames import Answer, read_answer
 from sitl.interfaces.frame import Frame, frame_of
 from sitl.messages import (
     CAMERA,
     DIALECT_COMPONENT,
     DIALECT_FRAMES,
     ENCODER,
-    NOTHING_NEW,
+    NO_READINGS,
     SIMULATOR_COMPONENT,
     VEHICLE_SYSTEM,
-    Newest,
-    Statement,
+    LatestReadings,
+    MessageConstants,
     put_sensors,
     put_truth,
 )
 from sitl.parameter_server import ParameterServer
 from sitl.plant.attachment import effective_mass
 from sitl.plant.records import Truth
-from sitl.running import Room, Runner, Running, Writers
 from sitl.sensors.barometer import BarometerReading
-from sitl.sensors.chosen import with_chosen
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
-from sitl.sensors.profile import Profile, stated_of
+from sitl.sensors.overrides import with_overrides
+from sitl.sensors.profile import Profile, reported_std
 from sitl.settings import SECOND_US, Settings, settings_of
 from sitl.sim_core import Forces, SimCore
+from sitl.tick_batch import BatchBuilder, FrameBuffers, TickBatch, Writers
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
@@ -64,7 +64,7 @@ _BATTERY_PERIOD_US = 200_000
 _BOOT_PERIOD_US = SECOND_US  # of SIM_BOOT, sent with the sensors
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
-LEAST_SNAP = 1e-3  # m/s, closing speed above which a cable that comes taut is reported
+MIN_SNAP_SPEED = 1e-3  # m/s, closing speed above which a cable that comes taut is reported
 
 _DIVERGED = mavlink.MAVLink_statustext_message(
     mavlink.MAV_SEVERITY_CRITICAL, b"Simulation stopped: outside its model"
@@ -72,7 +72,7 @@ _DIVERGED = mavlink.MAVLink_statustext_message(
 _FIX = {"3d": mavlink.GPS_FIX_TYPE_3D_FIX, "rtk": mavlink.GPS_FIX_TYPE_RTK_FIXED}
 
 
-def _asks_reboot(message: Any) -> bool:
+def _requests_reboot(message: Any) -> bool:
     if message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         return False
     return bool(message.command == mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN and message.param1 == 1.0)
@@ -122,16 +122,16 @@ class HilSimulator:
         self._put_sensors: Callable[..., tuple[int, int]] | None = None
         self._put_truth: Callable[..., int] | None = None
         self._answer_in: Callable[..., Answer] | None = None
-        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        self._payload = np.zeros(MAX_PAYLOAD_BYTES, np.uint8)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._dialect_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
-        self._runner = Runner(Writers(self._sensor_writer, self._truth_writer, self._dialect_writer))
+        self._batches = BatchBuilder(Writers(self._sensor_writer, self._truth_writer, self._dialect_writer))
         # a separate sequence counter: its frames are not recorded, and the recorded ones must have no gap
         self._run_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
-        self._begin()
+        self._reset()
 
-    def _begin(self) -> None:
+    def _reset(self) -> None:
         """Put the world to time 0, with the parameters in force."""
         table = self.parameters.table
         settings = settings_of(table)
@@ -141,24 +141,24 @@ class HilSimulator:
         self.rejected = 0  # controls that were not numbers
         self.answered = False  # whether the present tick was
         self.core = core
-        self._statement = self._stating(settings)
+        self._constants = self._packed_constants(settings)
         self._stopped = self._command = (0.0,) * len(self._layout)
         self._rotors = mavlink.PLUMBLINE_ROTORS_DISARMED
         self._gripper_open = False
         self._reel_rate = 0.0
         self._command_us = -1  # the tick that the last command answers
         height = BarometerReading(core.state.x_quad[2])
-        self._newest = packed(NOTHING_NEW._replace(height=height))
+        self._latest = packed(NO_READINGS._replace(height=height))
         sensors, waiting, _ = core.rows.queue.shape
         # room for a frame of each reading that can be on its way, of the rotors, and HIL_SENSOR
         frames = sensors * waiting + len(self._layout) + 1
-        self._buffer = np.zeros(frames * FRAME_ROOM, np.uint8)
+        self._buffer = np.zeros(frames * MAX_FRAME_BYTES, np.uint8)
         self._written = self._buffer.data
-        self._introduced = False  # whether SIM_BOOT is sent at the next tick too
+        self._announcing_boot = False  # whether SIM_BOOT is sent at the next tick too
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
-        self._wind_told = settings.wind, ZERO
+        self._reported_wind = settings.wind, ZERO
         self._reboot = False  # whether one was requested
         self._snap_mass()  # compiled before the first tick, not at the first snap
 
@@ -220,17 +220,17 @@ class HilSimulator:
         due = self.core.now_us % self._status_us == 0
         return self._run_writer.frame(self._boot()) if due else None
 
-    def greets(self, datagram: bytes) -> bool:
+    def has_heartbeat(self, datagram: bytes) -> bool:
         """Whether the datagram holds a HEARTBEAT of the vehicle's autopilot, which asks to be served."""
         return any(
             one.system == VEHICLE_SYSTEM and one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
             for one in decode(datagram)[0]
         )
 
-    def introduce(self) -> None:
+    def announce_boot(self) -> None:
         """Send SIM_BOOT, the number of this run of the world, with the sensors of this tick and the next."""
-        if not self._introduced:
-            self._introduced = True
+        if not self._announcing_boot:
+            self._announcing_boot = True
             self._sensors = self._sensor_writer.frame(self._boot()) + self._sensors
 
     def receive(self, datagram: bytes) -> bool:
@@ -241,30 +241,38 @@ class HilSimulator:
         In real time a late command is still the newest one, and is used.
         """
         if self._answer_in is None:
-            self._answer_in = entry_of(answer_in, datagram, VEHICLE_SYSTEM, self._payload)
+            self._answer_in = entry_of(read_answer, datagram, VEHICLE_SYSTEM, self._payload)
         answer = self._answer_in(datagram, VEHICLE_SYSTEM, self._payload)
         if answer[0]:
-            self._take(*answer[1:])
+            self._apply_answer(*answer[1:])
             return self.answered
-        was_answered = self.answered
-        aside = []
+        answered_before = self.answered
+        others = []
         for one in decode(datagram)[0]:
             if one.system != VEHICLE_SYSTEM:
                 continue
             if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
-                said = read_hil_actuator_controls(one.message)
-                self._take(said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
+                controls = read_hil_actuator_controls(one.message)
+                self._apply_answer(
+                    controls.time_us,
+                    controls.forces,
+                    controls.armed,
+                    controls.gripper_open,
+                    controls.reel_rate,
+                )
             else:
-                aside.append(one.message)
-        if self.answered and not was_answered:  # a repeated datagram changes nothing
-            for message in aside:
-                if _asks_reboot(message):
+                others.append(one.message)
+        if self.answered and not answered_before:  # a repeated datagram changes nothing
+            for message in others:
+                if _requests_reboot(message):
                     self._reboot = True
                 if self.parameters.receive(message):
                     self._retune()
         return self.answered
 
-    def _take(self, time_us: int, forces: Forces, armed: bool, gripper_open: bool, reel_rate: float) -> None:
+    def _apply_answer(
+        self, time_us: int, forces: Forces, armed: bool, gripper_open: bool, reel_rate: float
+    ) -> None:
         """Take an answer if it is that to this tick or, in real time, the newest to an earlier tick."""
         now_us = self.core.now_us
         if time_us == now_us:
@@ -277,23 +285,23 @@ class HilSimulator:
             self.rejected += 1
         else:
             self._command = forces[: len(self._layout)] if armed else self._stopped
-            obeying, disarmed = mavlink.PLUMBLINE_ROTORS_OBEYING, mavlink.PLUMBLINE_ROTORS_DISARMED
-            self._rotors = obeying if armed else disarmed
+            following, disarmed = mavlink.PLUMBLINE_ROTORS_OBEYING, mavlink.PLUMBLINE_ROTORS_DISARMED
+            self._rotors = following if armed else disarmed
         self._gripper_open = gripper_open
         self._reel_rate = reel_rate
         self._command_us = time_us
 
-    def obey(self, forces: Forces, armed: bool, gripper_open: bool = False) -> None:
+    def apply_command(self, forces: Forces, armed: bool, gripper_open: bool = False) -> None:
         """Take the answer to the present tick from an autopilot whose messages `receive` does not read."""
-        self._take(self.core.now_us, forces, armed, gripper_open, 0.0)
+        self._apply_answer(self.core.now_us, forces, armed, gripper_open, 0.0)
 
     @property
-    def inertial(self) -> ImuReading:
+    def imu_reading(self) -> ImuReading:
         """The last reading of the inertial unit, body FLU."""
-        return unpack(Newest, self._newest, 0).inertial
+        return unpack(LatestReadings, self._latest, 0).inertial
 
     @property
-    def navigates(self) -> bool:
+    def has_navigation_sensors(self) -> bool:
         """Whether it has the sensors for outdoor navigation: GNSS, barometer and magnetometer."""
         profile = self._profile
         return None not in (profile.gnss, profile.barometer, profile.magnetometer)
@@ -308,28 +316,28 @@ class HilSimulator:
         """The vehicle as third-party firmwares define it; ValueError if they cannot fly it."""
         return frame_of(self._layout, self.core.truth.rotor_min, self.core.truth.rotor_max)
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Put the world to time 0 again, with the parameters in force: another run."""
         self._boot_id += 1
-        self._begin()
+        self._reset()
 
     def _retune(self) -> None:
         """Apply a changed parameter."""
         table = self.parameters.table
         if table["SIM_GUST_NOW"] > 0.0:
             # not at this tick, whose truth may have been sent already
-            self.parameters.tell("SIM_GUST_AT_S", (self.core.now_us + self.tick_us) / SECOND_US)
-            self.parameters.tell("SIM_GUST_NOW", 0.0)
+            self.parameters.set_and_report("SIM_GUST_AT_S", (self.core.now_us + self.tick_us) / SECOND_US)
+            self.parameters.set_and_report("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
         self.core.retune(apply_parameters(self._file_truth, table), settings)
-        self._statement = self._stating(settings)
+        self._constants = self._packed_constants(settings)
 
-    def _stating(self, settings: Settings) -> Row:
-        profile = with_chosen(self._profile, settings.chosen)
+    def _packed_constants(self, settings: Settings) -> Row:
+        profile = with_overrides(self._profile, settings.overrides)
         gnss, cable = profile.gnss, profile.cable_sensor
         return packed(
-            Statement(
-                stated_of(profile, settings.noise_scale),
+            MessageConstants(
+                reported_std(profile, settings.noise_scale),
                 self._home,
                 _FIX[gnss.fix] if gnss else 0,
                 gnss.satellites if gnss else 0,
@@ -340,7 +348,7 @@ class HilSimulator:
     def advance(self) -> None:
         """Move the world to the next tick under the last command, or to its beginning if so requested."""
         if self._reboot:
-            self.begin_anew()
+            self.restart()
             return
         if not self._lockstep:
             if not self.answered:
@@ -354,24 +362,30 @@ class HilSimulator:
         self._sensors = self._sensor_frames()
         self._truth_made = False
 
-    def running(self) -> Running | None:
+    def tick_batch(self) -> TickBatch | None:
         """The data with which, and the time until which, machine code can move the world on without Python
         from this tick, whose sensors and truth are sent. None if it cannot, for example because this tick is
         answered already or more must be sent.
         """
         core = self.core
         now_us, tick_us = core.now_us, core.settings.tick_us
-        if not self._lockstep or self._reboot or self._introduced or self.answered or self.parameters.speaks:
+        if (
+            not self._lockstep
+            or self._reboot
+            or self._announcing_boot
+            or self.answered
+            or self.parameters.has_messages
+        ):
             return None
-        until_us = self._speaks_us
+        until_us = self._next_message_us
         if until_us <= now_us + tick_us:
             return None
         times = (now_us, core.tick_count, tick_us, until_us, self._truth_every)
-        room = Room(self._newest, self._statement, self._buffer, self._payload)
-        return self._runner.running(times, core.rows, core.chain, room)
+        buffers = FrameBuffers(self._latest, self._constants, self._buffer, self._payload)
+        return self._batches.next_batch(times, core.rows, core.chain, buffers)
 
     @property
-    def _speaks_us(self) -> int:
+    def _next_message_us(self) -> int:
         """Time of the next tick at which more than sensors and truth must be sent in any case."""
         core, now_us = self.core, self.core.now_us
         periods_us = [self._status_us, _BOOT_PERIOD_US]
@@ -379,20 +393,20 @@ class HilSimulator:
             periods_us.append(_BATTERY_PERIOD_US)
         return min(core.pulse_changes_us, *(next_multiple(now_us, each_us) for each_us in periods_us))
 
-    def ran(self, framed: bool) -> None:
-        """Take over the state to which machine code has moved the world. `framed`: the sensors of the present
-        tick are in the buffer and its truth is sent; otherwise both are still to be made."""
-        ran = self._runner.ran()
-        if ran is None:
+    def finish_batch(self, sensors_sent: bool) -> None:
+        """Take over the state to which machine code has moved the world. `sensors_sent`: the sensors of the
+        present tick are in the buffer and its truth is sent; otherwise both are still to be made."""
+        result = self._batches.result()
+        if result is None:
             return
-        self._command_us = ran.now_us - self.core.settings.tick_us
-        self.core.came_to(ran.now_us, ran.ticks)
-        self._command = tuple(ran.forces[: len(self._layout)]) if ran.armed else self._stopped
-        self._rotors = mavlink.PLUMBLINE_ROTORS_OBEYING if ran.armed else mavlink.PLUMBLINE_ROTORS_DISARMED
-        self._gripper_open, self._reel_rate = ran.gripper_open, ran.reel_rate
+        self._command_us = result.now_us - self.core.settings.tick_us
+        self.core.set_tick(result.now_us, result.ticks)
+        self._command = tuple(result.forces[: len(self._layout)]) if result.armed else self._stopped
+        self._rotors = mavlink.PLUMBLINE_ROTORS_OBEYING if result.armed else mavlink.PLUMBLINE_ROTORS_DISARMED
+        self._gripper_open, self._reel_rate = result.gripper_open, result.reel_rate
         self.answered = False
-        if framed:
-            self._sensors = self._written[: ran.framed].tobytes()
+        if sensors_sent:
+            self._sensors = self._written[: result.sensor_bytes].tobytes()
             self._truth, self._truth_made = None, True  # it has been sent
         else:
             self._sensors = self._sensor_frames()
@@ -400,38 +414,38 @@ class HilSimulator:
 
     def _sensor_frames(self) -> bytes:
         writer, core = self._sensor_writer, self.core
-        aside = self.parameters.take()
-        if self._introduced or core.now_us % _BOOT_PERIOD_US == 0:
-            self._introduced = False
-            aside.append(self._boot())
+        messages = self.parameters.pop_messages()
+        if self._announcing_boot or core.now_us % _BOOT_PERIOD_US == 0:
+            self._announcing_boot = False
+            messages.append(self._boot())
         if core.truth.drive.battery > 0.0 and core.now_us % _BATTERY_PERIOD_US == 0:
-            aside.append(self._battery())
+            messages.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # for the autopilot: how punctual the run is
-            aside.append(self._status())
-        first = b"".join(map(writer.frame, aside)) if aside else b""
-        room = (self._buffer, self._payload)
-        arguments = (core.rows, core.now_us, self._newest, self._statement, *room, writer.sequence)
+            messages.append(self._status())
+        message_frames = b"".join(map(writer.frame, messages)) if messages else b""
+        buffers = (self._buffer, self._payload)
+        arguments = (core.rows, core.now_us, self._latest, self._constants, *buffers, writer.sequence)
         if self._put_sensors is None:
             self._put_sensors = entry_of(put_sensors, *arguments)
         length, writer.sequence = self._put_sensors(*arguments)
         frames = self._written[:length].tobytes()
-        return first + frames if first else frames
+        return message_frames + frames if message_frames else frames
 
     def _truth_frames(self) -> bytes | None:
         core = self.core
         due = core.tick_count % self._truth_every == 0
         status_due = core.now_us % self._status_us == 0
-        wind_due = status_due or self._wind != self._wind_told
-        snapped = core.snap_speed > LEAST_SNAP
+        wind_due = status_due or self._wind != self._reported_wind
+        snapped = core.snap_speed > MIN_SNAP_SPEED
         if not (due or wind_due or snapped):
             return None
         writer, dialect, datagram = self._truth_writer, self._dialect_writer, b""
         if due:
-            room = (self._buffer, self._payload)
-            rows = (core.rows.world, core.rows.model, rotors_of(core.rows), self._statement)
+            buffers = (self._buffer, self._payload)
+            rows = (core.rows.world, core.rows.model, rotors_of(core.rows), self._constants)
             if self._put_truth is None:
-                self._put_truth = entry_of(put_truth, *rows, *room, writer.sequence, dialect.sequence)
-            length = self._put_truth(*rows, *room, writer.sequence, dialect.sequence)
+                self._put_truth = entry_of(put_truth, *rows, *buffers, writer.sequence, dialect.sequence)
+            length = self._put_truth(*rows, *buffers, writer.sequence, dialect.sequence)
             writer.sequence = (writer.sequence + 1) & 0xFF
             dialect.sequence = (dialect.sequence + DIALECT_FRAMES) & 0xFF
             datagram = self._written[:length].tobytes()
@@ -451,8 +465,8 @@ class HilSimulator:
         core, now_us = self.core, self.core.now_us
         messages: list[Any] = []
         if wind_due:
-            self._wind_told = self._wind
-            messages.append(wind_state_message(now_us, *self._wind_told))
+            self._reported_wind = self._wind
+            messages.append(wind_state_message(now_us, *self._reported_wind))
         if snapped:
             speed = core.snap_speed
             messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, self._snap_mass() * speed))
@@ -464,7 +478,7 @@ class HilSimulator:
         """SIM_BOOT: which run of the world this is, and the state that an autopilot finds that starts now."""
         core = self.core
         reeled_m = core.cable_length - core.truth.cable_length
-        forces = padded(self._command)
+        forces = padded_forces(self._command)
         return mavlink.MAVLink_sim_boot_message(
             core.now_us,
             self._boot_id,

@@ -20,13 +20,13 @@ from autopilot.wire.convert.simulator import (
     PRESSURE,
     TEMPERATURE,
     esc_status_values,
-    forces_in,
+    forces_from_row,
     hil_gps_values,
     hil_sensor_values,
     hil_state_quaternion_values,
     load_sensor_values,
     odometry_values,
-    speed_rpm,
+    rotor_speed_rpm,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.simulator_frames import (
@@ -39,7 +39,7 @@ from autopilot.wire.simulator_frames import (
     ODOMETRY,
     ROTOR_STATE,
 )
-from sitl.plant.attachment import attached_at
+from sitl.plant.attachment import attachment_position
 from sitl.plant.rotors import COMMAND, FORCE, STRENGTH, RotorRows
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.cable_sensor import CableReading
@@ -48,7 +48,7 @@ from sitl.sensors.imu import ImuReading
 from sitl.sensors.load_tracker import LoadReading
 from sitl.sensors.magnetometer import MagnetometerReading
 from sitl.sensors.pose_tracker import PoseReading
-from sitl.sensors.profile import Stated
+from sitl.sensors.profile import ReportedStd
 from sitl.world import (
     BARO,
     CABLE,
@@ -57,11 +57,11 @@ from sitl.world import (
     LOAD,
     MOCAP,
     READING,
-    SHOWS,
+    STAMP_US,
     World,
     WorldModel,
     WorldRows,
-    arrived,
+    pop_arrived,
     rotors_of,
 )
 from sitl.world import MAG as MAGNETOMETER
@@ -72,24 +72,24 @@ SIMULATOR_COMPONENT = 26
 DIALECT_COMPONENT = 27
 TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 DIALECT_FRAMES = 2  # frames of our dialect that `put_truth` writes, after one of the common dialect
-SPEEDS_US = 20_000  # period of the ticks at which the speed controllers report the speeds of the rotors
+ESC_PERIOD_US = 20_000  # period of the ticks at which the speed controllers report the speeds of the rotors
 _TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
 _FLOAT, _NO_FIX = mavlink.GPS_FIX_TYPE_RTK_FLOAT, mavlink.GPS_FIX_TYPE_NO_FIX
 _UNKNOWN_M = 655.35  # UINT16_MAX cm: unknown
 _NAN3: Vec3 = (nan, nan, nan)
 
 
-class Statement(NamedTuple):
+class MessageConstants(NamedTuple):
     """The contents of the messages besides the readings."""
 
-    stated: Stated
+    std: ReportedStd
     home: Home
     fix_type: int  # GPS_FIX_TYPE
     satellites: int
     cable_id: int  # LOAD_SENSOR.sensor_id of the cable sensor
 
 
-class Newest(NamedTuple):
+class LatestReadings(NamedTuple):
     """The last readings of the sensors that HIL_SENSOR repeats at every tick."""
 
     inertial: ImuReading
@@ -115,8 +115,8 @@ def rotor_speed(rows: WorldRows, i: int) -> float:
     rotors = rotors_of(rows)
     if i >= rotors.table.shape[0]:
         return 0.0
-    greatest = rotors.table[i, STRENGTH] * unpack(WorldModel, rows.model, 0).truth.rotor_max
-    return speed_rpm(rotors.rows[FORCE, i], greatest)
+    max_force = rotors.table[i, STRENGTH] * unpack(WorldModel, rows.model, 0).truth.rotor_max
+    return rotor_speed_rpm(rotors.rows[FORCE, i], max_force)
 
 
 @kernel
@@ -132,117 +132,117 @@ def _speeds(rows: WorldRows, first: int, now_us: int) -> Any:
 
 @kernel
 def put_sensors(
-    rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
+    rows: WorldRows, now_us: int, latest: Row, constants: Row, buffer: Bytes, payload: Bytes, sequence: int
 ) -> tuple[int, int]:
     """Take the readings that have left the sensors by now out of the queues, and write their frames,
     HIL_SENSOR last.
 
-    Returns the number of bytes and the sequence number of the next frame. `newest` is a `Newest`, which is
-    updated, `statement` a `Statement`; `payload` is scratch of PAYLOAD_ROOM bytes.
+    Returns the number of bytes and the sequence number of the next frame. `latest` is a `LatestReadings`,
+    which is updated, `constants` a `MessageConstants`; `payload` is scratch of MAX_PAYLOAD_BYTES bytes.
     """
-    said = unpack(Statement, statement, 0)
-    stated = said.stated
+    shared = unpack(MessageConstants, constants, 0)
+    std = shared.std
     queue = rows.queue
     at = fields = 0
-    found = arrived(MOCAP, now_us, rows)
-    while found >= 0:
-        row = queue[MOCAP, found]
+    reading = pop_arrived(MOCAP, now_us, rows)
+    while reading >= 0:
+        row = queue[MOCAP, reading]
         pose = unpack(PoseReading, row, READING)
         values = odometry_values(
-            int(row[SHOWS]),
+            int(row[STAMP_US]),
             pose.position,
             pose.quat_wxyz,
             pose.velocity,
             pose.omega_body,
-            stated.mocap_position,
-            stated.mocap_attitude,
-            stated.mocap_velocity,
+            std.mocap_position,
+            std.mocap_attitude,
+            std.mocap_velocity,
         )
         at = _put(ODOMETRY, values, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(MOCAP, now_us, rows)
-    found = arrived(LOAD, now_us, rows)
-    while found >= 0:
-        row = queue[LOAD, found]
+        reading = pop_arrived(MOCAP, now_us, rows)
+    reading = pop_arrived(LOAD, now_us, rows)
+    while reading >= 0:
+        row = queue[LOAD, reading]
         load = unpack(LoadReading, row, READING)
-        velocity_std = stated.load_velocity if load.velocity[0] == load.velocity[0] else nan
+        velocity_std = std.load_velocity if load.velocity[0] == load.velocity[0] else nan
         tracked = load_sensor_values(
-            int(row[SHOWS]),
+            int(row[STAMP_US]),
             load.position,
             load.velocity,
             _NAN3,
-            stated.load_position,
+            std.load_position,
             velocity_std,
             nan,
             TRACKER,
         )
         at = _put(LOAD_SENSOR, tracked, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(LOAD, now_us, rows)
-    found = arrived(CABLE, now_us, rows)
-    while found >= 0:
-        row = queue[CABLE, found]
+        reading = pop_arrived(LOAD, now_us, rows)
+    reading = pop_arrived(CABLE, now_us, rows)
+    while reading >= 0:
+        row = queue[CABLE, reading]
         cable = unpack(CableReading, row, READING)
-        if cable.seen > 0.0:
+        if cable.detected > 0.0:
             sighted = load_sensor_values(
-                int(row[SHOWS]),
+                int(row[STAMP_US]),
                 _NAN3,
                 _NAN3,
                 cable.direction_body,
                 nan,
                 nan,
-                stated.direction,
-                said.cable_id,
+                std.direction,
+                shared.cable_id,
             )
             at = _put(LOAD_SENSOR, sighted, payload, buffer, at, sequence)
             sequence += 1
-        found = arrived(CABLE, now_us, rows)
-    found = arrived(GNSS, now_us, rows)
-    while found >= 0:
-        row = queue[GNSS, found]
+        reading = pop_arrived(CABLE, now_us, rows)
+    reading = pop_arrived(GNSS, now_us, rows)
+    while reading >= 0:
+        row = queue[GNSS, reading]
         fix = unpack(GnssReading, row, READING)
-        fix_type, horizontal, vertical = said.fix_type, stated.gnss_horizontal, stated.gnss_vertical
+        fix_type, horizontal, vertical = shared.fix_type, std.gnss_horizontal, std.gnss_vertical
         if fix.quality == FLOATING:
-            fix_type, horizontal, vertical = _FLOAT, stated.gnss_float, stated.gnss_float
+            fix_type, horizontal, vertical = _FLOAT, std.gnss_float, std.gnss_float
         elif fix.quality == LOST:
             fix_type, horizontal, vertical = _NO_FIX, _UNKNOWN_M, _UNKNOWN_M
-        fixed = hil_gps_values(
-            int(row[SHOWS]),
+        gnss = hil_gps_values(
+            int(row[STAMP_US]),
             fix_type,
             fix.position,
             fix.velocity,
             horizontal,
             vertical,
-            said.satellites,
-            said.home,
+            shared.satellites,
+            shared.home,
         )
-        at = _put(HIL_GPS, fixed, payload, buffer, at, sequence)
+        at = _put(HIL_GPS, gnss, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(GNSS, now_us, rows)
-    if now_us % SPEEDS_US == 0:
+        reading = pop_arrived(GNSS, now_us, rows)
+    if now_us % ESC_PERIOD_US == 0:
         for first in range(0, rows.rotor_table.shape[0], 4):
             at = _put(ESC_STATUS, _speeds(rows, first, now_us), payload, buffer, at, sequence)
             sequence += 1
-    last = unpack(Newest, newest, 0)
+    last = unpack(LatestReadings, latest, 0)
     inertial, field, height = last.inertial, last.field, last.height
-    found = arrived(IMU, now_us, rows)
-    while found >= 0:
-        inertial = unpack(ImuReading, queue[IMU, found], READING)
+    reading = pop_arrived(IMU, now_us, rows)
+    while reading >= 0:
+        inertial = unpack(ImuReading, queue[IMU, reading], READING)
         fields |= ACCEL | GYRO
-        found = arrived(IMU, now_us, rows)
-    found = arrived(MAGNETOMETER, now_us, rows)
-    while found >= 0:
-        field = unpack(MagnetometerReading, queue[MAGNETOMETER, found], READING)
+        reading = pop_arrived(IMU, now_us, rows)
+    reading = pop_arrived(MAGNETOMETER, now_us, rows)
+    while reading >= 0:
+        field = unpack(MagnetometerReading, queue[MAGNETOMETER, reading], READING)
         fields |= MAG
-        found = arrived(MAGNETOMETER, now_us, rows)
-    found = arrived(BARO, now_us, rows)
-    while found >= 0:
-        height = unpack(BarometerReading, queue[BARO, found], READING)
+        reading = pop_arrived(MAGNETOMETER, now_us, rows)
+    reading = pop_arrived(BARO, now_us, rows)
+    while reading >= 0:
+        height = unpack(BarometerReading, queue[BARO, reading], READING)
         fields |= PRESSURE | TEMPERATURE
-        found = arrived(BARO, now_us, rows)
-    pack(Newest(inertial, field, height), newest, 0)
-    altitude = said.home.altitude_m + height.height
-    own = hil_sensor_values(
+        reading = pop_arrived(BARO, now_us, rows)
+    pack(LatestReadings(inertial, field, height), latest, 0)
+    altitude = shared.home.altitude_m + height.height
+    hil_sensor = hil_sensor_values(
         now_us,
         inertial.accel_body,
         inertial.gyro_body,
@@ -253,7 +253,7 @@ def put_sensors(
         fields,
         0,
     )
-    at = _put(HIL_SENSOR, own, payload, buffer, at, sequence)
+    at = _put(HIL_SENSOR, hil_sensor, payload, buffer, at, sequence)
     return at, (sequence + 1) & 0xFF
 
 
@@ -262,7 +262,7 @@ def put_truth(
     world_row: Row,
     model_row: Row,
     rotors: RotorRows,
-    statement: Row,
+    constants: Row,
     buffer: Bytes,
     payload: Bytes,
     sequence: int,
@@ -274,9 +274,9 @@ def put_truth(
     `dialect_sequence`, of DIALECT_COMPONENT.
     """
     world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
-    state, home = world.plant, unpack(Statement, statement, 0).home
-    a = state.accel_quad
-    attached = attached_at(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
+    state, home = world.plant, unpack(MessageConstants, constants, 0).home
+    accel = state.accel_quad
+    attachment = attachment_position(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
     vehicle = hil_state_quaternion_values(
         world.now_us,
         state.quat_wxyz,
@@ -284,7 +284,7 @@ def put_truth(
         state.x_quad,
         state.v_quad,
         norm(sub(state.v_quad, world.wind)),
-        apply_transposed(rotation_from_quat(state.quat_wxyz), (a[0], a[1], a[2] + truth.gravity)),
+        apply_transposed(rotation_from_quat(state.quat_wxyz), (accel[0], accel[1], accel[2] + truth.gravity)),
         home,
     )
     at = _put(HIL_STATE_QUATERNION, vehicle, payload, buffer, 0, sequence)
@@ -295,24 +295,24 @@ def put_truth(
         state.v_load,
         state.q_cable,
         state.q_cable_dot,
-        norm(sub(state.x_load, attached)),
+        norm(sub(state.x_load, attachment)),
         state.tension,
         state.taut > 0.0,
         int(state.slack_events),
     )
-    first = Origin(dialect_sequence & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
-    second = Origin((dialect_sequence + 1) & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
-    at = put_frame(LOAD_STATE, load, payload, buffer, at, first)
+    load_origin = Origin(dialect_sequence & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
+    rotor_origin = Origin((dialect_sequence + 1) & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
+    at = put_frame(LOAD_STATE, load, payload, buffer, at, load_origin)
     low, high = truth.rotor_min, truth.rotor_max
-    cut = 0
+    saturated = 0
     count = rotors.table.shape[0]
     for i in range(count):
         strength = rotors.table[i, STRENGTH]
         if not strength * low <= rotors.rows[COMMAND, i] <= strength * high:
-            cut |= 1 << i
-    forces = forces_in(rotors.rows[FORCE], 0)
-    told = rotor_state_values(world.now_us, _TRUTH, forces, low, high, cut, count)
-    return put_frame(ROTOR_STATE, told, payload, buffer, at, second)
+            saturated |= 1 << i
+    forces = forces_from_row(rotors.rows[FORCE], 0)
+    rotor_state = rotor_state_values(world.now_us, _TRUTH, forces, low, high, saturated, count)
+    return put_frame(ROTOR_STATE, rotor_state, payload, buffer, at, rotor_origin)
 
 
-NOTHING_NEW = Newest(ImuReading(ZERO, ZERO), MagnetometerReading(ZERO), BarometerReading(0.0))
+NO_READINGS = LatestReadings(ImuReading(ZERO, ZERO), MagnetometerReading(ZERO), BarometerReading(0.0))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from sitl.hil import PacingFigures
 
 _WINDOW_NS = 1_000_000_000
-_LARGEST_US = 2**32 - 1
+_MAX_LATENESS_US = 2**32 - 1
 
 
 def percentile(ascending: Sequence[int], share: float) -> int:
@@ -51,7 +51,7 @@ class Pacing:
             )
             self._window_start = now_ns
             self._window_first = len(self._late_us)
-        self._late_us.append(min(max(now_ns - due_ns, 0) // 1000, _LARGEST_US))
+        self._late_us.append(min(max(now_ns - due_ns, 0) // 1000, _MAX_LATENESS_US))
 
     def pause(self, duration_ns: int) -> None:
         """Leave out a time in which the clock waited for an autopilot: it is no measure of the machine."""

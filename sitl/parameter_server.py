@@ -21,46 +21,46 @@ class ParameterServer:
 
     def __init__(self, table: ParameterTable) -> None:
         self.table = table
-        self._waiting: deque[Any] = deque()
+        self._outgoing: deque[Any] = deque()
 
     def receive(self, message: Any) -> bool:
         """Process a message; True if it changed a value."""
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
-                self._waiting.clear()
-                self._waiting.extend(self._value(name) for name in self.table.names)
+                self._outgoing.clear()
+                self._outgoing.extend(self._value(name) for name in self.table.names)
             case mavlink.MAVLINK_MSG_ID_PARAM_SET if message.param_id in self.table:
                 return self._set(message.param_id, decimal_from_float32(message.param_value))
         return False
 
     @property
-    def speaks(self) -> bool:
+    def has_messages(self) -> bool:
         """Whether a message waits to be sent."""
-        return bool(self._waiting)
+        return bool(self._outgoing)
 
-    def take(self) -> list[Any]:
+    def pop_messages(self) -> list[Any]:
         """The messages that are sent with this tick."""
-        waiting = self._waiting
-        return [waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(waiting)))] if waiting else []
+        outgoing = self._outgoing
+        return [outgoing.popleft() for _ in range(min(VALUES_PER_TICK, len(outgoing)))] if outgoing else []
 
-    def tell(self, name: str, value: float) -> None:
+    def set_and_report(self, name: str, value: float) -> None:
         """Change a value on the simulator's side, and report it."""
         self.table.set(name, value)
-        self._waiting.append(self._value(name))
+        self._outgoing.append(self._value(name))
 
-    def say(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
+    def send_text(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
         """Send a text to the operators of the vehicle."""
         line = text.encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
-        self._waiting.append(mavlink.MAVLink_statustext_message(severity, line))
+        self._outgoing.append(mavlink.MAVLink_statustext_message(severity, line))
 
     def _set(self, name: str, value: float) -> bool:
-        before = self.table[name]
+        previous = self.table[name]
         try:
             self.table.set(name, value)
         except ParameterError as error:
-            self.say(str(error))
-        self._waiting.append(self._value(name))
-        return self.table[name] != before
+            self.send_text(str(error))
+        self._outgoing.append(self._value(name))
+        return self.table[name] != previous
 
     def _value(self, name: str) -> Any:
         return mavlink.MAVLink_param_value_message(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
-from sitl.sensors.chosen import Chosen, chosen_in
+from sitl.sensors.overrides import Overrides, overrides_in
 
 SECOND_US = 1_000_000
 
@@ -30,7 +30,7 @@ class Settings(NamedTuple):
     failing_share: float = 0.0  # share of its command that a failing rotor gives
     rotors_fail_at_us: int = 0
     stamp_offset_us: int = 0  # added to the time stamps of the readings of trackers, camera and receiver
-    chosen: Chosen = ()
+    overrides: Overrides = ()
 
     def rotor_shares(self, count: int) -> tuple[float, ...]:
         """The share of its command that each of `count` rotors gives once they fail."""
@@ -65,5 +65,5 @@ def settings_of(table: ParameterTable) -> Settings:
         failing_share=table["SIM_ENGINE_MUL"],
         rotors_fail_at_us=round(table["SIM_ENGINE_AT_S"] * SECOND_US),
         stamp_offset_us=round(table["SIM_SENS_OFS_MS"] * 1000.0),
-        chosen=chosen_in(table.__getitem__),
+        overrides=overrides_in(table.__getitem__),
     )

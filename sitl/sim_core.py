@@ -14,15 +14,15 @@ from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.vehicle.layout import PLUS, Layout
-from sitl.plant.chain.records import lay, new_chain
+from sitl.plant.chain.records import lay_straight, new_chain
 from sitl.plant.records import PlantState, Truth
-from sitl.plant.rotors import ASKED, COMMAND, FORCE, rotor_table
+from sitl.plant.rotors import COMMAND, FORCE, REQUESTED, rotor_table
 from sitl.sensors.profile import Profile
 from sitl.settings import Settings
 from sitl.world import (
     World,
-    command_room,
-    fates,
+    command_capacity,
+    delivery_table,
     model_of,
     new_world,
     world_tick,
@@ -68,7 +68,7 @@ class SimCore:
         self._world = self.world._replace(plant=state)
         pack(self._world, self.rows.world, 0)
         if self.chain is not None:
-            lay(self.chain, self.truth, state)
+            lay_straight(self.chain, self.truth, state)
 
     @property
     def command(self) -> Forces:
@@ -103,32 +103,32 @@ class SimCore:
     @property
     def pulse(self) -> Vec3:
         """The gust pulse that blows from this tick to the next."""
-        begins_us = self._pulse_at_us
-        blows = begins_us >= 0 and begins_us <= self.now_us < begins_us + self.settings.pulse_for_us
-        return self.settings.pulse if blows else ZERO
+        starts_us = self._pulse_at_us
+        is_active = starts_us >= 0 and starts_us <= self.now_us < starts_us + self.settings.pulse_for_us
+        return self.settings.pulse if is_active else ZERO
 
     @property
     def pulse_changes_us(self) -> int:
         """When the gust pulse will next begin or end; NEVER_US if it will not."""
-        begins_us = self._pulse_at_us
-        if begins_us < 0:
+        starts_us = self._pulse_at_us
+        if starts_us < 0:
             return NEVER_US
-        changes = (begins_us, begins_us + self.settings.pulse_for_us)
+        changes = (starts_us, starts_us + self.settings.pulse_for_us)
         return min((at_us for at_us in changes if at_us > self.now_us), default=NEVER_US)
 
-    def came_to(self, now_us: int, tick_count: int) -> None:
+    def set_tick(self, now_us: int, tick_count: int) -> None:
         """Note that the caller has moved the rows on to this tick by `world_tick`."""
         self._world = None
         self.now_us, self.tick_count = now_us, tick_count
 
     def tick(self, command: Forces, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
         """Integrate to the next tick; see `world_tick`. Rotors beyond those of `command` stand still."""
-        asked = self.rows.rotors[ASKED]
-        asked[:] = 0.0
-        asked[: len(command)] = command
+        requested = self.rows.rotors[REQUESTED]
+        requested[:] = 0.0
+        requested[: len(command)] = command
         if self._tick is None:
-            self._tick = entry_of(world_tick, self.rows, asked, gripper_open, reel_rate, self.chain)
-        self._tick(self.rows, asked, gripper_open, reel_rate, self.chain)
+            self._tick = entry_of(world_tick, self.rows, requested, gripper_open, reel_rate, self.chain)
+        self._tick(self.rows, requested, gripper_open, reel_rate, self.chain)
         self._world = None
         self.now_us += self.settings.tick_us
         self.tick_count += 1
@@ -140,17 +140,17 @@ class SimCore:
         """
         if settings.pulse_at_us != self.settings.pulse_at_us:
             self._pulse_at_us = settings.pulse_at_us if settings.pulse_at_us > self.now_us else -1
-        later_us = settings.actuator_delay_us - self.settings.actuator_delay_us
+        extra_delay_us = settings.actuator_delay_us - self.settings.actuator_delay_us
         self.truth, self.settings = truth, settings
         rows = self.rows
         pack(model_of(truth, self._profile, settings, self._pulse_at_us), rows.model, 0)
-        rows.fate[:] = fates(self._profile, settings)
+        rows.delivery[:] = delivery_table(self._profile, settings)
         # the commands on their way, oldest first, with room for later ones
         head, length = rows.command_ring
         waiting = np.roll(rows.commands, -head, axis=0)[:length]
-        commands = np.zeros((length + command_room(settings), waiting.shape[1]))
+        commands = np.zeros((length + command_capacity(settings), waiting.shape[1]))
         commands[:length] = waiting
-        commands[:length, 0] += later_us
+        commands[:length, 0] += extra_delay_us
         rows.command_ring[0] = 0
         table = rotor_table(self._layout, settings.rotor_shares(len(self._layout)))
         self.rows = rows._replace(commands=commands, rotor_table=table)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from autopilot.shell.compiling import name_what_is_compiled
+from autopilot.shell.compiling import print_compiled_kernels
 
 
 def main() -> None:
     """Compile the simulator, or find it compiled; prints the names of the kernels that are compiled."""
-    name_what_is_compiled()
+    print_compiled_kernels()
     # only now: the import itself compiles the first ones
     from sitl.hil import HilSimulator
-    from sitl.shell.tick_loop import rehearse
+    from sitl.shell.tick_loop import warm_up
 
     simulator = HilSimulator.build()
-    rehearse(simulator)
+    warm_up(simulator)
     simulator.truth_datagram()
     simulator.receive(b"")
     simulator.advance()

@@ -20,24 +20,24 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add
 from autopilot.geometry.packed import Row, pack, packed, unpack, with_field
-from autopilot.vehicle.layout import MOST, PLUS, Layout
-from sitl.plant.chain.records import ChainRows, reach_of
+from autopilot.vehicle.layout import MAX_ROTORS, PLUS, Layout
+from sitl.plant.chain.records import ChainRows, with_gripping_reach
 from sitl.plant.chain.step import advance_chain
-from sitl.plant.drive import FULL, Supply, drained
-from sitl.plant.gripper import dropped, takes_hold, without_cable
+from sitl.plant.drive import FULL, Supply, discharged
+from sitl.plant.gripper import can_grip, with_cable_released, without_cable
 from sitl.plant.records import PlantState, Truth
-from sitl.plant.rotors import COMMAND, FORCE, LEFT, SHARE, RotorRows, rotor_table, rotors_at_rest
+from sitl.plant.rotors import COMMAND, FAILED_SHARE, FORCE, SHARE, RotorRows, rotor_table, rotors_at_rest
 from sitl.plant.step import advance, initial_state
-from sitl.plant.winch import later, reeling
+from sitl.plant.winch import truth_after, with_commanded_rate
 from sitl.plant.wind import gust
 from sitl.sensors import barometer, cable_sensor, gnss, imu, load_tracker, magnetometer, pose_tracker
-from sitl.sensors.chosen import with_chosen
 from sitl.sensors.elementary import logarithm
 from sitl.sensors.motor_field import motor_field
 from sitl.sensors.noise import Drift, Noise, gaussian, uniform
+from sitl.sensors.overrides import with_overrides
 from sitl.sensors.profile import Delivery, Profile, Sampled, Stamped
 from sitl.sensors.room import Room
-from sitl.sensors.vibration import VibrationConfig, draw_phases, shaking
+from sitl.sensors.vibration import VibrationConfig, draw_phases, rotor_vibration
 from sitl.settings import SECOND_US, Settings
 
 # rows of the arrays, one per sensor
@@ -48,10 +48,10 @@ STREAMS = (1, 2, 3, 4, 5, 6, 7)
 GUSTS = 8
 # columns of `clock`
 FITTED, COUNT, NOMINAL, DUE, OUTAGE_END, HEAD, LENGTH, LATENCY, LEAD = range(9)
-# columns of `fate`
+# columns of `delivery`
 RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET = range(7)  # the last three: us
 # columns of `queue`: when the reading leaves the sensor (us), its time stamp (us), then the reading
-LEAVES, SHOWS, READING = 0, 1, 2
+DEPARTURE_US, STAMP_US, READING = 0, 1, 2
 _COLUMNS = 15
 _FATE_BLOCK, _OUTAGE_BLOCK, _JITTER_BLOCK = 15, 14, 13  # noise blocks; the sensors use those below
 _PHASES = 6  # in the row of the inertial unit's errors: where the angles of the rotors begin
@@ -110,7 +110,7 @@ class WorldRows(NamedTuple):
     model: Row  # WorldModel
     seed: Ints  # (1,)
     clock: Ints  # (sensors, 9)
-    fate: Floats  # (sensors, 7)
+    delivery: Floats  # (sensors, 7)
     errors: Floats  # (sensors, 20) biases, drifts, angles of the rotors
     queue: Floats  # (sensors, capacity, 15) readings on their way
     commands: Floats  # (capacity, 1 + rotors) takes effect at (us), forces (N)
@@ -147,22 +147,26 @@ def _sample(
     if sensor == IMU:
         inertial, biases = imu.sample(plant, unpack(imu.ImuState, error, 0), model.imu, noise)
         if model.vibration.accel > 0.0 or model.vibration.gyro > 0.0:
-            force, turning = shaking(rotors, model.truth, error[_PHASES:], model.vibration, noise)
-            inertial = imu.ImuReading(add(inertial.accel_body, force), add(inertial.gyro_body, turning))
-        pack(imu.cut(inertial, model.imu), row, READING)
+            accel_vibration, rate_vibration = rotor_vibration(
+                rotors, model.truth, error[_PHASES:], model.vibration, noise
+            )
+            inertial = imu.ImuReading(
+                add(inertial.accel_body, accel_vibration), add(inertial.gyro_body, rate_vibration)
+            )
+        pack(imu.clip_reading(inertial, model.imu), row, READING)
         pack(biases, error, 0)
     elif sensor == MOCAP:
-        pose, offset = pose_tracker.sample(
+        pose, pose_error = pose_tracker.sample(
             plant, unpack(pose_tracker.PoseState, error, 0), model.mocap, noise
         )
         pack(pose, row, READING)
-        pack(offset, error, 0)
+        pack(pose_error, error, 0)
     elif sensor == LOAD:
-        load, shift = load_tracker.sample(
+        load, load_error = load_tracker.sample(
             plant, unpack(load_tracker.LoadTrackerState, error, 0), model.load, noise
         )
         pack(load, row, READING)
-        pack(shift, error, 0)
+        pack(load_error, error, 0)
     elif sensor == CABLE:
         cable, mounting = cable_sensor.sample(
             plant, unpack(cable_sensor.CableState, error, 0), model.cable, noise
@@ -170,49 +174,49 @@ def _sample(
         pack(cable, row, READING)
         pack(mounting, error, 0)
     elif sensor == GNSS:
-        fix, slow = gnss.sample(plant, unpack(gnss.GnssState, error, 0), model.gnss, noise)
+        fix, gnss_errors = gnss.sample(plant, unpack(gnss.GnssState, error, 0), model.gnss, noise)
         pack(fix, row, READING)
-        pack(slow, error, 0)
+        pack(gnss_errors, error, 0)
     elif sensor == BARO:
         height, drift = barometer.sample(plant, unpack(barometer.BarometerState, error, 0), model.baro, noise)
         pack(height, row, READING)
         pack(drift, error, 0)
     else:
-        field, iron = magnetometer.sample(
+        field, hard_iron = magnetometer.sample(
             plant, unpack(magnetometer.MagnetometerState, error, 0), model.mag, noise
         )
         if model.motor_field > 0.0:
-            disturbed = motor_field(rotors, model.truth, model.motor_field * noise.scale)
-            field = magnetometer.MagnetometerReading(add(field.field_body, disturbed))
+            motor_gauss = motor_field(rotors, model.truth, model.motor_field * noise.scale)
+            field = magnetometer.MagnetometerReading(add(field.field_body, motor_gauss))
         pack(field, row, READING)
-        pack(iron, error, 0)
+        pack(hard_iron, error, 0)
 
 
 @kernel
-def _delivers(clock: Ints, fate: Floats, noise: Noise) -> bool:
+def _is_delivered(clock: Ints, delivery: Floats, noise: Noise) -> bool:
     """Draw the fate of a reading: lost singly, or in an outage of exponentially distributed length."""
-    if fate[LOSS] == 0.0 and fate[OUTAGE_CHANCE] == 0.0:
+    if delivery[LOSS] == 0.0 and delivery[OUTAGE_CHANCE] == 0.0:
         return True
-    lost, begins = uniform(noise, _FATE_BLOCK)
-    if clock[DUE] >= clock[OUTAGE_END] and begins <= fate[OUTAGE_CHANCE]:
-        length_s = -log(uniform(noise, _OUTAGE_BLOCK)[0]) * fate[OUTAGE_S]
+    lost, outage_draw = uniform(noise, _FATE_BLOCK)
+    if clock[DUE] >= clock[OUTAGE_END] and outage_draw <= delivery[OUTAGE_CHANCE]:
+        length_s = -log(uniform(noise, _OUTAGE_BLOCK)[0]) * delivery[OUTAGE_S]
         clock[OUTAGE_END] = clock[DUE] + max(int(np.rint(length_s * 1000000)), 1)
-    return bool(clock[DUE] >= clock[OUTAGE_END] and lost > fate[LOSS])
+    return bool(clock[DUE] >= clock[OUTAGE_END] and lost > delivery[LOSS])
 
 
 @kernel
-def _overtake(queue: Floats, head: int, last: int) -> None:
+def _insert_by_departure(queue: Floats, head: int, last: int) -> None:
     """Sort the reading at place `last` behind the head into the queue by the time at which it leaves: before
     the readings that it overtakes."""
     capacity = queue.shape[0]
     while last > 0:
-        later, own = queue[(head + last - 1) % capacity], queue[(head + last) % capacity]
-        if later[LEAVES] <= own[LEAVES]:
+        preceding, current = queue[(head + last - 1) % capacity], queue[(head + last) % capacity]
+        if preceding[DEPARTURE_US] <= current[DEPARTURE_US]:
             return
         for column in range(queue.shape[1]):
-            held = own[column]
-            own[column] = later[column]
-            later[column] = held
+            swapped = current[column]
+            current[column] = preceding[column]
+            preceding[column] = swapped
         last -= 1
 
 
@@ -221,32 +225,32 @@ def measure(plant: PlantState, now_us: int, model: WorldModel, rows: WorldRows) 
     """Take every measurement that is due."""
     capacity = rows.queue.shape[1]
     for sensor in range(SENSORS):
-        clock, fate = rows.clock[sensor], rows.fate[sensor]
+        clock, delivery = rows.clock[sensor], rows.delivery[sensor]
         while clock[DUE] <= now_us:
             noise = Noise(rows.seed[0], STREAMS[sensor], clock[COUNT], model.noise_scale)
             row = rows.queue[sensor, (clock[HEAD] + clock[LENGTH]) % capacity]
             _sample(sensor, plant, rotors_of(rows), rows.errors[sensor], row, model, noise)
-            if _delivers(clock, fate, noise):
-                row[LEAVES] = clock[NOMINAL] + clock[LATENCY]
-                row[SHOWS] = clock[DUE]
-                if fate[STAMP_OFFSET] != 0.0:
-                    row[SHOWS] = max(clock[DUE] + fate[STAMP_OFFSET], 0.0)
-                if fate[JITTER] > 0.0:
-                    late_us = -logarithm(uniform(noise, _JITTER_BLOCK)[0]) * fate[JITTER]
-                    row[LEAVES] = row[LEAVES] + np.rint(min(late_us, fate[JITTER_MAX]))
-                    _overtake(rows.queue[sensor], clock[HEAD], clock[LENGTH])
+            if _is_delivered(clock, delivery, noise):
+                row[DEPARTURE_US] = clock[NOMINAL] + clock[LATENCY]
+                row[STAMP_US] = clock[DUE]
+                if delivery[STAMP_OFFSET] != 0.0:
+                    row[STAMP_US] = max(clock[DUE] + delivery[STAMP_OFFSET], 0.0)
+                if delivery[JITTER] > 0.0:
+                    late_us = -logarithm(uniform(noise, _JITTER_BLOCK)[0]) * delivery[JITTER]
+                    row[DEPARTURE_US] = row[DEPARTURE_US] + np.rint(min(late_us, delivery[JITTER_MAX]))
+                    _insert_by_departure(rows.queue[sensor], clock[HEAD], clock[LENGTH])
                 clock[LENGTH] += 1
             clock[COUNT] += 1
-            clock[NOMINAL] = nominal_us(fate[RATE], model.tick_us, clock[LEAD], clock[COUNT])
+            clock[NOMINAL] = nominal_us(delivery[RATE], model.tick_us, clock[LEAD], clock[COUNT])
             clock[DUE] = max(clock[NOMINAL], 0)
 
 
 @kernel
-def arrived(sensor: int, now_us: int, rows: WorldRows) -> int:
+def pop_arrived(sensor: int, now_us: int, rows: WorldRows) -> int:
     """Row of the sensor's next reading that has left by now, which is taken out of the queue; or -1."""
     clock = rows.clock[sensor]
     head = clock[HEAD]
-    if clock[LENGTH] == 0 or rows.queue[sensor, head, LEAVES] > now_us:
+    if clock[LENGTH] == 0 or rows.queue[sensor, head, DEPARTURE_US] > now_us:
         return -1
     clock[HEAD] = (head + 1) % rows.queue.shape[1]
     clock[LENGTH] -= 1
@@ -263,13 +267,13 @@ def pulse_at(model: WorldModel, now_us: int) -> Vec3:
 
 
 @kernel
-def held_truth(model: WorldModel, world: World) -> Truth:
+def current_truth(model: WorldModel, world: World) -> Truth:
     """The truth of this instant: with the cable as set by the winch, or without one."""
-    supplied = with_field(model.truth, "supply", world.supply.share)
+    with_supply = with_field(model.truth, "supply", world.supply.share)
     if world.released:
-        return without_cable(supplied)
-    tied = with_field(supplied, "cable_length", world.cable_length)
-    return with_field(with_field(tied, "reel_rate", world.reel_rate), "reel_accel", world.reel_accel)
+        return without_cable(with_supply)
+    with_cable = with_field(with_supply, "cable_length", world.cable_length)
+    return with_field(with_field(with_cable, "reel_rate", world.reel_rate), "reel_accel", world.reel_accel)
 
 
 @kernel
@@ -280,29 +284,29 @@ def _with_winch(world: World, truth: Truth) -> World:
 
 
 @kernel
-def _as_wound(model: WorldModel, world: World) -> Truth:
+def _truth_with_cable(model: WorldModel, world: World) -> Truth:
     """The truth with the cable as set by the winch, held or not."""
-    return held_truth(model, with_field(world, "released", False))
+    return current_truth(model, with_field(world, "released", False))
 
 
 @kernel
-def _gripped(world: World, model: WorldModel, gripper_open: bool) -> World:
+def _after_gripper(world: World, model: WorldModel, gripper_open: bool) -> World:
     """The world after the gripper has moved. A gripper that opens lets go immediately; one that closes takes
     hold as soon as the load lies within reach."""
     if gripper_open == world.released:
         return world
     if gripper_open:
-        return with_field(with_field(world, "plant", dropped(world.plant)), "released", True)
-    if takes_hold(world.plant, reach_of(_as_wound(model, world))):
+        return with_field(with_field(world, "plant", with_cable_released(world.plant)), "released", True)
+    if can_grip(world.plant, with_gripping_reach(_truth_with_cable(model, world))):
         return with_field(world, "released", False)
     return world
 
 
 @kernel
-def _failing(rotors: RotorRows, failing: bool) -> None:
+def _set_rotor_shares(rotors: RotorRows, failing: bool) -> None:
     """Set the share of its command that each rotor gives: the share in its table if `failing`, else all."""
     for i in range(rotors.table.shape[0]):
-        rotors.rows[SHARE, i] = rotors.table[i, LEFT] if failing else 1.0
+        rotors.rows[SHARE, i] = rotors.table[i, FAILED_SHARE] if failing else 1.0
 
 
 @kernel
@@ -316,37 +320,37 @@ def world_tick(
     of a cable of links; without it the cable is massless and taut or slack.
     """
     model, world = unpack(WorldModel, rows.model, 0), unpack(World, rows.world, 0)
-    world = _gripped(world, model, gripper_open)
+    world = _after_gripper(world, model, gripper_open)
     tick_s = model.tick_us / 1000000
-    wanted = 0.0 if world.released else reel_rate
-    world = _with_winch(world, reeling(_as_wound(model, world), wanted, tick_s))
+    commanded_rate = 0.0 if world.released else reel_rate
+    world = _with_winch(world, with_commanded_rate(_truth_with_cable(model, world), commanded_rate, tick_s))
     now_us = world.now_us
     end_us = now_us + model.tick_us
     commands, ring = rows.commands, rows.command_ring
-    room = commands.shape[0]
-    last = commands[(ring[0] + ring[1]) % room]
-    last[0] = now_us + model.actuator_delay_us
+    capacity = commands.shape[0]
+    newest_command = commands[(ring[0] + ring[1]) % capacity]
+    newest_command[0] = now_us + model.actuator_delay_us
     rotors = rotors_of(rows)
     count = rotors.table.shape[0]
     for i in range(count):
-        last[1 + i] = forces[i]
+        newest_command[1 + i] = forces[i]
     ring[1] += 1
-    _failing(rotors, now_us >= model.rotors_fail_at_us)
-    wind, gusting = add(model.wind, pulse_at(model, now_us)), world.gust
+    _set_rotor_shares(rotors, now_us >= model.rotors_fail_at_us)
+    wind, gust_now = add(model.wind, pulse_at(model, now_us)), world.gust
     if model.gust_std != 0.0:
         normals = gaussian(Noise(rows.seed[0], GUSTS, world.tick, 1.0), 0)
-        gusting = gust(gusting, model.gust_std, model.gust_tau_s, tick_s, normals)
-        wind = add(wind, gusting)
+        gust_now = gust(gust_now, model.gust_std, model.gust_tau_s, tick_s, normals)
+        wind = add(wind, gust_now)
     if model.truth.drive.battery > 0.0:
-        drawn = drained(world.supply, rotors.rows[FORCE], count, model.truth, tick_s)
+        drawn = discharged(world.supply, rotors.rows[FORCE], count, model.truth, tick_s)
         world = with_field(world, "supply", drawn)
     plant, snap_speed = world.plant, 0.0
     while now_us < end_us:
         while ring[1] > 0 and commands[ring[0], 0] <= now_us:
-            first = commands[ring[0]]
+            oldest_command = commands[ring[0]]
             for i in range(count):
-                rotors.rows[COMMAND, i] = first[1 + i]
-            ring[0] = (ring[0] + 1) % room
+                rotors.rows[COMMAND, i] = oldest_command[1 + i]
+            ring[0] = (ring[0] + 1) % capacity
             ring[1] -= 1
         stop_us = end_us
         if ring[1] > 0 and commands[ring[0], 0] < stop_us:
@@ -354,12 +358,12 @@ def world_tick(
         for sensor in range(SENSORS):
             stop_us = min(stop_us, rows.clock[sensor, DUE])
         h = (stop_us - now_us) / 1000000
-        truth = held_truth(model, world)
+        truth = current_truth(model, world)
         if chain is None:
             plant = advance(plant, truth, rotors, wind, h)
         else:
             plant = advance_chain(plant, truth, rotors, wind, h, chain)
-        world = _with_winch(world, later(_as_wound(model, world), h))
+        world = _with_winch(world, truth_after(_truth_with_cable(model, world), h))
         snap_speed = max(snap_speed, plant.snap_speed)
         now_us = stop_us
         measure(plant, now_us, model, rows)
@@ -367,7 +371,7 @@ def world_tick(
         plant,
         world.tick + 1,
         end_us,
-        gusting,
+        gust_now,
         wind,
         world.cable_length,
         world.reel_rate,
@@ -382,16 +386,16 @@ def world_tick(
 # ---- before the flight, and when parameters change
 
 _NO_DRIFT = Drift(0.0, 1.0, 0.0)
-_NO_ROOM = Room(0.0, 1.0)
+_NO_DISTORTION = Room(0.0, 1.0)
 _NOT_FITTED = (
-    pose_tracker.PoseConfig(0.0, 0.0, 0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_ROOM),
-    load_tracker.LoadConfig(0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_ROOM),
+    pose_tracker.PoseConfig(0.0, 0.0, 0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_DISTORTION),
+    load_tracker.LoadConfig(0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_DISTORTION),
     cable_sensor.CableConfig(0.0, _NO_DRIFT, 0.0, 0.0),
     gnss.GnssConfig(ZERO, ZERO, ZERO, _NO_DRIFT, ZERO, _NO_DRIFT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     barometer.BarometerConfig(0.0, _NO_DRIFT),
     magnetometer.MagnetometerConfig(ZERO, 0.0, _NO_DRIFT),
 )
-_KINDS = (imu, pose_tracker, load_tracker, cable_sensor, gnss, barometer, magnetometer)
+_SENSOR_MODULES = (imu, pose_tracker, load_tracker, cable_sensor, gnss, barometer, magnetometer)
 READINGS = (
     imu.ImuReading,
     pose_tracker.PoseReading,
@@ -418,12 +422,12 @@ def fitted_sensors(profile: Profile) -> tuple[Delivery | None, ...]:
 
 def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: int) -> WorldModel:
     """The model of a world under these settings."""
-    profile = with_chosen(profile, settings.chosen)
+    profile = with_overrides(profile, settings.overrides)
     tick_s = settings.tick_us / SECOND_US
-    parts: list[Any] = [truth, profile.imu.config(tick_s, truth.gravity)]
+    values: list[Any] = [truth, profile.imu.config(tick_s, truth.gravity)]
     for table, blank in zip(fitted_sensors(profile)[1:], _NOT_FITTED, strict=True):
-        parts.append(blank if table is None else table.config(tick_s))  # type: ignore[attr-defined]
-    parts += [
+        values.append(blank if table is None else table.config(tick_s))  # type: ignore[attr-defined]
+    values += [
         profile.imu.vibration(tick_s),
         0.0 if profile.magnetometer is None else profile.magnetometer.motor_field_gauss,
         settings.tick_us,
@@ -437,37 +441,37 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
         settings.pulse_for_us,
         settings.rotors_fail_at_us,
     ]
-    return WorldModel(*parts)
+    return WorldModel(*values)
 
 
-def fates(profile: Profile, settings: Settings) -> Floats:
+def delivery_table(profile: Profile, settings: Settings) -> Floats:
     """(sensors, 7) rate of each sensor, the losses of its readings, and their additional delay and the error
     of their time stamps.
 
     All readings of a failed sensor are lost. The inertial unit is wired to the autopilot, so the losses of
     `settings` on the way do not affect it.
     """
-    found = np.zeros((SENSORS, 7))
-    for sensor, table in enumerate(fitted_sensors(with_chosen(profile, settings.chosen))):
+    table_rows = np.zeros((SENSORS, 7))
+    for sensor, table in enumerate(fitted_sensors(with_overrides(profile, settings.overrides))):
         if table is None:
             continue
-        row = found[sensor]
+        row = table_rows[sensor]
         rate_hz, _, lead_us = _timing(table, settings)
-        extra = 0.0 if sensor == IMU else settings.sensor_loss
+        link_loss = 0.0 if sensor == IMU else settings.sensor_loss
         if settings.failed_sensors[sensor]:
-            extra = 1.0
-        row[RATE], row[LOSS] = rate_hz, min(table.loss + extra, 1.0)
+            link_loss = 1.0
+        row[RATE], row[LOSS] = rate_hz, min(table.loss + link_loss, 1.0)
         period_us = nominal_us(rate_hz, settings.tick_us, lead_us, 1) + lead_us
         row[OUTAGE_CHANCE] = table.outages_per_min / 60.0 * period_us / SECOND_US
         row[OUTAGE_S] = table.outage_s
         if isinstance(table, Stamped):
-            row[JITTER] = round(table.jitter_ms * 1000.0) if table.latest_ms > 0.0 else 0.0
-            row[JITTER_MAX] = round(table.latest_ms * 1000.0)
+            row[JITTER] = round(table.jitter_ms * 1000.0) if table.max_extra_delay_ms > 0.0 else 0.0
+            row[JITTER_MAX] = round(table.max_extra_delay_ms * 1000.0)
             row[STAMP_OFFSET] = round(table.time_offset_ms * 1000.0) + settings.stamp_offset_us
-    return found
+    return table_rows
 
 
-def command_room(settings: Settings) -> int:
+def command_capacity(settings: Settings) -> int:
     """Room for the commands that can be on their way."""
     return settings.actuator_delay_us // settings.tick_us + _SPARE
 
@@ -479,8 +483,8 @@ def new_world(
     model = model_of(truth, profile, settings, settings.pulse_at_us)
     configs = model[1 : 1 + SENSORS]
     clock = np.zeros((SENSORS, 9), dtype=np.int64)
-    fate = fates(profile, settings)
-    errors = np.zeros((SENSORS, _PHASES + MOST))
+    delivery = delivery_table(profile, settings)
+    errors = np.zeros((SENSORS, _PHASES + MAX_ROTORS))
     capacity = _SPARE
     for sensor, (table, config) in enumerate(zip(fitted_sensors(profile), configs, strict=True)):
         clock[sensor, DUE] = _NEVER
@@ -488,18 +492,20 @@ def new_world(
             continue
         rate_hz, latency_us, lead_us = _timing(table, settings)
         first_us, second_us = (nominal_us(rate_hz, settings.tick_us, lead_us, n) for n in (0, 1))
-        begun = _KINDS[sensor].start(config, Noise(seed, STREAMS[sensor], 0, settings.noise_scale))
-        pack(begun, errors[sensor], 0)
+        initial_errors = _SENSOR_MODULES[sensor].start(
+            config, Noise(seed, STREAMS[sensor], 0, settings.noise_scale)
+        )
+        pack(initial_errors, errors[sensor], 0)
         clock[sensor, FITTED] = 1
         clock[sensor, NOMINAL] = first_us
         clock[sensor, DUE] = max(first_us, 0)
         clock[sensor, LATENCY] = latency_us
         clock[sensor, LEAD] = lead_us
-        latest_us = latency_us + int(fate[sensor, JITTER_MAX])
+        latest_us = latency_us + int(delivery[sensor, JITTER_MAX])
         waiting = (latest_us + settings.tick_us) // max(second_us - first_us, 1)
         capacity = max(capacity, waiting + _SPARE)
     draw_phases(errors[IMU, _PHASES:], len(layout), Noise(seed, STREAMS[IMU], 0, settings.noise_scale))
-    begun_world = World(
+    initial_world = World(
         plant=initial_state(truth),
         tick=0,
         now_us=0,
@@ -513,19 +519,19 @@ def new_world(
         snap_speed=0.0,
     )
     rows = WorldRows(
-        packed(begun_world),
+        packed(initial_world),
         packed(model),
         np.array([seed], dtype=np.int64),
         clock,
-        fate,
+        delivery,
         errors,
         np.zeros((SENSORS, capacity, _COLUMNS)),
-        np.zeros((command_room(settings), 1 + len(layout))),
+        np.zeros((command_capacity(settings), 1 + len(layout))),
         np.zeros(2, dtype=np.int64),
         rotors_at_rest(),
         rotor_table(layout, settings.rotor_shares(len(layout))),
     )
-    measure(begun_world.plant, 0, model, rows)
+    measure(initial_world.plant, 0, model, rows)
     return rows
 
 

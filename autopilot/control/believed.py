@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from autopilot.control.actuators.disturbance_observer import ObserverConstants, observer_constants, share_of
+from autopilot.control.actuators.disturbance_observer import (
+    ObserverConstants,
+    averaging_share,
+    observer_constants,
+)
 from autopilot.control.actuators.rotor_model import ActuationConstants, actuation_constants
-from autopilot.control.design import Design, Timing, Wanted, design
+from autopilot.control.design import Design, Requirements, Timing, design
 from autopilot.control.drag import Drag
 from autopilot.control.records import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.vehicle.rotors import allocate, sizes
+from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
 from autopilot.wire.parameter_table import ParameterTable
 
 # A rotor that is commanded its full force shows nothing of it until delay and lag have passed, and is judged
 # by three speeds, 60 ms. In this time t, the force expected of it may rise by less than a tenth of the full
 # force, from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
-SPEEDS_S, ROTOR_PATIENCE = 0.06, 10.0
-GREATEST_PUSH = 0.7  # of the weight: bound of the estimated wind force
+SPEED_REPORTS_S, ROTOR_WATCH_RATIO = 0.06, 10.0
+MAX_PUSH_SHARE = 0.7  # of the weight: bound of the estimated wind force
 
 
 def believed_vehicle(table: AutopilotParameters) -> Vehicle:
     """The vehicle as the parameters describe it."""
-    lift, level = sizes(allocate(table.layout))
+    thrust_per_force, moment_per_force = thrust_and_moment_per_force(mixer_table(table.layout))
     return Vehicle(
         quad_mass=table["VEH_QUAD_MASS"],
         load_mass=table["VEH_LOAD_MASS"],
@@ -31,8 +35,8 @@ def believed_vehicle(table: AutopilotParameters) -> Vehicle:
         torque_ratio=table["VEH_TORQUE"],
         rotor_min=table["VEH_ROTOR_MIN"],
         rotor_max=table["VEH_ROTOR_MAX"],
-        lift=lift,
-        level=level,
+        thrust_per_force=thrust_per_force,
+        moment_per_force=moment_per_force,
         attachment=(table["VEH_ATT_X"], table["VEH_ATT_Y"], table["VEH_ATT_Z"]),
     )
 
@@ -56,20 +60,20 @@ def believed_delay(table: ParameterTable) -> float:
 def believed_rotor_watch(table: ParameterTable) -> float:
     """Share of a period in the time for which a rotor must have been commanded a force to be judged by it."""
     period = 1.0 / table["CTL_RATE_HZ"]
-    silent = believed_delay(table) + 1e-3 * table["VEH_ROTOR_TAU"] + SPEEDS_S
-    return period / (ROTOR_PATIENCE * silent + period)
+    response_s = believed_delay(table) + 1e-3 * table["VEH_ROTOR_TAU"] + SPEED_REPORTS_S
+    return period / (ROTOR_WATCH_RATIO * response_s + period)
 
 
 def believed_factor_share(table: ParameterTable) -> float:
     """Share of a period in the time constant with which the rotor speeds change the thrust factor."""
-    return share_of(1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"])
+    return averaging_share(1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"])
 
 
 def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
     """The gains of `plumbline` for the vehicle that the parameters describe."""
-    lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+    lag, target_lag = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
     return design(
-        Wanted(
+        Requirements(
             tolerance=1e-3 * table["PLB_DELAY_TOL"],
             integral_ratio=table["PLB_RATIO_I"],
             cable_ratio=table["PLB_RATIO_Q"],
@@ -78,7 +82,11 @@ def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
             noise=table["PLB_NOISE"],
         ),
         Timing(
-            believed_delay(table), lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"], table["PLB_T_TORQUE"]
+            believed_delay(table),
+            lag,
+            min(lag, target_lag),
+            1.0 / table["CTL_RATE_HZ"],
+            table["PLB_T_TORQUE"],
         ),
         vehicle,
     )
@@ -92,7 +100,7 @@ def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConsta
         table["PLB_T_PUSH"],
         table["PLB_T_DRAG"],
         table["PLB_T_TORQUE"],
-        GREATEST_PUSH * weight,
+        MAX_PUSH_SHARE * weight,
         1.0 / table["CTL_RATE_HZ"],
         believed_drag(table),
         vehicle,

@@ -58,12 +58,12 @@ Array = NDArray[np.float64]
 NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
 SIGMAS, SIGMAS_RESERVED = 3.0, 1.5
 # rad/s, range of omega_R in which the greatest is searched
-_SLOWEST, _FASTEST = 0.5, 200.0
-_LEAST_LAG = 1e-4  # s; rotors without lag are treated as rotors of this lag
+_MIN_OMEGA_R, _MAX_OMEGA_R = 0.5, 200.0
+_MIN_LAG = 1e-4  # s; rotors without lag are treated as rotors of this lag
 _STATES = 7
 
 
-class Wanted(NamedTuple):
+class Requirements(NamedTuple):
     """The requirements of the design."""
 
     tolerance: float  # s, of delay
@@ -79,7 +79,7 @@ class Timing(NamedTuple):
 
     delay: float
     lag: float  # of the rotors
-    lag_shown: float  # after lag compensation
+    effective_lag: float  # after lag compensation
     period: float
     torque_time: float = 0.0  # time constant of the torque estimate; 0: none
 
@@ -96,37 +96,40 @@ class Design(NamedTuple):
     rotor_deviation: float  # N, standard deviation of a rotor's command
 
 
-def yaw_share(vehicle: Vehicle) -> float:
+def yaw_bandwidth_ratio(vehicle: Vehicle) -> float:
     """Ratio of the bandwidth of yaw to that of roll and pitch at which equal errors demand the same share of
     what the rotors can give about the axis. About the thrust axis they turn the vehicle by their drag alone.
     """
-    level = vehicle.level * vehicle.arm / max(vehicle.inertia[0], vehicle.inertia[1])
-    return min(1.0, math.sqrt(vehicle.lift * vehicle.torque_ratio / vehicle.inertia[2] / level))
+    moment_per_inertia = vehicle.moment_per_force * vehicle.arm / max(vehicle.inertia[0], vehicle.inertia[1])
+    return min(
+        1.0,
+        math.sqrt(vehicle.thrust_per_force * vehicle.torque_ratio / vehicle.inertia[2] / moment_per_inertia),
+    )
 
 
 def gains_of(
     omega_i: float, omega_x: float, omega_q: float, omega_R: float, zeta: float, vehicle: Vehicle
 ) -> PlumblineGains:
     """Gains that give the three loops these bandwidths (rad/s) and damping."""
-    mass, reach = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass * vehicle.cable_length
+    mass, m_Q_L = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass * vehicle.cable_length
     J_x, J_y, J_z = vehicle.inertia
-    slower = yaw_share(vehicle)
-    stiff, damped = omega_R * omega_R, 2.0 * zeta * omega_R
+    yaw_ratio = yaw_bandwidth_ratio(vehicle)
+    stiffness, damping = omega_R * omega_R, 2.0 * zeta * omega_R
     k_x = mass * omega_x * (omega_x + 2.0 * zeta * omega_i)
     k_v = mass * (2.0 * zeta * omega_x + omega_i)
     k_i = mass * omega_x * omega_x * omega_i
     return PlumblineGains(
-        k_R=(J_x * stiff, J_y * stiff, slower * slower * J_z * stiff),
-        k_Omega=(J_x * damped, J_y * damped, slower * J_z * damped),
-        k_q=reach * omega_q * omega_q,
-        k_omega=2.0 * zeta * omega_q * reach,
+        k_R=(J_x * stiffness, J_y * stiffness, yaw_ratio * yaw_ratio * J_z * stiffness),
+        k_Omega=(J_x * damping, J_y * damping, yaw_ratio * J_z * damping),
+        k_q=m_Q_L * omega_q * omega_q,
+        k_omega=2.0 * zeta * omega_q * m_Q_L,
         k_x=(k_x, k_x, k_x),
         k_v=(k_v, k_v, k_v),
         k_i=(k_i, k_i, k_i),
     )
 
 
-def level_axis(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
+def level_axis_model(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
     """(A, b) of e_i, x_L, v_L, q, q', theta, Omega, M along a level axis; u, N m, is the commanded moment."""
     stiffness = (
         (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / (vehicle.quad_mass * vehicle.cable_length)
@@ -140,10 +143,12 @@ def level_axis(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
     return A, b
 
 
-def response(vehicle: Vehicle, J: float, lag: float, period: float, omegas: Array) -> NDArray[np.complex128]:
+def frequency_response(
+    vehicle: Vehicle, J: float, lag: float, period: float, omegas: Array
+) -> NDArray[np.complex128]:
     """(s - A)^-1 b exp(-s T / 2) at s = i omega, one row for each omega (rad/s)."""
     s = 1j * omegas
-    stiffness = -level_axis(vehicle, J, lag)[0][4, 3]
+    stiffness = -level_axis_model(vehicle, J, lag)[0][4, 3]
     M = np.exp(-0.5 * s * period) / (lag * s + 1.0)
     Omega = M / (J * s)
     theta = Omega / s
@@ -152,7 +157,7 @@ def response(vehicle: Vehicle, J: float, lag: float, period: float, omegas: Arra
     return np.stack([v / (s * s), v / s, v, q, s * q, theta, Omega, M], axis=1)
 
 
-def feedback(A: Array, J: float, polynomial: Array) -> Array:
+def ackermann_gain(A: Array, J: float, polynomial: Array) -> Array:
     """K that gives the chain this polynomial of poles if the rotors have no lag (Ackermann)."""
     n = _STATES
     chain, b = A[:n, :n], np.zeros(n)
@@ -160,13 +165,13 @@ def feedback(A: Array, J: float, polynomial: Array) -> Array:
     powers = [np.eye(n)]
     for _ in range(n):
         powers.append(powers[-1] @ chain)
-    reach = np.array([power @ b for power in powers[:n]])
-    last = np.linalg.solve(reach, np.eye(n)[n - 1])
+    controllability = np.array([power @ b for power in powers[:n]])
+    last = np.linalg.solve(controllability, np.eye(n)[n - 1])
     closed = sum((polynomial[n - i] * powers[i] for i in range(n + 1)), np.zeros((n, n)))
     return np.append(last @ closed, 0.0)
 
 
-def judged(
+def evaluate(
     omega_i: float,
     omega_x: float,
     omega_q: float,
@@ -177,65 +182,65 @@ def judged(
     vehicle: Vehicle,
 ) -> tuple[float, float]:
     """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) if unstable."""
-    lag, T = max(_LEAST_LAG, timing.lag_shown), timing.period
+    lag, T = max(_MIN_LAG, timing.effective_lag), timing.period
     J = min(vehicle.inertia[0], vehicle.inertia[1])
-    A, b = level_axis(vehicle, J, lag)
+    A, b = level_axis_model(vehicle, J, lag)
     polynomial = np.array([1.0, omega_i])
     for omega in (omega_x, omega_q, omega_R):
         polynomial = np.convolve(polynomial, [1.0, 2.0 * zeta * omega, omega * omega])
-    K = feedback(A, J, polynomial)
-    ahead = K @ expm(A * timing.delay)
+    K = ackermann_gain(A, J, polynomial)
+    K_ahead = K @ expm(A * timing.delay)
 
     n = len(A)
-    held = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * T)
-    A_d, b_d = held[:n, :n], held[:n, n]
+    discrete = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * T)
+    A_d, b_d = discrete[:n, :n], discrete[:n, n]
     closed = A_d - np.outer(b_d, K)
     if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
         return 0.0, math.inf
     omegas = np.geomspace(0.02 * omega_x, 0.99 * math.pi / T, 300)
-    G = response(vehicle, J, lag, T, omegas)
-    against = (G @ ahead) / (1.0 + G @ K)
+    G = frequency_response(vehicle, J, lag, T, omegas)
+    S = (G @ K_ahead) / (1.0 + G @ K)
     if timing.torque_time > 0.0:
-        learned = 1.0 / (1.0 + 1j * omegas * timing.torque_time)
-        against = against * (1.0 - learned * np.exp(-1j * omegas * timing.delay)) + learned
-    tolerance = 1.0 / float(np.max(omegas * np.abs(against)))
+        Q = 1.0 / (1.0 + 1j * omegas * timing.torque_time)
+        S = S * (1.0 - Q * np.exp(-1j * omegas * timing.delay)) + Q
+    tolerance = 1.0 / float(np.max(omegas * np.abs(S)))
 
     W = np.zeros((n, n))
     W[:_STATES, :_STATES] = np.diag((noise * np.array(NOISE)) ** 2)
-    drive = float(ahead @ W @ ahead)
+    input_variance = float(K_ahead @ W @ K_ahead)
     with warnings.catch_warnings():
         # badly scaled: the integral of a position beside angular rates; only K P K' of P is used
         warnings.simplefilter("ignore", LinAlgWarning)
-        P = solve_discrete_lyapunov(closed, drive * np.outer(b_d, b_d))
-    moment = math.sqrt(float(K @ P @ K) + drive)
-    faster = (1.0 - math.exp(-T / lag)) / (1.0 - math.exp(-T / max(lag, timing.lag)))
-    return tolerance, faster * moment / (vehicle.level * vehicle.arm)
+        P = solve_discrete_lyapunov(closed, input_variance * np.outer(b_d, b_d))
+    moment = math.sqrt(float(K @ P @ K) + input_variance)
+    amplification = (1.0 - math.exp(-T / lag)) / (1.0 - math.exp(-T / max(lag, timing.lag)))
+    return tolerance, amplification * moment / (vehicle.moment_per_force * vehicle.arm)
 
 
 @lru_cache(maxsize=16)
-def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
+def design(requirements: Requirements, timing: Timing, vehicle: Vehicle) -> Design:
     """The fastest gains that meet the requirements; the slowest of the searched range if none do."""
-    hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.lift
-    room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
+    hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.thrust_per_force
+    headroom = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
     reserved = ROTOR_MARGIN * (vehicle.rotor_max - vehicle.rotor_min)
-    greatest = min(room / SIGMAS, reserved / SIGMAS_RESERVED)
+    max_deviation = min(headroom / SIGMAS, reserved / SIGMAS_RESERVED)
 
     def bandwidths(omega_R: float) -> tuple[float, float, float, float]:
-        omega_q = omega_R / wanted.attitude_ratio
-        omega_x = omega_q / wanted.cable_ratio
-        return wanted.integral_ratio * omega_x, omega_x, omega_q, omega_R
+        omega_q = omega_R / requirements.attitude_ratio
+        omega_x = omega_q / requirements.cable_ratio
+        return requirements.integral_ratio * omega_x, omega_x, omega_q, omega_R
 
-    def found(omega_R: float) -> tuple[float, float]:
-        return judged(*bandwidths(omega_R), wanted.zeta, wanted.noise, timing, vehicle)
+    def evaluate_at(omega_R: float) -> tuple[float, float]:
+        return evaluate(*bandwidths(omega_R), requirements.zeta, requirements.noise, timing, vehicle)
 
-    low, high = math.log(_SLOWEST), math.log(_FASTEST)
+    low, high = math.log(_MIN_OMEGA_R), math.log(_MAX_OMEGA_R)
     for _ in range(20):
         middle = 0.5 * (low + high)
-        tolerance, deviation = found(math.exp(middle))
-        if tolerance >= wanted.tolerance and deviation <= greatest:
+        tolerance, deviation = evaluate_at(math.exp(middle))
+        if tolerance >= requirements.tolerance and deviation <= max_deviation:
             low = middle
         else:
             high = middle
     omegas = bandwidths(math.exp(low))
-    gains = gains_of(*omegas, wanted.zeta, vehicle)
-    return Design(gains, *omegas, *found(omegas[-1]))
+    gains = gains_of(*omegas, requirements.zeta, vehicle)
+    return Design(gains, *omegas, *evaluate_at(omegas[-1]))

@@ -51,14 +51,14 @@ from autopilot.geometry.linear import ZERO, Vec3, add, add3, axpy, dot, norm, sc
 from autopilot.geometry.s2 import tangent, unit_derivatives
 
 # of the weight: bound of the feedback, however great the errors are
-GREATEST_FEEDBACK = 0.5
+MAX_FEEDBACK_SHARE = 0.5
 # of the weight: an upward part of A above _UPRIGHT is unchanged, below _FALLING it is set to the mean of the
 # two: a vehicle that falls with its load could not turn, and noise would decide where a short A points
-_UPRIGHT, _FALLING = 0.4, 0.1
-_LEAST_UPWARD = 0.5 * (_UPRIGHT + _FALLING)
-_BETWEEN = _UPRIGHT - _FALLING
+_BLEND_END, _BLEND_START = 0.4, 0.1
+_MIN_UPWARD = 0.5 * (_BLEND_END + _BLEND_START)
+_BLEND_RANGE = _BLEND_END - _BLEND_START
 # N; a smaller A has no direction to follow
-_LEAST_FORCE = 1e-3
+_MIN_FORCE = 1e-3
 
 
 class PositionJet(NamedTuple):
@@ -85,29 +85,29 @@ def saturated(v: Vec3, v_dot: Vec3, v_ddot: Vec3, limit: float) -> tuple[Vec3, V
 
 
 @kernel
-def held_up(A: Vec3, A_dot: Vec3, A_ddot: Vec3, weight: float) -> tuple[Vec3, Vec3, Vec3]:
+def with_min_upward(A: Vec3, A_dot: Vec3, A_ddot: Vec3, weight: float) -> tuple[Vec3, Vec3, Vec3]:
     """A with an upward part of at least a quarter of the weight (N), and its derivatives: A itself where the
     upward part is at least 0.4 of the weight, else less steep, with three continuous derivatives."""
-    share = (A[2] - _FALLING * weight) / (_BETWEEN * weight)
+    share = (A[2] - _BLEND_START * weight) / (_BLEND_RANGE * weight)
     if share >= 1.0:
         return A, A_dot, A_ddot
     t = max(share, 0.0)
     t3 = t * t * t
-    upward = weight * (_LEAST_UPWARD + _BETWEEN * t3 * t * (2.5 - 3.0 * t + t * t))
+    upward = weight * (_MIN_UPWARD + _BLEND_RANGE * t3 * t * (2.5 - 3.0 * t + t * t))
     slope = t3 * (10.0 - 15.0 * t + 6.0 * t * t)
-    bend = 30.0 * t * t * (1.0 - t) * (1.0 - t) / (_BETWEEN * weight)
+    curvature = 30.0 * t * t * (1.0 - t) * (1.0 - t) / (_BLEND_RANGE * weight)
     return (
         (A[0], A[1], upward),
         (A_dot[0], A_dot[1], slope * A_dot[2]),
-        (A_ddot[0], A_ddot[1], slope * A_ddot[2] + bend * A_dot[2] * A_dot[2]),
+        (A_ddot[0], A_ddot[1], slope * A_ddot[2] + curvature * A_dot[2] * A_dot[2]),
     )
 
 
 @kernel
-def swing_of(jet: Jet, vehicle: Vehicle) -> tuple[float, float]:
+def reference_swing(jet: Jet, vehicle: Vehicle) -> tuple[float, float]:
     """s' (1/s^3) and s'' (1/s^4, without the part of the third derivative of q_d) on the reference."""
     upward = (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity)
-    lift, lift_dot, lift_ddot = held_up(upward, jet[3], jet[4], vehicle.gravity)
+    lift, lift_dot, lift_ddot = with_min_upward(upward, jet[3], jet[4], vehicle.gravity)
     _, u_dot, u_ddot = unit_derivatives(lift, lift_dot, lift_ddot)
     return 2.0 * dot(u_dot, u_ddot), 2.0 * dot(u_ddot, u_ddot)
 
@@ -125,10 +125,11 @@ def position_jet(
 ) -> PositionJet:
     """A, A', A'' for a load that moves under the pull of A itself; gains are diagonals in the world frame.
 
-    With k_i = 0 and small errors A is that of (3-43), except where that lets the load fall (`held_up`).
+    With k_i = 0 and small errors A is that of (3-43), except where that lets the load fall
+    (`with_min_upward`).
     """
     q, q_dot = state.q_cable, state.q_cable_dot
-    at = load_position_force(
+    result = load_position_force(
         state.x_load,
         state.v_load,
         q,
@@ -144,37 +145,37 @@ def position_jet(
         vehicle.gravity,
     )
     mass = vehicle.quad_mass + vehicle.load_mass
-    reach = vehicle.quad_mass * vehicle.cable_length
+    m_Q_L = vehicle.quad_mass * vehicle.cable_length
     weight = mass * vehicle.gravity
-    limit = GREATEST_FEEDBACK * weight
+    limit = MAX_FEEDBACK_SHARE * weight
     s = dot(q_dot, q_dot)
-    s_dot, s_ddot = swing_of(jet, vehicle)
+    s_dot, s_ddot = reference_swing(jet, vehicle)
 
-    wanted = add3(times(k_i, e_i), times(k_x, at.e_x), times(k_v, at.e_v))
-    closed, _, _ = saturated(wanted, ZERO, ZERO, limit)
-    raised = sub(add3(at.A, times(k_x, at.e_x), times(k_v, at.e_v)), closed)
-    T = dot(q, raised) - reach * s
+    feedback = add3(times(k_i, e_i), times(k_x, result.e_x), times(k_v, result.e_v))
+    bounded, _, _ = saturated(feedback, ZERO, ZERO, limit)
+    A_raw = sub(add3(result.A, times(k_x, result.e_x), times(k_v, result.e_v)), bounded)
+    T = dot(q, A_raw) - m_Q_L * s
     e_a = sub(axpy(T / mass, q, (0.0, 0.0, -vehicle.gravity)), jet[2])
 
-    wanted_dot = add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a))
-    _, closed_dot, _ = saturated(wanted, wanted_dot, ZERO, limit)
+    feedback_dot = add3(times(k_i, result.e_x), times(k_x, result.e_v), times(k_v, e_a))
+    _, bounded_dot, _ = saturated(feedback, feedback_dot, ZERO, limit)
     swing_dot = add(scale(s_dot, q), scale(s, q_dot))
-    raised_dot = sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot)
-    T_dot = dot(q_dot, raised) + dot(q, raised_dot) - reach * s_dot
+    A_raw_dot = sub(add(scale(mass, jet[3]), scale(m_Q_L, swing_dot)), bounded_dot)
+    T_dot = dot(q_dot, A_raw) + dot(q, A_raw_dot) - m_Q_L * s_dot
     e_j = sub(scale(1.0 / mass, add(scale(T_dot, q), scale(T, q_dot))), jet[3])
 
-    wanted_ddot = add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j))
-    _, _, closed_ddot = saturated(wanted, wanted_dot, wanted_ddot, limit)
+    feedback_ddot = add3(times(k_i, result.e_v), times(k_x, e_a), times(k_v, e_j))
+    _, _, bounded_ddot = saturated(feedback, feedback_dot, feedback_ddot, limit)
     swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, tangent(q, motion.q_ddot)))
-    raised_ddot = sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot)
-    A, A_dot, A_ddot = held_up(raised, raised_dot, raised_ddot, weight)
-    return PositionJet(A, A_dot, A_ddot, at.e_x, at.e_v)
+    A_raw_ddot = sub(add(scale(mass, jet[4]), scale(m_Q_L, swing_ddot)), bounded_ddot)
+    A, A_dot, A_ddot = with_min_upward(A_raw, A_raw_dot, A_raw_ddot, weight)
+    return PositionJet(A, A_dot, A_ddot, result.e_x, result.e_v)
 
 
 @kernel
 def direction_jet(position: PositionJet, state: State) -> DirectionCommand:
     """q_c = -A/|A| with q_c' and q_c''; if A vanishes, the present direction at rest."""
-    if norm(position.A) < _LEAST_FORCE:
+    if norm(position.A) < _MIN_FORCE:
         zero: Vec3 = (0.0, 0.0, 0.0)
         return DirectionCommand(state.q_cable, zero, zero)
     u, u_dot, u_ddot = unit_derivatives(position.A, position.A_dot, position.A_ddot)

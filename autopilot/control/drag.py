@@ -9,7 +9,7 @@ from autopilot.geometry.linear import Vec3, norm, scale
 
 # 1/sqrt(s), random walk of the wind's force, as a share of this force: gusts are a fifth of the wind and last
 # for 2 s, and the drag, c u^2, changes by 2 c u times the gust: 2 * 0.2 * sqrt(2 / 2 s)
-GUSTY = 0.4
+GUST_RANDOM_WALK = 0.4
 
 
 class Drag(NamedTuple):
@@ -20,6 +20,6 @@ class Drag(NamedTuple):
 
 
 @kernel
-def air_force(v_quad: Vec3, drag: Drag) -> Vec3:
+def drag_force(v_quad: Vec3, drag: Drag) -> Vec3:
     """D, N, world frame, of a vehicle at v_quad (m/s) in air at rest."""
     return scale(-(drag.linear + drag.quadratic * norm(v_quad)), v_quad)

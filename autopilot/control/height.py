@@ -14,7 +14,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3
 
 # cosine of 60 deg: a greater tilt is not fully compensated
-_LEAST_COSINE = 0.5
+_MIN_COSINE = 0.5
 
 
 @kernel
@@ -30,10 +30,10 @@ def vertical_force(height_error: float, climb_error: float, k_z: float, k_v: flo
 @kernel
 def cable_pull(force: float, q_cable: Vec3) -> float:
     """Pull along the cable, N, whose vertical part is `force` for tilts of up to 60 deg."""
-    return force / max(_LEAST_COSINE, -q_cable[2])
+    return force / max(_MIN_COSINE, -q_cable[2])
 
 
 @kernel
 def tilted_thrust(force: float, R: Mat3) -> float:
     """Thrust, N, whose vertical part is `force` for tilts of up to 60 deg."""
-    return force / max(_LEAST_COSINE, R[2][2])
+    return force / max(_MIN_COSINE, R[2][2])

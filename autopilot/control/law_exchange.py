@@ -73,7 +73,7 @@ class Asked(NamedTuple):
 class Link(NamedTuple):
     """Addresses; the law does not define a mode whose function is 0."""
 
-    desk: int
+    row: int
     alarm: int  # called if the law's command is not a number
     load_position: int
     quad_position: int
@@ -82,24 +82,24 @@ class Link(NamedTuple):
 
 
 UNLINKED = Link(0, 0, 0, 0, 0, 0)
-UNASKED = Asked(WRENCH, nan, (nan, nan, nan), IDENTITY)
-ASKED = width(Now)  # place of `Asked` in the row
-OWN = ASKED + width(Asked)  # from here on the row belongs to the law
+UNSET_COMMAND = Asked(WRENCH, nan, (nan, nan, nan), IDENTITY)
+COMMAND_OFFSET = width(Now)  # place of `Asked` in the row
+LAW_OFFSET = COMMAND_OFFSET + width(Asked)  # from here on the row belongs to the law
 
 
 @kernel
-def is_sound(asked: Asked) -> bool:
+def is_valid(command: Asked) -> bool:
     """Whether the kind is a known one and all numbers are finite."""
-    v, R = asked.vector, asked.attitude
+    v, R = command.vector, command.attitude
     rows = R[0][0] + R[0][1] + R[0][2] + R[1][0] + R[1][1] + R[1][2] + R[2][0] + R[2][1] + R[2][2]
-    return WRENCH <= asked.kind <= RATES and isfinite(asked.thrust + v[0] + v[1] + v[2] + rows)
+    return WRENCH <= command.kind <= RATES and isfinite(command.thrust + v[0] + v[1] + v[2] + rows)
 
 
 @kernel
-def ask(function: int, address: int, now: Now) -> Asked:
+def call_law(function: int, address: int, now: Now) -> Asked:
     """The command of the C function `void f(double *)` at an address, called with the address of a row."""
-    desk = numbers_at(address, OWN)
-    pack(now, desk, 0)
-    pack(UNASKED, desk, ASKED)
+    row = numbers_at(address, LAW_OFFSET)
+    pack(now, row, 0)
+    pack(UNSET_COMMAND, row, COMMAND_OFFSET)
     call_at(function, address)
-    return unpack(Asked, desk, ASKED)
+    return unpack(Asked, row, COMMAND_OFFSET)

@@ -12,7 +12,7 @@
 | p            | p                        |       | N       | q . F    |
 | T            | T                        |       | N       | p - m_Q L s |
 | m            | mass                     |       | kg      | m_Q + m_L |
-| m_Q L        | reach                    |       | kg m    |          |
+| m_Q L        | m_Q_L                    |       | kg m    |          |
 
 F is all that acts on the vehicle besides weight and cable. With R' = R hat(Omega) (2-34), and D' left out,
 which is a hundredth of the rest, F' = f' R e_3 + W x f R e_3. Then
@@ -47,7 +47,7 @@ class LoadMotion(NamedTuple):
 def load_motion(state: State, thrust: float, thrust_rate: float, air: Vec3, vehicle: Vehicle) -> LoadMotion:
     """The motion of load and cable under the thrust f (N), which changes by f' (N/s) while the body turns."""
     q, q_dot, b3 = state.q_cable, state.q_cable_dot, column(state.R, 2)
-    reach = vehicle.quad_mass * vehicle.cable_length
+    m_Q_L = vehicle.quad_mass * vehicle.cable_length
     mass = vehicle.quad_mass + vehicle.load_mass
     lift = scale(thrust, b3)
     F = add(lift, air)
@@ -56,14 +56,14 @@ def load_motion(state: State, thrust: float, thrust_rate: float, air: Vec3, vehi
     s = dot(q_dot, q_dot)
     p = dot(q, F)
     # the cable pulls or does nothing
-    T = min(0.0, p - reach * s)
+    T = min(0.0, p - m_Q_L * s)
     a_load = sub(scale(T / mass, q), (0.0, 0.0, vehicle.gravity))
-    q_ddot = axpy(-s, q, scale(1.0 / reach, sub(scale(p, q), F)))
+    q_ddot = axpy(-s, q, scale(1.0 / m_Q_L, sub(scale(p, q), F)))
 
     s_dot = 2.0 * dot(q_dot, q_ddot)
-    T_dot = dot(q_dot, F) + dot(q, F_dot) - reach * s_dot if T < 0.0 else 0.0
-    turned = add(scale(T_dot, q), scale(T, q_dot))
-    j_load = scale(1.0 / mass, turned)
+    T_dot = dot(q_dot, F) + dot(q, F_dot) - m_Q_L * s_dot if T < 0.0 else 0.0
+    force_rate = add(scale(T_dot, q), scale(T, q_dot))
+    j_load = scale(1.0 / mass, force_rate)
     turning = sub(axpy(dot(q_dot, F) + dot(q, F_dot), q, scale(p, q_dot)), F_dot)
-    q_dddot = sub(scale(1.0 / reach, turning), axpy(s_dot, q, scale(s, q_dot)))
+    q_dddot = sub(scale(1.0 / m_Q_L, turning), axpy(s_dot, q, scale(s, q_dot)))
     return LoadMotion(a_load, j_load, q_ddot, q_dddot)

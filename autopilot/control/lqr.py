@@ -63,8 +63,8 @@ Row = tuple[  # of K, or the state: sixteen numbers
 Gain = tuple[Row, Row, Row, Row]
 
 # cosines and squared lengths below which a rate of an angle is no longer the exact one
-_LEAST_COSINE = 1e-3
-_LEAST_SQUARE = 1e-6
+_MIN_COSINE = 1e-3
+_MIN_SQUARE = 1e-6
 
 
 class LqrWeights(NamedTuple):
@@ -113,7 +113,7 @@ def lqr(vehicle: Vehicle, weights: LqrWeights = LQR_WEIGHTS) -> Lqr:
 def heading_frame(b1_d: Vec3) -> Mat3:
     """Rotation about the vertical that takes e1 to the level part of b1_d; the identity if there is none."""
     n = sqrt(b1_d[0] * b1_d[0] + b1_d[1] * b1_d[1])
-    if n * n < _LEAST_SQUARE:
+    if n * n < _MIN_SQUARE:
         return IDENTITY
     c, s = b1_d[0] / n, b1_d[1] / n
     return ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
@@ -123,7 +123,7 @@ def heading_frame(b1_d: Vec3) -> Mat3:
 def attitude_angles(R: Mat3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
     """(phi, theta, psi) in rad of R = Rz(psi) Ry(theta) Rx(phi), and their rates in rad/s."""
     sine = min(1.0, max(-1.0, -R[2][0]))
-    cosine = max(_LEAST_COSINE, sqrt(1.0 - sine * sine))
+    cosine = max(_MIN_COSINE, sqrt(1.0 - sine * sine))
     phi, psi = atan2(R[2][1], R[2][2]), atan2(R[1][0], R[0][0])
     # sine and cosine of phi, from the elements of R
     s_phi, c_phi = R[2][1] / cosine, R[2][2] / cosine
@@ -137,14 +137,14 @@ def attitude_angles(R: Mat3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
 @kernel
 def swing_angle(sideways: float, up: float, sideways_dot: float, up_dot: float) -> tuple[float, float]:
     """Angle (rad) from straight down of a direction in a vertical plane, and its rate (rad/s)."""
-    square = max(_LEAST_SQUARE, sideways * sideways + up * up)
+    square = max(_MIN_SQUARE, sideways * sideways + up * up)
     return atan2(sideways, -up), (sideways * up_dot - up * sideways_dot) / square
 
 
 @kernel
-def state_error(state: State, x_ref: Vec3, b1_d: Vec3, turning: float) -> Row:
+def state_error(state: State, x_ref: Vec3, b1_d: Vec3, heading_rate: float) -> Row:
     """x - x_ref of (4-6), for a vehicle that is to rest at x_ref with its nose along b1_d, a heading that
-    turns at `turning` rad/s about the vertical."""
+    turns at `heading_rate` rad/s about the vertical."""
     H = heading_frame(b1_d)
     x = apply_transposed(H, sub(state.x_quad, x_ref))
     v = apply_transposed(H, state.v_quad)
@@ -167,7 +167,7 @@ def state_error(state: State, x_ref: Vec3, b1_d: Vec3, turning: float) -> Row:
         v[2],
         angle_rates[0],
         angle_rates[1],
-        angle_rates[2] - turning,
+        angle_rates[2] - heading_rate,
         phi_L_dot,
         theta_L_dot,
     )
@@ -192,8 +192,8 @@ def load_position(state: State, reference: Reference, regulator: Lqr) -> Command
     """
     x_d, v_d = reference.jet[0], reference.jet[1]
     b1_d, b1_d_dot = reference.b1_d, reference.b1_d_dot
-    turning = b1_d[0] * b1_d_dot[1] - b1_d[1] * b1_d_dot[0]
-    error = state_error(state, axpy(regulator.cable_length, E3, x_d), b1_d, turning)
+    heading_rate = b1_d[0] * b1_d_dot[1] - b1_d[1] * b1_d_dot[0]
+    error = state_error(state, axpy(regulator.cable_length, E3, x_d), b1_d, heading_rate)
     K = regulator.K
     down, zero = neg(E3), (0.0, 0.0, 0.0)
     R_c = heading_frame(b1_d)

@@ -37,8 +37,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from autopilot.control.direction_jet import PositionJet, direction_jet, held_up, position_jet
-from autopilot.control.drag import Drag, air_force
+from autopilot.control.direction_jet import PositionJet, direction_jet, position_jet, with_min_upward
+from autopilot.control.drag import Drag, drag_force
 from autopilot.control.load_attitude import (
     DirectionCommand,
     DirectionResult,
@@ -69,21 +69,22 @@ from autopilot.geometry.linear import (
 from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
 from autopilot.geometry.so3 import exp
 
-STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
+# s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
+DIFFERENCE_STEP = 2e-3
 
-GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
+MAX_INTEGRAL_SHARE = 0.05  # of the weight: what the integral of the error may ask for
 
 # N; a smaller force has no direction to follow, and a freely falling load has no cable direction
-_LEAST_FORCE = 1e-3
+_MIN_FORCE = 1e-3
 # sine of the least angle between heading and thrust axis at which R_c is differentiated
-_LEAST_SINE = 1e-2
+_MIN_SINE = 1e-2
 # tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
-_GREATEST_LEAN = 2.7
-_LEAST_LIFT = 0.2
+_MAX_LEAN_TANGENT = 2.7
+_MIN_LIFT = 0.2
 # of the pull along the cable: the greatest force across it for errors, besides that for the reference
-_GREATEST_ACROSS = 0.7
-_GREATEST_RATE = 15.0  # rad/s
-_HASTENING_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
+_MAX_ACROSS_SHARE = 0.7
+_MAX_RATE = 15.0  # rad/s
+_PACE_RISE_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
 _FULL_RANGE_TIME = 0.1  # s, shortest time in which the thrust is assumed to pass through its whole range
 
 
@@ -107,7 +108,7 @@ class PlumblineMemory(NamedTuple):
     pace: float  # factor on the bandwidths of load and cable; 1: as designed
 
 
-class WantedForce(NamedTuple):
+class CommandedForce(NamedTuple):
     """The force that the vehicle should exert, and what it is made from."""
 
     F: Vec3  # N, world
@@ -134,21 +135,21 @@ def start() -> PlumblineMemory:
 
 
 @kernel
-def gently(v: Vec3, greatest: float) -> Vec3:
-    """v, shortened smoothly to less than `greatest`: by 0.2 % where v is 0.3 times as long as that."""
-    share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
+def smooth_limit(v: Vec3, limit: float) -> Vec3:
+    """v, shortened smoothly to less than `limit`: by 0.2 % where v is 0.3 times as long as that."""
+    share = dot(v, v) / max(limit * limit, _MIN_FORCE * _MIN_FORCE)
     return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
 
 
 @kernel
-def no_longer(v: Vec3, greatest: float) -> Vec3:
-    """v, shortened to `greatest` where it is longer."""
+def limit_length(v: Vec3, limit: float) -> Vec3:
+    """v, shortened to `limit` where it is longer."""
     n = norm(v)
-    return v if n <= greatest else scale(greatest / n, v)
+    return v if n <= limit else scale(limit / n, v)
 
 
 @kernel
-def paced(gains: PlumblineGains, pace: float) -> PlumblineGains:
+def with_pace(gains: PlumblineGains, pace: float) -> PlumblineGains:
     """The gains with `pace` times the bandwidth in the loops of load and cable."""
     square = pace * pace
     return PlumblineGains(
@@ -173,23 +174,23 @@ def commanded_attitude(
     zero: Vec3 = (0.0, 0.0, 0.0)
     b1_d = reference.b1_d
     sideways = norm((F[0], F[1], 0.0))
-    upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
-    if sideways > _GREATEST_LEAN * upward:
-        shrink = _GREATEST_LEAN * upward / sideways
+    upward = max(F[2], _MIN_LIFT * vehicle.quad_mass * vehicle.gravity)
+    if sideways > _MAX_LEAN_TANGENT * upward:
+        shrink = _MAX_LEAN_TANGENT * upward / sideways
         return AttitudeCommand(
             attitude_towards((shrink * F[0], shrink * F[1], upward), b1_d, state.R), zero, zero
         )
     n = norm(F)
-    if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
+    if n < _MIN_FORCE or norm(cross(F, b1_d)) < _MIN_SINE * n:
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
     attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, reference.b1_d_dot, reference.b1_d_ddot)
     J = max(vehicle.inertia[0], vehicle.inertia[1])
     return AttitudeCommand(
         attitude.R_c,
-        no_longer(attitude.Omega_c, _GREATEST_RATE),
-        no_longer(
+        limit_length(attitude.Omega_c, _MAX_RATE),
+        limit_length(
             attitude.Omega_c_dot,
-            0.5 * vehicle.level * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J,
+            0.5 * vehicle.moment_per_force * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J,
         ),
     )
 
@@ -211,8 +212,8 @@ def shifted_jet(jet: Jet, h: float) -> Jet:
 
 
 @kernel
-def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, vehicle: Vehicle) -> State:
-    """The state h seconds later along the motion of the model; `turning` is Omega', rad/s^2, body."""
+def shifted_state(state: State, motion: LoadMotion, angular_accel: Vec3, h: float, vehicle: Vehicle) -> State:
+    """The state h seconds later along the motion of the model; `angular_accel` is Omega', rad/s^2, body."""
     h2 = 0.5 * h * h
     q = normalise(add3(state.q_cable, scale(h, state.q_cable_dot), scale(h2, motion.q_ddot)))
     q_dot = add3(state.q_cable_dot, scale(h, motion.q_ddot), scale(h2, motion.q_dddot))
@@ -226,27 +227,27 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
         q_dot,
         add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
         add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
-        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
-        axpy(h, turning, state.omega_body),
+        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, angular_accel)))),
+        axpy(h, angular_accel, state.omega_body),
         state.a_quad,
     )
 
 
 @kernel
-def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
+def reference_force_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
     """The force across the cable that the reference itself needs, N: -m_Q L q_d'', at most the weight."""
     mass = vehicle.quad_mass + vehicle.load_mass
     # q_d = -lift / |lift|
-    lift, jerk, snap = held_up(
+    lift, jerk, snap = with_min_upward(
         (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity), jet[3], jet[4], vehicle.gravity
     )
     _, _, u_ddot = unit_derivatives(lift, jerk, snap)
-    reach = vehicle.quad_mass * vehicle.cable_length
-    return gently(scale(reach, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
+    m_Q_L = vehicle.quad_mass * vehicle.cable_length
+    return smooth_limit(scale(m_Q_L, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
 
 
 @kernel
-def wanted_force(
+def commanded_force(
     state: State,
     motion: LoadMotion,
     air: Vec3,
@@ -254,7 +255,7 @@ def wanted_force(
     e_i: Vec3,
     gains: PlumblineGains,
     vehicle: Vehicle,
-) -> WantedForce:
+) -> CommandedForce:
     """F of (3-31), with drag and wind compensated, and what it is made from."""
     position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
     q_c = direction_jet(position, state)
@@ -270,16 +271,16 @@ def wanted_force(
     )
     along = dot(state.q_cable, direction.F)
     pull = scale(along, state.q_cable)
-    asked = flat_across(state.q_cable, jet, vehicle)
-    across = gently(sub(sub(direction.F, pull), asked), _GREATEST_ACROSS * norm(position.A))
-    return WantedForce(sub(add3(pull, asked, across), air), position, direction, q_c)
+    reference_force = reference_force_across(state.q_cable, jet, vehicle)
+    across = smooth_limit(sub(sub(direction.F, pull), reference_force), _MAX_ACROSS_SHARE * norm(position.A))
+    return CommandedForce(sub(add3(pull, reference_force, across), air), position, direction, q_c)
 
 
 @kernel
-def force_beside(
+def shifted_force(
     state: State,
     motion: LoadMotion,
-    turning: Vec3,
+    angular_accel: Vec3,
     f: float,
     f_dot: float,
     jet: Jet,
@@ -291,12 +292,12 @@ def force_beside(
     vehicle: Vehicle,
 ) -> Vec3:
     """F, N, as it will be h seconds later, while the thrust f (N) changes by f' (N/s)."""
-    then = shifted_state(state, motion, turning, h, vehicle)
-    air = add(air_force(then.v_quad, drag), push)
-    moved = load_motion(then, f + h * f_dot, f_dot, air, vehicle)
+    later = shifted_state(state, motion, angular_accel, h, vehicle)
+    air = add(drag_force(later.v_quad, drag), push)
+    later_motion = load_motion(later, f + h * f_dot, f_dot, air, vehicle)
     e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
-    summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
-    return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
+    later_integral = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
+    return commanded_force(later, later_motion, air, shifted_jet(jet, h), later_integral, gains, vehicle).F
 
 
 @kernel
@@ -318,45 +319,45 @@ def load_position(
     air on the vehicle besides drag in still air; `period`, s, is that of the law.
     """
     jet = reference.jet
-    gains = paced(gains, memory.pace)
-    air = add(air_force(state.v_quad, drag), push)
+    gains = with_pace(gains, memory.pace)
+    air = add(drag_force(state.v_quad, drag), push)
     motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
-    wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
-    F, position, direction = wanted.F, wanted.position, wanted.direction
+    commanded = commanded_force(state, motion, air, jet, memory.integral, gains, vehicle)
+    F, position, direction = commanded.F, commanded.position, commanded.direction
 
     J, W = vehicle.inertia, state.omega_body
     torque = sub(moment, cross(W, times(J, W)))
-    turning: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
-    F_after = force_beside(
+    angular_accel: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
+    F_after = shifted_force(
         state,
         motion,
-        turning,
+        angular_accel,
         thrust,
         memory.thrust_rate,
         jet,
         memory.integral,
-        STEP,
+        DIFFERENCE_STEP,
         gains,
         drag,
         push,
         vehicle,
     )
-    F_before = force_beside(
+    F_before = shifted_force(
         state,
         motion,
-        turning,
+        angular_accel,
         thrust,
         memory.thrust_rate,
         jet,
         memory.integral,
-        -STEP,
+        -DIFFERENCE_STEP,
         gains,
         drag,
         push,
         vehicle,
     )
-    F_dot = scale(0.5 / STEP, sub(F_after, F_before))
-    F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
+    F_dot = scale(0.5 / DIFFERENCE_STEP, sub(F_after, F_before))
+    F_ddot = scale(1.0 / (DIFFERENCE_STEP * DIFFERENCE_STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
     attitude = commanded_attitude(F, F_dot, F_ddot, reference, state, vehicle)
     result = attitude_moment(
@@ -375,15 +376,15 @@ def load_position(
         result.e_Omega,
         result.psi_R,
         direction.psi_q,
-        wanted.q_c.q_c,
+        commanded.q_c.q_c,
         attitude.R_c,
     )
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     integral = axpy(period, position.e_x, memory.integral)
-    held = norm(times(gains.k_i, integral))
-    if held > GREATEST_HELD * weight:
-        integral = scale(GREATEST_HELD * weight / held, integral)
-    fastest = vehicle.lift * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
-    thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
-    pace = min(1.0, memory.pace + period / _HASTENING_TIME)
+    integral_force = norm(times(gains.k_i, integral))
+    if integral_force > MAX_INTEGRAL_SHARE * weight:
+        integral = scale(MAX_INTEGRAL_SHARE * weight / integral_force, integral)
+    max_thrust_rate = vehicle.thrust_per_force * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    thrust_rate = min(max_thrust_rate, max(-max_thrust_rate, dot(F_dot, b3) + dot(F, b3_dot)))
+    pace = min(1.0, memory.pace + period / _PACE_RISE_TIME)
     return PlumblineMemory(thrust_rate, integral, pace), command

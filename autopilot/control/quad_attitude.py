@@ -52,7 +52,7 @@ from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import vee
 
 # sine of the least angle between heading and thrust axis for which (3-29) is used
-_LEAST_SINE = 1e-3
+_MIN_SINE = 1e-3
 
 
 class AttitudeCommand(NamedTuple):
@@ -105,9 +105,9 @@ def heading_axis(b3_c: Vec3, b1_d: Vec3) -> Vec3:
     """
     normal = cross(b3_c, b1_d)
     n = norm(normal)
-    if n < _LEAST_SINE:
-        nose: Vec3 = (0.0, 0.0, -dot(b3_c, b1_d))
-        normal = cross(b3_c, nose)
+    if n < _MIN_SINE:
+        forward: Vec3 = (0.0, 0.0, -dot(b3_c, b1_d))
+        normal = cross(b3_c, forward)
         n = norm(normal)
     return scale(-1.0 / n, cross(b3_c, normal))
 

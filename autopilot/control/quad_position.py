@@ -33,8 +33,8 @@ from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 # tan 35 deg: the slack phases need no greater tilt
 _TILT_TANGENT = 0.7
 # least and greatest upward force, in weights
-_LEAST_LIFT = 0.2
-_GREATEST_LIFT = 1.6
+_MIN_LIFT = 0.2
+_MAX_LIFT = 1.6
 
 
 class QuadPositionGains(NamedTuple):
@@ -67,7 +67,7 @@ def position_force(
 @kernel
 def limited_force(F: Vec3, weight: float) -> Vec3:
     """F with an upward part of 0.2 to 1.6 weights, and no more than 35 deg from the vertical."""
-    up = min(_GREATEST_LIFT * weight, max(_LEAST_LIFT * weight, F[2]))
+    up = min(_MAX_LIFT * weight, max(_MIN_LIFT * weight, F[2]))
     sideways = norm((F[0], F[1], 0.0))
     shrink = min(1.0, _TILT_TANGENT * up / max(sideways, 1e-9))
     return (shrink * F[0], shrink * F[1], up)
@@ -93,8 +93,10 @@ def quad_position(
     """
     x_d, v_d, a_d = reference.jet[0], reference.jet[1], reference.jet[2]
     mass = vehicle.quad_mass + carried_mass
-    wanted = position_force(state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity)
-    F = limited_force(sub(wanted, push), mass * vehicle.gravity)
+    unlimited = position_force(
+        state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity
+    )
+    F = limited_force(sub(unlimited, push), mass * vehicle.gravity)
     R_c = attitude_towards(F, reference.b1_d, state.R)
     memory, command = quad_attitude(memory, state, R_c, thrust_along(F, state.R), gains, filters, vehicle)
     zero: Vec3 = (0.0, 0.0, 0.0)

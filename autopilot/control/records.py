@@ -29,8 +29,12 @@ class Vehicle(NamedTuple):
     torque_ratio: float  # c = d/b, m: drag torque for each newton of thrust
     rotor_min: float  # N, one rotor
     rotor_max: float  # N, one rotor; inf if unlimited
-    lift: float = 4.0  # thrust when the first rotor of strength 1 reaches a force, divided by that force
-    level: float = 2.0  # the same for a moment about a level axis, divided by that force times `arm`
+    thrust_per_force: float = (
+        4.0  # thrust when the first rotor of strength 1 reaches a force, divided by that force
+    )
+    moment_per_force: float = (
+        2.0  # the same for a moment about a level axis, divided by that force times `arm`
+    )
     attachment: Vec3 = (0.0, 0.0, 0.0)  # m, of the cable, from the centre of mass, body
 
 
@@ -57,7 +61,7 @@ class State(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """Where the load (or, in the vehicle position law, the vehicle) is to be, and where the nose points."""
+    """Where the load (or, in the vehicle position law, the vehicle) is to be, and its heading."""
 
     jet: Jet  # desired position and its six derivatives
     b1_d: Vec3  # desired heading, unit vector, not parallel to the thrust axis
@@ -65,8 +69,8 @@ class Reference(NamedTuple):
     b1_d_ddot: Vec3 = (0.0, 0.0, 0.0)  # 1/s^2
 
 
-class Nose(NamedTuple):
-    """Where the nose is to point: b_1d of (3-29), level, with two derivatives."""
+class HeadingReference(NamedTuple):
+    """The desired heading: b_1d of (3-29), level, with two derivatives."""
 
     b1_d: Vec3
     b1_d_dot: Vec3  # 1/s
@@ -92,6 +96,6 @@ class Command(NamedTuple):
 
 
 @kernel
-def with_length(vehicle: Vehicle, length: float) -> Vehicle:
+def with_cable_length(vehicle: Vehicle, length: float) -> Vehicle:
     """The vehicle with a cable of this length (m)."""
     return with_field(vehicle, "cable_length", length)

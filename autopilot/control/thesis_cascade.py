@@ -66,9 +66,9 @@ OMEGA_REFERENCE = 25.0
 ZETA = 0.98
 
 # A filtered unit vector shrinks while its command turns fast; below this length its direction means nothing
-_LEAST_LENGTH = 0.1
+_MIN_LENGTH = 0.1
 # N; a smaller force has no direction to follow
-_LEAST_FORCE = 1e-3
+_MIN_FORCE = 1e-3
 
 
 class ThesisGains(NamedTuple):
@@ -149,7 +149,7 @@ def filtered_direction(
 ) -> tuple[FilterState, DirectionCommand]:
     """The commanded cable direction, passed through its filter, with two derivatives."""
     memory = filter_step(memory, q_raw, constants)
-    if norm(memory.x1) < _LEAST_LENGTH:
+    if norm(memory.x1) < _MIN_LENGTH:
         # the command has jumped by nearly half a turn: begin again from it
         memory = filter_start(q_raw, (0.0, 0.0, 0.0))
     q_c, q_c_dot, q_c_ddot = unit_derivatives(memory.x1, memory.x2, filter_acceleration(memory, constants))
@@ -178,7 +178,7 @@ def filtered_rates(
 def attitude_towards(F: Vec3, b1_d: Vec3, R: Mat3) -> Mat3:
     """R_c of (3-27): thrust axis along F (3-30), nose towards b1_d (3-29). Without a force the axis stays."""
     n = norm(F)
-    b3_c = scale(1.0 / n, F) if n > _LEAST_FORCE else column(R, 2)
+    b3_c = scale(1.0 / n, F) if n > _MIN_FORCE else column(R, 2)
     b1_c = heading_axis(b3_c, b1_d)
     b2_c = cross(b3_c, b1_c)
     return from_columns(b1_c, b2_c, b3_c)
@@ -295,7 +295,7 @@ def load_position(
         vehicle.cable_length,
         vehicle.gravity,
     )
-    q_raw = computed_direction(position.A) if norm(position.A) > _LEAST_FORCE else state.q_cable
+    q_raw = computed_direction(position.A) if norm(position.A) > _MIN_FORCE else state.q_cable
     direction_memory, q_c = filtered_direction(memory.direction, q_raw, filters.direction)
     direction = load_attitude_force(
         state.q_cable,

@@ -36,11 +36,11 @@ def off_centre(vehicle: Vehicle) -> bool:
 
 
 @kernel
-def tell_attachment(inbox: Array, count: int, estimator: EstimatorState, attachment: Vec3) -> None:
+def shift_to_attachment(inbox: Array, count: int, estimator: EstimatorState, attachment: Vec3) -> None:
     """Shift the readings of the vehicle's position and velocity, in the inbox, to the cable's attachment."""
     omega = estimator.vehicle.omega_body
     arm = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), attachment)
-    beside = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), cross(omega, attachment))
+    arm_velocity = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), cross(omega, attachment))
     for i in range(count):
         if inbox[i, KIND] == POSE:
             pose = unpack(PoseReading, inbox[i], READING)
@@ -51,7 +51,7 @@ def tell_attachment(inbox: Array, count: int, estimator: EstimatorState, attachm
         elif inbox[i, KIND] == FIX:
             fix = unpack(GnssReading, inbox[i], READING)
             fix = with_field(fix, "position", add(fix.position, arm))
-            pack(with_field(fix, "velocity", add(fix.velocity, beside)), inbox[i], READING)
+            pack(with_field(fix, "velocity", add(fix.velocity, arm_velocity)), inbox[i], READING)
         elif inbox[i, KIND] == HEIGHT:
             inbox[i, READING] += arm[2]
 
@@ -61,7 +61,7 @@ def cable_moment(state: State, thrust: float, load_mass: float, length: float, v
     """M_T of a taut cable of this length (m), which carries a load of this mass (kg)."""
     reduced_mass = load_mass * vehicle.quad_mass / (load_mass + vehicle.quad_mass)
     q = state.q_cable
-    lifted = thrust / vehicle.quad_mass * dot(q, column(state.R, 2))
-    tension = reduced_mass * (length * dot(state.q_cable_dot, state.q_cable_dot) - lifted)
+    thrust_along_cable = thrust / vehicle.quad_mass * dot(q, column(state.R, 2))
+    tension = reduced_mass * (length * dot(state.q_cable_dot, state.q_cable_dot) - thrust_along_cable)
     pull = scale(if_above(tension, 0.0, tension, 0.0), q)
     return cross(vehicle.attachment, apply_transposed(state.R, pull))

@@ -16,26 +16,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
-from autopilot.control.actuators.mixer import FORCE, TOLD, new_rotors
-from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of, steady
-from autopilot.control.actuators.unlike_rotors import with_lags
+from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal_on_ground
+from autopilot.control.actuators.lag_equalisation import with_lag_columns
+from autopilot.control.actuators.mixer import FORCE, REPORTED_SPEED, new_rotors
+from autopilot.control.actuators.rotor_model import ActuationConstants, queue_rows, steady_actuation
 from autopilot.control.drag import Drag
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.records import Cable, State, Vehicle
-from autopilot.core.estimator_seat import Seat
+from autopilot.core.estimator_slot import EstimatorSlot
 from autopilot.core.tick import (
     NO_COMMAND,
     STOPPED,
     TO_DECIDE,
+    ControlMemory,
     CoreConstants,
     CoreRows,
-    Pilot,
-    Seen,
+    EstimateSummary,
     Winch,
-    any_law,
+    compiled_law,
     fly_tick,
-    law_at,
+    placeholder_law,
 )
 from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints, loss
 from autopilot.estimation.inbox import new_inbox
@@ -52,23 +52,23 @@ from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
 from autopilot.geometry.packed import pack, packed, place_of, unpack
 from autopilot.guidance.layout import COLUMNS, jets_ahead
 from autopilot.guidance.legs import Brake, Catch, Leg, Slow, least_move_s, top_of
-from autopilot.own.chosen import OwnSetup
 from autopilot.own.estimator import load_estimator
 from autopilot.own.host import Host
 from autopilot.own.law import load_law
+from autopilot.own.own_code import OwnSetup
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
-from autopilot.supervisor.recovery import Found, broken_off, take_up
+from autopilot.supervisor.quiescence import UNCONTROLLED, Stretch, next_stretch, uncontrolled_stretch
+from autopilot.supervisor.recovery import RestartState, abort_flight, resume_flight
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, Report, Text, View, carries, leg_time_s
+from autopilot.supervisor.state import Flight, Report, Text, View, leg_time_s, needs_load_estimate
 from autopilot.vehicle.layout import PLUS, Layout
-from autopilot.vehicle.rotors import allocate, sizes
+from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
 
-LAID_OUT = 250  # setpoints computed in one call, a second of them: this must not delay a tick
-LAID_OUT_WAITING = 4000  # where the clock waits, as in lockstep and in a sweep
-LAID_OUT_BRAKING = 50  # of a stop, which takes 20 us each: a commanded stop must not delay a tick
+SETPOINTS_PER_CALL = 250  # setpoints computed in one call, a second of them: this must not delay a tick
+SETPOINTS_LOCKSTEP = 4000  # where the clock waits, as in lockstep and in a sweep
+SETPOINTS_BRAKING = 50  # of a stop, which takes 20 us each: a commanded stop must not delay a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
 
@@ -99,7 +99,7 @@ class Setup:
         return law_of(self.law).preview_s(self.law)
 
 
-class LaidOut(NamedTuple):
+class PlannedSetpoints(NamedTuple):
     """The setpoints in `CoreRows.targets`: those of the first of these legs, from a tick on."""
 
     legs: tuple[Leg, ...]
@@ -112,42 +112,46 @@ class LaidOut(NamedTuple):
 class FlightCore:
     """One vehicle's flight software. `flight` is the supervisor's record; all else lies in `rows`."""
 
-    def __init__(self, setup: Setup, laid_out: int = LAID_OUT) -> None:
+    def __init__(self, setup: Setup, setpoints_per_call: int = SETPOINTS_PER_CALL) -> None:
         self.setup = setup
         self.flight = Flight()
         self.settings = setup.settings  # with the present cable
-        self._laid_out = laid_out
-        self._lost = 0  # rotors that are known to be lost: bits
+        self._setpoints_per_call = setpoints_per_call
+        self._lost_rotors = 0  # rotors that are known to be lost: bits
         self._cable_m: float | None = None  # length for which `settings` were made
         self._dirty = True  # the flight has changed since `rows.winch` was written
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
         self._host: Host | None = None
-        self._seat: Seat | None = None
+        self._estimator_slot: EstimatorSlot | None = None
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
         self._law: Any = None  # `law`, once it was needed
-        self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
-        pilot = Pilot(NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
+        self.planned: PlannedSetpoints | None = None  # what `rows.targets` are the setpoints of
+        control = ControlMemory(
+            NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal_on_ground(setup.vehicle), UNCONTROLLED, 0, False
+        )
         self.rows = CoreRows(
             estimator=packed(blank_state()),
-            pilot=packed(pilot),
-            seen=packed(_BLIND),
-            commands=np.zeros((rows_of(setup.actuation), 4)),
+            control=packed(control),
+            summary=packed(_NO_ESTIMATE_YET),
+            commands=np.zeros((queue_rows(setup.actuation), 4)),
             history=new_history(),
             inbox=new_inbox(),
             constants=packed(self._constants()),
             winch=packed(Winch(Cable(setup.vehicle.cable_length), 0.0, False)),
-            stretch=packed(at_rest(0, 0, False)),
+            stretch=packed(uncontrolled_stretch(0, 0, False)),
             targets=_NO_ROWS,
             references=_NO_ROWS,
             rotors=new_rotors(),
-            table=with_lags(allocate(setup.layout), setup.layout, setup.actuation),
+            table=with_lag_columns(mixer_table(setup.layout), setup.layout, setup.actuation),
         )
 
         self.law_rows = self._rows_of_law(setup)
         if setup.estimator is not None:
-            self._seat = Seat(load_estimator(setup.estimator.reference), self.rows, self._relieve)
-            self._seat.make(setup.estimator.values)
-            self._relieve()
+            self._estimator_slot = EstimatorSlot(
+                load_estimator(setup.estimator.reference), self.rows, self._link_estimator
+            )
+            self._estimator_slot.configure(setup.estimator.values)
+            self._link_estimator()
 
     # ---- the present state
 
@@ -157,27 +161,31 @@ class FlightCore:
         return unpack(EstimatorState, self.rows.estimator, 0)
 
     @property
-    def told_rpm(self) -> tuple[float, ...]:
+    def reported_rpm(self) -> tuple[float, ...]:
         """Speeds that the speed controllers reported last, rpm, one of each rotor."""
-        return tuple(self.rows.rotors[TOLD, : len(self.setup.layout)].tolist())
+        return tuple(self.rows.rotors[REPORTED_SPEED, : len(self.setup.layout)].tolist())
 
     @property
-    def pilot(self) -> Pilot:
+    def control(self) -> ControlMemory:
         """Command, rotor forces, and what is observed."""
-        return unpack(Pilot, self.rows.pilot, 0)
+        return unpack(ControlMemory, self.rows.control, 0)
 
     @property
-    def shown_estimator(self) -> Array:
+    def reported_estimator(self) -> Array:
         """`EstimatorState` as telemetry shows it: with the results of a custom estimator, if one is used."""
-        return self.rows.estimator if self._seat is None or self._seat.fault else self._seat.shown
+        return (
+            self.rows.estimator
+            if self._estimator_slot is None or self._estimator_slot.fault
+            else self._estimator_slot.reported
+        )
 
     @property
     def built_in(self) -> tuple[Vec3, Vec3, Vec3] | None:
         """Load (position, velocity) and vehicle (position) as the built-in filter estimates them beside a
         custom estimator; None if no custom estimator is used."""
-        if self._seat is None or self._seat.fault:
+        if self._estimator_slot is None or self._estimator_slot.fault:
             return None
-        state = self._seat.built_in
+        state = self._estimator_slot.built_in
         return state.x_load, state.v_load, state.x_quad
 
     @property
@@ -194,57 +202,57 @@ class FlightCore:
     @property
     def state(self) -> State:
         """State passed to the control laws."""
-        return unpack(Seen, self.rows.seen, 0).state
+        return unpack(EstimateSummary, self.rows.summary, 0).state
 
     @property
-    def reels(self) -> bool:
+    def is_reeling(self) -> bool:
         """Whether the present leg moves the winch."""
         legs = self.flight.legs
         if legs is not self._reeling[0]:
             self._reeling = (legs, bool(legs) and top_of(legs[0]) is not None)
         return self._reeling[1]
 
-    def view(self, now_us: int, pulls: bool = False) -> View:
-        """What the supervisor sees; the cable's pull only during a tick (`pulls`)."""
-        seen = unpack(Seen, self.rows.seen, 0)
-        carried = carries(self.flight)
-        found: tuple[str, ...] = ()
-        lost = ""
-        if seen.vehicle_complaint or (carried and seen.load_complaint):
-            estimator, silent_s = self.estimator, seen.inertial_age
+    def view(self, now_us: int, with_pull: bool = False) -> View:
+        """What the supervisor sees; the cable's pull only during a tick (`with_pull`)."""
+        summary = unpack(EstimateSummary, self.rows.summary, 0)
+        carries_load = needs_load_estimate(self.flight)
+        problems: tuple[str, ...] = ()
+        loss_text = ""
+        if summary.vehicle_problem or (carries_load and summary.load_problem):
+            estimator, silent_s = self.estimator, summary.inertial_age
             oldest_s = self.settings.failsafe.sensor_age_limit_s
-            found = complaints(estimator, oldest_s, carried, silent_s)
-            lost = loss(estimator, silent_s)
-        seat = self._seat
-        if seat is not None and not seat.fault and not seat.host.known:
-            found += (f"no estimate of {seat.host.estimator.told}",)
-        state = seen.state
+            problems = complaints(estimator, oldest_s, carries_load, silent_s)
+            loss_text = loss(estimator, silent_s)
+        slot = self._estimator_slot
+        if slot is not None and not slot.fault and not slot.host.has_estimate:
+            problems += (f"no estimate of {slot.host.estimator.label}",)
+        state = summary.state
         return View(
             now_us,
             state.x_quad,
             state.v_quad,
             state.x_load,
             state.v_load,
-            seen.taut,
-            seen.tilt_rad,
-            found,
-            seen.pull_n if pulls else nan,
-            seen.height_std,
+            summary.taut,
+            summary.tilt_rad,
+            problems,
+            summary.pull_n if with_pull else nan,
+            summary.height_std,
             state.R,
-            lost,
+            loss_text,
             self._host.fault if self._host is not None else "",
-            seen.rotors_lost,
-            seat.fault if seat is not None else "",
+            summary.rotors_lost,
+            slot.fault if slot is not None else "",
             bool(self.rows.estimator[_LOAD_AGE] == inf),
         )
 
     # ---- from tick to tick
 
-    def take_inbox(self, inbox: Array) -> None:
+    def use_inbox(self, inbox: Array) -> None:
         """Use a larger inbox."""
         self.rows = self.rows._replace(inbox=inbox)
-        if self._seat is not None:
-            self._seat.bind(self.rows)
+        if self._estimator_slot is not None:
+            self._estimator_slot.bind(self.rows)
 
     @property
     def law_rows(self) -> Any:
@@ -259,12 +267,12 @@ class FlightCore:
     def law(self) -> Any:
         """The law's rows as a tick takes them, with its machine code."""
         if self._law is None:
-            self._law = law_at(self.rows, self._law_rows)
+            self._law = compiled_law(self.rows, self._law_rows)
         return self._law
 
     def compile(self) -> Callable[..., int]:
         """Prepare the machine code of a tick that is the same with all laws."""
-        self._fly = entry_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
+        self._fly = entry_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
         return self._fly
 
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
@@ -286,53 +294,55 @@ class FlightCore:
         return report
 
     @property
-    def runs(self) -> bool:
+    def can_run_compiled(self) -> bool:
         """Whether machine code can fly the next tick, apart from decisions of the supervisor; it also calls a
         custom law."""
-        return self._seat is None and not self._dirty and not self.reels
+        return self._estimator_slot is None and not self._dirty and not self.is_reeling
 
     def address_of_tick(self) -> int:
         """The address of `fly_tick`, compiled or loaded if necessary; 0 where nothing is compiled."""
         if not hasattr(fly_tick, "overloads"):
             return 0
-        return native_address_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
+        return native_address_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
 
     def raise_interruption(self) -> None:
         """Raise what interrupted law or estimator during the tick without being their fault, such as
         Ctrl-C."""
         if self._host is not None:
             self._host.guard.raise_interruption()
-        if self._seat is not None:
-            self._seat.host.guard.raise_interruption()
+        if self._estimator_slot is not None:
+            self._estimator_slot.host.guard.raise_interruption()
 
     def decide(self, now_us: int, period_us: int) -> Report:
         """The supervisor's part of a tick, after the estimate and before the law."""
-        self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
+        self.flight, report = advance(self.flight, self.view(now_us, with_pull=True), self.settings)
         self._dirty = True
-        self._lay_out(now_us, period_us)
+        self._plan_setpoints(now_us, period_us)
         self._use_rotors()
         return report
 
     def _use_rotors(self) -> None:
         """Use the mixer's table for the rotors that are not lost, if these can fly the vehicle."""
         lost = self.flight.rotors_lost
-        if lost != self._lost:
-            self._lost = lost
+        if lost != self._lost_rotors:
+            self._lost_rotors = lost
             self.rows = self.rows._replace(table=self._table())
             pack(self._constants(), self.rows.constants, 0)
 
     def _table(self) -> Array:
         """The mixer's table, for the remaining rotors if these can fly the vehicle, otherwise for all."""
-        left = self.setup.settings.rotors.can_fly_without(self._lost)
+        can_fly = self.setup.settings.rotors.can_fly_without(self._lost_rotors)
         layout = self.setup.layout
-        return with_lags(allocate(layout, self._lost if left else 0), layout, self.setup.actuation)
+        return with_lag_columns(
+            mixer_table(layout, self._lost_rotors if can_fly else 0), layout, self.setup.actuation
+        )
 
     def _constants(self) -> CoreConstants:
         setup, rotors = self.setup, self.setup.settings.rotors
-        lift, level = sizes(self._table())
+        thrust_per_force, moment_per_force = thrust_and_moment_per_force(self._table())
         return CoreConstants(
             setup.tuning,
-            setup.vehicle._replace(lift=lift, level=level),
+            setup.vehicle._replace(thrust_per_force=thrust_per_force, moment_per_force=moment_per_force),
             setup.limited,
             setup.actuation,
             setup.observer,
@@ -341,42 +351,43 @@ class FlightCore:
             setup.settings.failsafe.sensor_age_limit_s,
             setup.rotor_watch,
             setup.factor_share,
-            rotors.can_fly_without(self._lost) and not rotors.can_hold_heading_without(self._lost),
-            *(self._seat.link if self._seat is not None else (0, 0)),
+            rotors.can_fly_without(self._lost_rotors)
+            and not rotors.can_hold_heading_without(self._lost_rotors),
+            *(self._estimator_slot.link if self._estimator_slot is not None else (0, 0)),
         )
 
     def move_cable(self, now_us: int) -> None:
         """Set the cable to the winch's state at this instant."""
         flight = self.flight
-        if not (self._dirty or self.reels):
+        if not (self._dirty or self.is_reeling):
             return
         before_m = flight.cable.length_m
         flight = self.flight = with_cable_now(flight, now_us)
         winch = flight.cable
         length = self.setup.vehicle.cable_length if winch.length_m is None else winch.length_m
-        grown = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
+        length_change = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
         cable = Cable(length, winch.reel_rate, winch.reel_accel)
-        pack(Winch(cable, grown, winch.released), self.rows.winch, 0)
+        pack(Winch(cable, length_change, winch.released), self.rows.winch, 0)
         # the growth is passed on once
-        self._dirty = grown != 0.0
-        self._follow_cable()
+        self._dirty = length_change != 0.0
+        self._update_cable_length()
 
-    def _follow_cable(self) -> None:
+    def _update_cable_length(self) -> None:
         if self.flight.cable.length_m == self._cable_m:
             return
         self._cable_m = self.flight.cable.length_m
         length, settings = self._cable_m, self.setup.settings
         if length is not None:
-            least_s = least_move_s(length, settings.gravity_m_s2)
-            settings = replace(settings, cable_length_m=length, least_move_s=least_s)
+            min_move_s = least_move_s(length, settings.gravity_m_s2)
+            settings = replace(settings, cable_length_m=length, min_move_s=min_move_s)
         self.settings = settings
 
-    def _lay_out(self, now_us: int, period_us: int) -> None:
+    def _plan_setpoints(self, now_us: int, period_us: int) -> None:
         """Compute the stretch that begins with this tick, and its setpoints."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
-        self.laid = None
-        if stretch.mode == RESTING:
+        self.planned = None
+        if stretch.mode == UNCONTROLLED:
             pack(stretch, self.rows.stretch, 0)
             return
         leg = flight.legs[0]
@@ -388,65 +399,67 @@ class FlightCore:
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
         else:
             legs = (*flight.legs, *flight.following)
-            most = LAID_OUT_BRAKING if isinstance(leg, Brake | Slow) else self._laid_out
-            ticks = max(1, min(most, -(-(stretch.stop_us - now_us) // stretch.period_us)))
+            max_ticks = SETPOINTS_BRAKING if isinstance(leg, Brake | Slow) else self._setpoints_per_call
+            ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
             targets = references = jets_ahead(legs, times)
             if preview_s != 0.0:
                 references = jets_ahead(legs, times + preview_s)
             # the remaining setpoints are those of legs that follow
-            own = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
-            self.laid = LaidOut(flight.legs, flight.leg_start_us, now_us, stretch.period_us, times[:own])
+            leg_rows = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
+            self.planned = PlannedSetpoints(
+                flight.legs, flight.leg_start_us, now_us, stretch.period_us, times[:leg_rows]
+            )
         stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
         pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
         self.rows = self.rows._replace(targets=targets, references=references)
 
     def setpoints_until_us(self, period_us: int) -> int:
         """The time from which `setpoint_row` has no row for ticks of this period; 0: it has none now."""
-        laid, flight = self.laid, self.flight
-        if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
+        planned, flight = self.planned, self.flight
+        if planned is None or flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
             return 0
-        return laid.first_us + period_us * len(laid.times_s) if laid.period_us == period_us else 0
+        return planned.first_us + period_us * len(planned.times_s) if planned.period_us == period_us else 0
 
     def setpoint_row(self, now_us: int) -> int:
         """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: there is
         none."""
-        laid, flight = self.laid, self.flight
-        if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
+        planned, flight = self.planned, self.flight
+        if planned is None or flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
             return -1
-        at, off = divmod(now_us - laid.first_us, laid.period_us)
-        return at if off == 0 and 0 <= at < len(laid.times_s) else -1
+        at, off = divmod(now_us - planned.first_us, planned.period_us)
+        return at if off == 0 and 0 <= at < len(planned.times_s) else -1
 
     # ---- between two ticks
 
-    def ask(self, request: object, now_us: int) -> Verdict:
+    def handle_request(self, request: object, now_us: int) -> Verdict:
         """The supervisor's verdict on a request, which may change the flight."""
         flight, verdict = decide(self.flight, request, self.view(now_us), self.settings)
-        self.change(flight)
+        self.replace_flight(flight)
         return verdict
 
-    def change(self, flight: Flight) -> None:
+    def replace_flight(self, flight: Flight) -> None:
         """Replace the flight; the supervisor runs at the next tick."""
         if flight is not self.flight:
             self.flight = flight
             self._dirty = True
             self.interrupt()
 
-    def take_up(self, found: Found, now_us: int) -> None:
+    def resume_flight(self, restart_state: RestartState, now_us: int) -> None:
         """Continue a flight that is under way."""
-        rotors = steady(found.thrust_n, len(self.rows.commands))
+        rotors = steady_actuation(restart_state.thrust_n, len(self.rows.commands))
         self.rows.commands[:] = rotors.queue
-        pack(self.pilot._replace(thrust=rotors.thrust), self.rows.pilot, 0)
-        self.change(take_up(self.flight, found, self.view(now_us), self.settings))
+        pack(self.control._replace(thrust=rotors.thrust), self.rows.control, 0)
+        self.replace_flight(resume_flight(self.flight, restart_state, self.view(now_us), self.settings))
 
-    def begin_anew(self, why: str, now_us: int) -> tuple[Text, ...]:
+    def restart_estimate(self, why: str, now_us: int) -> tuple[Text, ...]:
         """Discard the estimate, and end a flight, which could not be controlled; the texts about it."""
-        flight, texts = broken_off(self.flight, why, self.view(now_us), self.settings)
-        self.change(flight)
+        flight, texts = abort_flight(self.flight, why, self.view(now_us), self.settings)
+        self.replace_flight(flight)
         pack(blank_state(), self.rows.estimator, 0)
-        if self._seat is not None:
-            self._seat.host.begin()
+        if self._estimator_slot is not None:
+            self._estimator_slot.host.reset()
         for row, blank in zip(self.rows.history, new_history(), strict=True):
             row[:] = blank
         return texts
@@ -460,7 +473,7 @@ class FlightCore:
             self._host.bind(rows, setup.own.values)
         return rows
 
-    def _relieve(self) -> None:
+    def _link_estimator(self) -> None:
         """Let the tick call the custom estimator, as long as it has not failed."""
         pack(self._constants(), self.rows.constants, 0)
         self.interrupt()
@@ -470,15 +483,15 @@ class FlightCore:
         stretch = unpack(Stretch, self.rows.stretch, 0)
         pack(stretch._replace(stop_us=0), self.rows.stretch, 0)
 
-    def follow(self, setup: Setup) -> None:
+    def use_setup(self, setup: Setup) -> None:
         """Use other parameters from the next tick on."""
         before, self.setup = self.setup, setup
         self._cable_m, self.settings = None, setup.settings
         self._dirty = True
-        if self._seat is not None and setup.estimator is not None:
-            self._seat.make(setup.estimator.values)
+        if self._estimator_slot is not None and setup.estimator is not None:
+            self._estimator_slot.configure(setup.estimator.values)
         pack(self._constants(), self.rows.constants, 0)
-        commands = np.zeros((rows_of(setup.actuation), 4))
+        commands = np.zeros((queue_rows(setup.actuation), 4))
         kept = min(len(commands), len(self.rows.commands))
         commands[:kept] = self.rows.commands[:kept]
         # a longer delay requires older commands than are stored: the oldest stored command replaces them
@@ -489,10 +502,10 @@ class FlightCore:
             rows.memory[:] = self.law_rows.memory
         else:
             # another law has no memory yet
-            pilot = self.pilot._replace(control_mode=RESTING)
-            pack(pilot, self.rows.pilot, 0)
+            control = self.control._replace(control_mode=UNCONTROLLED)
+            pack(control, self.rows.control, 0)
         self.law_rows = rows
-        self._follow_cable()
+        self._update_cable_length()
         self.interrupt()
 
 
@@ -505,13 +518,13 @@ def with_cable_now(flight: Flight, now_us: int) -> Flight:
         return replace(flight, cable=replace(flight.cable, reel_rate=0.0, reel_accel=0.0))
     jet = flight.legs[0].jet(leg_time_s(flight, now_us))
     length = top - jet[0][2]
-    grown = 0.0 if flight.cable.length_m is None else length - flight.cable.length_m
+    length_change = 0.0 if flight.cable.length_m is None else length - flight.cable.length_m
     cable = replace(
         flight.cable,
         length_m=length,
         reel_rate=-jet[1][2],
         reel_accel=-jet[2][2],
-        taut_length_m=flight.cable.taut_length_m + grown,
+        taut_length_m=flight.cable.taut_length_m + length_change,
     )
     return replace(flight, cable=cable)
 
@@ -525,4 +538,5 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
 
 _LOAD_AGE = place_of(EstimatorState, "load") + place_of(LoadEstimate, "age_s")
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
-_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)  # before the first reading
+# before the first reading
+_NO_ESTIMATE_YET = EstimateSummary(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)

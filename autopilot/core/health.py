@@ -22,9 +22,9 @@ from autopilot.vehicle.battery import (
     Battery,
     charge_left,
     drawn_current,
+    rotor_power_coefficient,
+    rotor_power_term,
     terminal_voltage,
-    watts_per,
-    work_of,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
@@ -43,7 +43,7 @@ _NEVER = (-1, -1, -1, -1)
 class Condition(NamedTuple):
     """The data carried from tick to tick."""
 
-    heard_us: tuple[int, int, int, int] = _NEVER  # when each of _FIELDS was read last
+    last_received_us: tuple[int, int, int, int] = _NEVER  # when each of _FIELDS was read last
     fix_us: int = -1
     mean: Vec3 = ZERO  # m/s^2, body
     square: Vec3 = ZERO
@@ -58,11 +58,11 @@ def battery_constants(table: AutopilotParameters) -> Battery:
         table["BAT_CAPACITY"] * 3.6,
         table["BAT_CELLS"],
         table["BAT_R"],
-        watts_per(table["BAT_HOVER_W"], table["VEH_QUAD_MASS"] * table["VEH_GRAVITY"], rotors),
+        rotor_power_coefficient(table["BAT_HOVER_W"], table["VEH_QUAD_MASS"] * table["VEH_GRAVITY"], rotors),
     )
 
 
-def remaining(condition: Condition, battery: Battery) -> float:
+def remaining_charge(condition: Condition, battery: Battery) -> float:
     """Share of the charge that is left."""
     return charge_left(condition.used_as, battery)
 
@@ -73,31 +73,31 @@ def voltage(condition: Condition, battery: Battery) -> float:
 
 
 @kernel
-def _last(heard_us: int, now_us: int, fields: int, field: int) -> int:
-    return now_us if fields & field else heard_us
+def _updated_time(last_received_us: int, now_us: int, fields: int, field: int) -> int:
+    return now_us if fields & field else last_received_us
 
 
 @kernel
-def follow(
-    condition: Row, imu: Row, forces: Row, battery: Row, fields: int, fixed: bool, now_us: int, dt: float
+def update_condition(
+    condition: Row, imu: Row, forces: Row, battery: Row, fields: int, has_fix: bool, now_us: int, dt: float
 ) -> None:
     """Advance a `Condition` to the next tick, `dt` seconds later.
 
     `imu` is the `ImuReading` of this tick, `forces` what the rotors give (N), `battery` the `Battery`;
-    `fields` is HIL_SENSOR.fields_updated, `fixed` whether there was a HIL_GPS.
+    `fields` is HIL_SENSOR.fields_updated, `has_fix` whether there was a HIL_GPS.
     """
     before, sample = unpack(Condition, condition, 0), unpack(ImuReading, imu, 0)
-    heard = (
-        _last(before.heard_us[0], now_us, fields, ACCEL),
-        _last(before.heard_us[1], now_us, fields, GYRO),
-        _last(before.heard_us[2], now_us, fields, MAG),
-        _last(before.heard_us[3], now_us, fields, PRESSURE),
+    last_received_us = (
+        _updated_time(before.last_received_us[0], now_us, fields, ACCEL),
+        _updated_time(before.last_received_us[1], now_us, fields, GYRO),
+        _updated_time(before.last_received_us[2], now_us, fields, MAG),
+        _updated_time(before.last_received_us[3], now_us, fields, PRESSURE),
     )
     mean, square = before.mean, before.square
     if is_sane(sample) and dt > 0.0:
         slow, fast = dt / (dt + 0.5 / (pi * _MEAN_HZ)), dt / (dt + 0.5 / (pi * _SQUARE_HZ))
         a = sample.accel
-        if before.heard_us[0] < 0:
+        if before.last_received_us[0] < 0:
             mean = a
         mean = (
             mean[0] + slow * (a[0] - mean[0]),
@@ -110,9 +110,13 @@ def follow(
             square[2] + fast * ((a[2] - mean[2]) ** 2 - square[2]),
         )
     used = before.used_as + before.current * dt
-    work = work_of(forces, forces.shape[0])
+    work = rotor_power_term(forces, forces.shape[0])
     current = drawn_current(work, used, unpack(Battery, battery, 0))
-    pack(Condition(heard, now_us if fixed else before.fix_us, mean, square, used, current), condition, 0)
+    pack(
+        Condition(last_received_us, now_us if has_fix else before.fix_us, mean, square, used, current),
+        condition,
+        0,
+    )
 
 
 def vibration(condition: Condition) -> Vec3:
@@ -121,11 +125,11 @@ def vibration(condition: Condition) -> Vec3:
     return sqrt(x), sqrt(y), sqrt(z)
 
 
-def sensors(condition: Condition, now_us: int) -> tuple[int, int]:
+def present_and_healthy(condition: Condition, now_us: int) -> tuple[int, int]:
     """Sensors present (ever read) and healthy (read recently), as bits of SYS_STATUS."""
     present = healthy = 0
-    heard = (*condition.heard_us, condition.fix_us)
-    for last_us, bit in zip(heard, (*(bit for _, bit in _FIELDS), snapshot.GPS), strict=True):
+    last_received_us = (*condition.last_received_us, condition.fix_us)
+    for last_us, bit in zip(last_received_us, (*(bit for _, bit in _FIELDS), snapshot.GPS), strict=True):
         if last_us >= 0:
             present |= bit
             healthy |= bit if now_us - last_us <= _FRESH_US else 0

@@ -40,7 +40,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, frame_end, holds, taken
+from autopilot.wire.compiled import MAX_PAYLOAD_BYTES, Bytes, frame_end, match_frame, unpack_payload
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import (
     ACCEL,
@@ -49,8 +49,8 @@ from autopilot.wire.convert.simulator import (
     PRESSURE,
     HilGps,
     HilSensor,
-    load_sensor_in,
-    odometry_in,
+    load_sensor_record,
+    odometry_record,
     read_hil_gps,
     read_hil_sensor,
 )
@@ -58,7 +58,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.simulator_frames import ESC_STATUS, HIL_GPS, HIL_SENSOR, LOAD_SENSOR, ODOMETRY
 
 # results of `_read` in place of a number of readings
-_NOT_PLAIN = -1  # it holds more than whole, plain frames of the sensors
+_OTHER_CONTENT = -1  # it holds more than whole, plain frames of the sensors
 _NO_TICK = -2  # no HIL_SENSOR
 
 _SENSORS = (
@@ -90,8 +90,8 @@ class Tick(NamedTuple):
     now_us: int
     readings: int  # how many
     fields_updated: int  # of HIL_SENSOR
-    fixed: bool  # there was a HIL_GPS
-    aside: tuple[Any, ...]  # messages that are not from sensors
+    has_fix: bool  # there was a HIL_GPS
+    other_messages: tuple[Any, ...]  # messages that are not from sensors
 
 
 @kernel
@@ -115,29 +115,29 @@ def _put_vector(inbox: Array, at: int, kind: int, vector: Vec3) -> int:
 
 @kernel
 def _put_pose(inbox: Array, at: int, m: Any) -> int:
-    said = odometry_in(m)
-    velocity, std = said.velocity, said.velocity_std
+    odometry = odometry_record(m)
+    velocity, std = odometry.velocity, odometry.velocity_std
     if isnan(m.velocity_covariance[0]):
         velocity, std = ZERO, NOT_MEASURED
     elif std < 0.0:
         std = 0.0
-    stated = (said.position_std, said.attitude_std, std)
-    reading = PoseReading(0.0, said.position, said.quat_wxyz, velocity, stated[0], stated[1], stated[2])
-    return _put(inbox, at, POSE, said.time_us, reading)
+    stds = (odometry.position_std, odometry.attitude_std, std)
+    reading = PoseReading(0.0, odometry.position, odometry.quat_wxyz, velocity, stds[0], stds[1], stds[2])
+    return _put(inbox, at, POSE, odometry.time_us, reading)
 
 
 @kernel
 def _put_load(inbox: Array, at: int, m: Any) -> int:
-    said = load_sensor_in(m)
+    sensor = load_sensor_record(m)
     if m.fields & mavlink.PLUMBLINE_LOAD_POSITION:
         velocity, std = ZERO, NOT_MEASURED
         if m.fields & mavlink.PLUMBLINE_LOAD_VELOCITY:
-            velocity, std = said.velocity, 0.0 if said.velocity_std < 0.0 else said.velocity_std
-        reading = LoadReading(0.0, said.position, velocity, said.position_std, std)
-        at = _put(inbox, at, LOAD, said.time_us, reading)
+            velocity, std = sensor.velocity, 0.0 if sensor.velocity_std < 0.0 else sensor.velocity_std
+        reading = LoadReading(0.0, sensor.position, velocity, sensor.position_std, std)
+        at = _put(inbox, at, LOAD, sensor.time_us, reading)
     if m.fields & mavlink.PLUMBLINE_LOAD_DIRECTION:
-        sight = DirectionReading(0.0, said.direction_body, said.direction_std)
-        at = _put(inbox, at, DIRECTION, said.time_us, sight)
+        direction = DirectionReading(0.0, sensor.direction_body, sensor.direction_std)
+        at = _put(inbox, at, DIRECTION, sensor.time_us, direction)
     return at
 
 
@@ -170,57 +170,57 @@ def _read(
     absorbed. If the tick is later than `since_us`, the inertial sample is also written into `imu`,
     `SlowSensors` into `slow` and the HIL_GPS into `fix`.
     """
-    place = unpack(Home, home, 0)
+    home_position = unpack(Home, home, 0)
     sensor, gps = _NO_SENSOR, _NO_FIX
-    sensed = fixed = False
+    has_sensor = has_fix = False
     count = start = 0
     while start < len(datagram):
         end = frame_end(datagram, start)
         if end == 0:
-            return (_NOT_PLAIN, 0, 0, False)
-        if holds(HIL_SENSOR, datagram, start, payload):
-            sensor, sensed = read_hil_sensor(taken(HIL_SENSOR, payload)), True
-        elif holds(ODOMETRY, datagram, start, payload):
-            count = _put_pose(inbox, count, taken(ODOMETRY, payload))
-        elif holds(LOAD_SENSOR, datagram, start, payload):
-            count = _put_load(inbox, count, taken(LOAD_SENSOR, payload))
-        elif holds(ESC_STATUS, datagram, start, payload):
-            count = _put_speeds(inbox, count, taken(ESC_STATUS, payload))
-        elif holds(HIL_GPS, datagram, start, payload):
-            gps, fixed = read_hil_gps(taken(HIL_GPS, payload), place), True
+            return (_OTHER_CONTENT, 0, 0, False)
+        if match_frame(HIL_SENSOR, datagram, start, payload):
+            sensor, has_sensor = read_hil_sensor(unpack_payload(HIL_SENSOR, payload)), True
+        elif match_frame(ODOMETRY, datagram, start, payload):
+            count = _put_pose(inbox, count, unpack_payload(ODOMETRY, payload))
+        elif match_frame(LOAD_SENSOR, datagram, start, payload):
+            count = _put_load(inbox, count, unpack_payload(LOAD_SENSOR, payload))
+        elif match_frame(ESC_STATUS, datagram, start, payload):
+            count = _put_speeds(inbox, count, unpack_payload(ESC_STATUS, payload))
+        elif match_frame(HIL_GPS, datagram, start, payload):
+            gps, has_fix = read_hil_gps(unpack_payload(HIL_GPS, payload), home_position), True
         else:
-            return (_NOT_PLAIN, 0, 0, False)
+            return (_OTHER_CONTENT, 0, 0, False)
         start = end
-    if not sensed:
+    if not has_sensor:
         return (_NO_TICK, 0, 0, False)
     now_us = sensor.time_us
     sample = ImuReading(sensor.gyro_body, sensor.accel_body)
     new = sensor.fields & INERTIAL == INERTIAL
     count = _put(inbox, count, IMU, now_us if new else LONG_AGO, sample)
-    if fixed and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
+    if has_fix and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
         count = _put_fix(inbox, count, gps)
     if sensor.fields & PRESSURE:
-        height = sensor.pressure_altitude_m - place.altitude_m
+        height = sensor.pressure_altitude_m - home_position.altitude_m
         count = _put_vector(inbox, count, HEIGHT, (height, 0.0, 0.0))
     if sensor.fields & MAG:
         count = _put_vector(inbox, count, FIELD, sensor.mag_body_gauss)
     if now_us > since_us:
         pack(sample, imu, 0)
-        read = unpack(SlowSensors, slow, 0)
-        field = sensor.mag_body_gauss if sensor.fields & MAG else read.field_gauss
+        last = unpack(SlowSensors, slow, 0)
+        field = sensor.mag_body_gauss if sensor.fields & MAG else last.field_gauss
         if sensor.fields & PRESSURE:
-            air = (sensor.pressure_pa, sensor.pressure_altitude_m, sensor.temperature_degC)
+            baro = (sensor.pressure_pa, sensor.pressure_altitude_m, sensor.temperature_degC)
         else:
-            air = (read.pressure_pa, read.pressure_altitude_m, read.temperature_degC)
-        pack(SlowSensors(field, air[0], air[1], air[2]), slow, 0)
-        if fixed:
+            baro = (last.pressure_pa, last.pressure_altitude_m, last.temperature_degC)
+        pack(SlowSensors(field, baro[0], baro[1], baro[2]), slow, 0)
+        if has_fix:
             pack(gps, fix, 0)
-    return (count, now_us, sensor.fields, fixed)
+    return (count, now_us, sensor.fields, has_fix)
 
 
 def address_of_read(inbox: SensorInbox) -> int:
     """The address of the kernel that reads datagrams for this inbox, compiled or loaded if necessary."""
-    return native_address_of(_read, b"", *inbox.kept(0))
+    return native_address_of(_read, b"", *inbox.arguments(0))
 
 
 class SensorInbox:
@@ -232,13 +232,13 @@ class SensorInbox:
         self.imu = np.full(width(ImuReading), np.nan)  # `ImuReading` of the last tick
         self.slow = packed(SlowSensors())
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
-        self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        self.payload = np.zeros(MAX_PAYLOAD_BYTES, np.uint8)
         self._writer = FrameWriter(1, 1)
         self._entry: Callable[..., tuple[int, int, int, bool]] | None = (
             None  # machine code, once it was needed
         )
 
-    def kept(self, since_us: int) -> Any:
+    def arguments(self, since_us: int) -> Any:
         """The arguments of `_read` besides the datagram."""
         return (self.home, since_us, self.rows, self.imu, self.slow, self.fix, self.payload)
 
@@ -248,18 +248,18 @@ class SensorInbox:
         Its readings are in the first rows of `rows`, which may have grown. The sample and the fix are kept
         only of a tick later than `since_us`.
         """
-        aside: tuple[Any, ...] = ()
-        kept = self.kept(since_us)
+        other_messages: tuple[Any, ...] = ()
+        arguments = self.arguments(since_us)
         if self._entry is None:
-            self._entry = entry_of(_read, datagram, *kept)
-        count, now_us, fields, fixed = self._entry(datagram, *kept)
-        if count == _NOT_PLAIN:
+            self._entry = entry_of(_read, datagram, *arguments)
+        count, now_us, fields, has_fix = self._entry(datagram, *arguments)
+        if count == _OTHER_CONTENT:
             messages = [one.message for one in decode(datagram)[0]]
-            aside = tuple(message for message in messages if message.get_msgId() not in _SENSORS)
+            other_messages = tuple(message for message in messages if message.get_msgId() not in _SENSORS)
             sensors = (message for message in messages if message.get_msgId() in _SENSORS)
             datagram = b"".join(map(self._writer.frame, sensors))
-            count, now_us, fields, fixed = self._entry(datagram, *kept)
+            count, now_us, fields, has_fix = self._entry(datagram, *arguments)
         if count > len(self.rows):
             self.rows = new_inbox(2 * count)
-            self._entry(datagram, *self.kept(since_us))
-        return Tick(now_us, count, fields, fixed, aside) if count >= 0 else None
+            self._entry(datagram, *self.arguments(since_us))
+        return Tick(now_us, count, fields, has_fix, other_messages) if count >= 0 else None

@@ -18,31 +18,47 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from autopilot.control.actuators.disturbance_observer import (
-    Observed,
+    DisturbanceEstimate,
     ObserverConstants,
-    blown,
-    nominal,
+    cable_force,
+    nominal_on_ground,
     observe,
-    pulled,
-    rested,
+    slowed_by_noise,
+    with_wind_on_load,
 )
-from autopilot.control.actuators.mixer import EXPECTED, FORCE, MISSED, TOLD, MixerResult, spread
+from autopilot.control.actuators.lag_equalisation import equalise_lags
+from autopilot.control.actuators.mixer import (
+    EXPECTED_FORCE,
+    FORCE,
+    MISSED_COUNT,
+    REPORTED_SPEED,
+    MixerResult,
+    equal_forces,
+)
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control.actuators.thrust_factor import counted, learned_factor, mix_with
-from autopilot.control.actuators.unlike_rotors import make_alike
-from autopilot.control.drag import Drag, air_force
+from autopilot.control.actuators.thrust_factor import applied_factor, learned_factor, mix_with_factor
+from autopilot.control.drag import Drag, drag_force
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
 from autopilot.control.laws.interface import constants_of, kernels_of, memory_of
-from autopilot.control.records import Cable, Command, Jet, Nose, Reference, State, Vehicle, with_length
+from autopilot.control.records import (
+    Cable,
+    Command,
+    HeadingReference,
+    Jet,
+    Reference,
+    State,
+    Vehicle,
+    with_cable_length,
+)
 from autopilot.control.thesis_cascade import attitude_towards
-from autopilot.core.attachment import cable_moment, off_centre, tell_attachment
+from autopilot.core.attachment import cable_moment, off_centre, shift_to_attachment
 from autopilot.estimation.filter import (
     control_state,
     estimate,
-    inertial_complaint,
-    load_complaint,
-    vehicle_complaint,
+    inertial_problem,
+    load_problem,
+    vehicle_problem,
 )
 from autopilot.estimation.inbox import IMU, KIND, READING, SHOWS, SPEEDS, is_sane
 from autopilot.estimation.records import (
@@ -63,7 +79,7 @@ from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, colum
 from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
-from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide
+from autopilot.supervisor.quiescence import UNCONTROLLED, Stretch, may_need_decision
 from autopilot.vehicle.rotors import STRENGTH
 from autopilot.wire.convert.simulator import force_at
 
@@ -71,9 +87,9 @@ HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 over
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
 NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
 STOPPED = MixerResult(0, 0.0, ZERO)
-# a rotor is lost if LOST_SPEEDS of its reported speeds in a row show that it gives less than LOST_SHARE of
-# the force that has long been commanded, reduced by UNTOLD_SHARE of its greatest force
-LOST_SHARE, UNTOLD_SHARE, LOST_SPEEDS = 0.3, 0.03, 3
+# a rotor is lost if LOST_COUNT of its reported speeds in a row show that it gives less than LOST_SHARE of
+# the force that has long been commanded, reduced by SPEED_TOLERANCE of its greatest force
+LOST_SHARE, SPEED_TOLERANCE, LOST_COUNT = 0.3, 0.03, 3
 
 # results of a tick
 ESTIMATED, FLOWN, TO_DECIDE = 0, 1, 2
@@ -92,43 +108,43 @@ class CoreConstants(NamedTuple):
     sensor_age_s: float  # greatest age of a reading that is good enough for flight
     rotor_watch: float  # period over the time after which a rotor must give the force commanded of it
     factor_share: float  # period over the time constant of the thrust factor
-    nose_free: bool  # yaw is not controlled: the nose may point anywhere
+    yaw_free: bool  # yaw is not controlled: any heading is accepted
     estimator: int  # address of the function that runs a custom estimator; 0: there is none
-    seat: int  # address of its argument (`autopilot.core.estimator_seat`)
+    slot_address: int  # address of its argument (`autopilot.core.estimator_slot`)
 
 
 class Winch(NamedTuple):
     """The cable at this tick."""
 
     cable: Cable
-    grown: float  # m, since the last tick
+    length_change: float  # m, since the last tick
     released: bool  # nothing ties the load to the vehicle
 
 
-class Pilot(NamedTuple):
+class ControlMemory(NamedTuple):
     """What the control half carries from tick to tick, beside the law's memory."""
 
     command: Command
     mixed: MixerResult
-    factor: float  # force that the rotors give over the commanded force
+    thrust_factor: float  # force that the rotors give over the commanded force
     thrust: float  # N, assumed of the rotors
     moment: Vec3  # N m
-    observed: Observed
-    control_mode: int  # for which the law's memory was made; RESTING: there is no memory
+    observed: DisturbanceEstimate
+    control_mode: int  # for which the law's memory was made; UNCONTROLLED: there is no memory
     slack_events: Each
     was_taut: bool
 
 
-class Seen(NamedTuple):
-    """What the supervisor sees of the estimate."""
+class EstimateSummary(NamedTuple):
+    """What the supervisor uses of the estimate."""
 
     state: State
     taut: bool
     tilt_rad: float
     pull_n: float  # of the cable on the vehicle, as measured by the accelerometer
     height_std: float  # m, of heights above home, where a receiver measures them
-    vehicle_complaint: int
-    load_complaint: int
+    vehicle_problem: int
+    load_problem: int
     inertial_age: float  # s, since the last new sample of the inertial unit
     rotors_lost: int  # bit i: rotor i+1 does not follow its commands
 
@@ -137,8 +153,8 @@ class CoreRows(NamedTuple):
     """The memory of the flight software, written in place."""
 
     estimator: Row  # EstimatorState
-    pilot: Row  # Pilot
-    seen: Row  # Seen, of the last tick
+    control: Row  # ControlMemory
+    summary: Row  # EstimateSummary, of the last tick
     commands: Array  # (rows, 4) commands on their way to the rotors, as in `Actuation.queue`
     history: History
     inbox: Array  # readings of this tick, as in `autopilot.estimation.inbox`
@@ -147,11 +163,11 @@ class CoreRows(NamedTuple):
     stretch: Row  # Stretch
     targets: Array  # (ticks, 21) setpoints of load or vehicle, from the stretch's first tick on
     references: Array  # the same for the law: later by its preview
-    rotors: Array  # (7, MOST) forces of the rotors and the data that watch them, rows as in the mixer
+    rotors: Array  # (7, MAX_ROTORS) forces of the rotors and the data that watch them, rows as in the mixer
     table: Array  # (rotors + 1, 10) of the mixer, and what makes the rotors alike
 
 
-class LawAt(NamedTuple):
+class CompiledLaw(NamedTuple):
     """The rows of any law, and the address of the machine code of `control_tick` for it."""
 
     constants: Row
@@ -185,13 +201,15 @@ def _jet(table: Array, at: int) -> Jet:
 
 
 @kernel
-def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
+def measured_pull(control: ControlMemory, state: State, constants: CoreConstants) -> float:
     """Pull of the cable on the vehicle (N): the force on it besides weight, rotors, drag and wind."""
     vehicle, a = constants.vehicle, state.a_quad
-    felt = (a[0], a[1], a[2] + vehicle.gravity)
-    known = axpy(pilot.thrust, column(state.R, 2), air_force(state.v_quad, constants.drag))
-    known = add(known, pilot.observed.push)
-    return pulled(sub(scale(vehicle.quad_mass, felt), known), state.q_cable, column(state.R, 2))
+    specific_force = (a[0], a[1], a[2] + vehicle.gravity)
+    known = axpy(control.thrust, column(state.R, 2), drag_force(state.v_quad, constants.drag))
+    known = add(known, control.observed.push)
+    return cable_force(
+        sub(scale(vehicle.quad_mass, specific_force), known), state.q_cable, column(state.R, 2)
+    )
 
 
 @kernel
@@ -205,34 +223,39 @@ def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
         first = int(rows.inbox[i, READING])
         for j in range(first, min(first + 4, table.shape[0] - 1)):
             full = table[j, STRENGTH] * vehicle.rotor_max
-            given = force_at(rows.inbox[i, READING + 1 + j - first], full)
-            least = LOST_SHARE * rotors[EXPECTED, j] - UNTOLD_SHARE * full
-            rotors[TOLD, j] = rows.inbox[i, READING + 1 + j - first]
-            rotors[MISSED, j] = if_above(least, max(given, 0.0), rotors[MISSED, j] + 1.0, 0.0)
+            reported_force = force_at(rows.inbox[i, READING + 1 + j - first], full)
+            required_force = LOST_SHARE * rotors[EXPECTED_FORCE, j] - SPEED_TOLERANCE * full
+            rotors[REPORTED_SPEED, j] = rows.inbox[i, READING + 1 + j - first]
+            rotors[MISSED_COUNT, j] = if_above(
+                required_force, max(reported_force, 0.0), rotors[MISSED_COUNT, j] + 1.0, 0.0
+            )
     lost = unpack(Stretch, rows.stretch, 0).rotors_lost
     for j in range(table.shape[0] - 1):
-        if rotors[MISSED, j] >= LOST_SPEEDS:
+        if rotors[MISSED_COUNT, j] >= LOST_COUNT:
             lost |= 1 << j
     return lost
 
 
 @kernel
-def expect(rows: CoreRows, share: float) -> None:
+def update_expected_forces(rows: CoreRows, share: float) -> None:
     """Update the least force commanded of each rotor for so long that the rotor must give it."""
     rotors = rows.rotors
     for j in range(rows.table.shape[0] - 1):
-        asked, before = rotors[FORCE, j], rotors[EXPECTED, j]
-        rotors[EXPECTED, j] = if_above(before, asked, asked, before + share * (asked - before))
+        commanded, before = rotors[FORCE, j], rotors[EXPECTED_FORCE, j]
+        rotors[EXPECTED_FORCE, j] = if_above(
+            before, commanded, commanded, before + share * (commanded - before)
+        )
 
 
 @kernel
-def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
-    """Advance the estimate by `dt` seconds and the first `count` readings of the inbox, and update `Seen`."""
+def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
+    """Advance the estimate by `dt` seconds and the first `count` readings of the inbox, and update
+    `EstimateSummary`."""
     constants = unpack(CoreConstants, rows.constants, 0)
-    winch, pilot = unpack(Winch, rows.winch, 0), unpack(Pilot, rows.pilot, 0)
+    winch, control = unpack(Winch, rows.winch, 0), unpack(ControlMemory, rows.control, 0)
     if off_centre(constants.vehicle):
         known = unpack(EstimatorState, rows.estimator, 0)
-        tell_attachment(rows.inbox, count, known, constants.vehicle.attachment)
+        shift_to_attachment(rows.inbox, count, known, constants.vehicle.attachment)
     tied = winch.cable
     if winch.released:
         tied = Cable(float("inf"), winch.cable.rate, winch.cable.accel)
@@ -244,38 +267,38 @@ def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         now_us,
         constants.tuning,
         tied,
-        winch.grown,
+        winch.length_change,
         dt,
-        pilot.thrust,
-        pilot.moment,
+        control.thrust,
+        control.moment,
     )
     pack(estimator, rows.estimator, 0)
     state = control_state(estimator, winch.cable)
-    silent_s = unpack(Seen, rows.seen, 0).inertial_age + dt
+    silent_s = unpack(EstimateSummary, rows.summary, 0).inertial_age + dt
     for i in range(count):
         new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SHOWS] == now_us
         if new and is_sane(unpack(ImuReading, rows.inbox[i], READING)):
             silent_s = 0.0
     lost = rotors_lost(rows, count, constants.vehicle)
-    complaint = inertial_complaint(silent_s)
-    if complaint == 0:
-        complaint = vehicle_complaint(estimator, constants.sensor_age_s)
-    seen = Seen(
+    problem = inertial_problem(silent_s)
+    if problem == 0:
+        problem = vehicle_problem(estimator, constants.sensor_age_s)
+    summary = EstimateSummary(
         state,
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
-        felt_pull(pilot, state, constants),
+        measured_pull(control, state, constants),
         estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
-        complaint,
-        load_complaint(estimator, constants.sensor_age_s),
+        problem,
+        load_problem(estimator, constants.sensor_age_s),
         silent_s,
         lost,
     )
-    pack(seen, rows.seen, 0)
+    pack(summary, rows.summary, 0)
 
 
 @kernel
-def held_height(state: State, anchor_height: float, vehicle: Vehicle) -> float:
+def height_hold_force(state: State, anchor_height: float, vehicle: Vehicle) -> float:
     """Upward force (N) that keeps the load at a height (m) while an attitude is tracked."""
     mass = vehicle.quad_mass + vehicle.load_mass
     return vertical_force(
@@ -288,7 +311,9 @@ def held_height(state: State, anchor_height: float, vehicle: Vehicle) -> float:
 
 
 @kernel
-def reeled(observed: Observed, state: State, accel: float, quad_mass: float) -> Observed:
+def with_reel_force(
+    observed: DisturbanceEstimate, state: State, accel: float, quad_mass: float
+) -> DisturbanceEstimate:
     """The observed push on the vehicle, plus the force to which the winch's acceleration is equivalent.
 
     In the motion of load and cable, L'' has the same effect as a force m_Q L'' q on the vehicle, because
@@ -301,32 +326,32 @@ def reeled(observed: Observed, state: State, accel: float, quad_mass: float) -> 
 
 
 @kernel
-def fly_law(
+def run_law(
     law: Any,
     memory: Any,
     state: State,
     jet: Jet,
     stretch: Stretch,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
     vehicle: Vehicle,
 ) -> Any:
     """Run the law in the mode that the stretch requests; returns its memory and its command."""
     kernels = kernels_of(law)
-    nose = stretch.nose
-    reference = Reference(jet, nose.b1_d, nose.b1_d_dot, nose.b1_d_ddot)
+    heading = stretch.heading
+    reference = Reference(jet, heading.b1_d, heading.b1_d_dot, heading.b1_d_ddot)
     if stretch.mode == LOAD_POSITION:
         return kernels.load_position(law, memory, state, reference, actuation, observed, cable)
     if stretch.mode == QUAD_POSITION:
         return kernels.quad_position(law, memory, state, reference, actuation, observed, cable)
-    lift = held_height(state, stretch.anchor_height, vehicle)
+    lift = height_hold_force(state, stretch.anchor_height, vehicle)
     if stretch.mode == LOAD_ATTITUDE:
         pull = cable_pull(lift, state.q_cable)
         return kernels.load_attitude(
-            law, memory, state, neg(stretch.upward), nose.b1_d, pull, actuation, observed, cable
+            law, memory, state, neg(stretch.upward), heading.b1_d, pull, actuation, observed, cable
         )
-    R_d = attitude_towards(stretch.upward, nose.b1_d, state.R)
+    R_d = attitude_towards(stretch.upward, heading.b1_d, state.R)
     thrust = tilted_thrust(lift, state.R) if isnan(stretch.thrust) else stretch.thrust
     return kernels.quad_attitude(law, memory, state, R_d, thrust, actuation, observed, cable)
 
@@ -335,64 +360,76 @@ def fly_law(
 def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     """Observer, law and mixer for the estimate of this tick."""
     constants = unpack(CoreConstants, rows.constants, 0)
-    pilot, seen = unpack(Pilot, rows.pilot, 0), unpack(Seen, rows.seen, 0)
+    control, summary = unpack(ControlMemory, rows.control, 0), unpack(EstimateSummary, rows.summary, 0)
     stretch, cable = unpack(Stretch, rows.stretch, 0), unpack(Winch, rows.winch, 0).cable
-    state, vehicle = seen.state, constants.vehicle
-    turned = ZERO  # N m, by the cable
-    slack_events = pilot.slack_events
-    if pilot.was_taut and not seen.taut and not stretch.released:
+    state, vehicle = summary.state, constants.vehicle
+    cable_torque = ZERO  # N m, by the cable
+    slack_events = control.slack_events
+    if control.was_taut and not summary.taut and not stretch.released:
         slack_events += 1
     factor = learned_factor(
-        pilot.factor, pilot.thrust, vehicle, rows.table, rows.rotors, constants.factor_share
+        control.thrust_factor, control.thrust, vehicle, rows.table, rows.rotors, constants.factor_share
     )
     estimator = unpack(EstimatorState, rows.estimator, 0)
     observed = observe(
-        pilot.observed,
+        control.observed,
         state,
-        1.0 if seen.taut else 0.0,
-        pilot.thrust,
-        pilot.moment,
-        rested(constants.observer, pilot.observed, accel_shown(estimator.vibration)),
+        1.0 if summary.taut else 0.0,
+        control.thrust,
+        control.moment,
+        slowed_by_noise(constants.observer, control.observed, accel_shown(estimator.vibration)),
         constants.drag,
-        with_length(vehicle, cable.length),
+        with_cable_length(vehicle, cable.length),
     )
     air = estimator.air
-    gust = axpy(air.load_drag, state.v_load, (air.load[0], air.load[1], 0.0))
-    observed = blown(observed, (gust[0], gust[1], 0.0), air.load_drag, constants.observer)
-    actuation = Actuation(rows.commands, pilot.thrust, pilot.moment)
-    if stretch.mode == RESTING:
+    load_accel = axpy(air.load_drag, state.v_load, (air.load[0], air.load[1], 0.0))
+    observed = with_wind_on_load(
+        observed, (load_accel[0], load_accel[1], 0.0), air.load_drag, constants.observer
+    )
+    actuation = Actuation(rows.commands, control.thrust, control.moment)
+    if stretch.mode == UNCONTROLLED:
         command = NO_COMMAND
-        mixed = spread(IDLE_FORCE_N if stretch.idle else 0.0, rows.table, rows.rotors)
-        fresh = nominal(vehicle)
-        fresh = with_field(fresh, "support", observed.support)
-        observed = with_field(fresh, "load_ground", observed.load_ground)
+        mixed = equal_forces(IDLE_FORCE_N if stretch.idle else 0.0, rows.table, rows.rotors)
+        reset = nominal_on_ground(vehicle)
+        reset = with_field(reset, "ground_force", observed.ground_force)
+        observed = with_field(reset, "load_ground_height", observed.load_ground_height)
     else:
-        if constants.nose_free:
-            ahead = column(state.R, 0)
-            level = (ahead[0], ahead[1], 0.0)
-            stretch = with_field(stretch, "nose", Nose(scale(1.0 / norm(level), level), ZERO, ZERO))
+        if constants.yaw_free:
+            forward = column(state.R, 0)
+            level = (forward[0], forward[1], 0.0)
+            stretch = with_field(
+                stretch, "heading", HeadingReference(scale(1.0 / norm(level), level), ZERO, ZERO)
+            )
         law = constants_of(law_rows)
         jet = _jet(rows.references, row_at(stretch, now_us))
-        if stretch.mode == pilot.control_mode:
+        if stretch.mode == control.control_mode:
             memory = memory_of(law_rows)
         else:
             memory = kernels_of(law).start(law, state, jet[0], jet[1])
-        pushed = reeled(observed, state, cable.accel, vehicle.quad_mass)
-        memory, command = fly_law(law, memory, state, jet, stretch, actuation, pushed, cable, vehicle)
+        with_reel = with_reel_force(observed, state, cable.accel, vehicle.quad_mass)
+        memory, command = run_law(law, memory, state, jet, stretch, actuation, with_reel, cable, vehicle)
         pack(memory, law_rows.memory, 0)
         moment = command.moment
-        if off_centre(vehicle) and seen.taut:
-            turned = cable_moment(state, pilot.thrust, observed.load_mass, cable.length, vehicle)
-            moment = sub(moment, turned)
-        mixed = mix_with(
-            counted(factor), command.thrust, moment, vehicle, constants.limited, rows.table, rows.rotors
+        if off_centre(vehicle) and summary.taut:
+            cable_torque = cable_moment(state, control.thrust, observed.load_mass, cable.length, vehicle)
+            moment = sub(moment, cable_torque)
+        mixed = mix_with_factor(
+            applied_factor(factor),
+            command.thrust,
+            moment,
+            vehicle,
+            constants.limited,
+            rows.table,
+            rows.rotors,
         )
-    make_alike(rows.rotors, rows.table, vehicle, constants.limited)
-    expect(rows, constants.rotor_watch)
+    equalise_lags(rows.rotors, rows.table, vehicle, constants.limited)
+    update_expected_forces(rows, constants.rotor_watch)
     # rotors and cable together turn the vehicle
-    moment_done = add(mixed.moment_done, turned) if off_centre(vehicle) else mixed.moment_done
-    actuation = actuate(actuation, mixed.thrust_done, moment_done, constants.actuation)
-    pilot = Pilot(
+    achieved_moment = (
+        add(mixed.achieved_moment, cable_torque) if off_centre(vehicle) else mixed.achieved_moment
+    )
+    actuation = actuate(actuation, mixed.achieved_thrust, achieved_moment, constants.actuation)
+    control = ControlMemory(
         command,
         mixed,
         factor,
@@ -401,33 +438,33 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         observed,
         stretch.mode,
         slack_events,
-        seen.taut,
+        summary.taut,
     )
-    pack(pilot, rows.pilot, 0)
+    pack(control, rows.control, 0)
 
 
-def law_at(rows: CoreRows, law_rows: Any) -> Any:
+def compiled_law(rows: CoreRows, law_rows: Any) -> Any:
     """A law's rows as `fly_tick` takes them: with its machine code, compiled or loaded if necessary. Where
     nothing is compiled, the rows themselves."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
     control = native_address_of(control_tick, rows, law_rows, 0)
-    return LawAt(law_rows.constants, law_rows.memory, control)
+    return CompiledLaw(law_rows.constants, law_rows.memory, control)
 
 
-def any_law(law_rows: Any) -> Any:
+def placeholder_law(law_rows: Any) -> Any:
     """The same for no particular law, to compile `fly_tick` for; it cannot be flown."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
-    return LawAt(law_rows.constants, law_rows.memory, 0)
+    return CompiledLaw(law_rows.constants, law_rows.memory, 0)
 
 
-def control_by(rows: CoreRows, law_rows: Any, now_us: int) -> None:
+def call_control(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     """`control_tick` of the law with these rows."""
     control_tick(rows, law_rows, now_us)
 
 
-@overload(control_by, jit_options=INSIDE)
+@overload(call_control, jit_options=INSIDE)
 def _control_by(rows: Any, law_rows: Any, now_us: Any) -> Any:
     def called(rows: Any, law_rows: Any, now_us: Any) -> None:
         call_kernel_at(law_rows.control, (rows, law_rows.constants, law_rows.memory, now_us))
@@ -435,29 +472,31 @@ def _control_by(rows: Any, law_rows: Any, now_us: Any) -> Any:
     def linked(rows: Any, law_rows: Any, now_us: Any) -> None:
         control_tick(rows, law_rows, now_us)
 
-    return called if getattr(law_rows, "instance_class", None) is LawAt else linked
+    return called if getattr(law_rows, "instance_class", None) is CompiledLaw else linked
 
 
 @kernel
-def _to_decide(rows: CoreRows, now_us: int) -> bool:
-    stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
-    if seen.rotors_lost != stretch.rotors_lost:
+def _must_decide(rows: CoreRows, now_us: int) -> bool:
+    stretch, summary = unpack(Stretch, rows.stretch, 0), unpack(EstimateSummary, rows.summary, 0)
+    if summary.rotors_lost != stretch.rotors_lost:
         return True
     at = row_at(stretch, now_us)
     target = ZERO
-    if stretch.mode != RESTING and 0 <= at < rows_in(rows.targets):
+    if stretch.mode != UNCONTROLLED and 0 <= at < rows_in(rows.targets):
         target = vector_at(rows.targets, at, 0)
-    known = seen.vehicle_complaint == 0 and (not stretch.carried or seen.load_complaint == 0)
-    return may_decide(stretch, now_us, seen.state, known, seen.taut, seen.tilt_rad, seen.pull_n, target)
+    known = summary.vehicle_problem == 0 and (not stretch.load_required or summary.load_problem == 0)
+    return may_need_decision(
+        stretch, now_us, summary.state, known, summary.taut, summary.tilt_rad, summary.pull_n, target
+    )
 
 
 @kernel
-def estimate_instead(constants: CoreConstants, count: int, now_us: int, dt: float) -> None:
-    """Let a custom estimator, if there is one, write its estimate into `Seen`."""
+def run_custom_estimator(constants: CoreConstants, count: int, now_us: int, dt: float) -> None:
+    """Let a custom estimator, if there is one, write its estimate into `EstimateSummary`."""
     if constants.estimator != 0:
-        seat = numbers_at(constants.seat, 3)
-        seat[0], seat[1], seat[2] = count, now_us, dt
-        call_at(constants.estimator, constants.seat)
+        slot = numbers_at(constants.slot_address, 3)
+        slot[0], slot[1], slot[2] = count, now_us, dt
+        call_at(constants.estimator, constants.slot_address)
 
 
 @kernel
@@ -469,12 +508,12 @@ def fly_tick(
     `decided`: run the rest of a tick for which TO_DECIDE was returned.
     """
     if not decided:
-        sense(rows, count, now_us, dt)
+        update_estimate(rows, count, now_us, dt)
         constants = unpack(CoreConstants, rows.constants, 0)
-        estimate_instead(constants, count, now_us, dt)
+        run_custom_estimator(constants, count, now_us, dt)
         if tick % constants.control_every != 0:
             return ESTIMATED
-        if _to_decide(rows, now_us):
+        if _must_decide(rows, now_us):
             return TO_DECIDE
-    control_by(rows, law_rows, now_us)
+    call_control(rows, law_rows, now_us)
     return FLOWN

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
-from autopilot.core.tick import law_at
+from autopilot.core.tick import compiled_law
 from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
@@ -16,34 +16,34 @@ from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
 from autopilot.trajectory.splines import COLUMNS
-from autopilot.trajectory.waypoint_path import Passage
+from autopilot.trajectory.waypoint_path import PathSegment
 from missions.model import Signals, Sine, Term, Waypoint
 
 
-def rehearse_tick(setup: Setup) -> None:
+def warm_up_tick(setup: Setup) -> None:
     """Compile what is the same with all laws."""
     FlightCore(setup).compile()
 
 
-def rehearse_law(setup: Setup) -> None:
+def warm_up_law(setup: Setup) -> None:
     """Compile the law's half of a tick."""
     core = FlightCore(setup)
-    law_at(core.rows, core.law_rows)
+    compiled_law(core.rows, core.law_rows)
 
 
-def rehearse_paths(setup: Setup) -> None:
+def warm_up_paths(setup: Setup) -> None:
     """Lay out each kind of leg for an instant, and prepare a short mission."""
     load = (0.0, 0.0, 1.0)
-    over = (0.0, 0.0, 1.0 + setup.vehicle.cable_length)
+    above_load = (0.0, 0.0, 1.0 + setup.vehicle.cable_length)
     wave = Signals(
         1.0, (Term("x", 0.01, 0.0, 1.0, None, 0.0, (Sine(1.0),)), Term("x", 0.1, 0.0, 1.0, None, 0.0))
     )
     legs: tuple[Leg, ...] = (
         Hold(load),
-        transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
-        Creep(over, ZERO, QUAD_POSITION),
+        transfer_leg(load, above_load, 1.0, 1.0, LOAD_POSITION),
+        Creep(above_load, ZERO, QUAD_POSITION),
         Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
-        Pass(Passage(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),
+        Pass(PathSegment(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),
         begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
@@ -56,10 +56,10 @@ def rehearse_paths(setup: Setup) -> None:
     demand(np.zeros((7, 1, 3)), limits.body)  # of paths through waypoints
 
 
-PARTS = {"tick": rehearse_tick, "law": rehearse_law, "paths": rehearse_paths}
+PARTS = {"tick": warm_up_tick, "law": warm_up_law, "paths": warm_up_paths}
 
 
-def rehearse(setup: Setup) -> None:
+def warm_up(setup: Setup) -> None:
     """Run all parts."""
     for part in PARTS.values():
         part(setup)

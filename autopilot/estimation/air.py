@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from autopilot.control.drag import GUSTY
+from autopilot.control.drag import GUST_RANDOM_WALK
 from autopilot.estimation.covariance import kept
 from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
 from autopilot.geometry.kernel import kernel
@@ -35,7 +35,9 @@ def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: Est
     still, c = tuning.air_walk, tuning.load_drag
     wind2 = air.load[0] * air.load[0] + air.load[1] * air.load[1]
     speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
-    gusts = GUSTY * GUSTY * (wind2 if load.source == TRACKER else wind2 + HIDDEN * HIDDEN)
+    gusts = (
+        GUST_RANDOM_WALK * GUST_RANDOM_WALK * (wind2 if load.source == TRACKER else wind2 + HIDDEN * HIDDEN)
+    )
     return sqrt(still * still + gusts + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
 
 

@@ -34,7 +34,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, dot, norm
 from autopilot.geometry.packed import unpack, width, with_field
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.layout import MAX_ROTORS
 
 NEVER = -inf  # time of the last reading of a sensor that never sent one
 UNTOLD: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not contain
@@ -44,7 +44,7 @@ Forces = tuple[  # of each rotor, N; zeros for rotors that do not exist
     float, float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
 NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-assert len(NO_FORCES) == MOST
+assert len(NO_FORCES) == MAX_ROTORS
 
 
 class InertialSample(NamedTuple):

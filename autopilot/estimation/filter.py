@@ -250,13 +250,13 @@ _COMPLAINTS = {
 
 
 @kernel
-def inertial_complaint(silent_s: float) -> int:
+def inertial_problem(silent_s: float) -> int:
     """What is wrong with the inertial unit, whose last new sample is `silent_s` old; 0 if nothing is."""
     return 0 if silent_s <= INERTIAL_S else NO_INERTIAL
 
 
 @kernel
-def vehicle_complaint(state: EstimatorState, oldest_s: float) -> int:
+def vehicle_problem(state: EstimatorState, oldest_s: float) -> int:
     """What is wrong with the estimate of the vehicle; 0 if nothing is. The comparisons are written so that
     NaN is a complaint."""
     vehicle, doubt = state.vehicle, state.doubt
@@ -279,7 +279,7 @@ def vehicle_complaint(state: EstimatorState, oldest_s: float) -> int:
 
 
 @kernel
-def load_complaint(state: EstimatorState, oldest_s: float) -> int:
+def load_problem(state: EstimatorState, oldest_s: float) -> int:
     """What is wrong with the estimate of the load; 0 if nothing is."""
     load, doubt = state.load, state.doubt
     if load.source == CAMERA:
@@ -306,9 +306,9 @@ def complaints(
 
     Where no load is carried, it need not be known. `silent_s`: age of the last new inertial sample.
     """
-    found = [inertial_complaint(silent_s) or vehicle_complaint(state, oldest_s)]
+    found = [inertial_problem(silent_s) or vehicle_problem(state, oldest_s)]
     if carries:
-        found.append(load_complaint(state, oldest_s))
+        found.append(load_problem(state, oldest_s))
     return tuple(_COMPLAINTS[code].format(state.doubt.horizontal) for code in found if code)
 
 
@@ -316,7 +316,7 @@ def loss(state: EstimatorState, silent_s: float) -> str:
     """Why the estimate is not even good enough for a landing, in words; empty if it is. Written so that NaN
     is a loss."""
     doubt = state.doubt
-    if inertial_complaint(silent_s):
+    if inertial_problem(silent_s):
         return _COMPLAINTS[NO_INERTIAL]
     if state.vehicle.source == NOBODY or not doubt.tilt <= TILT_STD_TO_LAND:
         return _COMPLAINTS[ATTITUDE_VAGUE]

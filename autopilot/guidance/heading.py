@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import atan2, copysign, cos, exp, hypot, inf, nan, pi, remainder, sin, sqrt
 
-from autopilot.control.records import Nose
+from autopilot.control.records import HeadingReference
 from autopilot.geometry.linear import E1, ZERO, Mat3, Vec3
 
 K_P = 2.0  # 1/s, requested rate per radian of distance from the aim
@@ -28,7 +28,7 @@ LONGEST_STEP_S = 0.1  # longest time that passes in one step, whatever the clock
 ARRIVED = 1e-5  # rad, rad/s and rad/s^2
 NEAREST_M = 0.5  # distance from a place below which the nose is no longer turned to it
 
-EAST_NOSE = Nose(E1, ZERO, ZERO)
+EAST_NOSE = HeadingReference(E1, ZERO, ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,16 +85,16 @@ class Heading:
         still = self.rate == 0.0 and self.accel == 0.0
         return still and isinstance(aim, Towards) and aim.along == 0.0 and aim.angle == self.angle
 
-    def nose(self, ahead_s: float) -> Nose:
+    def nose(self, ahead_s: float) -> HeadingReference:
         """b_1d with two derivatives, `ahead_s` seconds after this instant."""
         rate, accel = self.rate + ahead_s * self.accel, self.accel
         angle = self.angle + ahead_s * (self.rate + 0.5 * ahead_s * accel)
         c, s = cos(angle), sin(angle)
         if rate == 0.0 and accel == 0.0:
-            return Nose((c, s, 0.0), ZERO, ZERO)
+            return HeadingReference((c, s, 0.0), ZERO, ZERO)
         square = rate * rate
         bend = (-accel * s - square * c, accel * c - square * s, 0.0)
-        return Nose((c, s, 0.0), (-rate * s, rate * c, 0.0), bend)
+        return HeadingReference((c, s, 0.0), (-rate * s, rate * c, 0.0), bend)
 
     def asked(self, aim: Aim, now_us: int) -> Heading:
         """The same heading with another aim."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
-from autopilot.trajectory.shaping import Shaped, evaluate_asked, evaluate_shaped
+from autopilot.trajectory.shaping import ShapedSignals, evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.transfer import transfer
@@ -48,7 +48,7 @@ def _runs(
 ) -> None:
     for k in range(times.shape[0]):
         if asked:
-            _put(out[k], evaluate_asked(table, duration, times[k] - lead))
+            _put(out[k], evaluate_requested(table, duration, times[k] - lead))
         else:
             _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
 
@@ -56,7 +56,7 @@ def _runs(
 class _Evaluated(NamedTuple):
     """Signals of a path at some times, relative to their own origin."""
 
-    path: Shaped
+    path: ShapedSignals
     times_s: Floats
     asked: bool
     found: Floats
@@ -65,7 +65,7 @@ class _Evaluated(NamedTuple):
 _evaluated: deque[_Evaluated] = deque(maxlen=_KEPT)  # the last ones
 
 
-def _signals(path: Shaped, times_s: Floats, asked: bool) -> Floats:
+def _signals(path: ShapedSignals, times_s: Floats, asked: bool) -> Floats:
     """(n, 21) the signals of a path at n times. A sweep needs the flown and the requested ones: where both
     are the same, they are evaluated once."""
     asked = asked or not len(path.pieces)

@@ -11,10 +11,10 @@ from math import comb, inf, pi, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import Follow, Posture
-from autopilot.trajectory.shaping import Shaped
-from autopilot.trajectory.swing import swing
+from autopilot.trajectory.shaping import ShapedSignals
+from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
-from autopilot.trajectory.waypoint_path import Passage, evaluate_path
+from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from autopilot.wire.dialect import plumbline as mavlink
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
@@ -282,7 +282,7 @@ class Run:
     """The signals of a mission as they are flown, from where the load hung when they began."""
 
     anchor: Vec3
-    path: Shaped
+    path: ShapedSignals
     control_mode: int = LOAD_POSITION
 
     @property
@@ -296,7 +296,7 @@ class Run:
 
     def asked(self, t: float) -> Jet:
         """The same for the requested path."""
-        return _moved(self.anchor, self.path.asked(t - self.path.lead_s))
+        return _moved(self.anchor, self.path.requested(t - self.path.lead_s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,7 +307,7 @@ class Pass:
     `fade_s`.
     """
 
-    path: Passage
+    path: PathSegment
     offset: Vec3
     fade_s: float
     control_mode: int = LOAD_POSITION
@@ -349,7 +349,7 @@ class Swing:
 
     def upward(self, t: float) -> Vec3:
         """Unit vector, ENU: the requested thrust axis, or the direction from load to vehicle."""
-        return swing(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
+        return swing_direction(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,22 +21,22 @@ class GroundWatch:
     """Whether the ground station was heard recently, and what the vehicle is to do if it was not."""
 
     def __init__(self) -> None:
-        self._patience_us = NEVER_US
+        self._timeout_us = NEVER_US
         self._action = 0
         self.lost = False  # the ground station is lost, and the vehicle has reacted
 
-    def follow(self, table: ParameterTable) -> None:
+    def update_parameters(self, table: ParameterTable) -> None:
         """Take over changed parameters."""
         self._action = int(table["NAV_DLL_ACT"])
-        self._patience_us = round(table["COM_DL_LOSS_T"] * 1e6) if self._action else NEVER_US
+        self._timeout_us = round(table["COM_DL_LOSS_T"] * 1e6) if self._action else NEVER_US
 
-    def changed(self, now_us: int, heard_us: int) -> bool:
+    def has_changed(self, now_us: int, heartbeat_us: int) -> bool:
         """Whether the ground station has become silent, or is heard again."""
-        return (now_us - heard_us > self._patience_us) != self.lost
+        return (now_us - heartbeat_us > self._timeout_us) != self.lost
 
-    def changes_us(self, heard_us: int) -> int:
+    def lost_at_us(self, heartbeat_us: int) -> int:
         """When it counts as silent if nothing is heard meanwhile; never if it is already lost."""
-        return NEVER_US if self.lost else heard_us + self._patience_us + 1
+        return NEVER_US if self.lost else heartbeat_us + self._timeout_us + 1
 
     def request(self, phase: Phase) -> tuple[Any, str] | None:
         """The request to the vehicle, and the word for it; None in a phase that needs no reaction."""

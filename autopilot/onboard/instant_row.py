@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.core.tick import Pilot, Seen
+from autopilot.core.tick import ControlMemory, EstimateSummary
 from autopilot.estimation.filter import NO_LOAD, NO_SIGHT
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
@@ -22,7 +22,7 @@ from autopilot.services.instant import Instant
 from autopilot.wire.dialect import plumbline as mavlink
 
 NO_LEG = -1  # in place of a leg's control mode
-_ESTIMATING = (
+_ESTIMATOR_FLAGS = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
     | mavlink.ESTIMATOR_VELOCITY_VERT
@@ -35,41 +35,41 @@ _ESTIMATING = (
 
 
 @cache
-def _fields(record: Any) -> dict[str, tuple[int, Any]]:
+def _field_offsets(record: Any) -> dict[str, tuple[int, Any]]:
     """Where in a packed record the numbers of each field begin, and the type of the field."""
     hints = get_type_hints(record)
     widths = [width(hints[name]) for name in record._fields]
-    begins = accumulate(widths[:-1], initial=0)
-    return {name: (first, hints[name]) for name, first in zip(record._fields, begins, strict=True)}
+    offsets = accumulate(widths[:-1], initial=0)
+    return {name: (offset, hints[name]) for name, offset in zip(record._fields, offsets, strict=True)}
 
 
-def _place(record: Any, path: str) -> int:
+def _offset(record: Any, path: str) -> int:
     """Where in a packed record the numbers of a field begin, a.b for the field b of the field a."""
-    first, kind = 0, record
+    total, kind = 0, record
     for name in path.split("."):
-        before, kind = _fields(kind)[name]
-        first += before
-    return first
+        offset, kind = _field_offsets(kind)[name]
+        total += offset
+    return total
 
 
-def _copies(record: Any, paths: dict[str, str]) -> NDArray[np.int64]:
+def _copy_table(record: Any, paths: dict[str, str]) -> NDArray[np.int64]:
     """(n, 2): the place in an `Instant`, and the place in a record from which each number is copied."""
     hints = get_type_hints(Instant)
     return np.array(
         [
-            (_place(Instant, name) + i, _place(record, path) + i)
+            (_offset(Instant, name) + i, _offset(record, path) + i)
             for name, path in paths.items()
             for i in range(width(hints[name]))
         ]
     )
 
 
-_OF_SEEN = _copies(
-    Seen,
+_FROM_SUMMARY = _copy_table(
+    EstimateSummary,
     {name: f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")}
     | {"omega_body": "state.omega_body", "taut": "taut"},
 )
-_OF_ESTIMATOR = _copies(
+_FROM_ESTIMATOR = _copy_table(
     EstimatorState,
     {
         "quat_wxyz": "vehicle.quat_wxyz",
@@ -79,8 +79,8 @@ _OF_ESTIMATOR = _copies(
         "tension": "load.tension",
     },
 )
-_OF_PILOT = _copies(
-    Pilot,
+_FROM_CONTROL = _copy_table(
+    ControlMemory,
     {
         name: f"command.{name}"
         for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "thrust", "moment")
@@ -92,38 +92,44 @@ _OF_PILOT = _copies(
         "saturated": "mixed.saturated",
     },
 )
-_VEHICLE_COMPLAINT, _LOAD_COMPLAINT = _place(Seen, "vehicle_complaint"), _place(Seen, "load_complaint")
-_R_C = _place(Pilot, "command.R_c")
-_NOW_US, _PHASE, _SEQ = (_place(Instant, name) for name in ("now_us", "phase", "seq"))
-_FLAGS, _DISTANCE = _place(Instant, "estimator_flags"), _place(Instant, "distance")
-_ELAPSED, _DURATION = _place(Instant, "elapsed_s"), _place(Instant, "duration_s")
-_X_LOAD, _X_QUAD, _X_QUAD_D = (_place(Instant, name) for name in ("x_load", "x_quad", "x_quad_d"))
-_X_LOAD_D, _V_LOAD_D, _A_LOAD_D = (_place(Instant, name) for name in ("x_load_d", "v_load_d", "a_load_d"))
-_X_ASKED, _V_ASKED = _place(Instant, "x_load_asked"), _place(Instant, "v_load_asked")
-_QUAT_C, _E_X, _E_V = (_place(Instant, name) for name in ("quat_c_wxyz", "e_x", "e_v"))
-_TENSION, _TAUT = _place(Instant, "tension"), _place(Instant, "taut")
+_VEHICLE_PROBLEM, _LOAD_PROBLEM = (
+    _offset(EstimateSummary, "vehicle_problem"),
+    _offset(EstimateSummary, "load_problem"),
+)
+_R_C = _offset(ControlMemory, "command.R_c")
+_NOW_US, _PHASE, _SEQ = (_offset(Instant, name) for name in ("now_us", "phase", "seq"))
+_FLAGS, _DISTANCE = _offset(Instant, "estimator_flags"), _offset(Instant, "distance")
+_ELAPSED, _DURATION = _offset(Instant, "elapsed_s"), _offset(Instant, "duration_s")
+_X_LOAD, _X_QUAD, _X_QUAD_D = (_offset(Instant, name) for name in ("x_load", "x_quad", "x_quad_d"))
+_X_LOAD_D, _V_LOAD_D, _A_LOAD_D = (_offset(Instant, name) for name in ("x_load_d", "v_load_d", "a_load_d"))
+_X_LOAD_REQUESTED, _V_LOAD_REQUESTED = (
+    _offset(Instant, "x_load_requested"),
+    _offset(Instant, "v_load_requested"),
+)
+_QUAT_C, _E_X, _E_V = (_offset(Instant, name) for name in ("quat_c_wxyz", "e_x", "e_v"))
+_TENSION, _TAUT = _offset(Instant, "tension"), _offset(Instant, "taut")
 _DISARMED, _ARMED = mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED
-_LEAST, _MOST = _place(Instant, "rotor_min"), _place(Instant, "rotor_max")
-_FORCES, _ROTORS = _place(Instant, "forces"), _place(Instant, "rotors")
+_ROTOR_MIN, _ROTOR_MAX = _offset(Instant, "rotor_min"), _offset(Instant, "rotor_max")
+_FORCES, _ROTORS = _offset(Instant, "forces"), _offset(Instant, "rotors")
 
 
 @kernel
 def put_instant(
-    seen: Row,
+    summary: Row,
     estimator: Row,
-    pilot: Row,
+    control: Row,
     forces: Row,
     targets: Array,
-    asked: Array,
-    at: int,
+    requested: Array,
+    row: int,
     control_mode: int,
     elapsed_s: float,
     duration_s: float,
     now_us: int,
     phase: int,
     seq: int,
-    carrying: bool,
-    carries: bool,
+    load_tracked: bool,
+    needs_load_estimate: bool,
     rotor_min: float,
     rotor_max: float,
     rotors: int,
@@ -131,45 +137,48 @@ def put_instant(
 ) -> None:
     """Write an `Instant` into its row.
 
-    `seen`, `estimator` and `pilot` are those of `CoreRows`, `forces` (14) those of the rotors. The present
-    leg has this control mode (NO_LEG: there is no leg); `targets[at]` is its setpoint, as `layout.jets`
-    returns it, and `asked[at]` the requested path. `carrying`: in a phase in which the load is tracked;
-    `carries`: the load must be known.
+    `summary`, `estimator` and `control` are those of `CoreRows`, `forces` (14) those of the rotors. The
+    present leg has this control mode (NO_LEG: there is no leg); `targets[row]` is its setpoint, as
+    `layout.jets` returns it, and `requested[row]` the requested path. `load_tracked`: in a phase in which the
+    load is tracked; `needs_load_estimate`: the load must be known.
     """
-    for i in range(_OF_SEEN.shape[0]):
-        instant[_OF_SEEN[i, 0]] = seen[_OF_SEEN[i, 1]]
-    for i in range(_OF_ESTIMATOR.shape[0]):
-        instant[_OF_ESTIMATOR[i, 0]] = estimator[_OF_ESTIMATOR[i, 1]]
-    for i in range(_OF_PILOT.shape[0]):
-        instant[_OF_PILOT[i, 0]] = pilot[_OF_PILOT[i, 1]]
+    for i in range(_FROM_SUMMARY.shape[0]):
+        instant[_FROM_SUMMARY[i, 0]] = summary[_FROM_SUMMARY[i, 1]]
+    for i in range(_FROM_ESTIMATOR.shape[0]):
+        instant[_FROM_ESTIMATOR[i, 0]] = estimator[_FROM_ESTIMATOR[i, 1]]
+    for i in range(_FROM_CONTROL.shape[0]):
+        instant[_FROM_CONTROL[i, 0]] = control[_FROM_CONTROL[i, 1]]
     instant[_NOW_US], instant[_PHASE], instant[_SEQ] = now_us, phase, seq
     instant[_ELAPSED], instant[_DURATION] = elapsed_s, duration_s
-    instant[_LEAST], instant[_MOST], instant[_ROTORS] = rotor_min, rotor_max, rotors
+    instant[_ROTOR_MIN], instant[_ROTOR_MAX], instant[_ROTORS] = rotor_min, rotor_max, rotors
     for i in range(forces.shape[0]):
         instant[_FORCES + i] = forces[i]
-    vague = seen[_VEHICLE_COMPLAINT] != 0.0 or (carries and seen[_LOAD_COMPLAINT] != 0.0)
-    instant[_FLAGS] = 0 if vague else _ESTIMATING
-    unseen = seen[_LOAD_COMPLAINT] == NO_LOAD or seen[_LOAD_COMPLAINT] == NO_SIGHT
-    if unseen and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
+    is_uncertain = summary[_VEHICLE_PROBLEM] != 0.0 or (needs_load_estimate and summary[_LOAD_PROBLEM] != 0.0)
+    instant[_FLAGS] = 0 if is_uncertain else _ESTIMATOR_FLAGS
+    load_undetected = summary[_LOAD_PROBLEM] == NO_LOAD or summary[_LOAD_PROBLEM] == NO_SIGHT
+    if load_undetected and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
         # in the air the accelerometer detects the pull; on the ground only sight shows that it has ended
         instant[_TENSION], instant[_TAUT] = nan, 0.0
     x_load = (instant[_X_LOAD], instant[_X_LOAD + 1], instant[_X_LOAD + 2])
     x_quad = (instant[_X_QUAD], instant[_X_QUAD + 1], instant[_X_QUAD + 2])
     instant[_DISTANCE] = norm(sub(x_load, x_quad))
     for j in range(3):
-        instant[_X_LOAD_D + j] = instant[_X_ASKED + j] = x_load[j]
-        instant[_V_LOAD_D + j] = instant[_A_LOAD_D + j] = instant[_V_ASKED + j] = 0.0
+        instant[_X_LOAD_D + j] = instant[_X_LOAD_REQUESTED + j] = x_load[j]
+        instant[_V_LOAD_D + j] = instant[_A_LOAD_D + j] = instant[_V_LOAD_REQUESTED + j] = 0.0
         instant[_X_QUAD_D + j] = nan
         if control_mode == LOAD_POSITION:
-            instant[_X_LOAD_D + j] = targets[at, j]
-            instant[_V_LOAD_D + j] = targets[at, 3 + j]
-            instant[_A_LOAD_D + j] = targets[at, 6 + j]
-            instant[_X_ASKED + j], instant[_V_ASKED + j] = asked[at, j], asked[at, 3 + j]
+            instant[_X_LOAD_D + j] = targets[row, j]
+            instant[_V_LOAD_D + j] = targets[row, 3 + j]
+            instant[_A_LOAD_D + j] = targets[row, 6 + j]
+            instant[_X_LOAD_REQUESTED + j], instant[_V_LOAD_REQUESTED + j] = (
+                requested[row, j],
+                requested[row, 3 + j],
+            )
         elif control_mode == QUAD_POSITION:
-            instant[_X_QUAD_D + j] = targets[at, j]
-        if not carrying:
+            instant[_X_QUAD_D + j] = targets[row, j]
+        if not load_tracked:
             instant[_E_X + j] = instant[_E_V + j] = 0.0
-    r = pilot[_R_C : _R_C + 9]
+    r = control[_R_C : _R_C + 9]
     q = quat_from_rotation(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])))
     for i in range(4):
         instant[_QUAT_C + i] = q[i]

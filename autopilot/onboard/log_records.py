@@ -20,19 +20,19 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, packed, width
 from autopilot.onboard.log_topics import FAST, Column, Derived, Sample
 from autopilot.services.instant import Instant
-from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.compiled import Bytes
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
 
-_STOP, _FULL = 1000.0, 2000.0  # actuator_outputs, us
+_PULSE_MIN_US, _PULSE_MAX_US = 1000.0, 2000.0  # actuator_outputs, us
 _FLOAT32_MAX = 3.4028234663852886e38
-_SENSED = next(i for i, (topic, _) in enumerate(FAST) if topic.name == "sensor_combined")
+_SENSOR_COMBINED = next(i for i, (topic, _) in enumerate(FAST) if topic.name == "sensor_combined")
 _FLOAT, _DOUBLE = -4, -8  # kinds of numbers; integers: their bytes
 
 
 @cache
-def _places(record: Any) -> dict[str, range]:
+def _field_ranges(record: Any) -> dict[str, range]:
     """The numbers of a packed record that belong to each field."""
     hints, places, begin = get_type_hints(record), {}, 0
     for name in record._fields:
@@ -41,21 +41,24 @@ def _places(record: Any) -> dict[str, range]:
     return places
 
 
-def _place(record: Any, name: str) -> int:
-    return _places(record)[name].start
+def _offset(record: Any, name: str) -> int:
+    return _field_ranges(record)[name].start
 
 
 # the row from which numbers are copied: an `Instant`, a `Derived`, the time
-_DERIVED = width(Instant)
-_TIME = _DERIVED + width(Derived)
-_FORCES, _MOST = _place(Instant, "forces"), _place(Instant, "rotor_max")
-_ROTORS = _place(Instant, "rotors")
-_QUAT, _QUAT_C = _place(Instant, "quat_wxyz"), _place(Instant, "quat_c_wxyz")
-_FLAGS = _place(Instant, "estimator_flags")
-_HOME, _IMU = _DERIVED + _place(Derived, "latitude_deg"), _DERIVED + _place(Derived, "gyro")
-_VALID = _DERIVED + _place(Derived, "valid")
-_QUAT_NED, _QUAT_C_NED = _DERIVED + _place(Derived, "quat_ned"), _DERIVED + _place(Derived, "quat_c_ned")
-_SHARES, _PULSES = _DERIVED + _place(Derived, "shares"), _DERIVED + _place(Derived, "pulses")
+_DERIVED_OFFSET = width(Instant)
+_TIME_OFFSET = _DERIVED_OFFSET + width(Derived)
+_FORCES, _ROTOR_MAX = _offset(Instant, "forces"), _offset(Instant, "rotor_max")
+_ROTORS = _offset(Instant, "rotors")
+_QUAT, _QUAT_C = _offset(Instant, "quat_wxyz"), _offset(Instant, "quat_c_wxyz")
+_FLAGS = _offset(Instant, "estimator_flags")
+_HOME, _IMU = _DERIVED_OFFSET + _offset(Derived, "latitude_deg"), _DERIVED_OFFSET + _offset(Derived, "gyro")
+_VALID = _DERIVED_OFFSET + _offset(Derived, "valid")
+_QUAT_NED, _QUAT_C_NED = (
+    _DERIVED_OFFSET + _offset(Derived, "quat_ned"),
+    _DERIVED_OFFSET + _offset(Derived, "quat_c_ned"),
+)
+_SHARES, _PULSES = _DERIVED_OFFSET + _offset(Derived, "shares"), _DERIVED_OFFSET + _offset(Derived, "pulses")
 
 
 @kernel
@@ -66,43 +69,43 @@ def put_sample(
     now_us: int,
     row: Row,
     copies: NDArray[np.int64],
-    wide: Bytes,
+    word: Bytes,
     records: Bytes,
 ) -> None:
     """Write the numbers of an instant into its records. `imu` and `home`: packed `ImuReading` and `Home`.
 
     `copies` has a line for each number: its place in `row`, its sign (1 or -1), its kind, its first byte.
-    `row` and `wide`, eight bytes, are scratch. A float beyond the range of float32 becomes its largest
+    `row` and `word`, eight bytes, are scratch. A float beyond the range of float32 becomes its largest
     number.
     """
-    for i in range(_DERIVED):
+    for i in range(_DERIVED_OFFSET):
         row[i] = instant[i]
     for i in range(3):
         row[_HOME + i] = home[i]
     for i in range(6):
         row[_IMU + i] = imu[i]
     row[_VALID] = 1.0 if instant[_FLAGS] != 0.0 else 0.0
-    row[_TIME] = now_us
+    row[_TIME_OFFSET] = now_us
     q = instant[_QUAT : _QUAT + 4]
     c = instant[_QUAT_C : _QUAT_C + 4]
     q_ned = quat_ned_frd_from_enu_flu((q[0], q[1], q[2], q[3]))
     c_ned = quat_ned_frd_from_enu_flu((c[0], c[1], c[2], c[3]))
-    most = instant[_MOST]
-    if not (isfinite(most) and most > 0.0):
-        most = 1.0
+    rotor_max = instant[_ROTOR_MAX]
+    if not (isfinite(rotor_max) and rotor_max > 0.0):
+        rotor_max = 1.0
     for i in range(4):
         row[_QUAT_NED + i], row[_QUAT_C_NED + i] = q_ned[i], c_ned[i]
-    for i in range(MOST):
-        share = instant[_FORCES + i] / most
+    for i in range(MAX_ROTORS):
+        share = instant[_FORCES + i] / rotor_max
         if share < 0.0:
             share = 0.0
         elif share > 1.0:
             share = 1.0
-        pulse = _STOP + (_FULL - _STOP) * share
+        pulse = _PULSE_MIN_US + (_PULSE_MAX_US - _PULSE_MIN_US) * share
         if i >= instant[_ROTORS]:
             share, pulse = nan, 0.0
         row[_SHARES + i], row[_PULSES + i] = share, pulse
-    doubles, floats, integers = wide.view(np.float64), wide.view(np.float32), wide.view(np.int64)
+    doubles, floats, integers = word.view(np.float64), word.view(np.float32), word.view(np.int64)
     for k in range(copies.shape[0]):
         number = row[copies[k, 0]]
         if copies[k, 1] < 0:
@@ -119,18 +122,18 @@ def put_sample(
         else:
             integers[0] = int(number)
         for i in range(size):
-            records[copies[k, 3] + i] = wide[i]
+            records[copies[k, 3] + i] = word[i]
 
 
-def _sources(column: Column) -> list[tuple[int, int]]:
+def _column_sources(column: Column) -> list[tuple[int, int]]:
     """(place in the row, sign) of each number of a column."""
-    record, first = (Instant, 0) if column.name in Instant._fields else (Derived, _DERIVED)
-    place = _places(record)[column.name]
+    record, first = (Instant, 0) if column.name in Instant._fields else (Derived, _DERIVED_OFFSET)
+    place = _field_ranges(record)[column.name]
     first += place.start
     places = range(1, 1 + len(place))
     # applying the axes to three different numbers shows the place and the sign of each
-    turned = column.axes(tuple(map(float, places))) if column.axes else places
-    return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in turned] * column.times
+    mapped = column.axes(tuple(map(float, places))) if column.axes else places
+    return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in mapped] * column.times
 
 
 class SampleRecords:
@@ -140,43 +143,43 @@ class SampleRecords:
         copies: list[tuple[int, int, int, int]] = []
         records: list[bytes] = []
         self.home = packed(home)
-        at = 0
+        offset = 0
         for number, (topic, columns) in enumerate(FAST):
             constants: list[float] = []
             kinds = topic.numbers
-            copies.append((_TIME, 1, 8, at + RECORD_HEAD))
+            copies.append((_TIME_OFFSET, 1, 8, offset + RECORD_HEAD))
             for column in columns:
                 if not isinstance(column, Column):
                     constants += column
                     continue
-                for place, sign in _sources(column):
+                for source, sign in _column_sources(column):
                     size, is_float, first = kinds[len(constants)]
                     kind = -size if is_float else size
-                    copies.append((place, sign, kind, at + RECORD_HEAD + first))
+                    copies.append((source, sign, kind, offset + RECORD_HEAD + first))
                     constants.append(0)
             records.append(writer.record(number, 0, *constants))
-            if number == _SENSED:
-                self.sensed = (at, at + len(records[-1]))
-            at += len(records[-1])
+            if number == _SENSOR_COMBINED:
+                self.imu_range = (offset, offset + len(records[-1]))
+            offset += len(records[-1])
         self.copies = np.array(copies)
         self.records = np.frombuffer(b"".join(records), np.uint8).copy()
-        self.row = np.zeros(_TIME + 1)
-        self.wide = np.zeros(8, np.uint8)
+        self.row = np.zeros(_TIME_OFFSET + 1)
+        self.word = np.zeros(8, np.uint8)
         self._put: Callable[..., None] | None = None  # machine code, after the first call
 
     def address(self, instant: Row, imu: Row) -> int:
         """The address of `put_sample`, compiled or loaded if necessary."""
-        arguments = (instant, imu, self.home, 0, self.row, self.copies, self.wide, self.records)
+        arguments = (instant, imu, self.home, 0, self.row, self.copies, self.word, self.records)
         return native_address_of(put_sample, *arguments)
 
-    def of(self, sample: Sample, now_us: int) -> bytes:
+    def records_at(self, sample: Sample, now_us: int) -> bytes:
         """The records of an instant, one after the other; that of the inertial sample only if it is sane."""
         arguments = (sample.instant, sample.imu, self.home, now_us, self.row, self.copies)
         if self._put is None:
-            self._put = entry_of(put_sample, *arguments, self.wide, self.records)
-        self._put(*arguments, self.wide, self.records)
+            self._put = entry_of(put_sample, *arguments, self.word, self.records)
+        self._put(*arguments, self.word, self.records)
         data = self.records.tobytes()
         if sample.imu_is_sane:
             return data
-        begin, end = self.sensed
+        begin, end = self.imu_range
         return data[:begin] + data[end:]

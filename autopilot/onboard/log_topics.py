@@ -17,7 +17,7 @@ from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
 from autopilot.services import identity
 from autopilot.services.snapshot import Snapshot
-from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.simulator import Forces
 from autopilot.wire.dialect import plumbline as mavlink
@@ -72,7 +72,7 @@ class Column(NamedTuple):
     times: int = 1
 
 
-def _of(*names: str) -> tuple[Column, ...]:
+def _columns(*names: str) -> tuple[Column, ...]:
     return tuple(Column(name) for name in names)
 
 
@@ -101,25 +101,25 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
             ),
         ),
         (
-            *_of("latitude_deg", "longitude_deg"),
+            *_columns("latitude_deg", "longitude_deg"),
             *_ned("x_quad", "v_quad", "accel_quad"),
-            *_of("altitude_m", "horizontal_std", "vertical_std"),
+            *_columns("altitude_m", "horizontal_std", "vertical_std"),
             Column("valid", times=len(_VALID)),
         ),
     ),
-    (Topic("vehicle_attitude", ("float[4] q",)), _of("quat_ned")),
+    (Topic("vehicle_attitude", ("float[4] q",)), _columns("quat_ned")),
     (Topic("vehicle_angular_velocity", (_vector("xyz"),)), _frd("omega_body")),
     (Topic("sensor_combined", (_vector("gyro_rad"), _vector("accelerometer_m_s2"))), _frd("gyro", "accel")),
     (
         Topic("actuator_outputs", ("uint32_t noutputs", f"float[{OUTPUTS}] output")),
-        (*_of("rotors", "pulses"), (0.0,) * (OUTPUTS - MOST)),
+        (*_columns("rotors", "pulses"), (0.0,) * (OUTPUTS - MAX_ROTORS)),
     ),
-    (Topic("actuator_motors", (f"float[{MOST}] control",)), _of("shares")),
+    (Topic("actuator_motors", (f"float[{MAX_ROTORS}] control",)), _columns("shares")),
     (
         Topic("vehicle_local_position_setpoint", (*_AXES, _vector("acceleration"))),
         (*_ned("x_quad_d"), ned_from_enu(ZERO), ned_from_enu(ZERO)),
     ),
-    (Topic("vehicle_attitude_setpoint", ("float[4] q_d",)), _of("quat_c_ned")),
+    (Topic("vehicle_attitude_setpoint", ("float[4] q_d",)), _columns("quat_c_ned")),
     (
         Topic(
             "load_state",
@@ -130,7 +130,7 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
         ),
         (
             *_ned("x_load", "v_load", "q_cable", "q_cable_dot"),
-            *_of("distance", "tension", "slack_events", "taut"),
+            *_columns("distance", "tension", "slack_events", "taut"),
         ),
     ),
     (
@@ -144,8 +144,8 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
             ),
         ),
         (
-            *_ned("x_load_d", "v_load_d", "a_load_d", "x_load_asked", "v_load_asked", "q_cable_c"),
-            *_of("elapsed_s", "duration_s", "seq", "phase", "control_mode"),
+            *_ned("x_load_d", "v_load_d", "a_load_d", "x_load_requested", "v_load_requested", "q_cable_c"),
+            *_columns("elapsed_s", "duration_s", "seq", "phase", "control_mode"),
         ),
     ),
     (
@@ -159,7 +159,7 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
         (
             *_ned("e_x", "e_v", "e_q", "e_q_dot"),
             *_frd("e_R", "e_Omega"),
-            *_of("psi_R", "psi_q", "thrust"),
+            *_columns("psi_R", "psi_q", "thrust"),
             *_frd("moment"),
         ),
     ),
@@ -167,14 +167,14 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
         Topic(
             "rotor_forces",
             (
-                f"float[{MOST}] force",
+                f"float[{MAX_ROTORS}] force",
                 "float force_min",
                 "float force_max",
                 "uint16_t saturated",
                 "uint8_t rotors",
             ),
         ),
-        _of("forces", "rotor_min", "rotor_max", "saturated", "rotors"),
+        _columns("forces", "rotor_min", "rotor_max", "saturated", "rotors"),
     ),
 )
 

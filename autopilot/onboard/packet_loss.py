@@ -16,7 +16,7 @@ def _uniform(key: int) -> float:
     return (z ^ (z >> 31)) / 2**64
 
 
-class Loss:
+class PacketLoss:
     """Decides for each datagram whether it is lost. TIMESYNC, which keeps the ground in step with the clock,
     is never lost, nor are messages that set or report the loss itself, so that any loss can be undone."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-MOST_MISSED = 0.01  # share of the commands in one second
+MAX_MISSED_SHARE = 0.01  # share of the commands in one second
 
 
 class Punctuality:
@@ -13,13 +13,13 @@ class Punctuality:
     def __init__(self) -> None:
         self._last: tuple[int, int, int] | None = None  # time, tick, missed commands
 
-    def hear(self, status: Any, tick: int) -> tuple[str, ...]:
+    def arming_problems(self, status: Any, tick: int) -> tuple[str, ...]:
         """Why the vehicle must not be armed, from SIM_STATUS received at this tick; empty: no reason."""
         last, self._last = self._last, (status.time_usec, tick, status.missed)
         if last is None or status.time_usec <= last[0]:
             return ()
         ticks, missed = max(tick - last[1], 1), status.missed - last[2]
-        if missed <= MOST_MISSED * ticks:
+        if missed <= MAX_MISSED_SHARE * ticks:
             return ()
         return (
             f"machine too slow: {missed} of {ticks} commands came too late in the last second; "

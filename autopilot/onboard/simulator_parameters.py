@@ -16,36 +16,36 @@ from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_fr
 
 SIMULATOR_COMPONENT = 26
 RETRY_US = 500_000
-LIST_ASKS = 6  # requests, after which a silent simulator is assumed to have no parameters
-_ANYTHING = 1e9
+MAX_LIST_REQUESTS = 6  # requests, after which a silent simulator is assumed to have no parameters
+_MAX_VALUE = 1e9
 
 
-class WorldParameters:
+class SimulatorParameters:
     """The copy of the simulator's parameters in our table."""
 
     def __init__(self, table: ParameterTable) -> None:
         self._table = table
-        self._heard: set[str] = set()
+        self._received: set[str] = set()
         self._complete = False  # the simulator has reported all its parameters
-        self._asks = 0
-        self._ask_us = 0
+        self._list_requests = 0
+        self._next_list_request_us = 0
         self._restored: Mapping[str, float] = {}
-        self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is next sent
+        self._pending: dict[str, tuple[float, int]] = {}  # value, and when it is next sent
 
-    def ask(self, name: str, value: float) -> None:
+    def request(self, name: str, value: float) -> None:
         """Set a parameter in the simulator."""
-        self._wanted[name] = (value, 0)
+        self._pending[name] = (value, 0)
 
     @property
-    def asked(self) -> dict[str, float]:
+    def unanswered(self) -> dict[str, float]:
         """The values to be set in the simulator that it has not answered yet."""
-        return {name: value for name, (value, _) in self._wanted.items()}
+        return {name: value for name, (value, _) in self._pending.items()}
 
-    def forget_asked(self) -> None:
+    def drop_unanswered(self) -> None:
         """Drop requested values that are not answered, since the client will have given up. Values to be
         restored are kept."""
-        wanted = self._wanted.items()
-        self._wanted = {name: due for name, due in wanted if self._restored.get(name) == due[0]}
+        pending = self._pending.items()
+        self._pending = {name: due for name, due in pending if self._restored.get(name) == due[0]}
 
     def restore(self, values: Mapping[str, float]) -> None:
         """Set these values in the simulator as soon as it has reported that it has these parameters."""
@@ -58,42 +58,48 @@ class WorldParameters:
             return None
         name: str = message.param_id
         value = decimal_from_float32(message.param_value)
-        self._heard.add(name)
-        self._complete = len(self._heard) >= message.param_count
-        asked = self._wanted.pop(name, None) is not None
-        if name in self._table.learned:
+        self._received.add(name)
+        self._complete = len(self._received) >= message.param_count
+        was_requested = self._pending.pop(name, None) is not None
+        if name in self._table.remote_names:
             new = self._table[name] != value
             if new:
                 self._table.set(name, value)
-            return name if new or asked else None
-        if name in self._table or not name.startswith("SIM_") or not abs(value) <= _ANYTHING:
+            return name if new or was_requested else None
+        if name in self._table or not name.startswith("SIM_") or not abs(value) <= _MAX_VALUE:
             return None
         text = "Of the simulator, which knows its range"
-        self._table.learn(Parameter(name, value, -_ANYTHING, _ANYTHING, "", text))
+        self._table.add_remote(Parameter(name, value, -_MAX_VALUE, _MAX_VALUE, "", text))
         saved = self._restored.get(name, value)
         if saved != value:
-            self._wanted[name] = (saved, 0)
+            self._pending[name] = (saved, 0)
         return None
 
     @property
-    def speaks(self) -> bool:
+    def has_messages(self) -> bool:
         """Whether there is, or may soon be, anything to send to the simulator."""
-        return bool(self._wanted) or not (self._complete or self._asks >= LIST_ASKS)
+        return bool(self._pending) or not (self._complete or self._list_requests >= MAX_LIST_REQUESTS)
 
-    def settled(self, now_us: int) -> bool:
+    def is_settled(self, now_us: int) -> bool:
         """Whether all parameters are known, or the simulator has had enough time to report them."""
-        return self._complete or (self._asks == LIST_ASKS and now_us >= self._ask_us)
+        return self._complete or (
+            self._list_requests == MAX_LIST_REQUESTS and now_us >= self._next_list_request_us
+        )
 
     def messages(self, now_us: int) -> list[Any]:
         """Messages to the simulator besides the answer to this tick."""
         messages: list[Any] = []
-        if not self._complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
-            self._asks += 1
-            self._ask_us = now_us + RETRY_US
+        if (
+            not self._complete
+            and self._list_requests < MAX_LIST_REQUESTS
+            and now_us >= self._next_list_request_us
+        ):
+            self._list_requests += 1
+            self._next_list_request_us = now_us + RETRY_US
             messages.append(mavlink.MAVLink_param_request_list_message(1, SIMULATOR_COMPONENT))
-        for name, (value, send_us) in self._wanted.items():
+        for name, (value, send_us) in self._pending.items():
             if now_us >= send_us:
-                self._wanted[name] = (value, now_us + RETRY_US)
+                self._pending[name] = (value, now_us + RETRY_US)
                 messages.append(
                     mavlink.MAVLink_param_set_message(
                         1, SIMULATOR_COMPONENT, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from autopilot.core.health import follow
+from autopilot.core.health import update_condition
 from autopilot.estimation.inbox import is_sane
 from autopilot.estimation.records import ImuReading
 from autopilot.geometry.entry import native_address_of
@@ -21,7 +21,7 @@ def answer_tick(
     forces: Row,
     battery: Row,
     fields: int,
-    fixed: bool,
+    has_fix: bool,
     now_us: int,
     dt: float,
     buffer: Bytes,
@@ -34,9 +34,10 @@ def answer_tick(
     released: bool,
     reel_rate: float,
 ) -> tuple[int, bool]:
-    """Update the `Condition` to this tick (`follow`) and write HIL_ACTUATOR_CONTROLS to the beginning of a
-    buffer (`put_answer`). Returns its number of bytes, and whether the inertial sample is sane."""
-    follow(condition, imu, forces, battery, fields, fixed, now_us, dt)
+    """Update the `Condition` to this tick (`update_condition`) and write HIL_ACTUATOR_CONTROLS to the
+    beginning of a buffer (`put_answer`). Returns its number of bytes, and whether the inertial sample is
+    sane."""
+    update_condition(condition, imu, forces, battery, fields, has_fix, now_us, dt)
     end = put_answer(
         buffer,
         payload,
@@ -56,5 +57,5 @@ def answer_tick(
 def address_of_answer() -> int:
     """The address of `answer_tick`, compiled or loaded if necessary."""
     row, scratch = np.zeros(1), np.zeros(1, np.uint8)
-    rows, room, said = (row, row, row, row), (scratch, scratch), (False, False, False, 0.0)
-    return native_address_of(answer_tick, *rows, 0, False, 0, 0.0, *room, 0, 0, 0, *said)
+    rows, buffers, flags = (row, row, row, row), (scratch, scratch), (False, False, False, 0.0)
+    return native_address_of(answer_tick, *rows, 0, False, 0, 0.0, *buffers, 0, 0, 0, *flags)

@@ -1,7 +1,7 @@
 """A tick of the flight software in machine code; the caller receives the sensors and sends the answer.
 
 `fly_next` flies it and writes the streams that are due, as long as no decision is needed and no answer of the
-ground has to be waited for (`goes_on`): see `autopilot.onboard.running`.
+ground has to be waited for (`can_continue`): see `autopilot.onboard.tick_batch`.
 """
 
 from __future__ import annotations
@@ -10,108 +10,108 @@ from autopilot.core.sensor_inbox import Tick
 from autopilot.core.tick import TO_DECIDE
 from autopilot.geometry.addresses import ask_kernel_at, bytes_at, call_kernel_at
 from autopilot.geometry.kernel import kernel
-from autopilot.onboard.running import (
+from autopilot.onboard.tick_batch import (
+    ANY_FIX,
     ARMED,
-    ASIDE_COMPONENT,
-    ASIDE_SEQUENCE,
-    ASKED,
-    ASKED_UNTIL_US,
-    ASKED_US,
-    CARRIES,
-    CARRYING,
     COMPONENT,
+    CONTROL_MODE,
     DIALECT_COMPONENT,
     DIALECT_SEQUENCE,
     DURATION_S,
-    EVER_FIXED,
     FIELDS,
-    FIRST_US,
-    FIXED,
+    HAS_FIX,
+    HAS_SETPOINTS,
+    IMU_BEGIN,
+    IMU_END,
+    IMU_SANE,
+    LAST_REQUEST_US,
+    LEG_START_US,
     LENGTH,
+    LOAD_TRACKED,
     LOCKSTEP,
     LOG_PERIOD_US,
     LOG_US,
-    LOGGED,
-    MODE,
+    LOGGED_BYTES,
+    NEEDS_LOAD_ESTIMATE,
+    NEXT_REQUEST_US,
+    NO_WAIT_UNTIL_US,
     NOW_US,
-    OWN_COMPONENT,
-    OWN_SEQUENCE,
-    OWN_SYSTEM,
     PERIOD_US,
     PHASE,
-    QUESTION_US,
-    RAN,
     READINGS,
     RELEASED,
+    REQUEST_COMPONENT,
+    REQUEST_SEQUENCE,
     ROTOR_MAX,
     ROTOR_MIN,
     ROTORS,
-    SAID,
-    SENSED,
-    SENSED_BEGIN,
-    SENSED_END,
     SEQ,
     SEQUENCE,
-    SINCE_US,
+    SETPOINTS_START_US,
+    STREAM_COMPONENT,
+    STREAM_SEQUENCE,
+    STREAM_SYSTEM,
     SYSTEM,
     TICK,
+    TICKS_RUN,
     TIMESYNC,
-    TRACKS,
+    UNSENT_BYTES,
     UNTIL_US,
+    WAITING_WINDOWS,
     WINDOW_US,
-    Running,
-    ask_answer,
-    ask_reading,
-    ask_streams,
+    TickBatch,
+    call_answer_tick,
+    call_put_streams,
+    call_read_sensors,
 )
-from autopilot.services.stream_frames import STREAMS_ROOM
-from autopilot.wire.compiled import FRAME_ROOM, Origin, put_frame
+from autopilot.services.stream_frames import MAX_STREAMS_BYTES
+from autopilot.wire.compiled import MAX_FRAME_BYTES, Origin, put_frame
 from autopilot.wire.periods import next_multiple
 
 # result of a tick: it was FLOWN, or flown and a window ENDED with it. Or Python must fly it: the datagram
 # that was HEARD is not the plain next tick, or the estimate is made and the supervisor must DECIDE
-FLOWN, ENDED, HEARD, DECIDE = range(4)
+FLOWN, WINDOW_ENDED, OTHER_DATAGRAM, NEEDS_DECISION = range(4)
 
 
 @kernel
-def fly_next(run: Running, address: int, size: int) -> int:
-    """Fly the tick whose sensors are the `size` bytes at `address`; the answer is put into `run.frame`."""
-    numbers, kept, code = run.numbers, run.readings, run.code
+def fly_next(batch: TickBatch, address: int, size: int) -> int:
+    """Fly the tick whose sensors are the `size` bytes at `address`; the answer is put into `batch.frame`."""
+    numbers, sensors, code = batch.numbers, batch.readings, batch.code
     before_us, period_us = numbers[NOW_US], numbers[PERIOD_US]
     dt, decided = period_us * 1e-6, False
-    count, now_us, fields, fixed = ask_reading(
+    count, now_us, fields, has_fix = call_read_sensors(
         code.read,
         (
             bytes_at(address, size),
-            kept.home,
+            sensors.home,
             before_us,
-            run.rows.inbox,
-            kept.imu,
-            kept.slow,
-            kept.fix,
-            kept.payload,
+            batch.rows.inbox,
+            sensors.imu,
+            sensors.slow,
+            sensors.fix,
+            sensors.payload,
         ),
     )
-    if count < 0 or count > run.rows.inbox.shape[0] or now_us != before_us + period_us:
-        return HEARD
+    if count < 0 or count > batch.rows.inbox.shape[0] or now_us != before_us + period_us:
+        return OTHER_DATAGRAM
     tick = numbers[TICK] + 1
-    what = ask_kernel_at(code.fly_tick, (run.rows, run.law, count, now_us, tick, dt, decided))
-    if what == TO_DECIDE:
-        numbers[READINGS], numbers[FIELDS], numbers[FIXED] = count, fields, fixed
-        return DECIDE
-    length, sane = ask_answer(
+    outcome = ask_kernel_at(code.fly_tick, (batch.rows, batch.law, count, now_us, tick, dt, decided))
+    if outcome == TO_DECIDE:
+        numbers[READINGS], numbers[FIELDS], numbers[HAS_FIX] = count, fields, has_fix
+        return NEEDS_DECISION
+    length, sane = call_answer_tick(
         code.answer_tick,
         (
-            run.health,
-            kept.imu,
-            run.forces,
-            run.battery,
+            batch.health,
+            sensors.imu,
+            batch.forces,
+            batch.battery,
             fields,
-            fixed,
+            has_fix,
             now_us,
             dt,
-            run.frame,
-            run.payload,
+            batch.frame,
+            batch.payload,
             numbers[SEQUENCE],
             numbers[SYSTEM],
             numbers[COMPONENT],
@@ -122,102 +122,105 @@ def fly_next(run: Running, address: int, size: int) -> int:
         ),
     )
     numbers[SEQUENCE] = (numbers[SEQUENCE] + 1) & 0xFF
-    numbers[LENGTH], numbers[SENSED] = length, sane
+    numbers[LENGTH], numbers[IMU_SANE] = length, sane
     numbers[NOW_US], numbers[TICK] = now_us, tick
-    numbers[EVER_FIXED] |= fixed
-    numbers[RAN] += 1
-    return ENDED if _tell(run, now_us, sane) else FLOWN
+    numbers[ANY_FIX] |= has_fix
+    numbers[TICKS_RUN] += 1
+    return WINDOW_ENDED if _put_outputs(batch, now_us, sane) else FLOWN
 
 
-def begun(run: Running) -> Tick:
+def tick_to_decide(batch: TickBatch) -> Tick:
     """The tick for which the supervisor must decide."""
-    numbers = run.numbers
+    numbers = batch.numbers
     now_us, readings = int(numbers[NOW_US] + numbers[PERIOD_US]), int(numbers[READINGS])
-    return Tick(now_us, readings, int(numbers[FIELDS]), bool(numbers[FIXED]), ())
+    return Tick(now_us, readings, int(numbers[FIELDS]), bool(numbers[HAS_FIX]), ())
 
 
 @kernel
-def goes_on(run: Running) -> bool:
+def can_continue(batch: TickBatch) -> bool:
     """Whether the next tick requires nothing else, and there is room for its output."""
-    numbers = run.numbers
+    numbers = batch.numbers
     next_us = numbers[NOW_US] + numbers[PERIOD_US]
-    asks = next_us >= numbers[QUESTION_US]
-    if next_us >= numbers[UNTIL_US] or (asks and next_us >= numbers[ASKED_UNTIL_US]):
+    timesync_due = next_us >= numbers[NEXT_REQUEST_US]
+    if next_us >= numbers[UNTIL_US] or (timesync_due and next_us >= numbers[NO_WAIT_UNTIL_US]):
         return False
-    said, logged = numbers[SAID] + STREAMS_ROOM + FRAME_ROOM, numbers[LOGGED] + len(run.log.records)
-    return bool(said <= len(run.streams.said) and logged <= len(run.log.logged))
+    message_bytes, log_bytes = (
+        numbers[UNSENT_BYTES] + MAX_STREAMS_BYTES + MAX_FRAME_BYTES,
+        numbers[LOGGED_BYTES] + len(batch.log.records),
+    )
+    return bool(message_bytes <= len(batch.streams.unsent) and log_bytes <= len(batch.log.logged))
 
 
 @kernel
-def _tell(run: Running, now_us: int, sane: bool) -> bool:
+def _put_outputs(batch: TickBatch, now_us: int, sane: bool) -> bool:
     """Write the streams and the records of the flight log that are due at this tick, after those of the
-    previous ticks; at the end of a window, write the question to the ground station. Returns whether a window
-    ends. `sane`: whether the inertial sample is sane."""
-    numbers, streams = run.numbers, run.streams
+    previous ticks; at the end of a window, write the timesync request to the ground station. Returns whether
+    a window ends. `sane`: whether the inertial sample is sane."""
+    numbers, streams = batch.numbers, batch.streams
     bits = 0
     for k in range(streams.due.shape[0]):
         interval_us = streams.due[k, 0]
         if now_us // interval_us != (now_us - numbers[PERIOD_US]) // interval_us:
             bits |= streams.due[k, 1]
-    logs = now_us >= numbers[LOG_US]
-    if bits != 0 or logs:
-        _put_instant(run, now_us)
+    log_due = now_us >= numbers[LOG_US]
+    if bits != 0 or log_due:
+        _put_instant(batch, now_us)
     if bits != 0:
-        _put_streams(run, bits)
-    ends = now_us >= numbers[QUESTION_US]
-    if ends:
-        numbers[QUESTION_US] = next_multiple(now_us, numbers[WINDOW_US])
-        origin = Origin(numbers[ASIDE_SEQUENCE], numbers[OWN_SYSTEM], numbers[ASIDE_COMPONENT])
+        _put_streams(batch, bits)
+    window_ended = now_us >= numbers[NEXT_REQUEST_US]
+    if window_ended:
+        numbers[NEXT_REQUEST_US] = next_multiple(now_us, numbers[WINDOW_US])
+        origin = Origin(numbers[REQUEST_SEQUENCE], numbers[STREAM_SYSTEM], numbers[REQUEST_COMPONENT])
         values = (0, now_us * 1000)
-        end = put_frame(TIMESYNC, values, streams.payload, streams.said, numbers[SAID], origin)
-        run.windows[numbers[ASKED]] = numbers[SAID] = end
-        numbers[ASKED] += 1
-        numbers[ASKED_US] = now_us
-        numbers[ASIDE_SEQUENCE] = (numbers[ASIDE_SEQUENCE] + 1) & 0xFF
-    if logs:
-        _put_records(run, now_us, sane)
-    return bool(ends)
+        end = put_frame(TIMESYNC, values, streams.payload, streams.unsent, numbers[UNSENT_BYTES], origin)
+        batch.window_ends[numbers[WAITING_WINDOWS]] = numbers[UNSENT_BYTES] = end
+        numbers[WAITING_WINDOWS] += 1
+        numbers[LAST_REQUEST_US] = now_us
+        numbers[REQUEST_SEQUENCE] = (numbers[REQUEST_SEQUENCE] + 1) & 0xFF
+    if log_due:
+        _put_records(batch, now_us, sane)
+    return bool(window_ended)
 
 
 @kernel
-def _put_records(run: Running, now_us: int, sane: bool) -> None:
+def _put_records(batch: TickBatch, now_us: int, sane: bool) -> None:
     """Write the records of an instant that has been assembled."""
-    numbers, log = run.numbers, run.log
+    numbers, log = batch.numbers, batch.log
     numbers[LOG_US] = next_multiple(now_us, numbers[LOG_PERIOD_US])
-    rows = (run.streams.instant, run.readings.imu, log.home, now_us, log.row)
-    call_kernel_at(run.code.put_sample, (rows, log.copies, log.wide, log.records))
-    at = numbers[LOGGED]
+    rows = (batch.streams.instant, batch.readings.imu, log.home, now_us, log.row)
+    call_kernel_at(batch.code.put_sample, (rows, log.copies, log.word, log.records))
+    offset = numbers[LOGGED_BYTES]
     for i in range(len(log.records)):
-        if sane or not numbers[SENSED_BEGIN] <= i < numbers[SENSED_END]:
-            log.logged[at] = log.records[i]
-            at += 1
-    numbers[LOGGED] = at
+        if sane or not numbers[IMU_BEGIN] <= i < numbers[IMU_END]:
+            log.logged[offset] = log.records[i]
+            offset += 1
+    numbers[LOGGED_BYTES] = offset
 
 
 @kernel
-def _put_instant(run: Running, now_us: int) -> None:
+def _put_instant(batch: TickBatch, now_us: int) -> None:
     """Assemble the instant of this tick."""
-    numbers, streams = run.numbers, run.streams
-    at = 0
-    if numbers[TRACKS]:
-        at = (now_us - numbers[FIRST_US]) // numbers[PERIOD_US]
+    numbers, streams = batch.numbers, batch.streams
+    row = 0
+    if numbers[HAS_SETPOINTS]:
+        row = (now_us - numbers[SETPOINTS_START_US]) // numbers[PERIOD_US]
     call_kernel_at(
-        run.code.put_instant,
+        batch.code.put_instant,
         (
-            run.flown,
-            run.targets,
-            run.asked,
-            at,
-            numbers[MODE],
-            (now_us - numbers[SINCE_US]) * 1e-6,
-            run.limits[DURATION_S],
+            batch.state_rows,
+            batch.targets,
+            batch.requested,
+            row,
+            numbers[CONTROL_MODE],
+            (now_us - numbers[LEG_START_US]) * 1e-6,
+            batch.limits[DURATION_S],
             now_us,
             numbers[PHASE],
             numbers[SEQ],
-            numbers[CARRYING] != 0,
-            numbers[CARRIES] != 0,
-            run.limits[ROTOR_MIN],
-            run.limits[ROTOR_MAX],
+            numbers[LOAD_TRACKED] != 0,
+            numbers[NEEDS_LOAD_ESTIMATE] != 0,
+            batch.limits[ROTOR_MIN],
+            batch.limits[ROTOR_MAX],
             numbers[ROTORS],
             streams.instant,
         ),
@@ -225,23 +228,23 @@ def _put_instant(run: Running, now_us: int) -> None:
 
 
 @kernel
-def _put_streams(run: Running, bits: int) -> None:
+def _put_streams(batch: TickBatch, bits: int) -> None:
     """Write a set of streams of an instant that has been assembled."""
-    numbers, streams = run.numbers, run.streams
-    begin = numbers[SAID]
-    length, numbers[OWN_SEQUENCE], numbers[DIALECT_SEQUENCE] = ask_streams(
-        run.code.put_streams,
+    numbers, streams = batch.numbers, batch.streams
+    begin = numbers[UNSENT_BYTES]
+    length, numbers[STREAM_SEQUENCE], numbers[DIALECT_SEQUENCE] = call_put_streams(
+        batch.code.put_streams,
         (
             bits,
             streams.instant,
             streams.home,
-            numbers[OWN_SYSTEM],
-            numbers[OWN_COMPONENT],
-            numbers[OWN_SEQUENCE],
+            numbers[STREAM_SYSTEM],
+            numbers[STREAM_COMPONENT],
+            numbers[STREAM_SEQUENCE],
             numbers[DIALECT_COMPONENT],
             numbers[DIALECT_SEQUENCE],
             streams.payload,
-            streams.said[begin:],
+            streams.unsent[begin:],
         ),
     )
-    numbers[SAID] = begin + length
+    numbers[UNSENT_BYTES] = begin + length

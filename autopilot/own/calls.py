@@ -1,7 +1,7 @@
 """The present call of user code, for a shell that watches how long it takes.
 
-No clock is read here: in real time, where a slow law flies late, the shell gives its clock to `CALL`; or it
-watches `CALL` from a separate thread.
+No clock is read here: in real time, where a slow law flies late, the shell gives its clock to `USER_CALL`;
+or it watches `USER_CALL` from a separate thread.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ class TooSlow(Exception):
 
 
 @dataclass
-class Call:
+class UserCall:
     """The present call, and the number of calls so far."""
 
     count: int = 0
-    going_on: bool = False
+    in_progress: bool = False
     clock: Callable[[], float] | None = None  # s
 
     def begin(self) -> float:
         """Note that a call begins; return the time in s, or 0 without a clock."""
         self.count += 1
-        self.going_on = True
+        self.in_progress = True
         return self.clock() if self.clock is not None else 0.0
 
-    def end(self, began_s: float) -> float:
+    def end(self, start_s: float) -> float:
         """Note that the call has ended; return how long it took in s, or 0 without a clock."""
-        self.going_on = False
-        return self.clock() - began_s if self.clock is not None else 0.0
+        self.in_progress = False
+        return self.clock() - start_s if self.clock is not None else 0.0
 
-    def break_off(self, thread: int) -> None:
+    def abort(self, thread: int) -> None:
         """Raise TooSlow in the present call, which runs in this thread (only Python code can be stopped)."""
-        if self.going_on:
+        if self.in_progress:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(TooSlow))
 
 
-CALL = Call()
+USER_CALL = UserCall()

@@ -1,6 +1,6 @@
-"""A class of compiled methods as C functions on its desk: no Python code runs while it flies.
+"""A class of compiled methods as C functions on its exchange row: no Python code runs while it flies.
 
-The class is a NamedTuple of numbers, and so is what its `start` returns. On the desk, the answer is followed
+The class is a NamedTuple of numbers, and so is what its `start` returns. In the row, the answer is followed
 by the numbers of the class and those of its memory; the functions read them there and write the memory back.
 """
 
@@ -18,26 +18,26 @@ from autopilot.geometry.addresses import numbers_at
 from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.entry import address_of
 from autopilot.geometry.packed import pack, unpack, width
-from autopilot.own.brought import Brought
+from autopilot.own.loaded_class import LoadedClass
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class Nothing(NamedTuple):
+class NoMemory(NamedTuple):
     """The memory of a class that has none."""
 
 
-class Desk(NamedTuple):
-    """Layout of a desk: what a method is given, a record of numbers, begins at number 0."""
+class ExchangeLayout(NamedTuple):
+    """Layout of an exchange row: what a method is given, a record of numbers, begins at number 0."""
 
-    given: Any  # the type of this record
-    answer: int  # where the answer begins
-    own: int  # where the numbers of the class begin, followed by those of its memory
+    input_type: Any  # the type of this record
+    answer_offset: int  # where the answer begins
+    own_offset: int  # where the numbers of the class begin, followed by those of its memory
 
-    def room(self, kind: type, memory: type) -> int:
-        """Count of all numbers on the desk, for a class and its memory."""
-        return self.own + width(kind) + width(memory)
+    def size(self, kind: type, memory: type) -> int:
+        """Count of all numbers in the row, for a class and its memory."""
+        return self.own_offset + width(kind) + width(memory)
 
 
 class CFunction(NamedTuple):
@@ -56,29 +56,31 @@ def c_function(entry: Any) -> CFunction:
     return CFunction(address_of(entry, 0), entry)
 
 
-def is_compiled(brought: Brought, methods: tuple[str, ...]) -> bool:
+def is_compiled(loaded_class: LoadedClass, methods: tuple[str, ...]) -> bool:
     """Whether a class can be called as machine code: it is a NamedTuple, and its methods are kernels."""
-    kind = brought.kind
-    found = [getattr(kind, name) for name in (*methods, "start") if hasattr(kind, name)]
-    return hasattr(kind, "_fields") and all(isinstance(method, Kernel) for method in found)
+    kind = loaded_class.kind
+    methods_found = [getattr(kind, name) for name in (*methods, "start") if hasattr(kind, name)]
+    return hasattr(kind, "_fields") and all(isinstance(method, Kernel) for method in methods_found)
 
 
-def memory_of(made: Any, now: Any) -> Any:
+def memory_type(instance: Any, now: Any) -> Any:
     """The type of the memory of an instance, for its input `now` at the first tick."""
-    return type(made.start(now)) if hasattr(made, "start") else Nothing
+    return type(instance.start(now)) if hasattr(instance, "start") else NoMemory
 
 
 @cache
-def compiled(kind: type, methods: tuple[str, ...], memory: type, desk: Desk) -> Mapping[str, CFunction]:
+def compiled(
+    kind: type, methods: tuple[str, ...], memory: type, layout: ExchangeLayout
+) -> Mapping[str, CFunction]:
     """The C function of each of these methods of a class, for the type of its memory."""
-    start = getattr(kind, "start", None) or _without(memory)
-    return {name: _function(kind, memory, desk, start, getattr(kind, name)) for name in methods}
+    start = getattr(kind, "start", None) or _start_without_memory(memory)
+    return {name: _compiled_method(kind, memory, layout, start, getattr(kind, name)) for name in methods}
 
 
-def address_in(function: Any) -> int:
+def function_address(function: Any) -> int:
     """The address of a `CFunction` or of a function of ctypes."""
-    found = getattr(function, "address", None) or ctypes.cast(function, ctypes.c_void_p).value
-    return int(found or 0)
+    address = getattr(function, "address", None) or ctypes.cast(function, ctypes.c_void_p).value
+    return int(address or 0)
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
@@ -94,7 +96,7 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     return compiled
 
 
-def _without(memory: type) -> Any:
+def _start_without_memory(memory: type) -> Any:
     @kernel
     def start(own: Any, now: Any) -> Any:
         return memory()
@@ -102,19 +104,19 @@ def _without(memory: type) -> Any:
     return start
 
 
-def _function(kind: Any, memory: Any, desk: Desk, start: Any, method: Any) -> CFunction:
-    given, answer, own = desk
-    room, remembered = desk.room(kind, memory), own + width(kind)
+def _compiled_method(kind: Any, memory: Any, layout: ExchangeLayout, start: Any, method: Any) -> CFunction:
+    input_type, answer_offset, own_offset = layout
+    size, memory_offset = layout.size(kind, memory), own_offset + width(kind)
 
     @kernel
     def entry(address: Any) -> None:
-        numbers = numbers_at(address, room)
-        now = unpack(given, numbers, 0)
-        made = unpack(kind, numbers, own)
+        numbers = numbers_at(address, size)
+        now = unpack(input_type, numbers, 0)
+        instance = unpack(kind, numbers, own_offset)
         if now.begins:
-            pack(start(made, now), numbers, remembered)
-        after, answered = method(made, unpack(memory, numbers, remembered), now)
-        pack(after, numbers, remembered)
-        pack(answered, numbers, answer)
+            pack(start(instance, now), numbers, memory_offset)
+        new_memory, result = method(instance, unpack(memory, numbers, memory_offset), now)
+        pack(new_memory, numbers, memory_offset)
+        pack(result, numbers, answer_offset)
 
     return c_function(entry)

@@ -8,7 +8,7 @@
         def estimate(self, memory, now): ...      # (memory, estimate)
 
 `now` is `autopilot.estimation.desk.Sensed`; the estimate is made by `estimated` or `no_estimate` of
-`autopilot.own.estimating`. An estimator whose class is a NamedTuple of numbers, and whose methods are
+`autopilot.own.estimates`. An estimator whose class is a NamedTuple of numbers, and whose methods are
 compiled by `kernel`, is called as machine code.
 """
 
@@ -16,31 +16,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from autopilot.own.brought import Brought, named
-from autopilot.own.source import OwnError, found_class
+from autopilot.own.loaded_class import LoadedClass, checked_fields
+from autopilot.own.source import OwnError, find_class
 
 GROUP = "plumbline.estimators"  # of entry points
 METHOD = "estimate"
 
 
 @dataclass(frozen=True)
-class OwnEstimator(Brought):
+class OwnEstimator(LoadedClass):
     """A loaded estimator."""
 
-    what = "Estimator"
+    role = "Estimator"
 
 
 def load_estimator(reference: str) -> OwnEstimator:
     """The estimator that a reference, as in `autopilot.own.source`, names. OwnError if it is none."""
-    return estimator_of(found_class(reference, GROUP, _suits, "estimator", ()), reference)
+    return estimator_from_class(find_class(reference, GROUP, _is_estimator, "estimator", ()), reference)
 
 
-def estimator_of(kind: type, reference: str) -> OwnEstimator:
+def estimator_from_class(kind: type, reference: str) -> OwnEstimator:
     """The estimator of a class. OwnError if the class is none."""
-    if not _suits(kind):
+    if not _is_estimator(kind):
         raise OwnError(f"{reference}: {kind.__name__} has no method {METHOD}(self, memory, now)")
-    return OwnEstimator(*named(kind, reference))
+    return OwnEstimator(*checked_fields(kind, reference))
 
 
-def _suits(kind: type) -> bool:
+def _is_estimator(kind: type) -> bool:
     return callable(getattr(kind, METHOD, None))

@@ -1,6 +1,6 @@
-"""Calls a custom estimator; its place in the tick is `autopilot.core.estimator_seat`.
+"""Calls a custom estimator; its place in the tick is `autopilot.core.estimator_slot`.
 
-It is called with the address of its desk, a row of numbers: `Sensed`, then the `Estimate`, then the
+It is called with the address of its exchange row: `Sensed`, then the `Estimate`, then the
 estimator's own numbers.
 """
 
@@ -27,88 +27,92 @@ from autopilot.estimation.desk import (
     told_of,
 )
 from autopilot.geometry.packed import Row, pack, unpack
-from autopilot.own.compiled import Desk, address_in, compiled, is_compiled, memory_of
+from autopilot.own.compiled import ExchangeLayout, compiled, function_address, is_compiled, memory_type
 from autopilot.own.estimator import METHOD, OwnEstimator
-from autopilot.own.guard import Calling, Guard, Wrong, pair_of, shown
-from autopilot.own.source import blamed
+from autopilot.own.guard import CallError, Guard, MethodCaller, memory_and_answer, short_repr
+from autopilot.own.source import error_text
 
-_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
-_DESK = Desk(Sensed, GIVEN, OWN)
-UNGIVEN = Estimate(True, REST._replace(x_quad=(nan, nan, nan)), nan, nan, nan)
+_C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+_LAYOUT = ExchangeLayout(Sensed, GIVEN, OWN)
+UNSET_ESTIMATE = Estimate(True, REST._replace(x_quad=(nan, nan, nan)), nan, nan, nan)
 
 
 class EstimatorHost:
-    """The estimator of one flight. `failed` is called, perhaps amid a tick, when it has failed."""
+    """The estimator of one flight. `on_failure` is called, perhaps amid a tick, when it has failed."""
 
-    def __init__(self, estimator: OwnEstimator, failed: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, estimator: OwnEstimator, on_failure: Callable[[], None] = lambda: None) -> None:
         self.estimator = estimator
-        self.guard = Guard(estimator, failed)
-        self.desk: Row = np.zeros(OWN)
-        self._calling = Calling(self.guard, _checked)
-        self._function: Any = _FUNCTION(self._call)
-        self.begin()
+        self.guard = Guard(estimator, on_failure)
+        self.exchange: Row = np.zeros(OWN)
+        self._method_caller = MethodCaller(self.guard, _checked_answer)
+        self._function: Any = _C_FUNCTION(self._call)
+        self.reset()
 
     @property
-    def known(self) -> bool:
+    def has_estimate(self) -> bool:
         """Whether it has given an estimate."""
-        return bool(self.desk[GIVEN])
+        return bool(self.exchange[GIVEN])
 
     @property
     def address(self) -> int:
-        """Address of the C function that is called with the address of the desk."""
-        return address_in(self._function)
+        """Address of the C function that is called with the address of the exchange row."""
+        return function_address(self._function)
 
-    def begin(self) -> None:
-        """Clear the desk: the next tick is the estimator's first."""
-        pack(NOTHING_SENSED, self.desk, 0)
-        pack(NO_ESTIMATE, self.desk, GIVEN)
+    def reset(self) -> None:
+        """Clear the exchange row: the next tick is the estimator's first."""
+        pack(NOTHING_SENSED, self.exchange, 0)
+        pack(NO_ESTIMATE, self.exchange, GIVEN)
 
-    def make(self, values: Mapping[str, float]) -> None:
-        """Make the estimator with these parameters; its memory is kept. The desk may be replaced."""
+    def configure(self, values: Mapping[str, float]) -> None:
+        """Make the estimator with these parameters; its memory is kept. The exchange row may be replaced."""
         if self.guard.fault:
             return
         kind: Any = self.estimator.kind
         try:
-            made = self._calling.made = self.estimator.made(values)
+            instance = self._method_caller.instance = self.estimator.new_instance(values)
             if not is_compiled(self.estimator, (METHOD,)):
                 return
-            if len(self.desk) == OWN:
-                memory = memory_of(made, NOTHING_SENSED)
-                self.desk = np.zeros(_DESK.room(kind, memory))
-                self.begin()
-                self._function = compiled(kind, (METHOD,), memory, _DESK)[METHOD]
-            pack(made, self.desk, OWN)
+            if len(self.exchange) == OWN:
+                memory = memory_type(instance, NOTHING_SENSED)
+                self.exchange = np.zeros(_LAYOUT.size(kind, memory))
+                self.reset()
+                self._function = compiled(kind, (METHOD,), memory, _LAYOUT)[METHOD]
+            pack(instance, self.exchange, OWN)
         except BaseException as error:
-            self.guard.fail(blamed(error, self.estimator.path, self.estimator.making))
+            self.guard.fail(error_text(error, self.estimator.path, self.estimator.constructor_location))
 
     def estimate_once(self, now: Sensed) -> None:
-        """Call it as the tick calls it, and raise the alarm if something is wrong."""
-        was_known = self.known
-        pack(now, self.desk, 0)
-        pack(UNGIVEN, self.desk, GIVEN)
-        _FUNCTION(self.address)(self.desk.ctypes.data)
-        estimate = unpack(Estimate, self.desk, GIVEN)
-        found = flaw(estimate) if estimate.known else FORGOTTEN if was_known else SOUND
-        if found != SOUND:
-            self.raise_alarm()
+        """Call it as the tick calls it, and reject the estimate if it is wrong."""
+        had_estimate = self.has_estimate
+        pack(now, self.exchange, 0)
+        pack(UNSET_ESTIMATE, self.exchange, GIVEN)
+        _C_FUNCTION(self.address)(self.exchange.ctypes.data)
+        estimate = unpack(Estimate, self.exchange, GIVEN)
+        problem = flaw(estimate) if estimate.known else FORGOTTEN if had_estimate else SOUND
+        if problem != SOUND:
+            self.reject_estimate()
 
-    def raise_alarm(self) -> None:
-        """Fail, because the estimate on the desk is unusable or missing."""
-        estimate = unpack(Estimate, self.desk, GIVEN)
-        found = flaw(estimate) if estimate.known else FORGOTTEN
-        self.guard.fail(self.guard.why or f"{told_of(estimate, found)} ({self.estimator.line(METHOD)})")
+    def reject_estimate(self) -> None:
+        """Fail, because the estimate in the exchange row is unusable or missing."""
+        estimate = unpack(Estimate, self.exchange, GIVEN)
+        problem = flaw(estimate) if estimate.known else FORGOTTEN
+        self.guard.fail(
+            self.guard.reason or f"{told_of(estimate, problem)} ({self.estimator.location(METHOD)})"
+        )
 
     def _call(self, _: int) -> None:
         """One tick of an estimator in plain Python."""
-        now = unpack(Sensed, self.desk, 0)
-        estimate = self._calling.call(METHOD, now, now.period_s or 1.0)
+        now = unpack(Sensed, self.exchange, 0)
+        estimate = self._method_caller.call(METHOD, now, now.period_s or 1.0)
         if estimate is not None:
-            pack(estimate, self.desk, GIVEN)
+            pack(estimate, self.exchange, GIVEN)
 
 
-def _checked(answer: Any, method: str) -> tuple[Any, Estimate]:
-    """Memory and estimate that an estimator has returned; raises Wrong if it returned anything else."""
-    memory, estimate = pair_of(answer, method, "estimated(...)")
+def _checked_answer(answer: Any, method: str) -> tuple[Any, Estimate]:
+    """Memory and estimate that an estimator has returned; raises CallError if it returned anything else."""
+    memory, estimate = memory_and_answer(answer, method, "estimated(...)")
     if not isinstance(estimate, Estimate):
-        raise Wrong(f"{method} gives {shown(estimate)}, which must be made by estimated or no_estimate")
+        raise CallError(
+            f"{method} gives {short_repr(estimate)}, which must be made by estimated or no_estimate"
+        )
     return memory, estimate

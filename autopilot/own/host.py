@@ -15,40 +15,40 @@ from typing import Any
 import numpy as np
 
 from autopilot.control.law_exchange import (
-    ASKED,
-    OWN,
+    COMMAND_OFFSET,
+    LAW_OFFSET,
     RATES,
-    UNASKED,
     UNLINKED,
+    UNSET_COMMAND,
     WRENCH,
     Asked,
     Link,
     Now,
-    is_sound,
+    is_valid,
 )
 from autopilot.control.laws import link_own
 from autopilot.geometry.packed import Row, pack, unpack
-from autopilot.own.compiled import Desk, address_in, compiled, is_compiled, memory_of
-from autopilot.own.guard import Calling, Guard, Wrong, pair_of, shown
+from autopilot.own.compiled import ExchangeLayout, compiled, function_address, is_compiled, memory_type
+from autopilot.own.guard import CallError, Guard, MethodCaller, memory_and_answer, short_repr
 from autopilot.own.law import MODES, OwnLaw
-from autopilot.own.source import blamed
+from autopilot.own.source import error_text
 
-_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
-_DESK = Desk(Now, ASKED, OWN)
+_C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+_LAYOUT = ExchangeLayout(Now, COMMAND_OFFSET, LAW_OFFSET)
 
 
 class Host:
-    """The law of one flight. `alarmed` is called, perhaps amid a tick, when it has failed."""
+    """The law of one flight. `on_failure` is called, perhaps amid a tick, when it has failed."""
 
-    def __init__(self, law: OwnLaw, alarmed: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, law: OwnLaw, on_failure: Callable[[], None] = lambda: None) -> None:
         self.law = law
-        self.guard = Guard(law, self._replaced)
-        self.desk: Row = np.zeros(OWN)
-        self._alarmed = alarmed
-        self._calling = Calling(self.guard, _checked)
+        self.guard = Guard(law, self._handle_failure)
+        self.exchange: Row = np.zeros(LAW_OFFSET)
+        self._on_failure = on_failure
+        self._method_caller = MethodCaller(self.guard, _checked_answer)
         self._rows: Any = None
         self._mode = law.modes[0]
-        self._alarm = _FUNCTION(self._raise_alarm)
+        self._reject_function = _C_FUNCTION(self._reject_command)
         self._functions: Mapping[str, Any] = {}
 
     @property
@@ -59,21 +59,23 @@ class Host:
     def bind(self, rows: Any, values: Mapping[str, float]) -> None:
         """Let the law fly the tick of these rows, with these values of the parameters."""
         self._rows = rows
-        self.make(values)
+        self.configure(values)
         self._link()
 
-    def make(self, values: Mapping[str, float]) -> None:
+    def configure(self, values: Mapping[str, float]) -> None:
         """Make the law with these parameters; its memory is kept."""
         if self.fault:
             return
         try:
-            self._calling.made = self.law.made(values)
+            self._method_caller.instance = self.law.new_instance(values)
             if not self._functions:
-                self._functions = self._compiled() if self._is_compiled else self._called()
+                self._functions = (
+                    self._compiled_functions() if self._is_compiled else self._python_functions()
+                )
             if self._is_compiled:
-                pack(self._calling.made, self.desk, OWN)
+                pack(self._method_caller.instance, self.exchange, LAW_OFFSET)
         except BaseException as error:
-            self.guard.fail(blamed(error, self.law.path, self.law.making))
+            self.guard.fail(error_text(error, self.law.path, self.law.constructor_location))
 
     @property
     def _is_compiled(self) -> bool:
@@ -82,48 +84,48 @@ class Host:
     def address(self, mode: str) -> int:
         """Address of the C function that flies a mode; 0 if the law does not fly it."""
         function = self._functions.get(mode)
-        return 0 if function is None else address_in(function)
+        return 0 if function is None else function_address(function)
 
-    def fly_once(self, mode: str, now: Now) -> Asked:
+    def command_once(self, mode: str, now: Now) -> Asked:
         """The command of a mode, called as the tick calls it."""
-        pack(now, self.desk, 0)
-        pack(UNASKED, self.desk, ASKED)
-        _FUNCTION(self.address(mode))(self.desk.ctypes.data)
-        asked = unpack(Asked, self.desk, ASKED)
-        if not is_sound(asked):
-            self._raise_alarm(0)
-        return asked
+        pack(now, self.exchange, 0)
+        pack(UNSET_COMMAND, self.exchange, COMMAND_OFFSET)
+        _C_FUNCTION(self.address(mode))(self.exchange.ctypes.data)
+        command = unpack(Asked, self.exchange, COMMAND_OFFSET)
+        if not is_valid(command):
+            self._reject_command(0)
+        return command
 
-    def _called(self) -> Mapping[str, Any]:
+    def _python_functions(self) -> Mapping[str, Any]:
         """Functions that call the methods in Python."""
-        return {mode: _FUNCTION(self._caller(mode)) for mode in self.law.modes}
+        return {mode: _C_FUNCTION(self._python_function(mode)) for mode in self.law.modes}
 
-    def _compiled(self) -> Mapping[str, Any]:
-        """Functions that are the machine code of the methods; law and memory are on the desk."""
-        memory = memory_of(self._calling.made, unpack(Now, self.desk, 0))
-        self.desk = np.zeros(_DESK.room(self.law.kind, memory))
-        return compiled(self.law.kind, self.law.modes, memory, _DESK)
+    def _compiled_functions(self) -> Mapping[str, Any]:
+        """Functions that are the machine code of the methods; law and memory are in the exchange row."""
+        memory = memory_type(self._method_caller.instance, unpack(Now, self.exchange, 0))
+        self.exchange = np.zeros(_LAYOUT.size(self.law.kind, memory))
+        return compiled(self.law.kind, self.law.modes, memory, _LAYOUT)
 
-    def _caller(self, mode: str) -> Callable[[int], None]:
+    def _python_function(self, mode: str) -> Callable[[int], None]:
         def call(_: int) -> None:
-            asked = self.call(mode, unpack(Now, self.desk, 0))
-            if asked is not None:
-                pack(asked, self.desk, ASKED)
+            command = self.call(mode, unpack(Now, self.exchange, 0))
+            if command is not None:
+                pack(command, self.exchange, COMMAND_OFFSET)
 
         return call
 
     def call(self, mode: str, now: Now) -> Asked | None:
-        """The command of the law; None if there is no answer; the alarm then reports the reason."""
+        """The command of the law; None if there is no answer; `guard` then has the reason."""
         self._mode = mode
-        asked: Asked | None = self._calling.call(mode, now, now.period_s)
-        return asked
+        command: Asked | None = self._method_caller.call(mode, now, now.period_s)
+        return command
 
-    def _line(self) -> str:
+    def _location(self) -> str:
         """File and line of the method that was called last."""
         path = self.law.path
         if self._is_compiled and len(self.law.modes) > 1:  # it is unknown which of them it was
             return path.name if path else self.law.reference
-        return self.law.line(self._mode)
+        return self.law.location(self._mode)
 
     def _link(self) -> None:
         if self._rows is None:
@@ -131,32 +133,39 @@ class Host:
         if self.fault:
             link_own(self._rows, UNLINKED)
             return
-        link_own(self._rows, Link(self.desk.ctypes.data, address_in(self._alarm), *map(self.address, MODES)))
+        link_own(
+            self._rows,
+            Link(
+                self.exchange.ctypes.data, function_address(self._reject_function), *map(self.address, MODES)
+            ),
+        )
 
-    def _raise_alarm(self, _: int) -> None:
-        """Fail, because the tick has found no valid command on the desk."""
-        asked = unpack(Asked, self.desk, ASKED)
-        self.guard.fail(self.guard.why or f"{_told(asked)} ({self._line()})")
+    def _reject_command(self, _: int) -> None:
+        """Fail, because the tick has found no valid command in the exchange row."""
+        command = unpack(Asked, self.exchange, COMMAND_OFFSET)
+        self.guard.fail(self.guard.reason or f"{_invalid_command_text(command)} ({self._location()})")
 
-    def _replaced(self) -> None:
+    def _handle_failure(self) -> None:
         self._link()
-        self._alarmed()
+        self._on_failure()
 
 
-def _checked(answer: Any, mode: str) -> tuple[Any, Asked]:
-    """Memory and command that a law has returned; raises Wrong if it returned anything else."""
-    memory, asked = pair_of(answer, mode, "force(...)")
-    if not isinstance(asked, Asked):
-        raise Wrong(f"{mode} asks for {shown(asked)}, which must be made by wrench, force, attitude or rates")
-    return memory, asked
+def _checked_answer(answer: Any, mode: str) -> tuple[Any, Asked]:
+    """Memory and command that a law has returned; raises CallError if it returned anything else."""
+    memory, command = memory_and_answer(answer, mode, "force(...)")
+    if not isinstance(command, Asked):
+        raise CallError(
+            f"{mode} asks for {short_repr(command)}, which must be made by wrench, force, attitude or rates"
+        )
+    return memory, command
 
 
-def _told(asked: Asked) -> str:
+def _invalid_command_text(command: Asked) -> str:
     """What is invalid in a command, in words."""
-    if not WRENCH <= asked.kind <= RATES:
-        return f"asks for a kind {asked.kind} that there is not"
-    if not isfinite(asked.thrust):
-        return f"asks for a thrust of {asked.thrust} N"
-    if not all(map(isfinite, asked.vector)):
-        return f"asks for {asked.vector}"
+    if not WRENCH <= command.kind <= RATES:
+        return f"asks for a kind {command.kind} that there is not"
+    if not isfinite(command.thrust):
+        return f"asks for a thrust of {command.thrust} N"
+    if not all(map(isfinite, command.vector)):
+        return f"asks for {command.vector}"
     return "commands an attitude that is not a number"

@@ -18,19 +18,19 @@ def is_interruption(error: BaseException) -> bool:
     if isinstance(error, Exception):
         return False
     frames: list[FrameType] = []
-    last, at = error.__traceback__, -1
-    while last is not None:
-        frames.append(last.tb_frame)
-        at = last.tb_frame.f_code.co_code[last.tb_lasti]
-        last = last.tb_next
+    trace, last_opcode = error.__traceback__, -1
+    while trace is not None:
+        frames.append(trace.tb_frame)
+        last_opcode = trace.tb_frame.f_code.co_code[trace.tb_lasti]
+        trace = trace.tb_next
     if any(_handles_signals(inner, outer) for outer, inner in pairwise(frames)):
         return True
-    return isinstance(error, KeyboardInterrupt) and at != _RAISE
+    return isinstance(error, KeyboardInterrupt) and last_opcode != _RAISE
 
 
 def _handles_signals(inner: FrameType, outer: FrameType) -> bool:
     """Whether the inner frame is a signal handler: its variables include the frame that was interrupted."""
-    given = list(inner.f_locals.values())
-    for several in [one for one in given if isinstance(one, tuple)]:
-        given += several
-    return any(one is outer for one in given)
+    values = list(inner.f_locals.values())
+    for group in [one for one in values if isinstance(one, tuple)]:
+        values += group
+    return any(one is outer for one in values)

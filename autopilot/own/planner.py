@@ -14,31 +14,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from autopilot.own.brought import Brought, named
-from autopilot.own.source import OwnError, found_class
+from autopilot.own.loaded_class import LoadedClass, checked_fields
+from autopilot.own.source import OwnError, find_class
 
 GROUP = "plumbline.planners"  # of entry points
 METHOD = "plan"
 
 
 @dataclass(frozen=True)
-class OwnPlanner(Brought):
+class OwnPlanner(LoadedClass):
     """A loaded planner."""
 
-    what = "Planner"
+    role = "Planner"
 
 
 def load_planner(reference: str) -> OwnPlanner:
     """The planner that a reference, as in `autopilot.own.source`, names. OwnError if it is none."""
-    return planner_of(found_class(reference, GROUP, _suits, "planner", ()), reference)
+    return planner_from_class(find_class(reference, GROUP, _is_planner, "planner", ()), reference)
 
 
-def planner_of(kind: type, reference: str) -> OwnPlanner:
+def planner_from_class(kind: type, reference: str) -> OwnPlanner:
     """The planner of a class. OwnError if the class is none."""
-    if not _suits(kind):
+    if not _is_planner(kind):
         raise OwnError(f"{reference}: {kind.__name__} has no method {METHOD}(self, route)")
-    return OwnPlanner(*named(kind, reference))
+    return OwnPlanner(*checked_fields(kind, reference))
 
 
-def _suits(kind: type) -> bool:
+def _is_planner(kind: type) -> bool:
     return callable(getattr(kind, METHOD, None))

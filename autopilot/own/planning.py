@@ -6,40 +6,42 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
-from autopilot.own.chosen import OwnSetup
-from autopilot.own.guard import Guard, Wrong, shown
+from autopilot.own.guard import CallError, Guard, short_repr
+from autopilot.own.own_code import OwnSetup
 from autopilot.own.planner import METHOD, OwnPlanner, load_planner
 from autopilot.trajectory.route import Path, PlanError, Planner, Route, check_path
 
 
-def planner_for(setup: OwnSetup | None) -> Planner | None:
+def plan_function_for(setup: OwnSetup | None) -> Planner | None:
     """The planner of this setup as a function; None if there is no setup: the built-in planner is used."""
-    return None if setup is None else planner_of(load_planner(setup.reference), setup.values)
+    return None if setup is None else plan_function(load_planner(setup.reference), setup.values)
 
 
-def planner_of(planner: OwnPlanner, values: Mapping[str, float]) -> Planner:
+def plan_function(planner: OwnPlanner, values: Mapping[str, float]) -> Planner:
     """The planner with these parameters as a function, which raises PlanError, with file and line, if it
     fails."""
 
     def plan(route: Route) -> Path:
         guard = Guard(planner, lambda: None)
 
-        def answer() -> Any:
-            return planner.made(values).plan(route)
+        def call_method() -> Any:
+            return planner.new_instance(values).plan(route)
 
-        def checked(path: Any) -> Path:
+        def check(path: Any) -> Path:
             if not isinstance(path, Path):
-                raise Wrong(f"{METHOD} returned {shown(path)}, which must be made by polynomials or samples")
+                raise CallError(
+                    f"{METHOD} returned {short_repr(path)}, which must be made by polynomials or samples"
+                )
             try:
                 check_path(path, route)
             except PlanError as error:
-                raise Wrong(str(error)) from None
+                raise CallError(str(error)) from None
             return path
 
-        path = guard.call(METHOD, inf, answer, checked)
+        path = guard.call(METHOD, inf, call_method, check)
         guard.raise_interruption()
         if path is None:
-            raise PlanError(f"{planner.told} failed: {guard.why}")
+            raise PlanError(f"{planner.label} failed: {guard.reason}")
         return path
 
     return plan

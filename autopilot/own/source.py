@@ -20,59 +20,65 @@ from types import ModuleType
 
 from autopilot.own.interruption import is_interruption
 from missions.nearest import did_you_mean
-from missions.toml_files import of_another_kind
+from missions.toml_files import other_kind_hint
 
-_OURS = Path(__file__).resolve().parents[1]
+_PACKAGE = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_LONGEST = 120  # most characters of an error that are reported
-_LONGEST_COMPILER = 240  # the same for errors of the compiler, which name types before the reason
+_MAX_ERROR_CHARS = 120  # most characters of an error that are reported
+_MAX_COMPILER_CHARS = 240  # the same for errors of the compiler, which name types before the reason
 
 
 class OwnError(ValueError):
     """A custom class cannot be used; the text says where and why."""
 
 
-def found_class(
-    reference: str, group: str, suits: Callable[[type], bool], what: str, shipped: Sequence[str]
+def find_class(
+    reference: str, group: str, is_suitable: Callable[[type], bool], role: str, shipped: Sequence[str]
 ) -> type:
-    """The class that a reference names. `suits` says whether a class can be meant, `what` is the kind in
-    words, and `shipped` are the names of the shipped ones.
+    """The class that a reference names. `is_suitable` says whether a class can be meant, `role` is the kind
+    in words, and `shipped` are the names of the shipped ones.
 
     OwnError if there is no such file, module, class or entry point, or if its module cannot be loaded.
     """
-    place, _, name = reference.rpartition(":") if ":" in reference else (reference, "", "")
-    if place.endswith(".py"):
-        module, told = _of_file(place), place
+    location, _, name = reference.rpartition(":") if ":" in reference else (reference, "", "")
+    if location.endswith(".py"):
+        module, label = _module_from_file(location), location
     elif ":" in reference:
-        module, told = _of_name(place), place
+        module, label = _import_module(location), location
     else:
-        return _of_entry_point(reference, group, what, shipped)
+        return _class_from_entry_point(reference, group, role, shipped)
     if not name:
-        every = [one for one in vars(module).values() if isinstance(one, type)]
-        there = [one for one in every if one.__module__ == module.__name__]
+        classes_in_module = [one for one in vars(module).values() if isinstance(one, type)]
+        defined_here = [one for one in classes_in_module if one.__module__ == module.__name__]
         # a single class that does not suit is returned too: the caller says what it lacks
-        own = [one for one in there if suits(one)] or (there if len(there) == 1 else [])
-        if len(own) == 1:
-            return own[0]
-        named = f"has {', '.join(one.__name__ for one in own)}; name one" if own else f"has no {what}"
-        raise OwnError(f"{told}: {named}, as {told}:{own[0].__name__ if own else 'MyLaw'}")
+        suitable = [one for one in defined_here if is_suitable(one)] or (
+            defined_here if len(defined_here) == 1 else []
+        )
+        if len(suitable) == 1:
+            return suitable[0]
+        problem = (
+            f"has {', '.join(one.__name__ for one in suitable)}; name one" if suitable else f"has no {role}"
+        )
+        raise OwnError(f"{label}: {problem}, as {label}:{suitable[0].__name__ if suitable else 'MyLaw'}")
     found = getattr(module, name, None)
     if not isinstance(found, type):
-        classes = [one.__name__ for one in vars(module).values() if isinstance(one, type) and suits(one)]
+        classes = [
+            one.__name__ for one in vars(module).values() if isinstance(one, type) and is_suitable(one)
+        ]
         known = f"; there is {', '.join(classes)}" if classes else ""
-        raise OwnError(f"{told}: has no class {name}{known}")
+        raise OwnError(f"{label}: has no class {name}{known}")
     return found
 
 
-def _of_file(place: str) -> ModuleType:
-    path = Path(place).expanduser()
+def _module_from_file(location: str) -> ModuleType:
+    path = Path(location).expanduser()
     if not path.is_file():
-        raise OwnError(f"{place}: no such file")
-    return _loaded(path.resolve(), place)
+        raise OwnError(f"{location}: no such file")
+    return _load_module(path.resolve(), location)
 
 
-def _loaded(path: Path, told: str) -> ModuleType:
+def _load_module(path: Path, label: str) -> ModuleType:
     # named by its content, so that a changed file is another module. It must be in `sys.modules` under its
     # name, by which records resolve their annotations
     name = f"{path.stem}_{hashlib.sha256(str(path).encode() + path.read_bytes()).hexdigest()[:12]}"
@@ -80,7 +86,7 @@ def _loaded(path: Path, told: str) -> ModuleType:
         return sys.modules[name]
     spec = spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise OwnError(f"{told}: is no Python file")
+        raise OwnError(f"{label}: is no Python file")
     module = module_from_spec(spec)
     sys.modules[name] = module
     folder = str(path.parent)
@@ -89,68 +95,68 @@ def _loaded(path: Path, told: str) -> ModuleType:
         spec.loader.exec_module(module)
     except BaseException as error:
         del sys.modules[name]
-        raise OwnError(f"{told}: {blamed(error, path)}") from error
+        raise OwnError(f"{label}: {error_text(error, path)}") from error
     finally:
         if folder in sys.path:
             sys.path.remove(folder)
     return module
 
 
-def _of_name(place: str) -> ModuleType:
-    if not _MODULE.fullmatch(place):
-        raise OwnError(f"{place}: is no Python file (.py), and no name of a module")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)  # as for a program that is run from here
+def _import_module(location: str) -> ModuleType:
+    if not _MODULE.fullmatch(location):
+        raise OwnError(f"{location}: is no Python file (.py), and no name of a module")
+    working_folder = str(Path.cwd())
+    if working_folder not in sys.path:
+        sys.path.append(working_folder)  # as for a program that is run from here
     try:
-        return import_module(place)
+        return import_module(location)
     except BaseException as error:
-        raise OwnError(f"{place}: {blamed(error, None)}") from error
+        raise OwnError(f"{location}: {error_text(error, None)}") from error
 
 
-def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) -> type:
-    there = {point.name: point for point in entry_points(group=group)}
-    if name not in there:
-        known = "".join(f"{one}, " for one in (*shipped, *sorted(there)))
+def _class_from_entry_point(name: str, group: str, role: str, shipped: Sequence[str]) -> type:
+    points = {point.name: point for point in entry_points(group=group)}
+    if name not in points:
+        known = "".join(f"{one}, " for one in (*shipped, *sorted(points)))
         known += "or " if known else ""
-        beside = f"{name}.py"
-        hint = f"did you mean {beside}? " if Path(beside).is_file() else of_another_kind(name, what)
-        hint = hint or did_you_mean(name, (*shipped, *there))
-        raise OwnError(f"{name!r}: no {what} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
+        file_name = f"{name}.py"
+        hint = f"did you mean {file_name}? " if Path(file_name).is_file() else other_kind_hint(name, role)
+        hint = hint or did_you_mean(name, (*shipped, *points))
+        raise OwnError(f"{name!r}: no {role} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
     try:
-        found = there[name].load()
+        found = points[name].load()
     except BaseException as error:
-        raise OwnError(f"{name}: {blamed(error, None)}") from error
+        raise OwnError(f"{name}: {error_text(error, None)}") from error
     if not isinstance(found, type):
-        raise OwnError(f"{name}: {there[name].value} is no class")
+        raise OwnError(f"{name}: {points[name].value} is no class")
     return found
 
 
-def file_of(kind: type) -> Path | None:
+def source_file(kind: type) -> Path | None:
     """The file in which a class is written; None if there is none."""
     module = sys.modules.get(kind.__module__)
-    place = getattr(module, "__file__", None)
-    return Path(place) if place else None
+    location = getattr(module, "__file__", None)
+    return Path(location) if location else None
 
 
-def digest_of(kind: type) -> str:
+def source_digest(kind: type) -> str:
     """A hash of the file in which a class is written, and of all loaded modules in its folder and below."""
-    path = file_of(kind)
+    path = source_file(kind)
     digest = hashlib.sha256()
-    for file in sorted(_beside(path)) if path is not None else ():
+    for file in sorted(_loaded_files_beside(path)) if path is not None else ():
         digest.update(file.relative_to(path.parent).as_posix().encode() + b"\0" + file.read_bytes())  # type: ignore[union-attr]
     return digest.hexdigest()[:16]
 
 
-def _beside(path: Path) -> set[Path]:
+def _loaded_files_beside(path: Path) -> set[Path]:
     places = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
-    files = {Path(place) for place in places if isinstance(place, str) and place.endswith(".py")}
+    files = {Path(location) for location in places if isinstance(location, str) and location.endswith(".py")}
     return {path, *(file for file in files if file.is_file() and file.is_relative_to(path.parent))}
 
 
-def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
+def error_text(error: BaseException, path: Path | None, entry: str = "") -> str:
     """One line about an error of user code written in the file `path`. It ends with file and line: the last
-    place in the folder of that file, or else `entered`, the place that was to be entered, or else the last
+    place in the folder of that file, or else `entry`, the place that was to be entered, or else the last
     place of all.
 
     An exception that only interrupted the code, such as Ctrl-C, is raised again.
@@ -158,52 +164,59 @@ def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
     if is_interruption(error):
         raise error
     if type(error).__module__.startswith("numba"):
-        return _told_of_compiler(str(error), path)
-    said = " ".join(str(error).split())
-    text = f"{type(error).__name__}: {_cut(said, _LONGEST)}" if said else type(error).__name__
+        return _compiler_error_text(str(error), path)
+    message = " ".join(str(error).split())
+    text = (
+        f"{type(error).__name__}: {_shortened(message, _MAX_ERROR_CHARS)}"
+        if message
+        else type(error).__name__
+    )
     if isinstance(error, SyntaxError) and error.filename:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}:{error.lineno})"
     frames = traceback.extract_tb(error.__traceback__)
-    near = [one for one in frames if path is not None and _is_beside(path, one.filename)]
-    if entered and not near:  # for example if an argument is missing
-        return f"{text} ({entered})"
-    last = near or [one for one in frames if not _of_importing(one.filename)]
+    own_frames = [one for one in frames if path is not None and _is_beside(path, one.filename)]
+    if entry and not own_frames:  # for example if an argument is missing
+        return f"{text} ({entry})"
+    last = own_frames or [one for one in frames if not _is_import_frame(one.filename)]
     return f"{text} ({Path(last[-1].filename).name}:{last[-1].lineno})" if last else text
 
 
 def _is_beside(path: Path, filename: str) -> bool:
     """Whether a file lies beside or below another, and belongs neither to Plumbline nor to a library."""
     file = Path(filename)
-    theirs = not file.is_relative_to(_OURS) and "site-packages" not in file.parts
-    return file == path or (theirs and file.is_relative_to(path.parent))
+    is_user_code = not file.is_relative_to(_PACKAGE) and "site-packages" not in file.parts
+    return file == path or (is_user_code and file.is_relative_to(path.parent))
 
 
-def _of_importing(filename: str) -> bool:
+def _is_import_frame(filename: str) -> bool:
     return filename.startswith("<") or "importlib" in Path(filename).parts or filename == __file__
 
 
-def _told_of_compiler(said: str, path: Path | None) -> str:
+def _compiler_error_text(message: str, path: Path | None) -> str:
     """What the compiler cannot compile and why, and the place in the file `path`."""
-    said = _COLOURS.sub("", said)  # numba's errors have colours if colorama is installed
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
-    why = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
+    message = _COLOURS.sub("", message)  # numba's errors have colours if colorama is installed
+    lines = [line.strip() for line in message.splitlines() if line.strip()]
+    reason = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
     call = next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "")
-    if call and why.endswith("for signature:"):
-        why = f"no implementation of {call}"
-    why = re.sub(r"(of type \w+)\(.*", r"\1", why)  # without the types of all fields
-    causes = re.findall(r"specific error:\s+(?:\w+: )?(?!Poison)(.*)", said)
-    because = "" if not causes or causes[-1] in why else f": {causes[-1]}"
-    return f"cannot be compiled: {_cut(f'{why}{because}', _LONGEST_COMPILER)}{_place_in(said, path)}"
+    if call and reason.endswith("for signature:"):
+        reason = f"no implementation of {call}"
+    reason = re.sub(r"(of type \w+)\(.*", r"\1", reason)  # without the types of all fields
+    causes = re.findall(r"specific error:\s+(?:\w+: )?(?!Poison)(.*)", message)
+    cause = "" if not causes or causes[-1] in reason else f": {causes[-1]}"
+    return (
+        f"cannot be compiled: {_shortened(f'{reason}{cause}', _MAX_COMPILER_CHARS)}"
+        f"{_location_in(message, path)}"
+    )
 
 
-def _place_in(said: str, path: Path | None) -> str:
+def _location_in(message: str, path: Path | None) -> str:
     """The line in the file `path` where the compiler was, or else that of the method that it compiled."""
     if path is None:
         return ""
-    found = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', said)
+    found = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', message)
     if found:
         return f" ({path.name}:{found.group(1)})"
-    method = re.search(r"<function (?:\w+\.)*(\w+) at ", said)
+    method = re.search(r"<function (?:\w+\.)*(\w+) at ", message)
     if method is not None and path.is_file():
         for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
             if re.match(rf"\s*def {method.group(1)}\(", line):
@@ -211,5 +224,5 @@ def _place_in(said: str, path: Path | None) -> str:
     return f" ({path.name})"
 
 
-def _cut(text: str, longest: int) -> str:
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+def _shortened(text: str, max_chars: int) -> str:
+    return text if len(text) <= max_chars else text[: max_chars - 3] + "..."

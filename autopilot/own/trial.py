@@ -19,42 +19,42 @@ from autopilot.estimation.desk import (
     Sensed,
 )
 from autopilot.geometry.linear import E1, IDENTITY, ZERO, Vec3, axpy
-from autopilot.own.chosen import Own, of_option
 from autopilot.own.estimator import OwnEstimator, load_estimator
 from autopilot.own.estimator_host import EstimatorHost
 from autopilot.own.host import Host
 from autopilot.own.law import OwnLaw, load_law
+from autopilot.own.own_code import OwnCode, naming_option
 from autopilot.own.planner import OwnPlanner, load_planner
-from autopilot.own.planning import planner_of
+from autopilot.own.planning import plan_function
 from autopilot.own.source import OwnError
 from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.trajectory.route import PlanError, Route
 from autopilot.vehicle.file import load_vehicle
 
 TICKS = 3
-_Q: Vec3 = (0.0199986667, 0.0, -0.99980000)
+_Q_CABLE: Vec3 = (0.0199986667, 0.0, -0.99980000)
 _X_LOAD: Vec3 = (0.03, -0.02, 1.01)
-_CORNER: tuple[Vec3, ...] = ((0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (2.0, 2.0, 1.5))
+_CORNER_POINTS: tuple[Vec3, ...] = ((0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (2.0, 2.0, 1.5))
 _X_D: Vec3 = (0.0, 0.0, 1.0)
 
 
-def try_out(
+def try_law(
     law: OwnLaw,
     parameters: Mapping[str, float],
     ticks: int = TICKS,
-    told: Callable[[Asked], None] = lambda _: None,
+    on_command: Callable[[Asked], None] = lambda _: None,
 ) -> None:
-    """Call each mode for a few ticks; `told` is called with each command.
+    """Call each mode for a few ticks; `on_command` is called with each command.
 
     OwnError, with file and line, if the law cannot be made with these parameters, or commands something
     invalid.
     """
     host = Host(law)
-    host.make(parameters)
+    host.configure(parameters)
     for mode in law.modes:
         for tick in range(ticks):
             if not host.fault:
-                told(host.fly_once(mode, _now(tick, parameters)))
+                on_command(host.command_once(mode, _hover_input(tick, parameters)))
     host.guard.raise_interruption()
     if host.fault:
         raise OwnError(f"{law.reference}: {host.fault}")
@@ -66,10 +66,10 @@ def try_estimator(estimator: OwnEstimator, parameters: Mapping[str, float], tick
     OwnError, with file and line, if it cannot be made with these parameters, or returns an invalid estimate.
     """
     host = EstimatorHost(estimator)
-    host.make(parameters)
+    host.configure(parameters)
     for tick in range(ticks):
         if not host.guard.fault:
-            host.estimate_once(_sensed(tick, parameters))
+            host.estimate_once(_hover_readings(tick, parameters))
     host.guard.raise_interruption()
     if host.guard.fault:
         raise OwnError(f"{estimator.reference}: {host.guard.fault}")
@@ -78,10 +78,10 @@ def try_estimator(estimator: OwnEstimator, parameters: Mapping[str, float], tick
 def try_planner(planner: OwnPlanner, parameters: Mapping[str, float]) -> None:
     """Let a planner plan a transfer, and a path through three points. OwnError, with file and line, if it
     fails or its path is invalid."""
-    plan = planner_of(planner, parameters)
+    plan = plan_function(planner, parameters)
     vehicle = load_vehicle("bebop")
     limits = VehicleLimits(vehicle).shaping
-    for points in (_CORNER[:2], _CORNER):
+    for points in (_CORNER_POINTS[:2], _CORNER_POINTS):
         route = Route(points, limits.speed_m_s, limits.accel_m_s2, False, limits.body, limits.bounds)
         try:
             plan(route)
@@ -89,51 +89,51 @@ def try_planner(planner: OwnPlanner, parameters: Mapping[str, float]) -> None:
             raise OwnError(f"{planner.reference}: {error}") from None
 
 
-def try_all(own: Own, parameters: Mapping[str, float]) -> None:
+def try_all(own: OwnCode, parameters: Mapping[str, float]) -> None:
     """Try all custom classes. OwnError, with file and line, if one of them cannot fly."""
     if own.law:
-        with of_option("law"):
-            try_out(load_law(own.law), parameters)
+        with naming_option("law"):
+            try_law(load_law(own.law), parameters)
     if own.estimator:
-        with of_option("estimator"):
+        with naming_option("estimator"):
             try_estimator(load_estimator(own.estimator), parameters)
     if own.planner:
-        with of_option("planner"):
+        with naming_option("planner"):
             try_planner(load_planner(own.planner), parameters)
 
 
-def _now(tick: int, parameters: Mapping[str, float]) -> Now:
+def _hover_input(tick: int, parameters: Mapping[str, float]) -> Now:
     length, period = parameters["VEH_CABLE_LEN"], 1.0 / parameters["CTL_RATE_HZ"]
     mass, load = parameters["VEH_QUAD_MASS"], parameters["VEH_LOAD_MASS"]
     inertia = (parameters["VEH_J_XX"], parameters["VEH_J_YY"], parameters["VEH_J_ZZ"])
     gravity = parameters["VEH_GRAVITY"]
     weight = (mass + load) * gravity
-    state = _state(length)
+    state = _hover_state(length)
     reference = Reference((_X_D, (0.1, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO), E1)
     believed = Believed(mass, load, inertia, gravity, ZERO, weight, ZERO, False, False)
     held = Held((0.0, 0.0, -1.0), load * gravity, IDENTITY, weight)
     return Now(tick == 0, tick * period, period, state, reference, held, Cable(length), believed)
 
 
-def _state(length: float) -> State:
+def _hover_state(length: float) -> State:
     return State(
         _X_LOAD,
         (0.01, 0.02, -0.01),
-        _Q,
+        _Q_CABLE,
         (0.0, 0.01, 0.0),
-        axpy(-length, _Q, _X_LOAD),
+        axpy(-length, _Q_CABLE, _X_LOAD),
         (0.01, 0.01, -0.01),
         IDENTITY,
         (0.01, -0.02, 0.01),
     )
 
 
-def _sensed(tick: int, parameters: Mapping[str, float]) -> Sensed:
+def _hover_readings(tick: int, parameters: Mapping[str, float]) -> Sensed:
     period = 1.0 / parameters["CTL_RATE_HZ"]
     length, gravity = parameters["VEH_CABLE_LEN"], parameters["VEH_GRAVITY"]
     weight = (parameters["VEH_QUAD_MASS"] + parameters["VEH_LOAD_MASS"]) * gravity
-    state, now_s = _state(length), tick * period
-    each = 0.25 * weight
+    state, now_s = _hover_state(length), tick * period
+    rotor_force = 0.25 * weight
     return Sensed(
         tick == 0,
         now_s,
@@ -141,11 +141,13 @@ def _sensed(tick: int, parameters: Mapping[str, float]) -> Sensed:
         InertialSample(True, now_s, state.omega_body, (0.0, 0.0, gravity)),
         PoseSample(True, now_s - 0.005, state.x_quad, state.R, state.v_quad, 1e-3, 2e-3, 0.02),
         LoadSample(True, now_s - 0.005, state.x_load, state.v_load, 1e-3, 0.02),
-        DirectionSample(True, now_s - 0.02, _Q, 5e-3),
+        DirectionSample(True, now_s - 0.02, _Q_CABLE, 5e-3),
         FixSample(True, now_s - 0.1, state.x_quad, state.v_quad, 0.02, 0.03, True),
         FieldSample(True, now_s, (0.2, 0.0, -0.4)),
         HeightSample(True, now_s, state.x_quad[2]),
-        Driven(weight, ZERO, (each, each, each, each, *NO_FORCES[4:]), weight, ZERO),
+        Driven(
+            weight, ZERO, (rotor_force, rotor_force, rotor_force, rotor_force, *NO_FORCES[4:]), weight, ZERO
+        ),
         Cable(length),
         True,
         state,

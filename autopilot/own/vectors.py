@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.geometry.linear import Vec3
-from autopilot.own.guard import shown
+from autopilot.own.guard import short_repr
 
 
 def three_numbers(numbers: Any, what: str) -> Vec3:
@@ -21,4 +21,4 @@ def three_numbers(numbers: Any, what: str) -> Vec3:
         shape = ()
     if shape:
         raise ValueError(f"{what} has {' x '.join(map(str, shape))} numbers; must be 3")
-    raise ValueError(f"{what} is {shown(numbers)}; must be 3 numbers")
+    raise ValueError(f"{what} is {short_repr(numbers)}; must be 3 numbers")

@@ -13,18 +13,18 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
-from autopilot.services.identity import FLOWN, Flavour, Identity, Mode
-from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Settled, Verdict
+from autopilot.services.identity import SUPPORTED_MODES, Flavour, Identity, Mode
+from autopilot.services.records import Announce, Decide, Output, Peer, RefusalCleared, Send, SendText, Verdict
 from autopilot.services.requests import (
-    Answered,
     Arm,
     ChangeAltitude,
     ChangeSpeed,
     Continue,
     EnableFence,
-    FailParts,
+    EndpointRequest,
     GetMessageInterval,
     Grab,
+    InjectFailure,
     Land,
     Orbit,
     Pause,
@@ -49,7 +49,7 @@ from autopilot.services.requests import (
 )
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import turn_nose
+from autopilot.wire.items import turn_heading
 from autopilot.wire.parameter_table import decimal_from_float32
 from missions.model import LookAt
 
@@ -65,7 +65,7 @@ _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
 _NO_CHANGE = -1.0  # of a speed
-_NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
+_NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _ABOVE_HOME_FRAMES = (
@@ -100,7 +100,7 @@ def _refused(text: str) -> Verdict:
     return Verdict(DENIED, text)
 
 
-def _whole(value: float) -> int | None:
+def _as_integer(value: float) -> int | None:
     """`value` as an integer, or None if it is not a whole number."""
     return int(value) if math.isfinite(value) and value.is_integer() else None
 
@@ -113,7 +113,7 @@ def _altitude_above_home(call: Call, context: Context) -> float | None:
     return call.z - context.home.altitude_m if above_sea else call.z
 
 
-def _place(call: Call, context: Context) -> Vec3 | None:
+def _position_enu(call: Call, context: Context) -> Vec3 | None:
     """param5 ... param7 as ENU from home [m]; NaN stays NaN, None for invalid coordinates or frame."""
     if call.frame is None:
         latitude, longitude = call.x * 1e7, call.y * 1e7
@@ -149,26 +149,26 @@ def _takeoff(call: Call, context: Context) -> Request | Verdict:
 def _mode_of_pair(main: int, sub: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode(main, sub)
     if mode is None:
-        return _refused(context.flavour.not_flown(f"Mode {main}/{sub} unknown"))
-    return _flown_mode(mode, SetMode(mode.main, mode.sub), context)
+        return _refused(context.flavour.mode_refusal(f"Mode {main}/{sub} unknown"))
+    return _supported_mode(mode, SetMode(mode.main, mode.sub), context)
 
 
 def _mode_of_number(number: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode_of_number(number)
     if mode is None:
-        return _refused(context.flavour.not_flown(f"Mode {number} unknown"))
-    return _flown_mode(mode, SetMode(mode.main, mode.sub, number), context)
+        return _refused(context.flavour.mode_refusal(f"Mode {number} unknown"))
+    return _supported_mode(mode, SetMode(mode.main, mode.sub, number), context)
 
 
-def _flown_mode(mode: Mode, request: SetMode, context: Context) -> Request | Verdict:
-    if mode.pair not in FLOWN:
-        return _refused(context.flavour.not_flown(f"{mode.name} not flown"))
+def _supported_mode(mode: Mode, request: SetMode, context: Context) -> Request | Verdict:
+    if mode.pair not in SUPPORTED_MODES:
+        return _refused(context.flavour.mode_refusal(f"{mode.name} not flown"))
     return request
 
 
 def _set_mode(call: Call, context: Context) -> Request | Verdict:
-    flags, number = _whole(call.p[0]), _whole(call.p[1])
-    sub = 0 if math.isnan(call.p[2]) else _whole(call.p[2])
+    flags, number = _as_integer(call.p[0]), _as_integer(call.p[1])
+    sub = 0 if math.isnan(call.p[2]) else _as_integer(call.p[2])
     if flags is None or number is None or sub is None or number < 0:
         return _refused("Set mode: param1 ... param3 must be whole numbers")
     if not flags & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
@@ -179,7 +179,7 @@ def _set_mode(call: Call, context: Context) -> Request | Verdict:
 
 
 def _set_standard_mode(call: Call, context: Context) -> Request | Verdict:
-    standard = _whole(call.p[0])
+    standard = _as_integer(call.p[0])
     mode = None if standard is None else context.flavour.mode_of_standard(standard)
     if mode is None:
         return Verdict(UNSUPPORTED, f"Set mode: no mode flown is standard mode {call.p[0]:g}")
@@ -189,7 +189,7 @@ def _set_standard_mode(call: Call, context: Context) -> Request | Verdict:
 def _start_mission(call: Call, context: Context) -> Request | Verdict:
     if math.isnan(call.p[0]):
         return StartMission(None)
-    first = _whole(call.p[0])
+    first = _as_integer(call.p[0])
     if first is None or first < 0:
         return _refused(f"Mission start: param1 = {call.p[0]:g}; must be an item number")
     return StartMission(first)
@@ -202,21 +202,21 @@ def _pause_continue(call: Call, context: Context) -> Request | Verdict:
 
 
 def _set_current(call: Call, context: Context) -> Request | Verdict:
-    seq = _whole(call.p[0])
+    seq = _as_integer(call.p[0])
     if seq is None or seq < 0:
         return _refused(f"Set current item: param1 = {call.p[0]:g}; must be an item number")
     return SetCurrent(seq)
 
 
 def _reposition(call: Call, context: Context) -> Request | Verdict:
-    place = _place(call, context)
-    if place is None:
+    position = _position_enu(call, context)
+    if position is None:
         return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
-    east, north, up = (None if math.isnan(value) else value for value in place)
+    east, north, up = (None if math.isnan(value) else value for value in position)
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
         return Pause()  # ground stations send this for "hold here"
-    flags = _whole(call.p[1]) or 0
+    flags = _as_integer(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     speed_m_s = call.p[0] if call.p[0] > 0.0 else None
     return Reposition(east, north, up, change_mode, speed_m_s, yaw)
@@ -224,26 +224,26 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
 
 def _yaw(call: Call, context: Context) -> float | None:
     """param4 as a heading from east to north [rad], or None. ArduPilot ignores it, and its clients send 0."""
-    if not context.flavour.heeds_yaw or not math.isfinite(call.p[3]):
+    if not context.flavour.uses_reposition_yaw or not math.isfinite(call.p[3]):
         return None
     return 0.5 * math.pi - call.p[3]
 
 
 def _orbit(call: Call, context: Context) -> Request | Verdict:
-    place = _place(call, context)
-    if place is None:
+    position = _position_enu(call, context)
+    if position is None:
         return _refused("Orbit: no such place; must be latitude and longitude of a global frame")
     if not math.isfinite(call.p[0]) or call.p[0] == 0.0:
         return _refused(f"Orbit: param1 = {call.p[0]:g} m; must be a radius")
     if math.isinf(call.p[1]):
         return _refused("Orbit: param2 must be a speed")
-    east, north, up = (None if math.isnan(value) else value for value in place)
+    east, north, up = (None if math.isnan(value) else value for value in position)
     speed = None if math.isnan(call.p[1]) else call.p[1]
     return Orbit(call.p[0], speed, east, north, up)
 
 
 def _change_altitude(call: Call, context: Context) -> Request | Verdict:
-    frame = _whole(call.p[1])
+    frame = _as_integer(call.p[1])
     if not math.isfinite(call.p[0]) or frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
         return _refused("Change altitude: param1 must be m, param2 a global frame")
     return ChangeAltitude(call.p[0] - (context.home.altitude_m if frame in _AMSL_FRAMES else 0.0))
@@ -253,10 +253,10 @@ def _loiter(call: Call, context: Context) -> Request | Verdict:
     """Fly to the position (0, 0 and NaN: here) and stay there."""
     if call.x == 0.0 and call.y == 0.0:
         call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
-    place = _place(call, context)
-    if place is None:
+    position = _position_enu(call, context)
+    if position is None:
         return _refused("Loiter: no such place; must be latitude and longitude of a global frame")
-    east, north, up = (None if math.isnan(value) else value for value in place)
+    east, north, up = (None if math.isnan(value) else value for value in position)
     return Pause() if east is None and up is None else Reposition(east, north, up, True)
 
 
@@ -265,19 +265,19 @@ def _loiter_turns(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Loiter: param1 = {call.p[0]:g} turns; must be > 0")
     if call.x == 0.0 and call.y == 0.0:
         call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
-    asked = _orbit(call._replace(p=(call.p[2], math.nan, 0.0, 0.0)), context)
-    return replace(asked, turns=call.p[0]) if isinstance(asked, Orbit) else asked
+    orbit = _orbit(call._replace(p=(call.p[2], math.nan, 0.0, 0.0)), context)
+    return replace(orbit, turns=call.p[0]) if isinstance(orbit, Orbit) else orbit
 
 
 def _calibrate(call: Call, context: Context) -> Request | Verdict:
-    asked = (*call.p, call.x, call.y, call.z)
-    if not any(value for value in asked):
+    parameters = (*call.p, call.x, call.y, call.z)
+    if not any(value for value in parameters):
         return Verdict(ACCEPTED)  # all 0: stop a calibration, of which none is under way
     return Verdict(UNSUPPORTED, "Calibration: sensors are simulated, their errors are what SIM_ says")
 
 
 def _change_speed(call: Call, context: Context) -> Request | Verdict:
-    kind = _whole(call.p[0])
+    kind = _as_integer(call.p[0])
     if kind not in _SPEEDS:
         return _refused(f"Change speed: param1 = {call.p[0]:g}; must be 0 or 1, 2 (climb) or 3 (descent)")
     if kind in _VERTICAL_SPEEDS or call.p[1] == _NO_CHANGE:
@@ -290,10 +290,10 @@ def _change_speed(call: Call, context: Context) -> Request | Verdict:
 def _set_home(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] == 1.0:
         return SetHome(None)
-    place = _place(call, context)
-    if place is None or any(math.isnan(value) for value in place):
+    position = _position_enu(call, context)
+    if position is None or any(math.isnan(value) for value in position):
         return _refused("Set home: param5 ... param7 must be latitude, longitude and altitude")
-    return SetHome(place)
+    return SetHome(position)
 
 
 def _terminate(call: Call, context: Context) -> Request | Verdict:
@@ -314,12 +314,12 @@ def _store_parameters(call: Call, context: Context) -> Request | Verdict:
 
 
 def _request_message(call: Call, context: Context) -> Request | Verdict:
-    message_id = _whole(call.p[0])
+    message_id = _as_integer(call.p[0])
     return Verdict(UNSUPPORTED) if message_id is None else RequestMessage(message_id, call.p[1])
 
 
 def _set_message_interval(call: Call, context: Context) -> Request | Verdict:
-    message_id = _whole(call.p[0])
+    message_id = _as_integer(call.p[0])
     interval = call.p[1]
     if message_id is None:
         return Verdict(UNSUPPORTED)
@@ -329,7 +329,7 @@ def _set_message_interval(call: Call, context: Context) -> Request | Verdict:
 
 
 def _get_message_interval(call: Call, context: Context) -> Request | Verdict:
-    message_id = _whole(call.p[0])
+    message_id = _as_integer(call.p[0])
     return Verdict(UNSUPPORTED) if message_id is None else GetMessageInterval(message_id)
 
 
@@ -373,20 +373,20 @@ def _condition_yaw(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Yaw: param1 = {angle:g} deg; must be -360 ... 360")
     if sense not in (-1.0, 0.0, 1.0) or relative not in (0.0, 1.0):
         return _refused("Yaw: param3 must be -1, 0 or 1, param4 0 (from north) or 1 (from here)")
-    return turn_nose(angle, rate, int(sense), bool(relative))
+    return turn_heading(angle, rate, int(sense), bool(relative))
 
 
 def _roi_location(call: Call, context: Context) -> Request | Verdict:
-    place = _place(call._replace(z=0.0), context)
-    if place is None or math.isnan(place[0]):
+    position = _position_enu(call._replace(z=0.0), context)
+    if position is None or math.isnan(position[0]):
         return _refused("ROI: param5 and param6 must be latitude and longitude of a global frame")
-    return LookAt(place[0], place[1])
+    return LookAt(position[0], position[1])
 
 
 def _roi(call: Call, context: Context) -> Request | Verdict:
     """The command whose param1 selects the kind; ArduPilot and MAVProxy leave it 0 and give a position."""
-    named = not (math.isnan(call.x) or math.isnan(call.y)) and (call.x, call.y) != (0.0, 0.0)
-    if call.p[0] in (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION) and named:
+    has_position = not (math.isnan(call.x) or math.isnan(call.y)) and (call.x, call.y) != (0.0, 0.0)
+    if call.p[0] in (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION) and has_position:
         return _roi_location(call, context)
     if call.p[0] == mavlink.MAV_ROI_NONE:
         return LookAt(None, None)
@@ -400,7 +400,7 @@ def _enable_fence(call: Call, context: Context) -> Request | Verdict:
 
 
 # bits of SIM_SENS_FAIL; gyroscope and accelerometer are one unit, motion capture is sent as visual odometry
-_SENSORS: dict[int | None, int] = {
+_SENSOR_FAILURE_BITS: dict[int | None, int] = {
     mavlink.FAILURE_UNIT_SENSOR_GYRO: 1,
     mavlink.FAILURE_UNIT_SENSOR_ACCEL: 1,
     mavlink.FAILURE_UNIT_SENSOR_MAG: 64,
@@ -411,9 +411,9 @@ _SENSORS: dict[int | None, int] = {
 
 
 def _inject_failure(call: Call, context: Context) -> Request | Verdict:
-    unit, kind, instance = _whole(call.p[0]), _whole(call.p[1]), _whole(call.p[2])
+    unit, kind, instance = _as_integer(call.p[0]), _as_integer(call.p[1]), _as_integer(call.p[2])
     motor = unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR
-    if not motor and unit not in _SENSORS:
+    if not motor and unit not in _SENSOR_FAILURE_BITS:
         return Verdict(UNSUPPORTED, "Failure: rotors (unit 101) and sensors (0, 1, 2, 3, 4, 6) can fail")
     if kind not in (mavlink.FAILURE_TYPE_OK, mavlink.FAILURE_TYPE_OFF):
         return Verdict(UNSUPPORTED, "Failure: it can be ok (0) or off (1)")
@@ -424,28 +424,30 @@ def _inject_failure(call: Call, context: Context) -> Request | Verdict:
                 f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... {context.rotors}, or 0 for all"
             )
         every = (1 << context.rotors) - 1
-        return FailParts("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), fail)
+        return InjectFailure("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), fail)
     if instance not in (0, 1):
         return _refused(f"Failure: param3 = {call.p[2]:g}; there is one of it, 1, or 0 for all")
-    return FailParts("SIM_SENS_FAIL", _SENSORS[unit], fail)
+    return InjectFailure("SIM_SENS_FAIL", _SENSOR_FAILURE_BITS[unit], fail)
 
 
-def _plain(request: Request) -> Parser:
+def _fixed_request(request: Request) -> Parser:
     return lambda call, context: request
 
 
-def _never(text: str) -> Parser:
+def _unsupported(text: str) -> Parser:
     return lambda call, context: Verdict(UNSUPPORTED, text)
 
 
-_NO_ACTUATOR = _never("Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these")
+_NO_ACTUATOR = _unsupported(
+    "Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these"
+)
 
 
 PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
-    mavlink.MAV_CMD_NAV_LAND: _plain(Land()),
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _plain(ReturnHome()),
+    mavlink.MAV_CMD_NAV_LAND: _fixed_request(Land()),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _fixed_request(ReturnHome()),
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
     mavlink.MAV_CMD_MISSION_START: _start_mission,
@@ -464,25 +466,27 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
     mavlink.MAV_CMD_DO_SET_HOME: _set_home,
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
-    mavlink.MAV_CMD_RUN_PREARM_CHECKS: _plain(RunPrearmChecks()),
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS: _fixed_request(RunPrearmChecks()),
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
     mavlink.MAV_CMD_PREFLIGHT_STORAGE: _store_parameters,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval,
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_message_interval,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
-    mavlink.MAV_CMD_GET_HOME_POSITION: _plain(RequestMessage(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.0)),
+    mavlink.MAV_CMD_GET_HOME_POSITION: _fixed_request(
+        RequestMessage(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.0)
+    ),
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _enable_fence,
     mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
     mavlink.MAV_CMD_CONDITION_YAW: _condition_yaw,
     mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _roi_location,
-    mavlink.MAV_CMD_DO_SET_ROI_NONE: _plain(LookAt(None, None)),
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: _fixed_request(LookAt(None, None)),
     mavlink.MAV_CMD_DO_SET_ROI: _roi,
     mavlink.MAV_CMD_NAV_ROI: _roi,
     mavlink.MAV_CMD_DO_SET_ACTUATOR: _NO_ACTUATOR,
     mavlink.MAV_CMD_DO_SET_SERVO: _NO_ACTUATOR,
     mavlink.MAV_CMD_DO_SET_RELAY: _NO_ACTUATOR,
-    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _plain(
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _fixed_request(
         RequestMessage(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION, 0.0)
     ),
 }
@@ -495,11 +499,11 @@ def _call_of_long(m: Any) -> Call:
 
 def _call_of_int(m: Any) -> Call:
     p = (m.param1, m.param2, m.param3, m.param4)
-    x, y = (math.nan if value == _NO_INT else float(value) for value in (m.x, m.y))
+    x, y = (math.nan if value == _NO_COORDINATE else float(value) for value in (m.x, m.y))
     return Call(m.command, p, x, y, m.z, m.frame)
 
 
-class _Done(NamedTuple):
+class _ExecutedCommand(NamedTuple):
     """An accepted command and its time: a repetition is answered, not executed."""
 
     call: str
@@ -512,30 +516,30 @@ class CommandService:
 
     def __init__(self, home: Home, identity: Identity) -> None:
         self.context = Context(home, identity.flavour, identity.rotors)
-        self._done: dict[tuple[Peer, int], _Done] = {}
+        self._executed: dict[tuple[Peer, int], _ExecutedCommand] = {}
         self._last: tuple[Peer, int] | None = None
 
-    def _conclude(
+    def _decide_and_answer(
         self, call: str, command: int, request: Request, peer: Peer, now_us: int, decide: Decide
     ) -> list[Output]:
         """Have a request decided; return the answer."""
         verdict = decide(request)
-        if verdict.result in _REFUSED and self._is_repeated(call, command, peer, now_us):
+        if verdict.result in _REFUSED and self._is_repetition(call, command, peer, now_us):
             return [_ack(command, ACCEPTED, peer)]
-        if verdict.result == ACCEPTED and not isinstance(request, Answered):
-            self._note_done(peer, command, call, verdict, now_us)
+        if verdict.result == ACCEPTED and not isinstance(request, EndpointRequest):
+            self._record_executed(peer, command, call, verdict, now_us)
         return _answer(command, verdict, peer)
 
-    def _note_done(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
-        self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
-        self._done[peer, command] = _Done(call, verdict, now_us)
+    def _record_executed(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
+        self._executed = {k: d for k, d in self._executed.items() if now_us - d.at_us <= REPEAT_US}
+        self._executed[peer, command] = _ExecutedCommand(call, verdict, now_us)
         self._last = (peer, command)
 
     def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_LONG."""
         call = _call_of_long(message)
         if message.confirmation:
-            done = self._done.get((peer, call.command))
+            done = self._executed.get((peer, call.command))
             if done and done.call == repr(call) and now_us - done.at_us <= REPEAT_US:
                 return [_ack(call.command, done.verdict.result, peer)]
         return self._execute(call, peer, now_us, decide)
@@ -552,13 +556,13 @@ class CommandService:
         command = mavlink.MAV_CMD_DO_SET_MODE
         if isinstance(request, Verdict):
             return _answer(command, request, peer)
-        return self._conclude(repr(request), command, request, peer, now_us, decide)
+        return self._decide_and_answer(repr(request), command, request, peer, now_us, decide)
 
     def receive_set_current(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
         verdict = decide(SetCurrent(message.seq))
         outputs: list[Output] = [Announce(peer.link, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
-        return _said(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict) + outputs
+        return _text_outputs(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict) + outputs
 
     def _execute(self, call: Call, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         parser = PARSERS.get(call.command)
@@ -567,28 +571,28 @@ class CommandService:
         request = parser(call, self.context)
         if isinstance(request, Verdict):
             return _answer(call.command, request, peer)
-        outputs = self._conclude(repr(call), call.command, request, peer, now_us, decide)
+        outputs = self._decide_and_answer(repr(call), call.command, request, peer, now_us, decide)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
         return outputs
 
-    def _is_repeated(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
+    def _is_repetition(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
         """Whether the command that was accepted last has arrived again: its ACK was lost, and some clients do
         not mark a repetition. The supervisor may refuse it by now because its execution has begun."""
-        done = self._done.get((peer, command))
+        done = self._executed.get((peer, command))
         if self._last != (peer, command) or done is None:
             return False
         return done.call == call and now_us - done.at_us <= REPEAT_US
 
 
-def _said(command: int, verdict: Verdict) -> list[Output]:
+def _text_outputs(command: int, verdict: Verdict) -> list[Output]:
     accepted = verdict.result == ACCEPTED
-    said: list[Output] = [Settled(command)] if accepted else []
+    outputs: list[Output] = [RefusalCleared(command)] if accepted else []
     if verdict.text is not None and (verdict.warns or not accepted):
-        said.append(Say(mavlink.MAV_SEVERITY_WARNING, verdict.text, command))
+        outputs.append(SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text, command))
     elif verdict.text is not None:
-        said.append(Say(mavlink.MAV_SEVERITY_INFO, verdict.text))
-    return said
+        outputs.append(SendText(mavlink.MAV_SEVERITY_INFO, verdict.text))
+    return outputs
 
 
 def _ack(command: int, result: int, peer: Peer) -> Output:
@@ -603,4 +607,4 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
 
 def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
     """The reason first, so that it has arrived when the ACK is shown."""
-    return [*_said(command, verdict), _ack(command, verdict.result, peer)]
+    return [*_text_outputs(command, verdict), _ack(command, verdict.result, peer)]

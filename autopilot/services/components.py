@@ -16,14 +16,16 @@ from autopilot.services.refusals import refusals
 from autopilot.wire.dialect import plumbline as mavlink
 
 _LONG, _INT = mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT
-_OF_ALL = frozenset(
+_COMMON_COMMANDS = frozenset(
     {
         mavlink.MAV_CMD_REQUEST_MESSAGE,
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
     }
 )
-_OF: dict[int | None, frozenset[int]] = {WINCH_COMPONENT: _OF_ALL | {mavlink.MAV_CMD_DO_WINCH}}
+_COMMANDS_BY_COMPONENT: dict[int | None, frozenset[int]] = {
+    WINCH_COMPONENT: _COMMON_COMMANDS | {mavlink.MAV_CMD_DO_WINCH}
+}
 
 
 class ComponentService:
@@ -36,9 +38,11 @@ class ComponentService:
         """Execute what the component offers, and refuse everything else."""
         kind = message.get_msgId()
         component = None if peer.addressed is None else peer.addressed[1]
-        if kind in (_LONG, _INT) and message.command in _OF.get(component, _OF_ALL):
-            do = self._commands.receive_long if kind == _LONG else self._commands.receive_int
-            return do(message, peer, now_us, decide)
+        if kind in (_LONG, _INT) and message.command in _COMMANDS_BY_COMPONENT.get(
+            component, _COMMON_COMMANDS
+        ):
+            receive_command = self._commands.receive_long if kind == _LONG else self._commands.receive_int
+            return receive_command(message, peer, now_us, decide)
         if kind == mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
             return [no_such_parameter(message.param_id, message.param_index, peer)]
         if kind == mavlink.MAVLINK_MSG_ID_PARAM_SET:

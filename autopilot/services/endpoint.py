@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from autopilot.services.commands import CommandService
 from autopilot.services.components import ComponentService
-from autopilot.services.faults import Faults
+from autopilot.services.faults import FaultReporter
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
@@ -46,20 +46,20 @@ from autopilot.services.records import (
     Output,
     ParametersSaved,
     Peer,
-    Say,
+    RefusalCleared,
     Send,
-    Settled,
+    SendText,
+    SimulatorParametersSaved,
     Source,
     Verdict,
-    WorldSaved,
 )
 from autopilot.services.requests import (
-    FailParts,
     FollowAttitude,
     FollowRates,
     FollowSetpoint,
     FollowStick,
     GetMessageInterval,
+    InjectFailure,
     Reposition,
     RequestCapabilities,
     RequestMessage,
@@ -71,14 +71,14 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.stream_frames import BITS, StreamFrames, parts_of
+from autopilot.services.stream_frames import BITS, StreamFrames, stream_groups
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import (
     COMPONENT_STREAMS,
-    GROUPS,
+    DATA_STREAM_GROUPS,
     LOAD_STREAMS,
-    LOAD_SYSTEM,
-    MESSAGE_ID,
+    LOAD_SYSTEM_BIT,
+    MESSAGE_ID_MASK,
     PROGRAM_INTERVALS_US,
     STREAMS,
     WATCHED,
@@ -86,7 +86,7 @@ from autopilot.services.telemetry import (
     Stream,
 )
 from autopilot.services.timesync import answer_ping, answer_timesync
-from autopilot.services.virtual_files import information_message, made_files, metadata_message
+from autopilot.services.virtual_files import generated_files, information_message, metadata_message
 from autopilot.wire.codec import FrameWriter, Received, decode
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -95,11 +95,11 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this silence a link that was not configured is forgotten
-REACHED_AGAIN = 10  # repetitions of the end of a mission, as in PX4
-REACHED_US = 1_000_000  # between two repetitions
-PATIENCE = 64  # bytes of a datagram that may belong to no message before the rest of it is skipped
+REACHED_REPETITIONS = 10  # repetitions of the end of a mission, as in PX4
+REACHED_INTERVAL_US = 1_000_000  # between two repetitions
+MAX_GARBAGE_BYTES = 64  # bytes of a datagram that may belong to no message before the rest of it is skipped
 MAX_LINKS = 16  # links that were not configured; a new one replaces the one silent longest
-MAKING_ROOM_US = 20_000  # least time between two replacements: a new link costs as much as ten messages
+LINK_REPLACEMENT_US = 20_000  # least time between two replacements: a new link costs as much as ten messages
 _SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
 _UINT16 = 2**16 - 1
@@ -109,7 +109,7 @@ _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 _NO_INSTANT = np.zeros(0)
 
-_STREAMED = FollowSetpoint | FollowAttitude | FollowRates | FollowStick  # they change no mode
+_SETPOINT_REQUESTS = FollowSetpoint | FollowAttitude | FollowRates | FollowStick  # they change no mode
 _METADATA = {
     mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
     mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
@@ -118,18 +118,18 @@ _METADATA = {
 SnapshotFactory = Callable[[], Snapshot]
 
 
-class Written(NamedTuple):
+class CompiledStreams(NamedTuple):
     """Streams of a link that machine code writes."""
 
     link: Link
     until_us: int  # when something else is due
-    due: NDArray[np.int64]  # from `Streams.written_by`
+    due: NDArray[np.int64]  # from `Streams.compiled_groups`
     frames: StreamFrames
-    aside: FrameWriter  # of a component that sends questions besides
+    request_writer: FrameWriter  # of a component that sends requests besides
 
 
 # streams that machine code writes, or that are empty: FILTER_STATE is sent only with a custom estimator
-_WRITTEN = BITS | {mavlink.MAVLINK_MSG_ID_FILTER_STATE: 0}
+_COMPILED_BITS = BITS | {mavlink.MAVLINK_MSG_ID_FILTER_STATE: 0}
 
 
 class VehicleEndpoint:
@@ -157,15 +157,15 @@ class VehicleEndpoint:
         self._commands = CommandService(home, identity)
         self._components = ComponentService(self._commands)
         self._guided = GuidedService(home, identity.system)
-        made = made_files(identity, parameters, lambda: self._missions.mission)
-        self.files = FileTree(MemoryCard() if card is None else card, made)
+        generated = generated_files(identity, parameters, lambda: self._missions.mission)
+        self.files = FileTree(MemoryCard() if card is None else card, generated)
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
         self._texts = TextWriter()
         self.kept_texts = KeptTexts(self._texts)
         self._now_us = 0  # of the last call; texts are dated by it
-        self._stood_us = 0  # time for which the vehicle's clock stood while that of the services ran
-        self._timed = (
+        self._paused_us = 0  # time for which the vehicle's clock was paused while that of the services ran
+        self._timed_services = (
             self._signing,
             self._missions,
             self._parameters,
@@ -173,10 +173,10 @@ class VehicleEndpoint:
             self._logs,
             self.kept_texts,
         )
-        self._faults = Faults()
+        self._faults = FaultReporter()
         self._links: dict[Link, LinkState] = {}
-        self._room_us = 0  # when the next link may replace another
-        self._learned: dict[Link, LinkState] = {}  # of `_links`, those that were not configured
+        self._next_replacement_us = 0  # when the next link may replace another
+        self._unconfigured: dict[Link, LinkState] = {}  # of `_links`, those that were not configured
         load: dict[int, Stream] = LOAD_STREAMS if identity.load_system else {}
         table = STREAMS | COMPONENT_STREAMS | load
         intervals_us = {key: stream.interval_us for key, stream in table.items()}
@@ -184,27 +184,31 @@ class VehicleEndpoint:
             intervals_us,
             intervals_us | PROGRAM_INTERVALS_US,
         )  # of ground stations, of programs
-        self._built_by = {
-            key: ((identity.load_system if key & LOAD_SYSTEM else identity.system, row.component), row.build)
+        self._builders = {
+            key: (
+                (identity.load_system if key & LOAD_SYSTEM_BIT else identity.system, row.component),
+                row.build,
+            )
             for key, row in table.items()
         }
-        self._own: Source = (identity.system, AUTOPILOT_COMPONENT)
+        self._own_source: Source = (identity.system, AUTOPILOT_COMPONENT)
         # streams by message id that each part of the vehicle serves on request; the autopilot nearly all
-        self._streams_of: dict[Source, dict[int, int]] = {}
-        for key, (source, _) in self._built_by.items():
-            self._streams_of.setdefault(source, {})[key & MESSAGE_ID] = key
-        self._streams_of[self._own] = {key: key for key in STREAMS}
+        self._streams_by_source: dict[Source, dict[int, int]] = {}
+        for key, (source, _) in self._builders.items():
+            self._streams_by_source.setdefault(source, {})[key & MESSAGE_ID_MASK] = key
+        self._streams_by_source[self._own_source] = {key: key for key in STREAMS}
         self._watched: dict[int, Any] = {}
-        self._seen: tuple[object, Any] = (None, ())  # `unchanged` and `plan_ids` of the last snapshot
-        self._asked_mode: int | None = None
+        # `change_token` and `plan_ids` of the last snapshot
+        self._last_version: tuple[object, Any] = (None, ())
+        self._requested_mode: int | None = None
         self._consequences: list[Output] = []  # of a decision
-        self._work = False  # something waits in a queue
-        self._stirred = False  # timers may have changed since these times were noted:
+        self._has_queued = False  # something waits in a queue
+        self._timers_changed = False  # timers may have changed since these times were noted:
         self._timer_us = self._next_us = 0  # when a service has something to do, and when anything is due
         self._events: list[Event] = []  # of `poll`, until they are taken
-        self.ground_us = NEVER_US  # when the last HEARTBEAT of a ground station arrived
+        self.gcs_heartbeat_us = NEVER_US  # when the last HEARTBEAT of a ground station arrived
         self.on_text: Callable[[int, str], None] | None = None  # called with each text for the operators
-        self.simulator_run: Any = None  # SIM_BOOT of the present simulator, once received
+        self.simulator_boot: Any = None  # SIM_BOOT of the present simulator, once received
         self.handlers = self._handler_table()  # by message id
 
     @property
@@ -232,8 +236,8 @@ class VehicleEndpoint:
         """Add a link that always receives telemetry, even if no message arrives on it; `program`: with the
         streams for programs instead of those for ground stations."""
         self._links[link] = self._new_link(now_us, program)
-        self._learned.pop(link, None)
-        self._work = True
+        self._unconfigured.pop(link, None)
+        self._has_queued = True
 
     def remove_link(self, link: Link) -> None:
         """Forget a link that no longer exists."""
@@ -248,64 +252,64 @@ class VehicleEndpoint:
         `program`: the kind of the link if it is new (see `add_link`).
         """
         events: list[Event] = []
-        self._stirred, self._now_us = True, now_us
-        for received in decode(datagram, PATIENCE)[0]:
+        self._timers_changed, self._now_us = True, now_us
+        for received in decode(datagram, MAX_GARBAGE_BYTES)[0]:
             message_id = received.id
-            if self._is_own(received) or not self._signing.hears(received, message_id):
+            if self._is_own(received) or not self._signing.accepts(received, message_id):
                 continue
-            state = self._heard(link, now_us, program)
+            state = self._receiving_link(link, now_us, program)
             if state is None:
                 break
             if message_id == _HEARTBEAT and received.message.type == mavlink.MAV_TYPE_GCS:
-                self.ground_us = now_us
+                self.gcs_heartbeat_us = now_us
             handler = self.handlers.get(message_id)
-            addressed = self._addressed(message_id, received.message) if handler else None
+            addressed = self._addressed_part(message_id, received.message) if handler else None
             if handler and addressed:
-                others = addressed != self._own
+                others = addressed != self._own_source
                 peer = Peer(link, received.system, received.component, addressed if others else None)
                 if others:
                     handler = self._components.receive
                 if addressed[1] == WINCH_COMPONENT and state.streams.interval(WINCH_HEARTBEAT) == OFF:
                     state.streams.set_interval(WINCH_HEARTBEAT, DEFAULT, now_us)
                 wrapped = self._decider(state, peer, now_us, decide)
-                service_us = now_us + self._stood_us
+                service_us = now_us + self._paused_us
                 try:
                     outputs = handler(received.message, peer, service_us, wrapped)
                 except Exception:  # an error in a service must not crash the vehicle
-                    outputs = self._faults.answered(received.message, peer, service_us)
-                self._do(outputs, events)
-                self._follow_up(events)
+                    outputs = self._faults.report_and_refuse(received.message, peer, service_us)
+                self._handle_outputs(outputs, events)
+                self._handle_consequences(events)
         return events
 
-    def _follow_up(self, events: list[Event]) -> None:
+    def _handle_consequences(self, events: list[Event]) -> None:
         """Carry out the consequences of a decision besides its answer."""
         consequences, self._consequences = self._consequences, []
-        self._do(consequences, events)
+        self._handle_outputs(consequences, events)
 
-    def tell_time(self, unix_us: int) -> None:
+    def set_wall_clock(self, unix_us: int) -> None:
         """Set the time of the wall clock, with which messages are signed if the vehicle's clock differs."""
-        self._signing.tell_time(unix_us)
+        self._signing.set_wall_clock(unix_us)
 
     def take_events(self) -> list[Event]:
         """Events that arose without a message, to be handled like those of `receive`."""
         events, self._events = self._events, []
         return events
 
-    def stand(self, passed_us: int) -> None:
-        """Note time that has passed while the vehicle's clock stood.
+    def add_paused_time(self, paused_us: int) -> None:
+        """Note time that has passed while the vehicle's clock was paused.
 
         Answers that are sent at their own pace continue meanwhile; streams wait for the vehicle.
         """
-        self._stood_us += passed_us
-        self._stirred = True
+        self._paused_us += paused_us
+        self._timers_changed = True
 
-    def say(self, severity: int, text: str, about: Hashable = None) -> None:
-        """Send a text to the operators of all links; for a refusal, `about` states what was refused."""
-        self._do([Say(severity, text, about)], [])
+    def send_text(self, severity: int, text: str, subject: Hashable = None) -> None:
+        """Send a text to the operators of all links; for a refusal, `subject` states what was refused."""
+        self._handle_outputs([SendText(severity, text, subject)], [])
 
-    def inherit_texts(self, before: VehicleEndpoint) -> None:
+    def inherit_texts(self, previous: VehicleEndpoint) -> None:
         """Take over the kept texts of the previous run."""
-        self.kept_texts.inherit(before.kept_texts.texts, before._now_us + before._stood_us)
+        self.kept_texts.inherit(previous.kept_texts.texts, previous._now_us + previous._paused_us)
 
     def item_reached(self, seq: int, last: bool = False) -> None:
         """Report that the mission has completed an item.
@@ -313,42 +317,42 @@ class VehicleEndpoint:
         For the last item this is repeated for ten seconds: MAVSDK learns only from this message that a
         mission has ended, and forgets it if it receives no heartbeat for three seconds.
         """
-        self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
+        self._handle_outputs([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
         self._reached, self._reached_us = seq, None
-        self._reached_left = REACHED_AGAIN if last else 0
+        self._reached_left = REACHED_REPETITIONS if last else 0
 
     def state_changed(self) -> None:
         """Mode or arming changed: send a HEARTBEAT to all links with the next `poll`."""
-        self._do([Announce(None, (_HEARTBEAT,))], [])
+        self._handle_outputs([Announce(None, (_HEARTBEAT,))], [])
 
     def expect_parameters(self) -> None:
         """More parameters will be learned soon: parameter lists wait until `parameters_complete`."""
         self._parameters.expect_more()
 
-    def world_silent(self, silent: bool) -> None:
+    def set_simulator_silent(self, silent: bool) -> None:
         """State whether the simulator is silent: then none of its parameters can be set."""
-        self._parameters.world_silent = silent
+        self._parameters.simulator_silent = silent
 
     def parameters_complete(self, now_us: int) -> None:
         """The parameter table is complete."""
         self._parameters.complete(now_us)
-        self._stirred = True
+        self._timers_changed = True
 
     def parameter_changed(self, name: str) -> None:
         """The vehicle itself changed a parameter: send it to all links."""
-        self._do([Send(None, self._parameters.value_message(name))], [])
+        self._handle_outputs([Send(None, self._parameters.value_message(name))], [])
 
     def datagram(self, link: Link, message: Any, component: int = AUTOPILOT_COMPONENT) -> bytes:
         """One message of a component for a link as a datagram, with the link's next sequence number."""
         return self._links[link].frame((self.identity.system, component), message)
 
-    def due(self, now_us: int) -> bool:
+    def is_due(self, now_us: int) -> bool:
         """Whether `poll` has anything to do."""
-        return self._work or now_us >= min(self._next_timer(), self._next_stream())
+        return self._has_queued or now_us >= min(self._next_timer(), self._next_stream())
 
     def _next_timer(self) -> int:
         """When a service, or the end of a mission, next has something to do, by the vehicle's clock."""
-        timers = [service.next_timer() - self._stood_us for service in self._timed]
+        timers = [service.next_timer() - self._paused_us for service in self._timed_services]
         if self._reached_left:
             timers.append(self._reached_us or 0)
         return min(timers)
@@ -359,23 +363,23 @@ class VehicleEndpoint:
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
         """All that is due now: answers first, then streams, packed into datagrams by link."""
         self._now_us = now_us
-        if self._stirred:
-            self._look_ahead()
-        if now_us < self._next_us and not self._work:
+        if self._timers_changed:
+            self._update_next_times()
+        if now_us < self._next_us and not self._has_queued:
             return []
-        if self._learned:
+        if self._unconfigured:
             self._forget_silent(now_us)
-        if self._work or now_us >= self._timer_us or self._signing.signing is not None:
-            service_us = now_us + self._stood_us
-            for service in self._timed:
+        if self._has_queued or now_us >= self._timer_us or self._signing.signing is not None:
+            service_us = now_us + self._paused_us
+            for service in self._timed_services:
                 try:
                     outputs = service.poll(service_us)
                 except Exception:  # as in `receive`
-                    outputs = self._faults.told(type(service).__name__, service_us)
-                self._do(outputs, self._events)
-            self._follow_up(self._events)
-            self._say_reached_again(make_snapshot, now_us)
-            self._work, self._stirred = False, True
+                    outputs = self._faults.report(type(service).__name__, service_us)
+                self._handle_outputs(outputs, self._events)
+            self._handle_consequences(self._events)
+            self._repeat_item_reached(make_snapshot, now_us)
+            self._has_queued, self._timers_changed = False, True
         due: list[tuple[Link, LinkState, tuple[int, ...]]] = []
         streams, next_us = False, self._timer_us
         for link, state in self._links.items():
@@ -384,37 +388,44 @@ class VehicleEndpoint:
             streams = streams or bool(keys or state.announced)
             next_us = min(next_us, state.streams.next_us)
         self._next_us = next_us
-        snapshot = self._look(make_snapshot) if streams else None
+        snapshot = self._take_snapshot(make_snapshot) if streams else None
         return self._datagrams(due, snapshot)
 
-    def written(self, told: object, now_us: int, aside: int) -> Written | None:
+    def compiled_streams(
+        self, change_token: object, now_us: int, request_component: int
+    ) -> CompiledStreams | None:
         """The streams that machine code can write at the next ticks in place of `poll`, on the only link,
-        while the flight record reports `told` and the built-in estimator flies; None: there may be more to
-        send. The component `aside` sends its questions besides."""
-        if self._work or self._learned or self._signing.signing is not None or len(self._links) != 1:
+        while the snapshot's `change_token` is this object and the built-in estimator flies; None: there may
+        be more to send. The component `request_component` sends its requests besides."""
+        if (
+            self._has_queued
+            or self._unconfigured
+            or self._signing.signing is not None
+            or len(self._links) != 1
+        ):
             return None
-        if self._stirred:
-            self._look_ahead()
-        (link, state), seen = next(iter(self._links.items())), self._seen
+        if self._timers_changed:
+            self._update_next_times()
+        (link, state), version = next(iter(self._links.items())), self._last_version
         # changes are announced, which only `poll` does
-        changed = told is not seen[0] or seen[1] != self._missions.plan_ids
+        changed = change_token is not version[0] or version[1] != self._missions.plan_ids
         if changed or state.queue or state.announced or self._next_us <= now_us:
             return None
-        due, others_us = state.streams.written_by(_WRITTEN)
-        writer = state.writer((self.identity.system, aside))
-        return Written(link, min(self._timer_us, others_us), due, state.frames, writer)
+        due, others_us = state.streams.compiled_groups(_COMPILED_BITS)
+        writer = state.writer((self.identity.system, request_component))
+        return CompiledStreams(link, min(self._timer_us, others_us), due, state.frames, writer)
 
-    def wrote(self, written: Written, now_us: int) -> None:
+    def streams_written(self, written: CompiledStreams, now_us: int) -> None:
         """Note that machine code has written all streams that were due until now."""
         streams = self._links[written.link].streams
         streams.take_due(now_us)
         self._now_us, self._next_us = now_us, min(self._timer_us, streams.next_us)
 
-    def _look(self, make_snapshot: SnapshotFactory) -> Snapshot:
+    def _take_snapshot(self, make_snapshot: SnapshotFactory) -> Snapshot:
         """The snapshot for the streams that are due; announces what has changed."""
         snapshot = make_snapshot()
-        snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
-        self._watch(snapshot)
+        snapshot.requested_mode, snapshot.plan_ids = self._requested_mode, self._missions.plan_ids
+        self._announce_changes(snapshot)
         return snapshot
 
     def _datagrams(
@@ -444,45 +455,51 @@ class VehicleEndpoint:
         # signed messages are written frame by frame
         written = snapshot.instant is not None and self._signing.signing is None
         outgoing: list[Outgoing | int] = []
-        for part in parts_of(keys) if written else (keys,):
+        for part in stream_groups(keys) if written else (keys,):
             if isinstance(part, int):
                 outgoing.append(part)
                 continue
             for key in part:
-                made = built.get(key)
-                if made is None:
-                    source, build = self._built_by[key]
+                stream_messages = built.get(key)
+                if stream_messages is None:
+                    source, build = self._builders[key]
                     messages = build(snapshot, self.identity)
-                    made = built[key] = [(source, message) for message in messages]
-                outgoing += made
+                    stream_messages = built[key] = [(source, message) for message in messages]
+                outgoing += stream_messages
         return outgoing
 
-    def _look_ahead(self) -> None:
+    def _update_next_times(self) -> None:
         """Note when there is something to do next if nothing arrives before."""
-        self._stirred = False
+        self._timers_changed = False
         self._timer_us = self._next_timer()
         self._next_us = min(self._timer_us, self._next_stream())
 
-    def _say_reached_again(self, make_snapshot: SnapshotFactory, now_us: int) -> None:
+    def _repeat_item_reached(self, make_snapshot: SnapshotFactory, now_us: int) -> None:
         if not self._reached_left:
             return
         if self._reached_us is None:
-            self._reached_us = now_us + REACHED_US
+            self._reached_us = now_us + REACHED_INTERVAL_US
         elif now_us >= self._reached_us:
-            if self._look(make_snapshot).mission_state != mavlink.MISSION_STATE_COMPLETE:
+            if self._take_snapshot(make_snapshot).mission_state != mavlink.MISSION_STATE_COMPLETE:
                 self._reached_left = 0  # the mission was begun again or replaced
                 return
-            self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(self._reached))], [])
-            self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_US
+            self._handle_outputs(
+                [Send(None, mavlink.MAVLink_mission_item_reached_message(self._reached))], []
+            )
+            self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_INTERVAL_US
 
     # ---- sending
 
-    def _watch(self, snapshot: Snapshot) -> None:
+    def _announce_changes(self, snapshot: Snapshot) -> None:
         """Announce what has changed since the last snapshot."""
-        seen = (snapshot.unchanged, snapshot.plan_ids)
-        if seen[0] is not None and seen[0] is self._seen[0] and seen[1] == self._seen[1]:
+        version = (snapshot.change_token, snapshot.plan_ids)
+        if (
+            version[0] is not None
+            and version[0] is self._last_version[0]
+            and version[1] == self._last_version[1]
+        ):
             return
-        self._seen = seen
+        self._last_version = version
         for key, pick in WATCHED.items():
             picked = pick(snapshot)
             if self._watched.get(key) != picked:
@@ -499,29 +516,29 @@ class VehicleEndpoint:
         state = self._links.get(link)
         return [state] if state else []
 
-    def _do(self, outputs: list[Output], events: list[Event]) -> None:
+    def _handle_outputs(self, outputs: list[Output], events: list[Event]) -> None:
         """Carry out what a service returned; events are added to `events`."""
         for output in outputs:
             match output:
                 case Send(link, message, source):
                     for state in self._states(link):
-                        state.queue.append((source or self._own, message))
-                case Settled(about):
-                    self.kept_texts.settle(about)
-                case Say(severity, text, about):
-                    self.kept_texts.keep(severity, text, self._now_us + self._stood_us, about)
+                        state.queue.append((source or self._own_source, message))
+                case RefusalCleared(subject):
+                    self.kept_texts.clear_refusals(subject)
+                case SendText(severity, text, subject):
+                    self.kept_texts.keep(severity, text, self._now_us + self._paused_us, subject)
                     if self.on_text is not None:
                         self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
                         for state in self._links.values():
-                            state.queue.append((self._own, message))
+                            state.queue.append((self._own_source, message))
                 case Announce(link, keys):
                     for key in keys:
                         self._announce(link, key)
                 case _:
                     events.append(output)
                     continue
-            self._work = True
+            self._has_queued = True
 
     # ---- links
 
@@ -534,28 +551,30 @@ class VehicleEndpoint:
         state.streams.set_interval(WINCH_HEARTBEAT, OFF, now_us)
         return state
 
-    def _heard(self, link: Link, now_us: int, program: bool) -> LinkState | None:
+    def _receiving_link(self, link: Link, now_us: int, program: bool) -> LinkState | None:
         """The link on which a message arrived; None: a new link for which there is no room now."""
         state = self._links.get(link)
         if state is None:
-            if len(self._learned) >= MAX_LINKS:
-                if now_us < self._room_us:
+            if len(self._unconfigured) >= MAX_LINKS:
+                if now_us < self._next_replacement_us:
                     return None
-                self._room_us = now_us + MAKING_ROOM_US
-                self._forget(min(self._learned, key=lambda link: self._learned[link].heard_us))
-            state = self._links[link] = self._learned[link] = self._new_link(now_us, program)
-            self._work = True
-        state.heard_us = now_us
+                self._next_replacement_us = now_us + LINK_REPLACEMENT_US
+                self._forget(
+                    min(self._unconfigured, key=lambda link: self._unconfigured[link].last_received_us)
+                )
+            state = self._links[link] = self._unconfigured[link] = self._new_link(now_us, program)
+            self._has_queued = True
+        state.last_received_us = now_us
         return state
 
     def _forget_silent(self, now_us: int) -> None:
-        for link, state in list(self._learned.items()):
-            if now_us - state.heard_us > LINK_SILENCE_US:
+        for link, state in list(self._unconfigured.items()):
+            if now_us - state.last_received_us > LINK_SILENCE_US:
                 self._forget(link)
 
     def _forget(self, link: Link) -> None:
         del self._links[link]
-        self._learned.pop(link, None)
+        self._unconfigured.pop(link, None)
         for service in (self._parameters, self._ftp, self._logs, self.kept_texts):
             service.forget(link)
 
@@ -563,19 +582,19 @@ class VehicleEndpoint:
 
     def _is_own(self, received: Received) -> bool:
         """Whether the vehicle itself sent the message, which returns on a looped link."""
-        own = (received.system, received.component) in self._streams_of
+        own = (received.system, received.component) in self._streams_by_source
         return own or received.system == self.identity.load_system != 0
 
-    def _addressed(self, message_id: int, message: Any) -> Source | None:
+    def _addressed_part(self, message_id: int, message: Any) -> Source | None:
         """The part of the vehicle to which a message is addressed: the autopilot if the address is 0 (all) or
         missing; None: another system or component."""
         if message_id == mavlink.MAVLINK_MSG_ID_PING:
-            return self._own  # its target states whether it is a request
+            return self._own_source  # its target states whether it is a request
         system = getattr(message, "target_system", 0) or self.identity.system
         component = getattr(message, "target_component", 0)
         if component == 0:
             component = AUTOPILOT_COMPONENT if system == self.identity.system else LOAD_COMPONENT
-        return (system, component) if (system, component) in self._streams_of else None
+        return (system, component) if (system, component) in self._streams_by_source else None
 
     def _decider(self, state: LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
         """`decide` for the supervisor's requests, combined with the requests that are answered here."""
@@ -585,14 +604,14 @@ class VehicleEndpoint:
                 case StoreParameters(save):
                     if save:
                         self._consequences.append(ParametersSaved())
-                    if save and self._parameters.table.learned:
-                        self._consequences.append(self._parameters.world())
+                    if save and self._parameters.table.remote_names:
+                        self._consequences.append(self._parameters.simulator_values())
                     return _ACCEPTED
-                case FailParts(parameter, bits, fail):
-                    asked = self._parameters.fail_parts(parameter, bits, fail)
-                    if isinstance(asked, str):
-                        return Verdict(mavlink.MAV_RESULT_DENIED, f"Failure: {asked}")
-                    self._consequences.append(asked)
+                case InjectFailure(parameter, bits, fail):
+                    outcome = self._parameters.inject_failure(parameter, bits, fail)
+                    if isinstance(outcome, str):
+                        return Verdict(mavlink.MAV_RESULT_DENIED, f"Failure: {outcome}")
+                    self._consequences.append(outcome)
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(
@@ -606,12 +625,16 @@ class VehicleEndpoint:
                     return self._set_interval(state, peer, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
-                self._consequences += [*self._parameters.reset(), ParametersSaved(), WorldSaved({})]
-            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
+                self._consequences += [
+                    *self._parameters.reset(),
+                    ParametersSaved(),
+                    SimulatorParametersSaved({}),
+                ]
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _SETPOINT_REQUESTS):
                 if isinstance(request, SetMode):
-                    self._asked_mode = request.number
+                    self._requested_mode = request.number
                 elif isinstance(request, Reposition):
-                    self._asked_mode = None
+                    self._requested_mode = None
                 self.state_changed()
             return verdict
 
@@ -623,35 +646,39 @@ class VehicleEndpoint:
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             number = int(argument) if 0.0 <= argument <= _UINT16 else -1
             return self._request_interval(state, peer, number)
-        source = peer.addressed or self._own
-        if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT and source == self._own:
-            self.kept_texts.ask(peer.link, now_us + self._stood_us)
+        source = peer.addressed or self._own_source
+        if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT and source == self._own_source:
+            self.kept_texts.request(peer.link, now_us + self._paused_us)
             return _ACCEPTED
-        where = _METADATA.get(message_id)
-        if where is not None and source == self._own:
-            state.queue.append((source, where(self.identity, self._parameters.table, now_us)))
+        build = _METADATA.get(message_id)
+        if build is not None and source == self._own_source:
+            state.queue.append((source, build(self.identity, self._parameters.table, now_us)))
             return _ACCEPTED
-        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES and source == self._own:
+        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES and source == self._own_source:
             modes = available_modes_messages(self.identity)
             if not 0.0 <= argument <= len(modes):
                 return Verdict(mavlink.MAV_RESULT_DENIED)
             which = int(argument)  # 0: all
             state.queue += [(source, mode) for mode in (modes[which - 1 : which] if which else modes)]
             return _ACCEPTED
-        if message_id == mavlink.MAVLINK_MSG_ID_SIM_BOOT and source == self._own and self.simulator_run:
-            state.queue.append(((self.identity.system, DIALECT_COMPONENT), self.simulator_run))
+        if (
+            message_id == mavlink.MAVLINK_MSG_ID_SIM_BOOT
+            and source == self._own_source
+            and self.simulator_boot
+        ):
+            state.queue.append(((self.identity.system, DIALECT_COMPONENT), self.simulator_boot))
             return _ACCEPTED
-        key = self._streams_of[source].get(message_id)
+        key = self._streams_by_source[source].get(message_id)
         if key is None:
             return _UNSUPPORTED
-        self._do([Announce(peer.link, (key,))], [])
+        self._handle_outputs([Announce(peer.link, (key,))], [])
         return _ACCEPTED
 
     def _request_interval(self, state: LinkState, peer: Peer, message_id: int) -> Verdict:
         if not 0 <= message_id <= _UINT16:
             return _UNSUPPORTED
-        source = peer.addressed or self._own
-        key = self._streams_of[source].get(message_id)
+        source = peer.addressed or self._own_source
+        key = self._streams_by_source[source].get(message_id)
         interval = 0 if key is None else state.streams.interval(key) or 0  # 0: not available
         message = mavlink.MAVLink_message_interval_message(message_id, min(interval, _INT32))
         state.queue.append((source, message))
@@ -660,7 +687,7 @@ class VehicleEndpoint:
     def _set_interval(
         self, state: LinkState, peer: Peer, message_id: int, interval_us: int, now_us: int
     ) -> Verdict:
-        key = self._streams_of[peer.addressed or self._own].get(message_id)
+        key = self._streams_by_source[peer.addressed or self._own_source].get(message_id)
         if key is None:
             return _UNSUPPORTED
         slowest = STREAMS[_HEARTBEAT].interval_us
@@ -677,14 +704,14 @@ class VehicleEndpoint:
             return []
         text = "Origin not moved: sitl --home and autopilot --home say where the world is"
         where = Announce(peer.link, (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,))
-        return [Say(mavlink.MAV_SEVERITY_WARNING, text), where]
+        return [SendText(mavlink.MAV_SEVERITY_WARNING, text), where]
 
     def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """REQUEST_DATA_STREAM: set the rate of a group on the requesting link; stop: the default rates."""
         state = self._links[peer.link]
         rate_hz = message.req_message_rate if message.start_stop else 0
         interval_us = _SECOND_US // rate_hz if rate_hz else DEFAULT
-        for message_id in GROUPS.get(message.req_stream_id, ()):
+        for message_id in DATA_STREAM_GROUPS.get(message.req_stream_id, ()):
             state.streams.set_interval(message_id, interval_us, self._now_us)
         return []
 

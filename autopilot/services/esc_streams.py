@@ -15,14 +15,14 @@ from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.dialect import plumbline as mavlink
 
 _GROUP = 4  # rotors in a message
-_TOLD_US = 20_000  # interval at which the controllers report their speeds
+_REPORT_INTERVAL_US = 20_000  # interval at which the controllers report their speeds
 _DSHOT = 5  # ESC_CONNECTION_TYPE
 _STUCK = 32  # ESC_FAILURE_FLAGS: the motor is commanded to turn but stands
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _INT32 = 2**31 - 1
 
 
-def _four(values: list[Any], first: int, missing: Any) -> list[Any]:
+def _group_values(values: list[Any], first: int, missing: Any) -> list[Any]:
     """The values of a group, filled up with `missing`."""
     found = values[first : first + _GROUP]
     return found + [missing] * (_GROUP - len(found))
@@ -30,20 +30,20 @@ def _four(values: list[Any], first: int, missing: Any) -> list[Any]:
 
 def esc_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     """ESC_STATUS of every group of rotors."""
-    work = [abs(rpm) ** 3 for rpm in s.rotor_rpm]
-    whole = sum(work) or 1.0
+    powers = [abs(rpm) ** 3 for rpm in s.rotor_rpm]
+    total = sum(powers) or 1.0
     volts = 0.0 if isnan(s.battery_voltage) else s.battery_voltage
     amperes = 0.0 if isnan(s.battery_current) else s.battery_current
     speeds = [saturated(rpm, -_INT32, _INT32) for rpm in s.rotor_rpm]
-    currents = [amperes * share / whole for share in work]
+    currents = [amperes * power / total for power in powers]
     voltages = [volts] * len(speeds)
     return tuple(
         mavlink.MAVLink_esc_status_message(
             index=first,
             time_usec=s.now_us,
-            rpm=_four(speeds, first, 0),
-            voltage=_four(voltages, first, 0.0),
-            current=_four(currents, first, 0.0),
+            rpm=_group_values(speeds, first, 0),
+            voltage=_group_values(voltages, first, 0.0),
+            current=_group_values(currents, first, 0.0),
         )
         for first in range(0, s.rotors, _GROUP)
     )
@@ -56,11 +56,11 @@ def esc_info(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
         mavlink.MAVLink_esc_info_message(
             index=first,
             time_usec=s.now_us,
-            counter=s.now_us // _TOLD_US & 0xFFFF,
+            counter=s.now_us // _REPORT_INTERVAL_US & 0xFFFF,
             count=s.rotors,
             connection_type=_DSHOT,
             info=(1 << min(_GROUP, s.rotors - first)) - 1,
-            failure_flags=_four(flags, first, 0),
+            failure_flags=_group_values(flags, first, 0),
             error_count=[0] * _GROUP,
             temperature=[_UNKNOWN_TEMPERATURE] * _GROUP,
         )

@@ -13,12 +13,12 @@ from typing import NamedTuple, Protocol
 
 Path = tuple[str, ...]  # names from the root downwards; () is the root itself
 
-LONGEST_NAME = 255  # bytes of one name, as on any common disk
+MAX_NAME_BYTES = 255  # bytes of one name, as on any common disk
 LOG_FOLDER: Path = ("log",)  # of the card
-LOG_ENDING = ".ulg"
+LOG_SUFFIX = ".ulg"
 
 
-class Trouble(IntEnum):
+class ErrorCode(IntEnum):
     """Why a file operation failed: the error codes of FILE_TRANSFER_PROTOCOL."""
 
     FAIL = 1
@@ -36,9 +36,9 @@ class Trouble(IntEnum):
 class FileError(Exception):
     """A failed operation; `errno` (POSIX) accompanies FAIL_ERRNO."""
 
-    def __init__(self, trouble: Trouble, errno: int = 0) -> None:
-        super().__init__(f"{trouble.name} {errno}" if errno else trouble.name)
-        self.trouble = trouble
+    def __init__(self, code: ErrorCode, errno: int = 0) -> None:
+        super().__init__(f"{code.name} {errno}" if errno else code.name)
+        self.code = code
         self.errno = errno
 
 
@@ -54,8 +54,8 @@ class Entry(NamedTuple):
 class Card(Protocol):
     """A tree of files. Every method raises FileError if it cannot do what its docstring says."""
 
-    def entries(self, path: Path, first: int = 0, most: int | None = None) -> list[Entry]:
-        """The contents of a folder, sorted by name: at most `most` entries from number `first` on."""
+    def entries(self, path: Path, first: int = 0, max_count: int | None = None) -> list[Entry]:
+        """The contents of a folder, sorted by name: at most `max_count` entries from number `first` on."""
 
     def size(self, path: Path) -> int:
         """Bytes in a file."""
@@ -94,11 +94,11 @@ def path_of(text: bytes) -> Path:
     try:
         decoded = text.split(b"\0", 1)[0].decode("utf-8")
     except UnicodeDecodeError:
-        raise FileError(Trouble.NOT_FOUND) from None
+        raise FileError(ErrorCode.NOT_FOUND) from None
     names = tuple(name for name in decoded.split("/") if name not in ("", "."))
     for name in names:
-        if name == ".." or len(name.encode()) > LONGEST_NAME or not name.isprintable() or "\\" in name:
-            raise FileError(Trouble.NOT_FOUND)
+        if name == ".." or len(name.encode()) > MAX_NAME_BYTES or not name.isprintable() or "\\" in name:
+            raise FileError(ErrorCode.NOT_FOUND)
     return names
 
 
@@ -115,7 +115,7 @@ class Limits:
     def check_depth(self, names: int) -> None:
         """Raise FileError for a path with too many names."""
         if names > self.depth:
-            raise FileError(Trouble.FAIL_ERRNO, ENAMETOOLONG)
+            raise FileError(ErrorCode.FAIL_ERRNO, ENAMETOOLONG)
 
 
 class MemoryCard:
@@ -126,12 +126,12 @@ class MemoryCard:
         self._files: dict[Path, bytearray] = {}
         self._folders: set[Path] = {()}
 
-    def entries(self, path: Path, first: int = 0, most: int | None = None) -> list[Entry]:
+    def entries(self, path: Path, first: int = 0, max_count: int | None = None) -> list[Entry]:
         if path not in self._folders:
-            raise FileError(Trouble.NOT_FOUND)
+            raise FileError(ErrorCode.NOT_FOUND)
         found = [Entry(file[-1], len(data), False) for file, data in self._files.items() if file[:-1] == path]
         found += [Entry(folder[-1], 0, True) for folder in self._folders if folder and folder[:-1] == path]
-        return sorted(found)[first : None if most is None else first + most]
+        return sorted(found)[first : None if max_count is None else first + max_count]
 
     def size(self, path: Path) -> int:
         return len(self._file(path))
@@ -141,21 +141,21 @@ class MemoryCard:
 
     def create(self, path: Path) -> None:
         if path in self._folders:
-            raise FileError(Trouble.FAIL)
-        self._parent(path)
-        self._one_more(path)
+            raise FileError(ErrorCode.FAIL)
+        self._check_parent(path)
+        self._check_count(path)
         self._files[path] = bytearray()
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
         file = self._file(path)
         end = offset + len(data)
-        self._room(file, end)
+        self._check_capacity(file, end)
         file.extend(bytes(max(0, end - len(file))))
         file[offset:end] = data
 
     def truncate(self, path: Path, size: int) -> None:
         file = self._file(path)
-        self._room(file, size)
+        self._check_capacity(file, size)
         file.extend(bytes(max(0, size - len(file))))
         del file[size:]
 
@@ -165,16 +165,16 @@ class MemoryCard:
 
     def rename(self, old: Path, new: Path) -> None:
         if new in self._files or new in self._folders:
-            raise FileError(Trouble.EXISTS)
-        self._parent(new)
+            raise FileError(ErrorCode.EXISTS)
+        self._check_parent(new)
         if old in self._files:
             self._limits.check_depth(len(new))
             self._files[new] = self._files.pop(old)
             return
         if not old or old not in self._folders:
-            raise FileError(Trouble.NOT_FOUND)
+            raise FileError(ErrorCode.NOT_FOUND)
         if new[: len(old)] == old:
-            raise FileError(Trouble.FAIL)
+            raise FileError(ErrorCode.FAIL)
         length = len(old)
         inside = [len(path) for path in (*self._files, *self._folders) if path[:length] == old]
         self._limits.check_depth(len(new) + max(inside) - length)
@@ -183,37 +183,37 @@ class MemoryCard:
 
     def make_folder(self, path: Path) -> None:
         if path in self._folders or path in self._files:
-            raise FileError(Trouble.EXISTS)
-        self._parent(path)
-        self._one_more(path)
+            raise FileError(ErrorCode.EXISTS)
+        self._check_parent(path)
+        self._check_count(path)
         self._folders.add(path)
 
     def remove_folder(self, path: Path) -> None:
         if not path or path not in self._folders:
-            raise FileError(Trouble.NOT_FOUND)
+            raise FileError(ErrorCode.NOT_FOUND)
         if self.entries(path):
-            raise FileError(Trouble.FAIL)
+            raise FileError(ErrorCode.FAIL)
         self._folders.remove(path)
 
     def _file(self, path: Path) -> bytearray:
         if path not in self._files:
-            raise FileError(Trouble.NOT_FOUND)
+            raise FileError(ErrorCode.NOT_FOUND)
         return self._files[path]
 
-    def _parent(self, path: Path) -> None:
+    def _check_parent(self, path: Path) -> None:
         if path[:-1] not in self._folders:
-            raise FileError(Trouble.NOT_FOUND)
+            raise FileError(ErrorCode.NOT_FOUND)
 
-    def _one_more(self, path: Path) -> None:
+    def _check_count(self, path: Path) -> None:
         self._limits.check_depth(len(path))
         if len(self._files) + len(self._folders) > self._limits.files:
-            raise FileError(Trouble.FAIL)
+            raise FileError(ErrorCode.FAIL)
 
-    def _room(self, file: bytearray, size: int) -> None:
-        grown = size - len(file)
+    def _check_capacity(self, file: bytearray, size: int) -> None:
+        growth = size - len(file)
         total = sum(map(len, self._files.values()))
-        if grown > 0 and (size > self._limits.file_bytes or total + grown > self._limits.total_bytes):
-            raise FileError(Trouble.FAIL)
+        if growth > 0 and (size > self._limits.file_bytes or total + growth > self._limits.total_bytes):
+            raise FileError(ErrorCode.FAIL)
 
 
 def _moved(path: Path, old: Path, new: Path, length: int) -> Path:

@@ -1,8 +1,8 @@
 """Setpoints and sticks: messages that are repeated many times a second and are never acknowledged.
 
 Each message becomes a request in ENU. A message that requests nothing that can be flown is refused by a
-STATUSTEXT, once in COMPLAIN_US for each reason. Body axes are level and follow the heading; a yaw of NaN is
-ignored.
+STATUSTEXT, once in WARNING_INTERVAL_US for each reason. Body axes are level and follow the heading; a yaw of
+NaN is ignored.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
-from autopilot.services.records import Decide, Output, Peer, Say, Verdict
+from autopilot.services.records import Decide, Output, Peer, SendText, Verdict
 from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
-COMPLAIN_US = 5_000_000
-FASTEST_RAD_S = 10.0  # of a body rate
+WARNING_INTERVAL_US = 5_000_000
+MAX_BODY_RATE_RAD_S = 10.0  # of a body rate
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
 _NO_YAW, _NO_YAW_RATE = 0x400, 0x800
 _RATE_BITS = 0x7  # of an attitude setpoint: about forward, right, down
@@ -34,7 +34,7 @@ _ABOVE_HOME = (
 )
 _ABOVE_SEA = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 
-Asking = FollowSetpoint | FollowAttitude | FollowRates | FollowStick
+SetpointRequest = FollowSetpoint | FollowAttitude | FollowRates | FollowStick
 
 
 def _masked(values: tuple[float, float, float], mask: int, shift: int) -> Vec3:
@@ -43,7 +43,7 @@ def _masked(values: tuple[float, float, float], mask: int, shift: int) -> Vec3:
     return (n, e, d)
 
 
-def _asks_badly(values: tuple[float, float, float], mask: int, shift: int) -> bool:
+def _has_invalid_value(values: tuple[float, float, float], mask: int, shift: int) -> bool:
     """Whether a value that is to be used is not a finite number."""
     return any(not mask >> (shift + i) & 1 and not math.isfinite(v) for i, v in enumerate(values))
 
@@ -53,12 +53,12 @@ def _heading(m: Any) -> float:
     return math.nan if m.type_mask & _NO_YAW else 0.5 * math.pi - m.yaw
 
 
-def _turning(m: Any) -> float:
+def _yaw_rate(m: Any) -> float:
     """Rate (rad/s) at which the heading is to turn; NaN: none."""
     return math.nan if m.type_mask & _NO_YAW_RATE else -m.yaw_rate
 
 
-def _problem(m: Any, place: tuple[float, float, float]) -> str:
+def _problem(m: Any, position: tuple[float, float, float]) -> str:
     """Why a position setpoint cannot be used, or an empty string."""
     mask = m.type_mask
     # the bit makes the accelerations forces, if any is used; MAVProxy sets it and uses none
@@ -66,10 +66,10 @@ def _problem(m: Any, place: tuple[float, float, float]) -> str:
         return "Setpoint refused: forces are not followed"
     if all(mask & bits == bits for bits in (_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS)):
         return "Setpoint refused: neither position nor velocity nor acceleration is asked for"
-    used = ((place, 0), ((m.vx, m.vy, m.vz), 3), ((m.afx, m.afy, m.afz), 6))
-    if any(_asks_badly(values, mask, shift) for values, shift in used):
+    used = ((position, 0), ((m.vx, m.vy, m.vz), 3), ((m.afx, m.afy, m.afz), 6))
+    if any(_has_invalid_value(values, mask, shift) for values, shift in used):
         return "Setpoint refused: a used value is not a number"
-    if math.isinf(_heading(m)) or math.isinf(_turning(m)):
+    if math.isinf(_heading(m)) or math.isinf(_yaw_rate(m)):
         return "Setpoint refused: yaw is infinite"
     return ""
 
@@ -79,20 +79,20 @@ def read_local(m: Any) -> FollowSetpoint | Verdict:
     frame, mask = m.coordinate_frame, m.type_mask
     if frame not in _LOCAL_FRAMES:
         return _refused(f"Setpoint refused: frame {frame}; must be one of 1, 7, 8, 9, 12")
-    place = (m.x, m.y, m.z)
-    problem = _problem(m, place)
+    position = (m.x, m.y, m.z)
+    problem = _problem(m, position)
     if problem:
         return _refused(problem)
     body = frame in _BODY_FRAMES
-    turned = flu_from_frd if body else enu_from_ned
+    convert = flu_from_frd if body else enu_from_ned
     return FollowSetpoint(
-        turned(_masked(place, mask, 0)),
-        turned(_masked((m.vx, m.vy, m.vz), mask, 3)),
-        turned(_masked((m.afx, m.afy, m.afz), mask, 6)),
+        convert(_masked(position, mask, 0)),
+        convert(_masked((m.vx, m.vy, m.vz), mask, 3)),
+        convert(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=frame != mavlink.MAV_FRAME_LOCAL_NED,
         body=body,
         heading_rad=_heading(m),
-        turning_rad_s=_turning(m),
+        yaw_rate_rad_s=_yaw_rate(m),
     )
 
 
@@ -101,14 +101,14 @@ def read_global(m: Any, home: Home) -> FollowSetpoint | Verdict:
     frame, mask = m.coordinate_frame, m.type_mask
     if frame not in _ABOVE_HOME and frame not in _ABOVE_SEA:
         return _refused(f"Setpoint refused: frame {frame}; must be one of 0, 3, 5, 6")
-    level_used = mask & 0x3 != 0x3
-    if level_used and (abs(m.lat_int) > 900_000_000 or abs(m.lon_int) > 1_800_000_000):
+    horizontal_used = mask & 0x3 != 0x3
+    if horizontal_used and (abs(m.lat_int) > 900_000_000 or abs(m.lon_int) > 1_800_000_000):
         return _refused("Setpoint refused: no such place")
     problem = _problem(m, (0.0, 0.0, m.alt))
     if problem:
         return _refused(problem)
     east, north = 0.0, 0.0
-    if level_used:
+    if horizontal_used:
         east, north, _ = enu_from_geodetic(m.lat_int, m.lon_int, 0, home)
     height = m.alt - home.altitude_m if frame in _ABOVE_SEA else m.alt
     return FollowSetpoint(
@@ -117,7 +117,7 @@ def read_global(m: Any, home: Home) -> FollowSetpoint | Verdict:
         enu_from_ned(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=False,
         heading_rad=_heading(m),
-        turning_rad_s=_turning(m),
+        yaw_rate_rad_s=_yaw_rate(m),
     )
 
 
@@ -128,14 +128,14 @@ def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
     if not mask & _NO_THRUST and not 0.0 <= m.thrust <= 1.0:
         return _refused("Attitude setpoint refused: thrust must be 0 ... 1")
     thrust = None if mask & _NO_THRUST else m.thrust
-    asked = (m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
-    if any(not mask >> i & 1 and not abs(rate) <= FASTEST_RAD_S for i, rate in enumerate(asked)):
-        limit = f"-{FASTEST_RAD_S:g} ... {FASTEST_RAD_S:g} rad/s"
+    rates = (m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
+    if any(not mask >> i & 1 and not abs(rate) <= MAX_BODY_RATE_RAD_S for i, rate in enumerate(rates)):
+        limit = f"-{MAX_BODY_RATE_RAD_S:g} ... {MAX_BODY_RATE_RAD_S:g} rad/s"
         return _refused(f"Attitude setpoint refused: rates must be {limit}")
     if mask & _NO_ATTITUDE:
         if mask & _RATE_BITS == _RATE_BITS:
             return _refused("Attitude setpoint refused: neither attitude nor body rates are asked for")
-        p, q, r = (0.0 if mask >> i & 1 else rate for i, rate in enumerate(asked))
+        p, q, r = (0.0 if mask >> i & 1 else rate for i, rate in enumerate(rates))
         return FollowRates(flu_from_frd((p, q, r)), thrust)
     w, x, y, z = m.q
     size = math.sqrt(w * w + x * x + y * y + z * z)
@@ -144,20 +144,20 @@ def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
     w, x, y, z = w / size, x / size, y / size, z / size
     # minus the third column of the rotation: NED
     up_ned = (-2.0 * (x * z + w * y), -2.0 * (y * z - w * x), -(w * w - x * x - y * y + z * z))
-    upward = enu_from_ned(up_ned)
+    thrust_axis = enu_from_ned(up_ned)
     # heading of the level part of the first column, forward
     yaw = math.atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
-    turning = math.nan if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE else -m.body_yaw_rate
-    return FollowAttitude(upward, thrust, 0.5 * math.pi - yaw, turning)
+    yaw_rate = math.nan if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE else -m.body_yaw_rate
+    return FollowAttitude(thrust_axis, thrust, 0.5 * math.pi - yaw, yaw_rate)
 
 
 def read_stick(m: Any) -> FollowStick | Verdict:
     """MANUAL_CONTROL: x forward, y right, z 0 ... 1000 with 500 for neither up nor down, r clockwise."""
-    level = [0.0 if v == _NO_STICK else v / 1000.0 for v in (m.x, m.y, m.r)]
-    lift = 0.0 if m.z == _NO_STICK else (m.z - 500.0) / 500.0
-    if max(map(abs, (*level, lift))) > 1.0:
+    axes = [0.0 if v == _NO_STICK else v / 1000.0 for v in (m.x, m.y, m.r)]
+    vertical = 0.0 if m.z == _NO_STICK else (m.z - 500.0) / 500.0
+    if max(map(abs, (*axes, vertical))) > 1.0:
         return _refused("MANUAL_CONTROL refused: x, y, r must be -1000 ... 1000 and z 0 ... 1000")
-    return FollowStick((level[0], -level[1], lift), -level[2])
+    return FollowStick((axes[0], -axes[1], vertical), -axes[2])
 
 
 def _refused(text: str) -> Verdict:
@@ -170,32 +170,36 @@ class GuidedService:
     def __init__(self, home: Home, system: int) -> None:
         self._home = home
         self._system = system
-        self._said_us: dict[str, int] = {}
+        self._warned_us: dict[str, int] = {}
 
     def receive_local(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """SET_POSITION_TARGET_LOCAL_NED."""
-        return self._ask(read_local(message), now_us, decide)
+        return self._handle_request(read_local(message), now_us, decide)
 
     def receive_global(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """SET_POSITION_TARGET_GLOBAL_INT."""
-        return self._ask(read_global(message, self._home), now_us, decide)
+        return self._handle_request(read_global(message, self._home), now_us, decide)
 
     def receive_attitude(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """SET_ATTITUDE_TARGET."""
-        return self._ask(read_attitude(message), now_us, decide)
+        return self._handle_request(read_attitude(message), now_us, decide)
 
     def receive_stick(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MANUAL_CONTROL, which addresses a system and has no target component."""
         if message.target not in (0, self._system):
             return []
-        return self._ask(read_stick(message), now_us, decide)
+        return self._handle_request(read_stick(message), now_us, decide)
 
-    def _ask(self, asked: Asking | Verdict, now_us: int, decide: Decide) -> list[Output]:
-        verdict = asked if isinstance(asked, Verdict) else decide(asked)
+    def _handle_request(
+        self, request: SetpointRequest | Verdict, now_us: int, decide: Decide
+    ) -> list[Output]:
+        verdict = request if isinstance(request, Verdict) else decide(request)
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED or verdict.text is None:
             return []
-        if now_us - self._said_us.get(verdict.text, -COMPLAIN_US) < COMPLAIN_US:
+        if now_us - self._warned_us.get(verdict.text, -WARNING_INTERVAL_US) < WARNING_INTERVAL_US:
             return []
-        self._said_us = {text: at for text, at in self._said_us.items() if now_us - at < COMPLAIN_US}
-        self._said_us[verdict.text] = now_us
-        return [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)]
+        self._warned_us = {
+            text: at for text, at in self._warned_us.items() if now_us - at < WARNING_INTERVAL_US
+        }
+        self._warned_us[verdict.text] = now_us
+        return [SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text)]

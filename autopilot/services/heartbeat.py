@@ -20,7 +20,7 @@ _PROTOCOL_VERSION = 3  # HEARTBEAT.mavlink_version, the same since MAVLink 1
 def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink_heartbeat_message:
     """The vehicle's HEARTBEAT; a mode that is not in the flavour's table is reported as custom mode 0."""
     flavour = identity.flavour
-    mode = flavour.mode(snapshot.main_mode, snapshot.sub_mode, snapshot.asked_mode)
+    mode = flavour.mode(snapshot.main_mode, snapshot.sub_mode, snapshot.requested_mode)
     base_mode = mode.base_mode if mode else mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if snapshot.armed:
         base_mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED

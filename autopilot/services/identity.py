@@ -37,7 +37,7 @@ AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = 2, 3, 4, 5, 6
 _AUTOMATIC = 4  # MAV_MODE_PROPERTY_AUTO_MODE
 
 # Modes that the supervisor flies; the other named modes are refused
-FLOWN = (
+SUPPORTED_MODES = (
     (AUTO, AUTO_TAKEOFF),
     (AUTO, AUTO_LOITER),
     (AUTO, AUTO_MISSION),
@@ -47,7 +47,7 @@ FLOWN = (
     (POSCTL, 0),
 )
 # modes that are suggested when a mode is refused, the most useful first
-_NAMED = (
+_SUGGESTED_MODES = (
     (AUTO, AUTO_LOITER),
     (AUTO, AUTO_MISSION),
     (AUTO, AUTO_RTL),
@@ -56,7 +56,7 @@ _NAMED = (
     (OFFBOARD, 0),
 )
 # MAV_STANDARD_MODE of a pair
-_STANDARD = {
+_STANDARD_MODES = {
     (AUTO, AUTO_TAKEOFF): mavlink.MAV_STANDARD_MODE_TAKEOFF,
     (AUTO, AUTO_MISSION): mavlink.MAV_STANDARD_MODE_MISSION,
     (AUTO, AUTO_RTL): mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY,
@@ -84,7 +84,7 @@ class Mode:
     @property
     def standard(self) -> int:
         """MAV_STANDARD_MODE; NON_STANDARD for most."""
-        return _STANDARD.get(self.pair, mavlink.MAV_STANDARD_MODE_NON_STANDARD)
+        return _STANDARD_MODES.get(self.pair, mavlink.MAV_STANDARD_MODE_NON_STANDARD)
 
 
 def _px4(main: int, sub: int, name: str) -> Mode:
@@ -121,7 +121,7 @@ class Flavour:
         return self.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
     @property
-    def heeds_yaw(self) -> bool:
+    def uses_reposition_yaw(self) -> bool:
         """Whether the yaw of DO_REPOSITION is flown, as in PX4."""
         return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
@@ -131,29 +131,31 @@ class Flavour:
         return all(mode.custom_mode == mode.sub << 24 | mode.main << 16 for mode in self.modes)
 
     @cached_property
-    def flown(self) -> tuple[Mode, ...]:
+    def available_modes(self) -> tuple[Mode, ...]:
         """The modes that can be entered, each number once."""
         return tuple(
-            mode for mode in self.modes if mode.pair in FLOWN and self._by_number[mode.custom_mode] is mode
+            mode
+            for mode in self.modes
+            if mode.pair in SUPPORTED_MODES and self._by_number[mode.custom_mode] is mode
         )
 
-    def not_flown(self, what: str) -> str:
+    def mode_refusal(self, what: str) -> str:
         """Why a mode is refused (`what`), and as many names of other modes as fit into one STATUSTEXT."""
         text = f"{what}; use"
-        for pair in _NAMED:
+        for pair in _SUGGESTED_MODES:
             longer = f"{text} {self._by_pair[pair].name}" if pair in self._by_pair else text
             text = longer if len(longer) <= CHUNK else text
         return text
 
-    def mode(self, main: int, sub: int, asked: int | None = None) -> Mode | None:
-        """The mode of PX4's pair, with the number `asked` if that means the pair.
+    def mode(self, main: int, sub: int, requested_number: int | None = None) -> Mode | None:
+        """The mode of PX4's pair, with the number `requested_number` if that means the pair.
 
         AUTO without a sub-mode is AUTO.MISSION, as in PX4.
         """
         if (main, sub) == (AUTO, 0):
             sub = AUTO_MISSION
         for mode in self.modes:
-            if mode.custom_mode == asked and mode.pair == (main, sub):
+            if mode.custom_mode == requested_number and mode.pair == (main, sub):
                 return mode
         return self._by_pair.get((main, sub))
 
@@ -163,7 +165,7 @@ class Flavour:
 
     def mode_of_standard(self, standard: int) -> Mode | None:
         """The mode with this MAV_STANDARD_MODE that can be flown."""
-        return next((mode for mode in self.flown if mode.standard == standard != 0), None)
+        return next((mode for mode in self.available_modes if mode.standard == standard != 0), None)
 
 
 _CAPABILITIES = (
@@ -180,8 +182,8 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-_BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-_CAST = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+_ENCODE_BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+_ENCODE_CAST = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
 
 PX4 = Flavour(
     name="px4",
@@ -200,7 +202,7 @@ PX4 = Flavour(
         _px4(STABILIZED, 0, "STABILIZED"),
     ),
     takeoff_above_home=False,
-    capabilities=_CAPABILITIES | _BYTEWISE,
+    capabilities=_CAPABILITIES | _ENCODE_BYTEWISE,
     release=(1, 15, 0),
 )
 
@@ -224,7 +226,7 @@ ARDUPILOT = Flavour(
         _ardupilot(16, "POSHOLD", POSCTL),
     ),
     takeoff_above_home=True,
-    capabilities=_CAPABILITIES | _CAST,
+    capabilities=_CAPABILITIES | _ENCODE_CAST,
     release=(4, 5, 0),
 )
 
@@ -233,7 +235,7 @@ GENERIC = replace(
     name="generic",
     autopilot=mavlink.MAV_AUTOPILOT_GENERIC,
     takeoff_above_home=True,
-    capabilities=_CAPABILITIES | _CAST,
+    capabilities=_CAPABILITIES | _ENCODE_CAST,
 )
 
 FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, GENERIC)}
@@ -258,13 +260,13 @@ class Identity:
     flavour: Flavour = PX4
     version: tuple[int, int, int] = (0, 1, 0)  # of this program
     load_system: int = 0
-    integers: bool = False  # whole-numbered parameters are transferred as INT32
+    integer_parameters: bool = False  # whole-numbered parameters are transferred as INT32
     rotors: int = 4  # number of rotors
 
     @property
     def parameter_encoding(self) -> ParameterEncoding:
         """By bits or by value, as the capabilities state."""
-        return ParameterEncoding(self.integers, bool(self.flavour.capabilities & _BYTEWISE))
+        return ParameterEncoding(self.integer_parameters, bool(self.flavour.capabilities & _ENCODE_BYTEWISE))
 
 
 def identity_of(table: AutopilotParameters) -> Identity:
@@ -272,13 +274,15 @@ def identity_of(table: AutopilotParameters) -> Identity:
     system, load = int(table["MAV_SYS_ID"]), int(table["MAV_LOAD_SYS_ID"])
     flavour = tuple(FLAVOURS.values())[int(table["MAV_IDENTITY"])]
     integers = table["MAV_PARAM_INT"] > 0.0
-    apart = 0 if load == system else load
-    return Identity(system, flavour, load_system=apart, integers=integers, rotors=len(table.layout))
+    separate_load = 0 if load == system else load
+    return Identity(
+        system, flavour, load_system=separate_load, integer_parameters=integers, rotors=len(table.layout)
+    )
 
 
 def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_available_modes_message, ...]:
     """AVAILABLE_MODES for each mode that can be flown."""
-    modes = identity.flavour.flown
+    modes = identity.flavour.available_modes
     return tuple(
         mavlink.MAVLink_available_modes_message(
             number_modes=len(modes),

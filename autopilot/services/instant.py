@@ -75,8 +75,8 @@ class Instant(NamedTuple):
     x_load_d: Vec3
     v_load_d: Vec3
     a_load_d: Vec3
-    x_load_asked: Vec3
-    v_load_asked: Vec3
+    x_load_requested: Vec3
+    v_load_requested: Vec3
     q_cable_c: Vec3
     x_quad_d: Vec3
     quat_c_wxyz: Quat
@@ -247,8 +247,8 @@ def load_setpoint_of(s: Any) -> tuple[float, ...]:
         s.q_cable_c,
         s.elapsed_s,
         s.duration_s,
-        s.x_load_asked,
-        s.v_load_asked,
+        s.x_load_requested,
+        s.v_load_requested,
     )
 
 

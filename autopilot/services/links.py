@@ -10,7 +10,7 @@ from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT
 from autopilot.services.records import Source
 from autopilot.services.stream_frames import StreamFrames
 from autopilot.services.streams import Streams
-from autopilot.wire.codec import FrameWriter, split
+from autopilot.wire.codec import FrameWriter, split_frames
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Sign
@@ -28,7 +28,7 @@ class LinkState:
     __slots__ = (
         "announced",
         "frames",
-        "heard_us",
+        "last_received_us",
         "number",
         "queue",
         "signer",
@@ -47,7 +47,7 @@ class LinkState:
     ) -> None:
         self.number = number  # in the signatures
         self.signer = signer
-        self.heard_us = now_us
+        self.last_received_us = now_us
         self.streams = Streams(defaults, now_us)
         self.writers: dict[Source, FrameWriter] = {}
         own, dialect = self.writer((system, AUTOPILOT_COMPONENT)), self.writer((system, DIALECT_COMPONENT))
@@ -72,17 +72,17 @@ class LinkState:
         in `StreamFrames`; a link that signs must not have any."""
         sign, writers = self.signer(self.number), self.writers
         pieces: list[bytes] = []
-        for one in outgoing:
-            if isinstance(one, int):
-                pieces.append(self.frames.frames(one, instant))
+        for item in outgoing:
+            if isinstance(item, int):
+                pieces.append(self.frames.frames(item, instant))
             else:
-                source, message = one
+                source, message = item
                 pieces.append((writers.get(source) or self.writer(source)).frame(message, sign))
-        whole = b"".join(pieces)
-        return [whole] if 0 < len(whole) <= DATAGRAM_BYTES else _packed(split(whole))
+        joined = b"".join(pieces)
+        return [joined] if 0 < len(joined) <= DATAGRAM_BYTES else _packed_datagrams(split_frames(joined))
 
 
-def _packed(frames: Iterable[bytes]) -> list[bytes]:
+def _packed_datagrams(frames: Iterable[bytes]) -> list[bytes]:
     """Datagrams of these frames in their order, as many in each as fit."""
     datagrams: list[bytes] = []
     together: list[bytes] = []

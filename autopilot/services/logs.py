@@ -14,16 +14,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from autopilot.services.file_tree import FileTree
-from autopilot.services.files import LOG_ENDING, LOG_FOLDER, Entry, FileError
+from autopilot.services.files import LOG_FOLDER, LOG_SUFFIX, Entry, FileError
 from autopilot.services.records import Decide, Link, Output, Peer, Send
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
 
 BLOCK = 90  # LOG_DATA.data
-PACE_US = 250  # between two blocks: 360 kB/s
-AT_ONCE = 32  # blocks in one tick
-MOST_RANGES = 32
-MOST_CLIENTS = 16
+BLOCK_INTERVAL_US = 250  # between two blocks: 360 kB/s
+BLOCKS_PER_TICK = 32  # blocks in one tick
+MAX_RANGES = 32
+MAX_CLIENTS = 16
 _UINT32 = 2**32 - 1
 
 
@@ -70,13 +70,13 @@ class LogService:
         if message.id >= len(logs):
             return [Send(peer.link, _block(message.id, message.ofs, b""))]
         client = self._client(peer, now_us)
-        wanted = (message.ofs, message.ofs + message.count)
-        if client.log != message.id or wanted[1] >= logs[message.id].size:
+        requested = (message.ofs, message.ofs + message.count)
+        if client.log != message.id or requested[1] >= logs[message.id].size:
             client.ranges.clear()  # another log, or the whole rest of this one
         client.log = message.id
-        on_order = any(start <= wanted[0] and wanted[1] <= end for start, end in client.ranges)
-        if not on_order and len(client.ranges) < MOST_RANGES:
-            client.ranges.append(wanted)
+        already_requested = any(start <= requested[0] and requested[1] <= end for start, end in client.ranges)
+        if not already_requested and len(client.ranges) < MAX_RANGES:
+            client.ranges.append(requested)
         return []
 
     def receive_end(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -106,8 +106,10 @@ class LogService:
         for peer, client in list(self._clients.items()):
             if not client.waiting or client.due_us > now_us:
                 continue
-            budget = min((now_us - client.due_us) // PACE_US + 1, AT_ONCE)
-            client.due_us = max(client.due_us, now_us - AT_ONCE * PACE_US) + budget * PACE_US
+            budget = min((now_us - client.due_us) // BLOCK_INTERVAL_US + 1, BLOCKS_PER_TICK)
+            client.due_us = (
+                max(client.due_us, now_us - BLOCKS_PER_TICK * BLOCK_INTERVAL_US) + budget * BLOCK_INTERVAL_US
+            )
             while budget and client.entries:
                 outputs.append(Send(peer.link, client.entries.popleft()))
                 budget -= 1
@@ -124,7 +126,7 @@ class LogService:
         client = self._clients.pop(peer, None) or _Client()
         if not client.waiting:
             client.due_us = now_us
-        if len(self._clients) >= MOST_CLIENTS:
+        if len(self._clients) >= MAX_CLIENTS:
             del self._clients[next(iter(self._clients))]  # the client whose last request is oldest
         self._clients[peer] = client
         return client
@@ -139,20 +141,20 @@ class LogService:
         blocks: list[Any] = []
         while budget > len(blocks) and client.ranges:
             start, end = client.ranges.popleft()
-            wanted = min(end - start, BLOCK * (budget - len(blocks)))
+            size = min(end - start, BLOCK * (budget - len(blocks)))
             try:
-                data = self._tree.card.read(path, start, wanted)
+                data = self._tree.card.read(path, start, size)
             except FileError:
                 data = b""
-            ended = len(data) < wanted
+            ended = len(data) < size
             blocks += [
                 _block(client.log, start + place, data[place : place + BLOCK])
                 for place in range(0, len(data), BLOCK)
             ]
             if ended and len(data) % BLOCK == 0:
                 blocks.append(_block(client.log, start + len(data), b""))
-            if not ended and start + wanted < end:
-                client.ranges.appendleft((start + wanted, end))
+            if not ended and start + size < end:
+                client.ranges.appendleft((start + size, end))
         return blocks
 
     def _logs(self) -> list[Entry]:
@@ -160,7 +162,7 @@ class LogService:
             entries = self._tree.card.entries(LOG_FOLDER)
         except FileError:
             return []
-        return [entry for entry in entries if entry.name.endswith(LOG_ENDING) and not entry.is_folder]
+        return [entry for entry in entries if entry.name.endswith(LOG_SUFFIX) and not entry.is_folder]
 
 
 def _block(log: int, offset: int, data: bytes) -> Any:

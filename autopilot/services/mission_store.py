@@ -19,9 +19,9 @@ MAX_ITEMS = 2000
 
 _MAGIC = b"PLMI"
 _VERSION = 1
-_HEAD = struct.Struct("<4sHH")
+_HEADER = struct.Struct("<4sHH")
 _RECORD = struct.Struct("<BHBBffffiif")
-_CHECK = struct.Struct("<I")
+_CRC = struct.Struct("<I")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +56,16 @@ def serialise(items: tuple[WireItem, ...]) -> bytes:
         )
         for item in items
     )
-    body = _HEAD.pack(_MAGIC, _VERSION, len(items)) + records
-    return body + _CHECK.pack(zlib.crc32(body))
+    body = _HEADER.pack(_MAGIC, _VERSION, len(items)) + records
+    return body + _CRC.pack(zlib.crc32(body))
 
 
 def plan_id(items: tuple[WireItem, ...]) -> int:
     """Number of this version of a plan, the same after a restart; 0: there is no plan."""
     if not items:
         return 0
-    check: int = _CHECK.unpack(serialise(items)[-_CHECK.size :])[0]
-    return check or 1
+    crc: int = _CRC.unpack(serialise(items)[-_CRC.size :])[0]
+    return crc or 1
 
 
 def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
@@ -82,14 +82,14 @@ def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
 
 def deserialise_items(data: bytes) -> tuple[WireItem, ...] | CorruptMission:
     """The items in `data`, of any kind."""
-    if len(data) < _HEAD.size + _CHECK.size or not data.startswith(_MAGIC):
+    if len(data) < _HEADER.size + _CRC.size or not data.startswith(_MAGIC):
         return CorruptMission(f"{len(data)} bytes that do not begin as a mission file")
-    _, version, count = _HEAD.unpack_from(data)
+    _, version, count = _HEADER.unpack_from(data)
     if version != _VERSION:
         return CorruptMission(f"version {version}; this program reads version {_VERSION}")
-    if len(data) != _HEAD.size + count * _RECORD.size + _CHECK.size:
+    if len(data) != _HEADER.size + count * _RECORD.size + _CRC.size:
         return CorruptMission(f"{len(data)} bytes; {count} items need another length")
-    body, (check,) = data[: -_CHECK.size], _CHECK.unpack(data[-_CHECK.size :])
-    if zlib.crc32(body) != check:
+    body, (crc,) = data[: -_CRC.size], _CRC.unpack(data[-_CRC.size :])
+    if zlib.crc32(body) != crc:
         return CorruptMission("its checksum is wrong")
-    return tuple(WireItem(*record) for record in _RECORD.iter_unpack(body[_HEAD.size :]))
+    return tuple(WireItem(*record) for record in _RECORD.iter_unpack(body[_HEADER.size :]))

@@ -11,7 +11,7 @@ are checked):
                COUNT, same peer     begin again                           -> receiving
                anything, other peer DENIED for its COUNT, else nothing    -> receiving
                ACK from the peer    the peer has given up                 -> idle
-               silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
+               silence              ask again; after MAX_REQUESTS: ACK OPERATION_CANCELLED -> idle
 
 The ACK that ends an upload is sent once if no message was lost. If an item had to be requested again, the ACK
 is repeated until the peer sends another mission message: some clients never ask for a lost ACK.
@@ -34,9 +34,9 @@ from autopilot.services.records import (
     MissionChanged,
     Output,
     Peer,
-    Say,
+    RefusalCleared,
     Send,
-    Settled,
+    SendText,
 )
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
@@ -45,14 +45,14 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
-ASK_US = 250_000  # after this silence a requested item is requested again, as PX4 does
-MAX_ASKS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
+RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
+MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
 # Requests for the first item as MISSION_ITEM_INT, after which the client is assumed to know only MISSION_ITEM
 # (DroneKit). Never in the other order: MAVSDK cancels on a MISSION_REQUEST.
-INT_ASKS = 6
-ECHOES = 3  # repetitions of the last ACK on a link that loses messages
-ECHO_US = 600_000  # between two repetitions
-LATE_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
+INT_REQUESTS = 6
+ACK_REPETITIONS = 3  # repetitions of the last ACK on a link that loses messages
+ACK_INTERVAL_US = 600_000  # between two repetitions
+LATE_ITEM_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _ALL = mavlink.MAV_MISSION_TYPE_ALL
@@ -63,7 +63,7 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
     mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
 }
 
-_NO_INT = 2**31 - 1
+_NO_COORDINATE = 2**31 - 1
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to fly to immediately
 _ABOVE_HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _GLOBAL_FRAMES = (*_ABOVE_HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -81,16 +81,16 @@ class _Upload:
 
     peer: Peer
     count: int
-    ask_again_us: int
+    retry_us: int
     kind: int = _MISSION
-    asks: int = 1  # how often the next item was requested
+    requests: int = 1  # how often the next item was requested
     lossy: bool = False  # an item had to be requested again
     as_float: bool = False  # the client uses MISSION_ITEM
     items: list[WireItem] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class _Ended:
+class _EndedUpload:
     """The transfer that ended last, kept to answer its last item again."""
 
     peer: Peer
@@ -98,8 +98,8 @@ class _Ended:
     result: int
     at_us: int
     kind: int
-    echoes: int = 0  # how often its ACK is still to be sent
-    echo_us: int = NEVER_US
+    acks_left: int = 0  # how often its ACK is still to be sent
+    next_ack_us: int = NEVER_US
 
 
 class MissionService:
@@ -112,12 +112,13 @@ class MissionService:
 
     def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
-        self._item_of_home = (_home_item(home),) if home_is_item else ()
+        self._home_items = (_home_item(home),) if home_is_item else ()
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
-        self._ended: _Ended | None = None
-        self._numbered: tuple[tuple[WireItem, ...], ...] = ((), (), ())  # items that `_plan_ids` identify
+        self._ended: _EndedUpload | None = None
+        # items that `_plan_ids` identify
+        self._identified_items: tuple[tuple[WireItem, ...], ...] = ((), (), ())
         self._plan_ids = (0, 0, 0)
 
     @property
@@ -125,9 +126,13 @@ class MissionService:
         """Numbers of the versions of mission, fence and rally points in force; 0: there is none."""
         fence, rally = _AREAS
         mission, fence_items, rally_items = self.mission.items, self.areas[fence], self.areas[rally]
-        known = self._numbered
-        if mission is not known[0] or fence_items is not known[1] or rally_items is not known[2]:
-            self._numbered = (mission, fence_items, rally_items)
+        identified = self._identified_items
+        if (
+            mission is not identified[0]
+            or fence_items is not identified[1]
+            or rally_items is not identified[2]
+        ):
+            self._identified_items = (mission, fence_items, rally_items)
             self._plan_ids = (plan_id(mission), plan_id(fence_items), plan_id(rally_items))
         return self._plan_ids
 
@@ -138,7 +143,7 @@ class MissionService:
 
     def receive_count(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_COUNT: a client wants to upload."""
-        self._hush(peer)
+        self._stop_ack_repetition(peer)
         kind, count = message.mission_type, message.count
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -147,23 +152,26 @@ class MissionService:
         self._upload = None
         if count > MAX_ITEMS:
             why = f"Mission of {count} items; at most {MAX_ITEMS} are kept"
-            return [Say(mavlink.MAV_SEVERITY_WARNING, why), _ack(peer, mavlink.MAV_MISSION_NO_SPACE, kind)]
+            return [
+                SendText(mavlink.MAV_SEVERITY_WARNING, why),
+                _ack(peer, mavlink.MAV_MISSION_NO_SPACE, kind),
+            ]
         refused = [] if kind in _AREAS else self._refusal((), count, peer, decide)
         if refused:
             return refused
         if count == 0:
-            done = self._area_replaced(kind, ()) if kind in _AREAS else self._replaced(StoredMission())
-            return [*done, self._accepted(peer, kind)]
-        self._upload = _Upload(peer, count, now_us + ASK_US, kind)
-        return [self._ask()]
+            done = self._replace_area(kind, ()) if kind in _AREAS else self._replace_mission(StoredMission())
+            return [*done, self._accepting_ack(peer, kind)]
+        self._upload = _Upload(peer, count, now_us + RETRY_US, kind)
+        return [self._item_request()]
 
     def receive_item_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_ITEM_INT."""
-        return self._item(message, _item_of_int(message), False, peer, now_us, decide)
+        return self._receive_item(message, _item_of_int(message), False, peer, now_us, decide)
 
     def receive_item(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_ITEM, the older form with coordinates as floats."""
-        return self._item(message, _item_of_float(message), True, peer, now_us, decide)
+        return self._receive_item(message, _item_of_float(message), True, peer, now_us, decide)
 
     def receive_ack(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_ACK: the end of a download, or the client gives up its upload."""
@@ -174,31 +182,33 @@ class MissionService:
     def next_timer(self) -> int:
         """Time at which `poll` has something to do, in us."""
         if self._upload:
-            return self._upload.ask_again_us
-        return self._ended.echo_us if self._ended else NEVER_US
+            return self._upload.retry_us
+        return self._ended.next_ack_us if self._ended else NEVER_US
 
     def poll(self, now_us: int) -> list[Output]:
         """Request a missing item again, or give up the upload; repeat the ACK of an ended upload."""
         upload, ended = self._upload, self._ended
-        if upload is None and ended and now_us >= ended.echo_us:
-            left = ended.echoes - 1
-            self._ended = replace(ended, echoes=left, echo_us=now_us + ECHO_US if left else NEVER_US)
-            return [self._said_again(ended)]
-        if upload is None or now_us < upload.ask_again_us:
+        if upload is None and ended and now_us >= ended.next_ack_us:
+            left = ended.acks_left - 1
+            self._ended = replace(
+                ended, acks_left=left, next_ack_us=now_us + ACK_INTERVAL_US if left else NEVER_US
+            )
+            return [self._repeated_ack(ended)]
+        if upload is None or now_us < upload.retry_us:
             return []
-        if upload.asks == MAX_ASKS:
-            self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
+        if upload.requests == MAX_REQUESTS:
+            self._end_upload(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
             why = f"Mission upload given up: item {len(upload.items)} of {upload.count} did not come"
             cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind)
-            return [Say(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
-        if not upload.items and upload.asks >= INT_ASKS:
+            return [SendText(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
+        if not upload.items and upload.requests >= INT_REQUESTS:
             upload.as_float = True
-        upload.asks += 1
+        upload.requests += 1
         upload.lossy = True
-        upload.ask_again_us = now_us + ASK_US
-        return [self._ask()]
+        upload.retry_us = now_us + RETRY_US
+        return [self._item_request()]
 
-    def _item(
+    def _receive_item(
         self,
         message: Any,
         item: WireItem | None,
@@ -209,31 +219,31 @@ class MissionService:
     ) -> list[Output]:
         upload = self._upload
         if upload is None or upload.peer != peer:
-            alone = message.mission_type == _MISSION and message.current == _GUIDED_ITEM
-            if alone and item is not None:
-                return self._go_there(item, peer, decide)
-            return self._late_item(message, peer, now_us)
+            is_guided_item = message.mission_type == _MISSION and message.current == _GUIDED_ITEM
+            if is_guided_item and item is not None:
+                return self._fly_to_item(item, peer, decide)
+            return self._answer_late_item(message, peer, now_us)
         if message.mission_type != upload.kind:
             return []
         expected = len(upload.items)
         if message.seq < expected:
             return []
         if message.seq > expected:
-            return [self._ask()]
+            return [self._item_request()]
         if item is None:
-            self._end(mavlink.MAV_MISSION_INVALID_PARAM5_X, now_us)
+            self._end_upload(mavlink.MAV_MISSION_INVALID_PARAM5_X, now_us)
             why = f"Mission item {expected}: x or y is no coordinate"
             return [
-                Say(mavlink.MAV_SEVERITY_WARNING, why),
+                SendText(mavlink.MAV_SEVERITY_WARNING, why),
                 _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X, upload.kind),
             ]
         upload.items.append(item)
-        upload.asks, upload.ask_again_us, upload.as_float = 1, now_us + ASK_US, as_float
+        upload.requests, upload.retry_us, upload.as_float = 1, now_us + RETRY_US, as_float
         if len(upload.items) < upload.count:
-            return [self._ask()]
-        return self._complete(upload, now_us, decide)
+            return [self._item_request()]
+        return self._complete_upload(upload, now_us, decide)
 
-    def _go_there(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
+    def _fly_to_item(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
         """A single waypoint outside any upload, which is ArduPilot's "go there"."""
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
@@ -242,68 +252,70 @@ class MissionService:
         verdict = decide(Reposition(east, north, up, True))
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return [_ack(peer, _ACCEPTED)]
-        said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
-        return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED)]
+        texts: list[Output] = [SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
+        return [*texts, _ack(peer, mavlink.MAV_MISSION_DENIED)]
 
-    def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
+    def _complete_upload(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items have arrived: check them as a whole, and only then replace the mission."""
         items, kind = tuple(upload.items), upload.kind
-        if self._item_of_home and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            items = (*self._item_of_home, *items[1:])
+        if self._home_items and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
+            items = (*self._home_items, *items[1:])
         try:
             if kind in _AREAS:
                 _READERS[kind](items, self.home)
-                self._end(_ACCEPTED, now_us)
-                settled = Settled(_upload_of(kind))
-                return [settled, *self._area_replaced(kind, items), self._accepted(upload.peer, kind)]
+                self._end_upload(_ACCEPTED, now_us)
+                cleared = RefusalCleared(_upload_of(kind))
+                return [cleared, *self._replace_area(kind, items), self._accepting_ack(upload.peer, kind)]
             steps = located_steps(items, self.home)
         except MissionItemError as error:
-            self._end(error.result, now_us)
-            said = Say(mavlink.MAV_SEVERITY_WARNING, str(error), _upload_of(kind))
-            return [said, _ack(upload.peer, error.result, kind)]
+            self._end_upload(error.result, now_us)
+            text = SendText(mavlink.MAV_SEVERITY_WARNING, str(error), _upload_of(kind))
+            return [text, _ack(upload.peer, error.result, kind)]
         refused = self._refusal(steps, upload.count, upload.peer, decide)
         if refused:
-            self._end(mavlink.MAV_MISSION_DENIED, now_us)
+            self._end_upload(mavlink.MAV_MISSION_DENIED, now_us)
             return refused
-        self._end(_ACCEPTED, now_us)
-        replaced = self._replaced(StoredMission(items))
-        return [Settled(_upload_of(kind)), *replaced, self._accepted(upload.peer, kind)]
+        self._end_upload(_ACCEPTED, now_us)
+        replaced = self._replace_mission(StoredMission(items))
+        return [RefusalCleared(_upload_of(kind)), *replaced, self._accepting_ack(upload.peer, kind)]
 
-    def _accepted(self, peer: Peer, kind: int) -> Output:
+    def _accepting_ack(self, peer: Peer, kind: int) -> Output:
         """The acknowledgement of a plan that is now in force."""
         return _ack(peer, _ACCEPTED, kind, self._plan_id(kind))
 
-    def _late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
+    def _answer_late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
         ended = self._ended
         if (
             ended
             and ended.peer == peer
             and message.seq == ended.count - 1
             and message.mission_type == ended.kind
-            and now_us - ended.at_us <= LATE_US
+            and now_us - ended.at_us <= LATE_ITEM_US
         ):
-            return [self._said_again(ended)]
+            return [self._repeated_ack(ended)]
         return []
 
-    def _said_again(self, ended: _Ended) -> Output:
+    def _repeated_ack(self, ended: _EndedUpload) -> Output:
         if ended.result == _ACCEPTED:
-            return self._accepted(ended.peer, ended.kind)
+            return self._accepting_ack(ended.peer, ended.kind)
         return _ack(ended.peer, ended.result, ended.kind)
 
-    def _end(self, result: int, now_us: int) -> None:
+    def _end_upload(self, result: int, now_us: int) -> None:
         upload, self._upload = self._upload, None
         if upload is None:
             return
-        self._ended = _Ended(upload.peer, upload.count, result, now_us, upload.kind)
+        self._ended = _EndedUpload(upload.peer, upload.count, result, now_us, upload.kind)
         if upload.lossy and result != mavlink.MAV_MISSION_OPERATION_CANCELLED:
-            self._ended = replace(self._ended, echoes=ECHOES, echo_us=now_us + ECHO_US)
+            self._ended = replace(
+                self._ended, acks_left=ACK_REPETITIONS, next_ack_us=now_us + ACK_INTERVAL_US
+            )
 
-    def _hush(self, peer: Peer) -> None:
+    def _stop_ack_repetition(self, peer: Peer) -> None:
         """The peer has sent another mission message: stop repeating the ACK of its upload."""
         if self._ended and self._ended.peer == peer:
-            self._ended = replace(self._ended, echoes=0, echo_us=NEVER_US)
+            self._ended = replace(self._ended, acks_left=0, next_ack_us=NEVER_US)
 
-    def _ask(self) -> Output:
+    def _item_request(self) -> Output:
         upload = self._upload
         assert upload is not None
         request = (
@@ -318,7 +330,7 @@ class MissionService:
 
     def receive_clear_all(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_CLEAR_ALL."""
-        self._hush(peer)
+        self._stop_ack_repetition(peer)
         kind = message.mission_type
         if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -332,9 +344,9 @@ class MissionService:
         done: list[Output] = []
         for area in _AREAS:
             if kind in (area, _ALL):
-                done += self._area_replaced(area, ())
+                done += self._replace_area(area, ())
         if kind not in _AREAS:
-            done += self._replaced(StoredMission())
+            done += self._replace_mission(StoredMission())
         return [*done, _ack(peer, _ACCEPTED, kind)]
 
     def _refusal(
@@ -350,16 +362,16 @@ class MissionService:
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return []
         warning, what = mavlink.MAV_SEVERITY_WARNING, _upload_of(kind)
-        said: list[Output] = [Say(warning, verdict.text, what)] if verdict.text else []
-        return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+        texts: list[Output] = [SendText(warning, verdict.text, what)] if verdict.text else []
+        return [*texts, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
-    def _area_replaced(self, kind: int, items: tuple[WireItem, ...]) -> list[Output]:
+    def _replace_area(self, kind: int, items: tuple[WireItem, ...]) -> list[Output]:
         if self.areas[kind] == items:
             return []
         self.areas[kind] = items
         return [AreasChanged(kind, items), Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
 
-    def _replaced(self, mission: StoredMission) -> list[Output]:
+    def _replace_mission(self, mission: StoredMission) -> list[Output]:
         self.mission = mission
         return [MissionChanged(mission), Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
 
@@ -367,7 +379,7 @@ class MissionService:
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_LIST: send the number of items to the requesting client only."""
-        self._hush(peer)
+        self._stop_ack_repetition(peer)
         kind = message.mission_type
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -380,7 +392,7 @@ class MissionService:
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
         """All items of a kind; empty for an unknown kind."""
         if kind == _MISSION:
-            return self.mission.items or self._item_of_home
+            return self.mission.items or self._home_items
         return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -392,7 +404,7 @@ class MissionService:
         return self._download(message, peer, mavlink.MAVLink_mission_item_message, _coordinates_as_float)
 
     def _download(self, message: Any, peer: Peer, answer: Any, coordinates: Any) -> list[Output]:
-        self._hush(peer)
+        self._stop_ack_repetition(peer)
         kind, seq = message.mission_type, message.seq
         items = self._items_of(kind)
         if seq >= len(items):
@@ -434,7 +446,7 @@ def _home_item(home: Home) -> WireItem:
 
 
 def _upload_of(kind: int) -> tuple[str, int]:
-    """The `about` of a refusal of items of this kind."""
+    """The `subject` of a refusal of items of this kind."""
     return "upload", kind
 
 
@@ -468,9 +480,9 @@ def _scale(frame: int) -> float:
 
 def _int_coordinate(value: float, scale: float) -> int | None:
     if math.isnan(value):
-        return _NO_INT
+        return _NO_COORDINATE
     scaled = value * scale
-    return round(scaled) if abs(scaled) < _NO_INT else None
+    return round(scaled) if abs(scaled) < _NO_COORDINATE else None
 
 
 def _item_of_float(m: Any) -> WireItem | None:
@@ -488,5 +500,5 @@ def _coordinates_as_int(item: WireItem) -> tuple[int, int]:
 
 def _coordinates_as_float(item: WireItem) -> tuple[float, float]:
     scale = _scale(item.frame)
-    x, y = (math.nan if value == _NO_INT else value / scale for value in (item.x, item.y))
+    x, y = (math.nan if value == _NO_COORDINATE else value / scale for value in (item.x, item.y))
     return x, y

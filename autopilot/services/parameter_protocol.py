@@ -23,25 +23,25 @@ from autopilot.services.records import (
     Output,
     ParameterChanged,
     Peer,
-    Say,
     Send,
-    WorldAsked,
-    WorldSaved,
+    SendText,
+    SimulatorParameterRequested,
+    SimulatorParametersSaved,
 )
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import Layout
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_encoding import from_the_wire, on_the_wire
+from autopilot.wire.parameter_encoding import decode_parameter_value, encode_parameter_value
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, float32
 
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
-LIST_PACE_US = 2000  # between two values of a list: 500 a second
+LIST_INTERVAL_US = 2000  # between two values of a list: 500 a second
 LIST_BURST = 8  # values at once, if ticks are longer than that
 
 # MAV_PARAM_ERROR; the last is newer than the dialect's copy of the enum
 DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 OUT_OF_RANGE = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
-OUT_OF_REACH = mavlink.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND
+COMPONENT_NOT_FOUND = mavlink.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND
 READ_ONLY = mavlink.MAV_PARAM_ERROR_READ_ONLY
 TYPE_MISMATCH = 7
 HASH_NAME = "_HASH_CHECK"
@@ -65,15 +65,15 @@ class ParameterService:
 
     def __init__(self, table: ParameterTable, encoding: ParameterEncoding = ALL_REAL) -> None:
         self.table = table
-        self.world_silent = False  # the simulator is silent, so that its parameters cannot be set
+        self.simulator_silent = False  # the simulator is silent, so that its parameters cannot be set
         self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and its time
-        self._complete = True  # no more parameters will be learned
+        self._is_complete = True  # no more parameters will be learned
         self._hash: tuple[int, int] = (-1, 0)  # version of the table, and its hash
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Begin the list for this link; if one is under way, begin it again without the hash."""
-        self._lists[peer.link] = (0 if peer.link in self._lists else self._begin, now_us)
+        self._lists[peer.link] = (0 if peer.link in self._lists else self._first_index, now_us)
         return []
 
     def receive_request_read(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -96,20 +96,22 @@ class ParameterService:
             return []
         if name not in self.table:
             return [no_such_parameter(name, _BY_NAME, peer)]
-        kind = self._carried(name)[1]
-        if message.param_type not in (kind, mavlink.MAV_PARAM_TYPE_REAL32):
-            why = f"{name}: type {message.param_type} was sent; it is {_TYPE_NAMES[kind]} ({kind})"
+        wire_type = self._wire_value(name)[1]
+        if message.param_type not in (wire_type, mavlink.MAV_PARAM_TYPE_REAL32):
+            why = f"{name}: type {message.param_type} was sent; it is {_TYPE_NAMES[wire_type]} ({wire_type})"
             return self._refused(name, TYPE_MISMATCH, why, peer)
         before = self.table[name]
-        value = from_the_wire(message.param_value, message.param_type)
+        value = decode_parameter_value(message.param_value, message.param_type)
         try:
             self.table.describe(name).checked(value)
         except ParameterError as error:
             return self._refused(name, OUT_OF_RANGE, str(error), peer)
-        if name in self.table.learned:
-            if self.world_silent:
-                return self._refused(name, OUT_OF_REACH, f"{name} not set: the simulator is silent", peer)
-            return [WorldAsked(name, value)]
+        if name in self.table.remote_names:
+            if self.simulator_silent:
+                return self._refused(
+                    name, COMPONENT_NOT_FOUND, f"{name} not set: the simulator is silent", peer
+                )
+            return [SimulatorParameterRequested(name, value)]
         try:
             after = self.table.set(name, value)
         except ParameterError as error:  # in range, but fixed while running
@@ -121,51 +123,53 @@ class ParameterService:
     def reset(self) -> list[Output]:
         """Reset every parameter to its default, except those that are fixed while running."""
         outputs: list[Output] = []
-        count = kept = 0
+        count = unchangeable = 0
         for name, value in self.table.changed().items():
             default = self.table.describe(name).default
-            if name in self.table.learned:
-                outputs.append(WorldAsked(name, default))
+            if name in self.table.remote_names:
+                outputs.append(SimulatorParameterRequested(name, default))
                 count += 1
                 continue
             try:
                 self.table.set(name, default)
             except ParameterError:
-                kept += 1
+                unchangeable += 1
                 continue
             if self.table[name] != value:
                 outputs += [Send(None, self.value_message(name)), ParameterChanged(name, default)]
                 count += 1
         text = f"{count} parameters are at their default again"
-        if kept:
-            text += f"; {kept} are fixed while running"
-        return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
+        if unchangeable:
+            text += f"; {unchangeable} are fixed while running"
+        return [*outputs, SendText(mavlink.MAV_SEVERITY_NOTICE, text)]
 
-    def fail_parts(self, name: str, bits: int, fail: bool) -> WorldAsked | str:
+    def inject_failure(self, name: str, bits: int, fail: bool) -> SimulatorParameterRequested | str:
         """Make the parts behind these bits of a simulator's parameter fail or work; a text if it cannot.
 
         The value is in our table immediately, so that commands in quick succession add up.
         """
-        if name not in self.table.learned:
+        if name not in self.table.remote_names:
             return f"the simulator has told of no {name}"
-        if self.world_silent:
+        if self.simulator_silent:
             return "the simulator is silent"
         before = int(self.table[name])
-        return WorldAsked(name, self.table.set(name, before | bits if fail else before & ~bits))
+        return SimulatorParameterRequested(
+            name, self.table.set(name, before | bits if fail else before & ~bits)
+        )
 
-    def world(self) -> WorldSaved:
+    def simulator_values(self) -> SimulatorParametersSaved:
         """The present values of the simulator's parameters."""
-        return WorldSaved({name: self.table[name] for name in sorted(self.table.learned)})
+        return SimulatorParametersSaved({name: self.table[name] for name in sorted(self.table.remote_names)})
 
     def value_message(self, name: str) -> Any:
         """PARAM_VALUE of the value in force."""
         table = self.table
         return mavlink.MAVLink_param_value_message(
-            name.encode(), *self._carried(name), len(table.names), table.index(name)
+            name.encode(), *self._wire_value(name), len(table.names), table.index(name)
         )
 
     @property
-    def _begin(self) -> int:
+    def _first_index(self) -> int:
         """The index with which a list begins."""
         return _HASH_INDEX if self._encoding.bytewise else 0
 
@@ -175,47 +179,47 @@ class ParameterService:
         if self._hash[0] != table.version:
             parts = []
             for name in table.names:
-                whole = self._encoding.integers and table.describe(name).integer
-                value = _INT32.pack(round(table[name])) if whole else _FLOAT32.pack(float32(table[name]))
+                is_integer = self._encoding.integers and table.describe(name).integer
+                value = _INT32.pack(round(table[name])) if is_integer else _FLOAT32.pack(float32(table[name]))
                 parts.append(name.encode() + value)
             self._hash = (table.version, checksum(b"".join(parts)))
         values = (self._hash[1], len(table), _NO_INDEX, HASH_NAME.encode(), mavlink.MAV_PARAM_TYPE_UINT32)
         return (_HASH_VALUE, values)
 
-    def _carried(self, name: str) -> tuple[float, int]:
-        whole = self._encoding.integers and self.table.describe(name).integer
-        return on_the_wire(self.table[name], whole, self._encoding.bytewise)
+    def _wire_value(self, name: str) -> tuple[float, int]:
+        is_integer = self._encoding.integers and self.table.describe(name).integer
+        return encode_parameter_value(self.table[name], is_integer, self._encoding.bytewise)
 
     def expect_more(self) -> None:
         """More parameters will be learned soon: lists wait."""
-        self._complete = False
+        self._is_complete = False
 
     def complete(self, now_us: int) -> None:
         """The table is complete: requested lists begin."""
-        self._complete = True
-        self._lists = dict.fromkeys(self._lists, (self._begin, now_us))
+        self._is_complete = True
+        self._lists = dict.fromkeys(self._lists, (self._first_index, now_us))
 
     def next_timer(self) -> int:
         """Time at which `poll` has something to send, in us."""
-        if not self._complete:
+        if not self._is_complete:
             return NEVER_US
         return min((at_us for _, at_us in self._lists.values()), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
         """The values that are due of the lists under way."""
         outputs: list[Output] = []
-        if not self._complete:
+        if not self._is_complete:
             return outputs
         names = self.table.names
         for link, (index, at_us) in list(self._lists.items()):
             if at_us > now_us:
                 continue
-            count = min((now_us - at_us) // LIST_PACE_US + 1, LIST_BURST)
+            count = min((now_us - at_us) // LIST_INTERVAL_US + 1, LIST_BURST)
             if index == _HASH_INDEX:
                 outputs.append(Send(link, self._hash_message()))
             sent = names[max(index, 0) : index + count]
             outputs += [Send(link, self.value_message(name)) for name in sent]
-            self._lists[link] = (index + count, at_us + count * LIST_PACE_US)
+            self._lists[link] = (index + count, at_us + count * LIST_INTERVAL_US)
             if index + count >= len(names):
                 del self._lists[link]
         return outputs
@@ -226,7 +230,7 @@ class ParameterService:
 
     def _refused(self, name: str, error: int, why: str, peer: Peer) -> list[Output]:
         return [
-            Say(mavlink.MAV_SEVERITY_WARNING, why),
+            SendText(mavlink.MAV_SEVERITY_WARNING, why),
             _error(name, self.table.index(name), error, peer),
             Send(peer.link, self.value_message(name)),
         ]

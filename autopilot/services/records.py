@@ -1,8 +1,8 @@
 """Records that the services exchange with each other and with the shell; they have no behaviour.
 
-A service takes a message, the peer that sent it and `now_us`; it returns outputs. `Send` and `Say` are sent
-on the wire, `Announce` requests messages that are built from the next snapshot, `Settled` is for the kept
-texts, and the rest are events for the shell, named as facts.
+A service takes a message, the peer that sent it and `now_us`; it returns outputs. `Send` and `SendText` are
+sent on the wire, `Announce` requests messages that are built from the next snapshot, `RefusalCleared` is for
+the kept texts, and the rest are events for the shell, named as facts.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ class Send:
 
 
 @dataclass(frozen=True, slots=True)
-class Say:
+class SendText:
     """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug).
 
-    A refusal states what it is `about`, a command or an upload: it is a warning until that is accepted
-    (`Settled`).
+    A refusal states what it is `subject`, a command or an upload: it is a warning until that is accepted
+    (`RefusalCleared`).
     """
 
     severity: int
     text: str
-    about: Hashable = None
+    subject: Hashable = None
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class RefusalCleared:
     """A command or upload that was refused before is now accepted: its refusals are no longer warnings."""
 
-    about: Hashable
+    subject: Hashable
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class ParameterChanged:
 
 
 @dataclass(frozen=True, slots=True)
-class WorldAsked:
+class SimulatorParameterRequested:
     """A parameter of the simulator is to be set to `value`; the value that the simulator then reports is in
     force and is sent to the ground stations."""
 
@@ -123,7 +123,7 @@ class ParametersSaved:
 
 
 @dataclass(frozen=True, slots=True)
-class WorldSaved:
+class SimulatorParametersSaved:
     """Values of the simulator's parameters that are to be restored after a restart (empty: none are)."""
 
     values: Mapping[str, float]
@@ -139,16 +139,16 @@ class ServiceFailed:
 
 Event = (
     ParameterChanged
-    | WorldAsked
+    | SimulatorParameterRequested
     | MissionChanged
     | AreasChanged
     | TimesyncAnswered
     | SigningChanged
     | ParametersSaved
-    | WorldSaved
+    | SimulatorParametersSaved
     | ServiceFailed
 )
-Output = Send | Say | Settled | Announce | Event
+Output = Send | SendText | RefusalCleared | Announce | Event
 
 
 class Verdict(NamedTuple):

@@ -1,6 +1,7 @@
 """The requests of ground stations, in SI units and ENU from home, whatever message carried them.
 
-The supervisor decides on those in `Decided`; the endpoint itself answers those in `Answered`.
+The supervisor decides on those in `SupervisorRequest`; the endpoint itself answers those in
+`EndpointRequest`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from math import nan
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.items import LocatedStep
-from missions.model import LookAt, TurnNose
+from missions.model import LookAt, TurnHeading
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class EnableFence:
 
 
 @dataclass(frozen=True, slots=True)
-class FailParts:
+class InjectFailure:
     """Make parts of the simulated vehicle fail or work again: `bits` of the simulator's parameter."""
 
     parameter: str
@@ -120,17 +121,17 @@ class FollowSetpoint:
     relative: bool
     body: bool = False
     heading_rad: float = nan  # from east to north; in a `body` setpoint relative to the present heading
-    turning_rad_s: float = nan
+    yaw_rate_rad_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)
 class FollowAttitude:
     """One attitude of a stream: thrust axis as a unit vector, ENU; thrust 0 ... 1, None: keep the height."""
 
-    upward: Vec3
+    thrust_axis: Vec3
     thrust: float | None
     heading_rad: float = nan  # from east to north
-    turning_rad_s: float = nan
+    yaw_rate_rad_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,8 +148,8 @@ class FollowStick:
     """One position of the stick: the components of the velocity, forward, left and up, and the yaw rate,
     counter-clockwise, each as a share of its maximum."""
 
-    share: Vec3
-    turning: float = 0.0
+    velocity_share: Vec3
+    yaw_rate: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +206,7 @@ class Grab:
 
 
 # requests that move the vehicle or its load as soon as time continues
-FLOWN = (
+MOTION_REQUESTS = (
     Takeoff
     | Land
     | ReturnHome
@@ -287,7 +288,7 @@ class ChangeSigningKey:
     """Change or remove the key for signed messages; only the signing service knows the new key."""
 
 
-Decided = (
+SupervisorRequest = (
     Arm
     | Takeoff
     | Land
@@ -303,7 +304,7 @@ Decided = (
     | FollowAttitude
     | FollowRates
     | FollowStick
-    | TurnNose
+    | TurnHeading
     | LookAt
     | Orbit
     | ChangeAltitude
@@ -319,12 +320,12 @@ Decided = (
     | ResetParameters
     | ChangeSigningKey
 )
-Answered = (
-    FailParts
+EndpointRequest = (
+    InjectFailure
     | StoreParameters
     | RequestMessage
     | SetMessageInterval
     | GetMessageInterval
     | RequestCapabilities
 )
-Request = Decided | Answered
+Request = SupervisorRequest | EndpointRequest

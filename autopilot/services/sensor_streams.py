@@ -12,7 +12,7 @@ from typing import Any
 from autopilot.geometry.linear import Vec3
 from autopilot.services.identity import Identity
 from autopilot.services.instant import attitude_quaternion_of, pulses_of
-from autopilot.services.snapshot import Sensed, Snapshot
+from autopilot.services.snapshot import SensorReadings, Snapshot
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.scaling import saturated
@@ -38,10 +38,10 @@ def _within(value: float, factor: float) -> int:
     return saturated(value * factor, -_INT16 - 1, _INT16)
 
 
-def _updated(s: Snapshot, sensed: Sensed) -> int:
+def _updated(s: Snapshot, readings: SensorReadings) -> int:
     """Bits of the fields of HIGHRES_IMU that are new."""
     fields = _INERTIAL
-    for bits, read_us in ((_FIELD, sensed.field_us), (_PRESSURE, sensed.pressure_us)):
+    for bits, read_us in ((_FIELD, readings.field_us), (_PRESSURE, readings.pressure_us)):
         if read_us >= 0 and s.now_us - read_us < _UPDATED_US:
             fields |= bits
     return fields
@@ -49,22 +49,22 @@ def _updated(s: Snapshot, sensed: Sensed) -> int:
 
 def highres_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     """HIGHRES_IMU; fields of a sensor that has never read anything are 0, and their bits are not set."""
-    sensed = s.sensed
-    if sensed is None:
+    readings = s.readings
+    if readings is None:
         return ()
     return (
         (
             _HIGHRES_IMU,
             (
                 s.now_us,
-                *frd_from_flu(sensed.accel),
-                *frd_from_flu(sensed.gyro),
-                *frd_from_flu(sensed.field_gauss),
-                sensed.pressure_pa * 0.01,
+                *frd_from_flu(readings.accel),
+                *frd_from_flu(readings.gyro),
+                *frd_from_flu(readings.field_gauss),
+                readings.pressure_pa * 0.01,
                 0.0,
-                sensed.pressure_altitude_m,
-                sensed.temperature_degC,
-                _updated(s, sensed),
+                readings.pressure_altitude_m,
+                readings.temperature_degC,
+                _updated(s, readings),
                 0,
             ),
         ),
@@ -73,24 +73,24 @@ def highres_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def scaled_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     """SCALED_IMU of the one inertial unit: milli-g, mrad/s, mgauss; its temperature is not known."""
-    sensed = s.sensed
-    if sensed is None:
+    readings = s.readings
+    if readings is None:
         return ()
-    readings = (
-        *(_within(a, 1e3 / _STANDARD_GRAVITY) for a in frd_from_flu(sensed.accel)),
-        *(_within(w, 1e3) for w in frd_from_flu(sensed.gyro)),
-        *(_within(b, 1e3) for b in frd_from_flu(sensed.field_gauss)),
+    fields = (
+        *(_within(a, 1e3 / _STANDARD_GRAVITY) for a in frd_from_flu(readings.accel)),
+        *(_within(w, 1e3) for w in frd_from_flu(readings.gyro)),
+        *(_within(b, 1e3) for b in frd_from_flu(readings.field_gauss)),
     )
-    return (mavlink.MAVLink_scaled_imu_message(boot_ms(s.now_us), *readings),)
+    return (mavlink.MAVLink_scaled_imu_message(boot_ms(s.now_us), *fields),)
 
 
 def scaled_pressure(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     """SCALED_PRESSURE of the barometer, if one is carried."""
-    sensed = s.sensed
-    if sensed is None or sensed.pressure_us < 0:
+    readings = s.readings
+    if readings is None or readings.pressure_us < 0:
         return ()
-    temperature = _within(sensed.temperature_degC, 100.0)
-    pressure = sensed.pressure_pa * 0.01
+    temperature = _within(readings.temperature_degC, 100.0)
+    pressure = readings.pressure_pa * 0.01
     return (mavlink.MAVLink_scaled_pressure_message(boot_ms(s.now_us), pressure, 0.0, temperature),)
 
 

@@ -34,7 +34,7 @@ GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is a fence
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
 
 
-HEIGHT_LIMIT = "GF_MAX_VER_DIST"  # the parameter that `breach` names if the flight is too high
+HEIGHT_LIMIT_PARAMETER = "GF_MAX_VER_DIST"  # the parameter that `breach` names if the flight is too high
 
 
 class GpsFix(NamedTuple):
@@ -49,7 +49,7 @@ class GpsFix(NamedTuple):
     satellites: int
 
 
-class Sensed(NamedTuple):
+class SensorReadings(NamedTuple):
     """The last readings of the vehicle's own sensors, body FLU; zeros for a sensor that has read nothing."""
 
     gyro: Vec3  # rad/s
@@ -71,7 +71,7 @@ class TestRatios(NamedTuple):
     magnetic: float
 
 
-UNTESTED = TestRatios(math.nan, math.nan, math.nan, math.nan)
+NO_TEST_RATIOS = TestRatios(math.nan, math.nan, math.nan, math.nan)
 
 
 class Sortie(NamedTuple):
@@ -104,11 +104,11 @@ class Snapshot:
     sub_mode: int
     landed_state: int  # MAV_LANDED_STATE
     system_status: int  # MAV_STATE
-    asked_mode: int | None = None  # custom mode that was requested by its number
+    requested_mode: int | None = None  # custom mode that was requested by its number
 
-    launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
+    home_position: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
 
-    guarded: bool = True  # the fence is not switched off
+    fence_enabled: bool = True  # the fence is not switched off
     breach: str = ""  # of the fence; empty: none
     breaches: int = 0
     breach_us: int = 0
@@ -121,7 +121,7 @@ class Snapshot:
     estimator_flags: int = 0  # ESTIMATOR_STATUS_FLAGS
     horizontal_std: float = math.nan  # m
     vertical_std: float = math.nan  # m
-    test_ratios: TestRatios = UNTESTED
+    test_ratios: TestRatios = NO_TEST_RATIOS
 
     # estimate of load and cable
     x_load: Vec3 = ZERO
@@ -145,8 +145,8 @@ class Snapshot:
     x_load_d: Vec3 = ZERO
     v_load_d: Vec3 = ZERO
     a_load_d: Vec3 = ZERO
-    x_load_asked: Vec3 = ZERO  # the requested path; the above is as close to it as the vehicle can fly
-    v_load_asked: Vec3 = ZERO
+    x_load_requested: Vec3 = ZERO  # the requested path; the above is as close to it as the vehicle can fly
+    v_load_requested: Vec3 = ZERO
     q_cable_c: Vec3 = _DOWN
     x_quad_d: Vec3 = _UNKNOWN  # position setpoint of the vehicle; NaN while there is none
     quat_c_wxyz: Quat = _LEVEL
@@ -176,7 +176,7 @@ class Snapshot:
     sensors_present: int = 0  # the bits above
     sensors_healthy: int = 0
     gps: GpsFix | None = None
-    sensed: Sensed | None = None  # None: no inertial sample yet
+    readings: SensorReadings | None = None  # None: no inertial sample yet
     sortie: Sortie = _NO_SORTIE
     vibration: Vec3 = ZERO  # m/s^2, body
     wind: Vec3 = _UNKNOWN  # m/s, the direction towards which it blows
@@ -193,4 +193,5 @@ class Snapshot:
     plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none
 
     instant: Row | None = None  # the packed `Instant`, if available: machine code makes frames of it
-    unchanged: object = None  # while it is the same object, only the plans of `telemetry.WATCHED` can change
+    # while it is the same object, only the plans of `telemetry.WATCHED` can change
+    change_token: object = None

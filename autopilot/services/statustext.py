@@ -6,7 +6,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 CHUNK = 50  # STATUSTEXT.text
 _LAST_ID = 0xFFFF
-_MOST_CHUNKS = 256  # STATUSTEXT.chunk_seq is a byte
+_MAX_CHUNKS = 256  # STATUSTEXT.chunk_seq is a byte
 
 
 class TextWriter:
@@ -17,12 +17,12 @@ class TextWriter:
 
     def messages(self, severity: int, text: str) -> list[mavlink.MAVLink_statustext_message]:
         """The messages that carry `text`; characters that are not ASCII become question marks."""
-        line = " ".join(text.split()).encode("ascii", errors="replace")[: CHUNK * _MOST_CHUNKS]
+        line = " ".join(text.split()).encode("ascii", errors="replace")[: CHUNK * _MAX_CHUNKS]
         if len(line) <= CHUNK:
             return [mavlink.MAVLink_statustext_message(severity, line)]
         self._id = self._id % _LAST_ID + 1
         # a full last chunk needs an empty one after it, since a NUL ends the text
-        starts = range(0, min(len(line) + 1, CHUNK * _MOST_CHUNKS), CHUNK)
+        starts = range(0, min(len(line) + 1, CHUNK * _MAX_CHUNKS), CHUNK)
         return [
             mavlink.MAVLink_statustext_message(severity, line[start : start + CHUNK], self._id, number)
             for number, start in enumerate(starts)

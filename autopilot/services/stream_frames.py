@@ -37,7 +37,7 @@ from autopilot.services.instant import (
     vfr_hud_of,
 )
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM, Bytes, Origin, put_frame, wire_record
+from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, Bytes, Origin, put_frame, wire_record
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.telemetry import boot_ms
 from autopilot.wire.dialect import plumbline as mavlink
@@ -59,7 +59,7 @@ CASCADE_ERRORS = wire_record(mavlink.MAVLink_cascade_errors_message, __name__)
 ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 
 # a set of these streams is the sum of their bits, which increase in the order of sending
-_WRITTEN = (
+_COMPILED_STREAMS = (
     mavlink.MAVLINK_MSG_ID_ATTITUDE,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
@@ -76,9 +76,9 @@ _WRITTEN = (
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
 )
-BITS = {key: 1 << i for i, key in enumerate(_WRITTEN)}
-_MOST_FRAMES = len(BITS) + len(DEBUG_VECTORS) + len(NAMED_VALUES)
-STREAMS_ROOM = _MOST_FRAMES * FRAME_ROOM  # bytes that hold all of them
+BITS = {key: 1 << i for i, key in enumerate(_COMPILED_STREAMS)}
+_MAX_FRAMES = len(BITS) + len(DEBUG_VECTORS) + len(NAMED_VALUES)
+MAX_STREAMS_BYTES = _MAX_FRAMES * MAX_FRAME_BYTES  # bytes that hold all of them
 
 
 def _name(name: bytes) -> tuple[int, ...]:
@@ -89,27 +89,27 @@ _POSITION, _VELOCITY, _CABLE, _ERROR = (_name(name) for name in DEBUG_VECTORS)
 _TENSION, _SWING, _DISTANCE, _PSI_R, _PSI_Q = (_name(name) for name in NAMED_VALUES)
 
 # a set of streams that are written together, or the keys of streams that are not written by this module
-Part = int | tuple[int, ...]
+StreamGroup = int | tuple[int, ...]
 
 
 @lru_cache(maxsize=256)
-def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
+def stream_groups(keys: tuple[int, ...]) -> tuple[StreamGroup, ...]:
     """Streams in the order of sending, grouped into those that are written together."""
-    parts: list[Part] = []
-    last: Part = 0
+    groups: list[StreamGroup] = []
+    last: StreamGroup = 0
     for key in keys:
         bit = BITS.get(key, 0)
         if not bit:
             if isinstance(last, tuple):
-                parts.pop()
+                groups.pop()
             last = (*last, key) if isinstance(last, tuple) else (key,)
         elif isinstance(last, int) and 0 < last < bit:
-            parts.pop()
+            groups.pop()
             last |= bit
         else:
             last = bit
-        parts.append(last)
-    return tuple(parts)
+        groups.append(last)
+    return tuple(groups)
 
 
 @kernel
@@ -153,7 +153,7 @@ def put_streams(
     `instant` is a packed `Instant`, `home` a packed `Home`; sequence numbers are those of the first frame of
     each component. Returns the number of bytes, and the sequence numbers of the next frames.
     """
-    s, place = unpack(Instant, instant, 0), unpack(Home, home, 0)
+    s, home_record = unpack(Instant, instant, 0), unpack(Home, home, 0)
     at = 0
     origin = Origin(sequence, system, component)
     if streams & 1:
@@ -163,11 +163,13 @@ def put_streams(
     if streams & 4:
         at, origin = _put(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
     if streams & 8:
-        at, origin = _put(GLOBAL_POSITION_INT, global_position_int_of(s, place), payload, buffer, at, origin)
+        at, origin = _put(
+            GLOBAL_POSITION_INT, global_position_int_of(s, home_record), payload, buffer, at, origin
+        )
     if streams & 16:
-        at, origin = _put(ALTITUDE, altitude_of(s, place), payload, buffer, at, origin)
+        at, origin = _put(ALTITUDE, altitude_of(s, home_record), payload, buffer, at, origin)
     if streams & 32:
-        at, origin = _put(VFR_HUD, vfr_hud_of(s, place), payload, buffer, at, origin)
+        at, origin = _put(VFR_HUD, vfr_hud_of(s, home_record), payload, buffer, at, origin)
     if streams & 64 and not isnan(s.x_quad_d[0]):
         at, origin = _put(
             POSITION_TARGET_LOCAL_NED, position_target_local_ned_of(s), payload, buffer, at, origin
@@ -215,9 +217,9 @@ class StreamFrames:
         self.autopilot = autopilot
         self.dialect = dialect
         self.home = packed(home)
-        self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-        self._buffer = np.zeros(STREAMS_ROOM, np.uint8)
-        self._written = self._buffer.data
+        self.payload = np.zeros(MAX_PAYLOAD_BYTES, np.uint8)
+        self._buffer = np.zeros(MAX_STREAMS_BYTES, np.uint8)
+        self._buffer_view = self._buffer.data
         self._put: Callable[..., tuple[int, int, int]] | None = None  # machine code, after the first call
 
     def frames(self, streams: int, instant: Row) -> bytes:
@@ -230,4 +232,4 @@ class StreamFrames:
         if self._put is None:
             self._put = entry_of(put_streams, *arguments)
         end, autopilot.sequence, dialect.sequence = self._put(*arguments)
-        return self._written[:end].tobytes()
+        return self._buffer_view[:end].tobytes()

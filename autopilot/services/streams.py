@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 OFF = -1  # MAV_CMD_SET_MESSAGE_INTERVAL: never
 DEFAULT = 0  # and: the default interval
 NEVER_US = 2**63 - 1
-_MOST_MET = 64  # remembered sets of groups; a client may choose intervals that seldom coincide again
+_MAX_COMBINATIONS = 64  # remembered sets of groups; a client may choose intervals that seldom coincide again
 
 
 class Streams:
@@ -38,8 +38,10 @@ class Streams:
             groups.setdefault((due_us[key], self._interval[key]), []).append(key)
         self._groups = [(due, interval, tuple(keys)) for (due, interval), keys in groups.items()]
         heapify(self._groups)
-        self._written: tuple[NDArray[np.int64], set[int]] | None = None
-        self._met: dict[tuple[tuple[int, ...], ...], tuple[int, ...]] = {}  # groups that were due together
+        self._compiled: tuple[NDArray[np.int64], set[int]] | None = None
+        self._combinations: dict[
+            tuple[tuple[int, ...], ...], tuple[int, ...]
+        ] = {}  # groups that were due together
         self.next_us = self._groups[0][0] if self._groups else NEVER_US
 
     def interval(self, key: int) -> int | None:
@@ -54,48 +56,51 @@ class Streams:
         due_us[key] = _at_or_after(interval, now_us)
         self._regroup(due_us)
 
-    def written_by(self, bits: Mapping[int, int]) -> tuple[NDArray[np.int64], int]:
+    def compiled_groups(self, bits: Mapping[int, int]) -> tuple[NDArray[np.int64], int]:
         """The groups all of whose streams have a bit, (n, 2): interval in us and the sum of their bits; and
         the time at which the first of the other streams is due. No group of the table may be due now: from
         then on, it is due at each tick that reaches or passes a multiple of its interval."""
-        if self._written is None:
-            rows = [(each, sum(map(bits.__getitem__, keys))) for each, keys in self._by(bits, True)]
-            others = {key for _, keys in self._by(bits, False) for key in keys}
-            self._written = np.array(rows, np.int64).reshape(-1, 2), others
-        table, others = self._written
+        if self._compiled is None:
+            rows = [
+                (interval, sum(map(bits.__getitem__, keys)))
+                for interval, keys in self._sent_groups(bits, True)
+            ]
+            others = {key for _, keys in self._sent_groups(bits, False) for key in keys}
+            self._compiled = np.array(rows, np.int64).reshape(-1, 2), others
+        table, others = self._compiled
         return table, min((due for due, _, keys in self._groups if keys[0] in others), default=NEVER_US)
 
-    def _by(self, bits: Mapping[int, int], written: bool) -> list[tuple[int, tuple[int, ...]]]:
-        """Intervals and streams of the groups that are sent; `written`: of those all of whose streams have a
+    def _sent_groups(self, bits: Mapping[int, int], compiled: bool) -> list[tuple[int, tuple[int, ...]]]:
+        """Intervals and streams of the groups that are sent; `compiled`: of those all of whose streams have a
         bit, else of the others."""
         sent = [(interval, keys) for _, interval, keys in self._groups if interval > 0]
-        return [(interval, keys) for interval, keys in sent if all(key in bits for key in keys) is written]
+        return [(interval, keys) for interval, keys in sent if all(key in bits for key in keys) is compiled]
 
     def take_due(self, now_us: int) -> tuple[int, ...]:
         """The streams due at this tick; each of them is due again at the next multiple of its interval."""
         groups = self._groups
         taken: tuple[tuple[int, ...], ...] = ()
-        last, twice = 0, False
+        last, is_split = 0, False
         while self.next_us <= now_us:
             _, interval, keys = groups[0]
             # a stream was set to this interval between two times at which the others with it were due
-            twice, last = twice or interval == last, interval
+            is_split, last = is_split or interval == last, interval
             taken += (keys,)
             heapreplace(groups, (_at_or_after(interval, now_us + 1), interval, keys))
             self.next_us = groups[0][0]
-        if twice:
+        if is_split:
             self._regroup(self._due_us())
-        return self._together(taken)
+        return self._merged(taken)
 
-    def _together(self, groups: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
+    def _merged(self, groups: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
         """The keys of these groups in their order. The same groups coincide again and again."""
         if len(groups) <= 1:
             return groups[0] if groups else ()
-        keys = self._met.get(groups)
+        keys = self._combinations.get(groups)
         if keys is None:
-            if len(self._met) >= _MOST_MET:
-                self._met.clear()
-            keys = self._met[groups] = tuple(sorted(chain(*groups), key=self._order.__getitem__))
+            if len(self._combinations) >= _MAX_COMBINATIONS:
+                self._combinations.clear()
+            keys = self._combinations[groups] = tuple(sorted(chain(*groups), key=self._order.__getitem__))
         return keys
 
     def _due_us(self) -> dict[int, int]:

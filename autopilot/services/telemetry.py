@@ -58,7 +58,7 @@ from autopilot.services.sensor_streams import (
     scaled_imu,
     scaled_pressure,
 )
-from autopilot.services.snapshot import GEOFENCE, HEIGHT_LIMIT, PREARM, Snapshot
+from autopilot.services.snapshot import GEOFENCE, HEIGHT_LIMIT_PARAMETER, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert.axes import ned_from_enu
@@ -112,7 +112,7 @@ def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     # some tools read a missing health bit as a breach
     health = s.sensors_healthy | (0 if s.breach else GEOFENCE)
     present = s.sensors_present | PREARM
-    enabled = present if s.guarded else present & ~GEOFENCE
+    enabled = present if s.fence_enabled else present & ~GEOFENCE
     battery = _battery(s)
     return (
         mavlink.MAVLink_sys_status_message(
@@ -165,7 +165,7 @@ def _gps_global_origin(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _home_position(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (home_position_message(s.now_us, s.launch, s.home),)
+    return (home_position_message(s.now_us, s.home_position, s.home),)
 
 
 def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -189,7 +189,7 @@ def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    too_high = HEIGHT_LIMIT in s.breach
+    too_high = HEIGHT_LIMIT_PARAMETER in s.breach
     kind = mavlink.FENCE_BREACH_MAXALT if too_high else mavlink.FENCE_BREACH_BOUNDARY
     return (
         mavlink.MAVLink_fence_status_message(
@@ -203,14 +203,14 @@ def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     seq, total = uint16(s.mission_current), uint16(s.mission_total)
-    flies = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
+    in_mission_mode = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
     mission, fence, rally = s.plan_ids
     return (
         mavlink.MAVLink_mission_current_message(
             seq,
             total,
             s.mission_state,
-            mission_mode=_IN_MISSION_MODE if flies else _SUSPENDED,
+            mission_mode=_IN_MISSION_MODE if in_mission_mode else _SUSPENDED,
             mission_id=mission,
             fence_id=fence,
             rally_points_id=rally,
@@ -254,7 +254,7 @@ def _wind_cov(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _current_mode(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    mode = identity.flavour.mode(s.main_mode, s.sub_mode, s.asked_mode)
+    mode = identity.flavour.mode(s.main_mode, s.sub_mode, s.requested_mode)
     if mode is None:
         return ()
     return (mavlink.MAVLink_current_mode_message(mode.standard, mode.custom_mode, mode.custom_mode),)
@@ -352,7 +352,7 @@ class Stream(NamedTuple):
     build: Builder
 
 
-def _rate(hertz: int) -> int:
+def _interval_us(hertz: int) -> int:
     return 1_000_000 // hertz
 
 
@@ -360,19 +360,19 @@ _AUTOPILOT, _DIALECT = AUTOPILOT_COMPONENT, DIALECT_COMPONENT
 
 STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(_AUTOPILOT, HEARTBEAT_US, _heartbeat),
-    mavlink.MAVLINK_MSG_ID_SYS_STATUS: Stream(_AUTOPILOT, _rate(2), _sys_status),
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(_AUTOPILOT, _rate(1), _system_time),
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(_AUTOPILOT, _rate(1), _extended_sys_state),
-    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(_AUTOPILOT, _rate(1), _battery_status),
-    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _rate(2), _gps_raw_int),
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: Stream(_AUTOPILOT, _rate(1), _home_position),
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _rate(1), _mission_current),
-    mavlink.MAVLINK_MSG_ID_FENCE_STATUS: Stream(_AUTOPILOT, _rate(1), _fence_status),
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(_AUTOPILOT, _rate(1), _estimator_status),
-    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(_AUTOPILOT, _rate(1), _ekf_status_report),
-    mavlink.MAVLINK_MSG_ID_VIBRATION: Stream(_AUTOPILOT, _rate(1), _vibration),
-    mavlink.MAVLINK_MSG_ID_WIND_COV: Stream(_AUTOPILOT, _rate(1), _wind_cov),
-    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: Stream(_AUTOPILOT, _rate(1), scaled_pressure),
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: Stream(_AUTOPILOT, _interval_us(2), _sys_status),
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(_AUTOPILOT, _interval_us(1), _system_time),
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(_AUTOPILOT, _interval_us(1), _extended_sys_state),
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(_AUTOPILOT, _interval_us(1), _battery_status),
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _interval_us(2), _gps_raw_int),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: Stream(_AUTOPILOT, _interval_us(1), _home_position),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _interval_us(1), _mission_current),
+    mavlink.MAVLINK_MSG_ID_FENCE_STATUS: Stream(_AUTOPILOT, _interval_us(1), _fence_status),
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(_AUTOPILOT, _interval_us(1), _estimator_status),
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(_AUTOPILOT, _interval_us(1), _ekf_status_report),
+    mavlink.MAVLINK_MSG_ID_VIBRATION: Stream(_AUTOPILOT, _interval_us(1), _vibration),
+    mavlink.MAVLINK_MSG_ID_WIND_COV: Stream(_AUTOPILOT, _interval_us(1), _wind_cov),
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: Stream(_AUTOPILOT, _interval_us(1), scaled_pressure),
     mavlink.MAVLINK_MSG_ID_SCALED_IMU: Stream(_AUTOPILOT, OFF, scaled_imu),
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: Stream(_AUTOPILOT, OFF, highres_imu),
     mavlink.MAVLINK_MSG_ID_ODOMETRY: Stream(_AUTOPILOT, OFF, odometry),
@@ -381,42 +381,42 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_ESC_INFO: Stream(_AUTOPILOT, OFF, esc_info),
     mavlink.MAVLINK_MSG_ID_RC_CHANNELS: Stream(_AUTOPILOT, OFF, rc_channels),
     mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: Stream(_AUTOPILOT, OFF, flight_information),
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _rate(25), _attitude_quaternion),
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(_AUTOPILOT, _rate(20), _local_position_ned),
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(_AUTOPILOT, _rate(10), _global_position_int),
-    mavlink.MAVLINK_MSG_ID_ALTITUDE: Stream(_AUTOPILOT, _rate(5), _altitude),
-    mavlink.MAVLINK_MSG_ID_VFR_HUD: Stream(_AUTOPILOT, _rate(5), _vfr_hud),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _interval_us(25), _attitude),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _interval_us(25), _attitude_quaternion),
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(_AUTOPILOT, _interval_us(20), _local_position_ned),
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(_AUTOPILOT, _interval_us(10), _global_position_int),
+    mavlink.MAVLINK_MSG_ID_ALTITUDE: Stream(_AUTOPILOT, _interval_us(5), _altitude),
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: Stream(_AUTOPILOT, _interval_us(5), _vfr_hud),
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Stream(
-        _AUTOPILOT, _rate(10), _position_target_local_ned
+        _AUTOPILOT, _interval_us(10), _position_target_local_ned
     ),
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(_AUTOPILOT, _rate(10), _attitude_target),
-    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: Stream(_AUTOPILOT, _rate(5), _servo_output_raw),
-    mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _rate(5), _debug_vect),
-    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _rate(5), _named_value_float),
-    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(WINCH_COMPONENT, _rate(2), _winch_status),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(_AUTOPILOT, _interval_us(10), _attitude_target),
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: Stream(_AUTOPILOT, _interval_us(5), _servo_output_raw),
+    mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _interval_us(5), _debug_vect),
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _interval_us(5), _named_value_float),
+    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(WINCH_COMPONENT, _interval_us(2), _winch_status),
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
     mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: Stream(_AUTOPILOT, OFF, _protocol_version),
     # not streamed: tools that do not know these messages would count them as lost
     mavlink.MAVLINK_MSG_ID_CURRENT_MODE: Stream(_AUTOPILOT, OFF, _current_mode),
     mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(_AUTOPILOT, OFF, _available_modes_monitor),
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _rate(20), _load_state),
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(10), _load_setpoint),
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(5), _cascade_errors),
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(5), _rotor_state),
-    mavlink.MAVLINK_MSG_ID_FILTER_STATE: Stream(_DIALECT, _rate(50), _filter_state),
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _interval_us(20), _load_state),
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _interval_us(10), _load_setpoint),
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _interval_us(5), _cascade_errors),
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _interval_us(5), _rotor_state),
+    mavlink.MAVLINK_MSG_ID_FILTER_STATE: Stream(_DIALECT, _interval_us(50), _filter_state),
 }
 
 # Intervals on a link to a program that differ from the defaults, as in PX4's profile `onboard`
 PROGRAM_INTERVALS_US: dict[int, int] = {
-    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _rate(50),
-    mavlink.MAVLINK_MSG_ID_ODOMETRY: _rate(30),
-    mavlink.MAVLINK_MSG_ID_ESC_STATUS: _rate(5),
-    mavlink.MAVLINK_MSG_ID_ESC_INFO: _rate(1),
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _interval_us(50),
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: _interval_us(30),
+    mavlink.MAVLINK_MSG_ID_ESC_STATUS: _interval_us(5),
+    mavlink.MAVLINK_MSG_ID_ESC_INFO: _interval_us(1),
 }
 
-_GROUPED: dict[int, tuple[int, ...]] = {
+_DATA_STREAM_GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: (
         mavlink.MAVLINK_MSG_ID_SCALED_IMU,
         mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE,
@@ -450,11 +450,13 @@ _GROUPED: dict[int, tuple[int, ...]] = {
     ),
 }
 # The messages of each group of REQUEST_DATA_STREAM
-GROUPS = _GROUPED | {mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_GROUPED.values(), ()))}
+DATA_STREAM_GROUPS = _DATA_STREAM_GROUPS | {
+    mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_DATA_STREAM_GROUPS.values(), ()))
+}
 
 # Other parts of the vehicle send messages with ids that the autopilot uses as well: their keys have a bit
 # above the 24 bits of a message id, so that they differ from the keys above
-MESSAGE_ID = (1 << 24) - 1
+MESSAGE_ID_MASK = (1 << 24) - 1
 # The winch's HEARTBEAT is sent on a link only after a message on this link was addressed to the winch:
 # DroneKit and `set_mode` of pymavlink take the last HEARTBEAT for that of the vehicle
 WINCH_HEARTBEAT = 1 << 25 | mavlink.MAVLINK_MSG_ID_HEARTBEAT
@@ -462,13 +464,15 @@ COMPONENT_STREAMS: dict[int, Stream] = {
     WINCH_HEARTBEAT: Stream(WINCH_COMPONENT, HEARTBEAT_US, _winch_heartbeat)
 }
 # The load as a separate MAVLink system
-LOAD_SYSTEM = 1 << 24
+LOAD_SYSTEM_BIT = 1 << 24
 LOAD_STREAMS: dict[int, Stream] = {
-    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(LOAD_COMPONENT, HEARTBEAT_US, _load_heartbeat),
-    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(
-        LOAD_COMPONENT, _rate(5), _load_global_position_int
+    LOAD_SYSTEM_BIT | mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(LOAD_COMPONENT, HEARTBEAT_US, _load_heartbeat),
+    LOAD_SYSTEM_BIT | mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(
+        LOAD_COMPONENT, _interval_us(5), _load_global_position_int
     ),
-    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(LOAD_COMPONENT, _rate(5), _load_attitude),
+    LOAD_SYSTEM_BIT | mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(
+        LOAD_COMPONENT, _interval_us(5), _load_attitude
+    ),
 }
 
 # Sent immediately to every link, in addition to their rate, when the values picked here have changed
@@ -481,6 +485,6 @@ WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
         s.mission_state,
         s.plan_ids,
     ),
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.launch),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.home_position),
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: lambda s: (s.breach, s.breaches),
 }

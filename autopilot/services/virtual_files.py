@@ -13,7 +13,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from autopilot.services.file_tree import Maker, checksum
+from autopilot.services.file_tree import FileGenerator, checksum
 from autopilot.services.files import Path
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
@@ -24,14 +24,14 @@ from autopilot.wire.parameter_table import ParameterTable
 PARAMETERS: Path = ("@PARAM", "param.pck")
 MISSION: Path = ("@MISSION", "mission.dat")
 GENERAL: Path = ("etc", "extras", "component_general.json")
-PARAMETER_TEXTS: Path = ("etc", "extras", "parameters.json")
+PARAMETER_METADATA: Path = ("etc", "extras", "parameters.json")
 
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _INT32_TYPE, _FLOAT_TYPE, _HAS_DEFAULT = 3, 4, 0x10
-_LONGEST_COMMON = 15  # letters that a name may share with the one before it, a field of four bits
-_HEAD = struct.Struct("<HHH")
+_MAX_COMMON = 15  # letters that a name may share with the one before it, a field of four bits
+_HEADER = struct.Struct("<HHH")
 _MISSION_MAGIC = 0x763D
-_MISSION_HEAD = struct.Struct("<5H")
+_MISSION_HEADER = struct.Struct("<5H")
 _ITEM = struct.Struct("<ffffiifHHBBBBBB")  # MISSION_ITEM_INT as it is transferred
 _FLOAT32_MAX = 3.4028234663852886e38
 _PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
@@ -44,34 +44,34 @@ def parameter_pack(table: ParameterTable, query: Mapping[str, str], integers: bo
     name before, the rest of the name, the value, and the default if it differs.
     """
     defaults = query.get("withdefaults") == "1"
-    start, count = _whole(query.get("start"), 0), _whole(query.get("count"), len(table))
+    start, count = _as_integer(query.get("start"), 0), _as_integer(query.get("count"), len(table))
     part = (PARAMETERS, defaults, start, count, integers)
-    return table.remembered(part, lambda: _packed(table, defaults, start, count, integers))
+    return table.cached(part, lambda: _packed(table, defaults, start, count, integers))
 
 
 def _packed(table: ParameterTable, defaults: bool, start: int, count: int, integers: bool) -> bytes:
     names = table.names[start : start + count]
-    packed = [_HEAD.pack(_MAGIC_WITH_DEFAULTS if defaults else _MAGIC, len(names), len(table))]
-    before = b""
+    packed = [_HEADER.pack(_MAGIC_WITH_DEFAULTS if defaults else _MAGIC, len(names), len(table))]
+    previous = b""
     for text in names:
         name = text.encode()
-        common = min(_shared(before, name), _LONGEST_COMMON, len(name) - 1)
+        common = min(_common_length(previous, name), _MAX_COMMON, len(name) - 1)
         value, default = table[text], table.describe(text).default
         flags = _HAS_DEFAULT if defaults and default != value else 0
         rest = name[common:]
         numbers = (value, default) if flags else (value,)
         kind, letter = (_INT32_TYPE, "i") if integers and table.describe(text).integer else (_FLOAT_TYPE, "f")
         packed.append(bytes((kind | flags, common | (len(rest) - 1) << 4)) + rest)
-        carried = map(round if letter == "i" else _within_float32, numbers)
-        packed.append(struct.pack(f"<{len(numbers)}{letter}", *carried))
-        before = name
+        encoded = map(round if letter == "i" else _within_float32, numbers)
+        packed.append(struct.pack(f"<{len(numbers)}{letter}", *encoded))
+        previous = name
     return b"".join(packed)
 
 
 def mission_pack(items: tuple[WireItem, ...]) -> bytes:
     """The items as MISSION_ITEM_INT, one after the other."""
-    head = _MISSION_HEAD.pack(_MISSION_MAGIC, mavlink.MAV_MISSION_TYPE_MISSION, 0, 0, len(items))
-    return head + b"".join(
+    header = _MISSION_HEADER.pack(_MISSION_MAGIC, mavlink.MAV_MISSION_TYPE_MISSION, 0, 0, len(items))
+    return header + b"".join(
         _ITEM.pack(
             item.param1,
             item.param2,
@@ -93,33 +93,33 @@ def mission_pack(items: tuple[WireItem, ...]) -> bytes:
     )
 
 
-def parameter_texts(table: ParameterTable, integers: bool = False) -> bytes:
+def parameter_metadata(table: ParameterTable, integers: bool = False) -> bytes:
     """Metadata of the parameters; those of the simulator without a range, which only the simulator knows."""
-    return table.remembered((PARAMETER_TEXTS, integers), lambda: _texts(table, integers))
+    return table.cached((PARAMETER_METADATA, integers), lambda: _metadata(table, integers))
 
 
-def _texts(table: ParameterTable, integers: bool) -> bytes:
+def _metadata(table: ParameterTable, integers: bool) -> bytes:
     listed = []
     for name in table.names:
-        known = table.describe(name)
+        description = table.describe(name)
         record: dict[str, Any] = {
             "name": name,
-            "type": "Int32" if integers and known.integer else "Float",
-            "shortDesc": known.text,
-            "units": known.unit,
+            "type": "Int32" if integers and description.integer else "Float",
+            "shortDesc": description.text,
+            "units": description.unit,
             "group": name.partition("_")[0],
-            "decimalPlaces": 0 if known.integer else 6,
-            "rebootRequired": known.fixed,
+            "decimalPlaces": 0 if description.integer else 6,
+            "rebootRequired": description.fixed,
         }
-        if name not in table.learned:
-            record |= {"default": known.default, "min": known.low, "max": known.high}
-        listed.append({key: value for key, value in record.items() if _tellable(value)})
+        if name not in table.remote_names:
+            record |= {"default": description.default, "min": description.low, "max": description.high}
+        listed.append({key: value for key, value in record.items() if _is_json_value(value)})
     return _json({"version": 3, "parameters": listed})
 
 
-def general(identity: Identity, table: ParameterTable) -> bytes:
+def general_metadata(identity: Identity, table: ParameterTable) -> bytes:
     """The general file: which metadata exist, and where."""
-    texts = parameter_texts(table, identity.integers)
+    metadata = parameter_metadata(table, identity.integer_parameters)
     return _json(
         {
             "version": 1,
@@ -127,33 +127,33 @@ def general(identity: Identity, table: ParameterTable) -> bytes:
             "modelName": "quadrotor with a load on a cable",
             "firmwareVersion": ".".join(map(str, identity.version)),
             "metadataTypes": [
-                {"type": _PARAMETER_METADATA, "uri": _uri(PARAMETER_TEXTS), "fileCrc": checksum(texts)}
+                {"type": _PARAMETER_METADATA, "uri": _uri(PARAMETER_METADATA), "fileCrc": checksum(metadata)}
             ],
         }
     )
 
 
-def made_files(
+def generated_files(
     identity: Identity, table: ParameterTable, mission: Callable[[], StoredMission]
-) -> dict[Path, Maker]:
+) -> dict[Path, FileGenerator]:
     """All generated files by path; `mission` returns the mission in force."""
     return {
-        PARAMETERS: lambda query: parameter_pack(table, query, identity.integers),
+        PARAMETERS: lambda query: parameter_pack(table, query, identity.integer_parameters),
         MISSION: lambda query: mission_pack(mission().items),
-        GENERAL: lambda query: general(identity, table),
-        PARAMETER_TEXTS: lambda query: parameter_texts(table, identity.integers),
+        GENERAL: lambda query: general_metadata(identity, table),
+        PARAMETER_METADATA: lambda query: parameter_metadata(table, identity.integer_parameters),
     }
 
 
 def metadata_message(identity: Identity, table: ParameterTable, now_us: int) -> Any:
     """COMPONENT_METADATA: where the general file is."""
-    crc = checksum(general(identity, table))
+    crc = checksum(general_metadata(identity, table))
     return mavlink.MAVLink_component_metadata_message(_boot_ms(now_us), crc, _uri(GENERAL).encode())
 
 
 def information_message(identity: Identity, table: ParameterTable, now_us: int) -> Any:
     """COMPONENT_INFORMATION, the older form of COMPONENT_METADATA."""
-    crc = checksum(general(identity, table))
+    crc = checksum(general_metadata(identity, table))
     return mavlink.MAVLink_component_information_message(
         _boot_ms(now_us), crc, _uri(GENERAL).encode(), 0, b""
     )
@@ -171,11 +171,11 @@ def _json(record: Any) -> bytes:
     return json.dumps(record, separators=(",", ":"), allow_nan=False).encode()
 
 
-def _tellable(value: Any) -> bool:
+def _is_json_value(value: Any) -> bool:
     return not (isinstance(value, float) and not math.isfinite(value))
 
 
-def _shared(a: bytes, b: bytes) -> int:
+def _common_length(a: bytes, b: bytes) -> int:
     """Number of equal bytes at the beginning of both."""
     count = 0
     for x, y in zip(a, b, strict=False):
@@ -185,8 +185,8 @@ def _shared(a: bytes, b: bytes) -> int:
     return count
 
 
-def _whole(text: str | None, otherwise: int) -> int:
-    return int(text) if text is not None and text.isascii() and text.isdigit() else otherwise
+def _as_integer(text: str | None, default: int) -> int:
+    return int(text) if text is not None and text.isascii() and text.isdigit() else default
 
 
 def _within_float32(value: float) -> float:

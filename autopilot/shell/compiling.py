@@ -13,7 +13,9 @@ from pathlib import Path
 from autopilot.geometry.machine_code import ROOT, is_ready, mark_ready
 from autopilot.vehicle.parameters import LAWS
 
-ONCE = "compiling the flight software, once; it takes a minute or two (gcs warmup shows how far it is)"
+COMPILING_TEXT = (
+    "compiling the flight software, once; it takes a minute or two (gcs warmup shows how far it is)"
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Part:
         """Whether nothing is left to be compiled."""
         return is_ready(self.source, (self.mark,))
 
-    def done(self) -> None:
+    def mark_done(self) -> None:
         """Mark the part: nothing is left to be compiled from now on."""
         mark_ready(self.source, (self.mark,))
 
@@ -42,25 +44,25 @@ _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
 
 
-OWN = "own"  # stands for any custom law: the autopilot is compiled once for all of them
+ANY_OWN_LAW = "own"  # stands for any custom law: the autopilot is compiled once for all of them
 
 
 def compiled_for(laws: Iterable[str]) -> tuple[str, ...]:
     """The names for which code is compiled to fly with these laws, each once."""
-    return tuple(dict.fromkeys(law if law in LAWS else OWN for law in laws))
+    return tuple(dict.fromkeys(law if law in LAWS else ANY_OWN_LAW for law in laws))
 
 
 def autopilot_parts(*laws: str) -> tuple[Part, ...]:
     """The parts that the autopilot needs to fly with these laws, the longest one first; shared parts once."""
-    module, any_law = "autopilot.shell.warmup", compiled_for(laws)[0]
+    module, placeholder_law = "autopilot.shell.warmup", compiled_for(laws)[0]
     return (
-        Part("the autopilot", module, ("tick", any_law), _AUTOPILOT, "tick", 25.0),
+        Part("the autopilot", module, ("tick", placeholder_law), _AUTOPILOT, "tick", 25.0),
         *(
             Part(f"the law {law}", module, ("law", law), _AUTOPILOT, f"law-{law}", 12.0)
             for law in compiled_for(laws)
         ),
-        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 13.0),
-        Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 5.0),
+        Part("the messages", module, ("messages", placeholder_law), _ONBOARD, "messages", 13.0),
+        Part("the paths", module, ("paths", placeholder_law), _AUTOPILOT, "paths", 5.0),
     )
 
 
@@ -69,7 +71,7 @@ def ready(parts: Iterable[Part]) -> bool:
     return all(part.ready for part in parts)
 
 
-def name_what_is_compiled() -> None:
+def print_compiled_kernels() -> None:
     """From now on print the name of each kernel as its compilation begins."""
     from numba.core import event
 

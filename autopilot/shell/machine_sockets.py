@@ -44,37 +44,41 @@ def address_of_system(address: bytes) -> tuple[str, int]:
     return socket.inet_ntop(socket.AF_INET, address[4:8]), struct.unpack("!H", address[2:4])[0]
 
 
-def _called(name: str, kinds: list[Any]) -> Any:
+def _library_call(name: str, kinds: list[Any]) -> Any:
     """A function of the system's library; its arguments are a file descriptor, an address, a size, the flags
     0, and those of `kinds`."""
 
-    def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(_WIDE, [_INT, _POINTER, _WIDE, _INT, *kinds])
         function = cgutils.get_or_insert_function(builder.module, kind, name)
-        more = [
+        extra_arguments = [
             builder.inttoptr(value, _POINTER) if kind is _POINTER else builder.trunc(value, _INT)
-            for kind, value in zip(kinds, given[3:], strict=True)
+            for kind, value in zip(kinds, arguments[3:], strict=True)
         ]
-        first = (builder.trunc(given[0], _INT), builder.inttoptr(given[1], _POINTER), given[2])
-        return builder.call(function, [*first, ir.Constant(_INT, 0), *more])
+        leading_arguments = (
+            builder.trunc(arguments[0], _INT),
+            builder.inttoptr(arguments[1], _POINTER),
+            arguments[2],
+        )
+        return builder.call(function, [*leading_arguments, ir.Constant(_INT, 0), *extra_arguments])
 
     return lower
 
 
 def _receive(_: Any, fd: Any, address: Any, size: Any) -> Any:
-    return types.int64(types.int64, types.int64, types.int64), _called("recv", [])
+    return types.int64(types.int64, types.int64, types.int64), _library_call("recv", [])
 
 
 def _send(_: Any, fd: Any, address: Any, size: Any) -> Any:
-    return types.int64(types.int64, types.int64, types.int64), _called("send", [])
+    return types.int64(types.int64, types.int64, types.int64), _library_call("send", [])
 
 
 def _receive_from(_: Any, fd: Any, address: Any, size: Any, sender: Any, sender_size: Any) -> Any:
-    return types.int64(*[types.int64] * 5), _called("recvfrom", [_POINTER, _POINTER])
+    return types.int64(*[types.int64] * 5), _library_call("recvfrom", [_POINTER, _POINTER])
 
 
 def _send_to(_: Any, fd: Any, address: Any, size: Any, receiver: Any, receiver_size: Any) -> Any:
-    return types.int64(*[types.int64] * 5), _called("sendto", [_POINTER, _INT])
+    return types.int64(*[types.int64] * 5), _library_call("sendto", [_POINTER, _INT])
 
 
 # number of bytes received or sent; less than 0: none

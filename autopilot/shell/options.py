@@ -23,28 +23,28 @@ from autopilot.wire.convert.geodesy import Home, home_from_text
 
 Address = tuple[str, int]
 
-LARGEST_DATAGRAM = 65535
-MOST_SEED = 2**63 - 1
+MAX_DATAGRAM_BYTES = 65535
+MAX_SEED = 2**63 - 1
 EXIT_ERROR, EXIT_USAGE = 1, 2  # usage: an error of the command line, or of a file that it names
-MOST_SPEED = 1000.0  # times the wall clock
-ARGUMENTS_FOLLOW = "--arguments-follow"  # on stdin
-_THIS_MACHINE = "127.0.0.1"
+MAX_SPEED = 1000.0  # times the wall clock
+ARGUMENTS_ON_STDIN = "--arguments-follow"  # on stdin
+_LOCALHOST = "127.0.0.1"
 _PR_SET_TIMERSLACK = 29
 
 
 class ProgramCommand(click.Command):
     """A program that reports wrong usage in one line and exits with 2.
 
-    It can be loaded before its arguments are known: with `ARGUMENTS_FOLLOW` as the only argument it waits for
-    them on stdin.
+    It can be loaded before its arguments are known: with `ARGUMENTS_ON_STDIN` as the only argument it waits
+    for them on stdin.
     """
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra["standalone_mode"] = False
         open_closed_streams()
-        outlive_terminal()
-        if args is None and sys.argv[1:] == [ARGUMENTS_FOLLOW]:
-            args = _following_arguments()
+        tolerate_closed_terminal()
+        if args is None and sys.argv[1:] == [ARGUMENTS_ON_STDIN]:
+            args = _arguments_from_stdin()
         try:
             code = super().main(args, **extra)
         except click.UsageError as error:
@@ -53,28 +53,28 @@ class ProgramCommand(click.Command):
         sys.exit(code if isinstance(code, int) else 0)
 
 
-def _following_arguments() -> list[str]:
+def _arguments_from_stdin() -> list[str]:
     """The arguments in a line of JSON on stdin, whose first entry is the file for stdout and stderr; exits if
     no line arrives."""
     line = sys.stdin.buffer.readline()
     if not line:
         sys.exit(0)
     log, *arguments = cast("list[str]", json.loads(line))
-    _lead(os.devnull, os.O_RDONLY, 0)
-    _lead(log, os.O_WRONLY | os.O_APPEND, 1, 2)
+    _redirect(os.devnull, os.O_RDONLY, 0)
+    _redirect(log, os.O_WRONLY | os.O_APPEND, 1, 2)
     return arguments
 
 
-def _lead(path: str, flags: int, *numbers: int) -> None:
+def _redirect(path: str, flags: int, *numbers: int) -> None:
     """Redirect these file descriptors to a file."""
-    opened = os.open(path, flags)
+    descriptor = os.open(path, flags)
     for number in numbers:
-        os.dup2(opened, number)
-    if opened not in numbers:
-        os.close(opened)
+        os.dup2(descriptor, number)
+    if descriptor not in numbers:
+        os.close(descriptor)
 
 
-def complain(program: str, exit_code: int, *lines: str) -> int:
+def print_errors(program: str, exit_code: int, *lines: str) -> int:
     """Print why a program ends, a line for each problem; return the exit code."""
     for line in lines:
         print(f"{program}: {line}", file=sys.stderr)
@@ -94,7 +94,7 @@ class WholeNumber(click.IntRange):
     name = "whole number"
 
 
-class NamedPath(click.Path):
+class NonEmptyPath(click.Path):
     """A path that is not empty: an empty one would mean whatever folder is the current one."""
 
     def convert(
@@ -107,34 +107,36 @@ class NamedPath(click.Path):
 
 def stop_signals() -> tuple[signal.Signals, ...]:
     """The signals that end a program; a closed terminal too, unless the program is to outlive it (nohup)."""
-    outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    return (signal.SIGINT, signal.SIGTERM) if outlives else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    survives_hangup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    return (
+        (signal.SIGINT, signal.SIGTERM) if survives_hangup else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    )
 
 
-class LastingStream:
+class CloseSafeStream:
     """A terminal that accepts text even after it is closed; from then on the text is lost."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        with self._whether_or_not_it_is_there():
+        with self._ignoring_closed_terminal():
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
-        with self._whether_or_not_it_is_there():
+        with self._ignoring_closed_terminal():
             self._stream.flush()
 
     @contextmanager
-    def _whether_or_not_it_is_there(self) -> Iterator[None]:
+    def _ignoring_closed_terminal(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
             if error.errno != errno.EIO:
                 raise
             # the rest of its buffer is written there, too
-            _lead(os.devnull, os.O_WRONLY, self._stream.fileno())
+            _redirect(os.devnull, os.O_WRONLY, self._stream.fileno())
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -147,17 +149,17 @@ def open_closed_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            _lead(os.devnull, os.O_RDWR, number)
+            _redirect(os.devnull, os.O_RDWR, number)
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
-def outlive_terminal() -> None:
+def tolerate_closed_terminal() -> None:
     """Make text to a closed terminal be lost without an error."""
     if sys.stdout.isatty():
-        sys.stdout = cast(TextIO, LastingStream(sys.stdout))
+        sys.stdout = cast(TextIO, CloseSafeStream(sys.stdout))
     if sys.stderr.isatty():
-        sys.stderr = cast(TextIO, LastingStream(sys.stderr))
+        sys.stderr = cast(TextIO, CloseSafeStream(sys.stderr))
 
 
 class Stop(BaseException):
@@ -171,7 +173,7 @@ class StopRequest:
     handle it.
     """
 
-    asked = False
+    requested = False
     _signals: tuple[signal.Signals, ...] = ()
 
     def __enter__(self) -> StopRequest:
@@ -185,11 +187,11 @@ class StopRequest:
             signal.signal(number, signal.SIG_IGN)  # once is enough
 
     def _note(self, _signal: int, _frame: object) -> None:
-        self.asked = True
+        self.requested = True
 
     def check(self) -> None:
         """Raise Stop if a signal came."""
-        if self.asked:
+        if self.requested:
             raise Stop
 
 
@@ -201,12 +203,12 @@ def set_timeout(sock: socket.socket, seconds: float) -> None:
 
 
 def receive(
-    sock: socket.socket, flags: int = 0, most_bytes: int = LARGEST_DATAGRAM
+    sock: socket.socket, flags: int = 0, max_bytes: int = MAX_DATAGRAM_BYTES
 ) -> tuple[bytes, Address] | None:
-    """The next datagram, at most `most_bytes` of it, and its sender; None after the timeout, or if one of
+    """The next datagram, at most `max_bytes` of it, and its sender; None after the timeout, or if one of
     ours found no listener."""
     try:
-        return sock.recvfrom(most_bytes, flags)
+        return sock.recvfrom(max_bytes, flags)
     except OSError:
         return None
 
@@ -230,7 +232,7 @@ def datagram_socket(address: Address) -> socket.socket:
     return socket.socket(family, socket.SOCK_DGRAM)
 
 
-def reason(error: OSError) -> str:
+def os_error_text(error: OSError) -> str:
     """The system's text of an error, without what Python adds about the call (its `strerror`)."""
     is_of_system = not isinstance(error, socket.gaierror)
     if error.errno is not None and error.errno in errno.errorcode and is_of_system:
@@ -238,17 +240,17 @@ def reason(error: OSError) -> str:
     return error.strerror.lower() if error.strerror else str(error)
 
 
-def shown(address: Address | None) -> str:
+def address_text(address: Address | None) -> str:
     """An address as readable text."""
     return f"{address[0]}:{address[1]}" if address else "nowhere"
 
 
-def can_branch_off() -> bool:
+def can_fork() -> bool:
     """Whether a forked process can use what is loaded here: no other thread holds a lock to inherit."""
     return sys.platform.startswith("linux") and threading.active_count() == 1
 
 
-def be_punctual(real_time: bool) -> None:
+def reduce_latency(real_time: bool) -> None:
     """Request short delays from the system and the interpreter; the program also works without them.
 
     A program that keeps to the wall clock also requests priority over all others, but not for the processes
@@ -270,7 +272,7 @@ def address_option(text: str) -> Address:
     host, colon, port = text.rpartition(":")
     if not (bool(host) == bool(colon) and port.isdecimal() and 0 < int(port) < 65536):
         raise click.BadParameter(f"{text!r}; must be PORT or HOST:PORT, with a port of 1 ... 65535")
-    return host.strip("[]") or _THIS_MACHINE, int(port)
+    return host.strip("[]") or _LOCALHOST, int(port)
 
 
 def home_option(text: str) -> Home:
@@ -293,7 +295,7 @@ def signing_key_option(text: str) -> bytes:
     except NoKeyError as error:
         raise click.BadParameter(f"{text!r} {error}") from None
     except (OSError, UnicodeDecodeError) as error:
-        why = reason(error) if isinstance(error, OSError) else "not a text file"
+        why = os_error_text(error) if isinstance(error, OSError) else "not a text file"
         raise click.BadParameter(f"{text!r}: {why}") from None
 
 
@@ -308,12 +310,12 @@ def setting_option(text: str) -> tuple[str, float]:
 
 def unknown_setting(name: str, names: Iterable[str]) -> str:
     """A text for a name that is unknown, with suggestions: if several names continue it (SIM_WIND), all of
-    them, as none is nearer than the others; else as `unknown_parameter`."""
-    from autopilot.wire.parameter_names import unknown_parameter  # only if needed
+    them, as none is nearer than the others; else as `unknown_parameter_text`."""
+    from autopilot.wire.parameter_names import unknown_parameter_text  # only if needed
 
     known = sorted(names)
-    longer = [one for one in known if "_" in name and one.startswith(f"{name}_")]
-    if len(longer) < 2:
-        return unknown_parameter(name, known)
-    several = f"{', '.join(longer[:-1])} or {longer[-1]}"
-    return f"{name}: no such parameter; did you mean {several}? docs/parameters.md lists all"
+    longer_names = [one for one in known if "_" in name and one.startswith(f"{name}_")]
+    if len(longer_names) < 2:
+        return unknown_parameter_text(name, known)
+    choices = f"{', '.join(longer_names[:-1])} or {longer_names[-1]}"
+    return f"{name}: no such parameter; did you mean {choices}? docs/parameters.md lists all"

@@ -16,8 +16,8 @@ from platformdirs import user_state_path
 
 from autopilot.onboard.onboard import SIMULATOR_SYSTEM, Onboard
 from autopilot.onboard.snapshot import Options
-from autopilot.own.chosen import Own, parameters_for
-from autopilot.own.law import law_number, own_law
+from autopilot.own.law import law_number, own_law_reference
+from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.own.trial import try_all
 from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
@@ -30,37 +30,37 @@ from autopilot.services.records import (
     ParametersSaved,
     ServiceFailed,
     SigningChanged,
-    WorldSaved,
+    SimulatorParametersSaved,
 )
-from autopilot.shell.compiling import ONCE, OWN, autopilot_parts, ready
-from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations, listen, open_socket
+from autopilot.shell.background_worker import BackgroundWorker
+from autopilot.shell.compiling import ANY_OWN_LAW, COMPILING_TEXT, autopilot_parts, ready
+from autopilot.shell.ground import AutopilotError, GroundStations, LockstepGroundStation, listen, open_socket
 from autopilot.shell.options import (
     EXIT_ERROR,
     EXIT_USAGE,
-    LARGEST_DATAGRAM,
+    MAX_DATAGRAM_BYTES,
     Address,
-    NamedPath,
+    NonEmptyPath,
     ProgramCommand,
     Stop,
     StopRequest,
     address_option,
-    be_punctual,
-    complain,
+    address_text,
     home_option,
-    reason,
+    os_error_text,
+    print_errors,
+    reduce_latency,
     send,
     set_timeout,
     setting_option,
-    shown,
     signing_key_option,
 )
-from autopilot.shell.path_worker import Aside
 from autopilot.shell.setting_names import check_names
 from autopilot.shell.steady_clock import SteadyClock
 from autopilot.shell.storage import Storage, StorageError
-from autopilot.shell.storing import Storing
+from autopilot.shell.storage_worker import StorageWorker
 from autopilot.shell.tick_cost import TickCost
-from autopilot.shell.tick_loop import NOTHING, Met, TickLoop, rehearse
+from autopilot.shell.tick_loop import NO_BATCH, BatchEnd, TickLoop, warm_up
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
@@ -72,11 +72,11 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterError
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
-_GREETING_S = 0.2  # between heartbeats to a simulator that does not answer yet
-_BEAT_S = 1.0  # between two heartbeats while the clock stands
+_GREETING_PERIOD_S = 0.2  # between heartbeats to a simulator that does not answer yet
+_HEARTBEAT_PERIOD_S = 1.0  # between two heartbeats while the clock stands
 _SLOW_SHARE = 0.8  # share of the wall clock's rate below which the vehicle's clock is slow
-_STANDING_STEP_US = 4000  # steps in which answers continue meanwhile; so many between two greetings:
-_STANDING_STEPS = round(1e6 * _GREETING_S / _STANDING_STEP_US)
+_PAUSED_STEP_US = 4000  # steps in which answers continue meanwhile; so many between two greetings:
+_PAUSED_STEPS = round(1e6 * _GREETING_PERIOD_S / _PAUSED_STEP_US)
 _SILENCE_S = 3.0  # silence of the simulator after which it is reported
 _LOG_BYTES = 32_768  # of the flight log that are stored at once
 
@@ -84,10 +84,10 @@ _LOG_BYTES = 32_768  # of the flight log that are stored at once
 SIMULATOR_RESTARTED = "Simulator restarted, vehicle on the ground: disarmed"
 
 
-def turned_away(datagram: bytes) -> str:
+def refusal_text(datagram: bytes) -> str:
     """The text of a simulator to an autopilot that it does not serve, and what to do; else empty."""
-    said = [one.message.text for one in decode(datagram)[0] if one.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT]
-    return f"{said[-1]}; end that one, or start another sitl (--listen, --sim)" if said else ""
+    texts = [one.message.text for one in decode(datagram)[0] if one.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT]
+    return f"{texts[-1]}; end that one, or start another sitl (--listen, --sim)" if texts else ""
 
 
 class Program:
@@ -98,23 +98,23 @@ class Program:
         build: Callable[[StoredMission | None], Onboard],
         mission: StoredMission | None,
         storage: Storage,
-        storing: Storing,
+        storage_worker: StorageWorker,
         simulator: Address,
-        ground: GroundStations | GroundInStep,
-        aside: Aside,
-        say: Callable[[str], None],
+        ground: GroundStations | LockstepGroundStation,
+        worker: BackgroundWorker,
+        notify: Callable[[str], None],
     ) -> None:
         self._build = build
         self._storage = storage
-        self._storing = storing
+        self._storage_worker = storage_worker
         self._clock = SteadyClock()
         self._simulator = simulator
         self._ground = ground
-        self._say = say
+        self._notify = notify
         self._socket = open_socket(simulator, "simulator")
         self._connect()
-        self._greeted = 0.0  # time of the last greeting, monotonic clock
-        self._beaten, self._beaten_us = (
+        self._greeting_s = 0.0  # time of the last greeting, monotonic clock
+        self._heartbeat_s, self._heartbeat_us = (
             0.0,
             0,
         )  # the wall clock and the vehicle's clock at the last check
@@ -126,73 +126,77 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
-        self._aside = aside
+        self._worker = worker
         self.cost = TickCost()
         self._greeting = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
         if isinstance(ground, GroundStations):  # our clock does not wait for paths
-            self._aside.start(self.onboard.rehearsal)
+            self._worker.start(self.onboard.warmup_work)
         self._ground.join(self.onboard)
 
-    def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
+    def restore_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
         """Take over stored fence and rally points, and report what of the storage is lost."""
         for kind, items in areas.items():
-            self.onboard.take_areas(kind, items)
-        self.onboard.take_losses(self._storage.lost)
+            self.onboard.set_areas(kind, items)
+        self.onboard.set_storage_losses(self._storage.lost)
 
-    def tell(self, troubles: list[str]) -> None:
+    def report_problems(self, problems: list[str]) -> None:
         """Report problems of the storage on the terminal and to the operators."""
-        for trouble in troubles:
-            print(f"autopilot: {trouble}", file=sys.stderr)
-            self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, f"Storage: {trouble}")
+        for problem in problems:
+            print(f"autopilot: {problem}", file=sys.stderr)
+            self.onboard.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, f"Storage: {problem}")
 
     def run(self, stop: StopRequest) -> None:
         """Fly ticks until a signal stops the program."""
-        set_timeout(self._socket, _GREETING_S)
-        heard = time.monotonic()
-        silent, lost, beaten, refused = True, False, 0.0, ""
-        self._say(f"looking for the simulator at {shown(self._simulator)}")
+        set_timeout(self._socket, _GREETING_PERIOD_S)
+        received_s = time.monotonic()
+        silent, lost, heartbeat_s, last_refusal = True, False, 0.0, ""
+        self._notify(f"looking for the simulator at {address_text(self._simulator)}")
         self._greet()
         receive_from_simulator = self._socket.recv
         ground = self._ground
-        alone = (TickLoop(self._socket, *ground.way), ground) if isinstance(ground, GroundInStep) else None
+        batch_loop = (
+            (TickLoop(self._socket, *ground.socket_and_address), ground)
+            if isinstance(ground, LockstepGroundStation)
+            else None
+        )
         while True:
             stop.check()
-            self._aside.attend(self.onboard)
-            self._storing.attend()
-            met = NOTHING if alone is None or silent or lost else self._run_on(*alone)
-            if met.ran:
-                heard = time.monotonic()
-            if met.more:
+            self._worker.update(self.onboard)
+            self._storage_worker.report_results()
+            end = NO_BATCH if batch_loop is None or silent or lost else self._run_batch(*batch_loop)
+            if end.flew_ticks:
+                received_s = time.monotonic()
+            if end.can_continue:
                 continue
-            if met.decide is not None:
-                self._answer(self.onboard.complete(met.decide), stop, True)
+            if end.tick_to_decide is not None:
+                self._answer(self.onboard.complete(end.tick_to_decide), stop, True)
                 continue
             stop.check()
             try:
-                datagram = met.datagram or receive_from_simulator(LARGEST_DATAGRAM)
+                datagram = end.datagram or receive_from_simulator(MAX_DATAGRAM_BYTES)
             except OSError:  # nothing arrived within the timeout, or nobody listens at the address
                 now = time.monotonic()
-                if not silent and now - heard > _SILENCE_S:
+                if not silent and now - received_s > _SILENCE_S:
                     silent = True
-                    self._say(f"no message from the simulator for {_SILENCE_S:g} s; looking for it")
-                    self.onboard.endpoint.say(
+                    self._notify(f"no message from the simulator for {_SILENCE_S:g} s; looking for it")
+                    self.onboard.endpoint.send_text(
                         mavlink.MAV_SEVERITY_ERROR, "Simulator silent: time stands still"
                     )
-                    self.onboard.take_silence(True)
+                    self.onboard.set_simulator_silent(True)
                     lost = True
-                if silent or now - heard > 1.0:
+                if silent or now - received_s > 1.0:
                     self._greet()
                 # the clock stands, but requests are answered
                 self.cost.pause()
                 if isinstance(self._ground, GroundStations):
-                    self._ground.exchange(self.onboard, self._keep, stop)
-                    for _ in range(_STANDING_STEPS):
-                        self.onboard.endpoint.stand(_STANDING_STEP_US)
+                    self._ground.exchange(self.onboard, self._store_events, stop)
+                    for _ in range(_PAUSED_STEPS):
+                        self.onboard.endpoint.add_paused_time(_PAUSED_STEP_US)
                         self._ground.send(self.onboard)
-                    if lost and now - beaten >= _BEAT_S:
-                        beaten = now
-                        self._ground.beat(self.onboard)
+                    if lost and now - heartbeat_s >= _HEARTBEAT_PERIOD_S:
+                        heartbeat_s = now
+                        self._ground.send_heartbeats(self.onboard)
                 continue
             onboard = self.onboard
             self.cost.tick(onboard.tick_us)
@@ -202,142 +206,148 @@ class Program:
                 self._answer(answer, stop, onboard.tick != tick_before)
                 if silent:
                     silent = False
-                    self._say(f"flying with the simulator at {shown(self._simulator)}")
+                    self._notify(f"flying with the simulator at {address_text(self._simulator)}")
                     if lost:
                         lost = False
-                        self.onboard.take_silence(False)
-                        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
-                heard = time.monotonic()
+                        self.onboard.set_simulator_silent(False)
+                        self.onboard.endpoint.send_text(
+                            mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again"
+                        )
+                received_s = time.monotonic()
             elif onboard.restarted:
-                self._say("the simulator has started again: so do I")
-                before = self.onboard
-                areas = before.endpoint.areas
+                self._notify("the simulator has started again: so do I")
+                previous = self.onboard
+                areas = previous.endpoint.areas
                 self._end_log()
-                self.onboard = self._build(before.endpoint.mission)
-                self.onboard.endpoint.inherit_texts(before.endpoint)
-                self.take_areas(areas)
+                self.onboard = self._build(previous.endpoint.mission)
+                self.onboard.endpoint.inherit_texts(previous.endpoint)
+                self.restore_areas(areas)
                 self._ground.join(self.onboard)
-                self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
-            elif silent and (why := turned_away(datagram)) not in ("", refused):
-                refused = why
-                self._say(f"the simulator at {shown(self._simulator)} does not serve this one: {why}")
+                self.onboard.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
+            elif silent and (why := refusal_text(datagram)) not in ("", last_refusal):
+                last_refusal = why
+                self._notify(
+                    f"the simulator at {address_text(self._simulator)} does not serve this one: {why}"
+                )
 
-    def _run_on(self, ticks: TickLoop, ground: GroundInStep) -> Met:
+    def _run_batch(self, ticks: TickLoop, ground: LockstepGroundStation) -> BatchEnd:
         """Fly ticks without Python, if the next ones allow it."""
-        met = ticks.run(self.onboard, ground.questions)
-        if met.ran:
+        end = ticks.run(self.onboard, ground.timesync_requests)
+        if end.flew_ticks:
             self.cost.pause()
-            ground.take_back(self.onboard.said)
-            if self.onboard.logged:
-                self._keep_log(_LOG_BYTES)
-        return met
+            ground.set_unsent(self.onboard.unsent_windows)
+            if self.onboard.has_log_data:
+                self._store_log(_LOG_BYTES)
+        return end
 
     def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
         """Exchange with the ground before the answer if the ground shares our clock, else after it."""
-        if isinstance(self._ground, GroundInStep):
+        if isinstance(self._ground, LockstepGroundStation):
             if new:
-                self._ground.exchange(self.onboard, self._keep, stop)
+                self._ground.exchange(self.onboard, self._store_events, stop)
             send(self._socket, answer)
         else:
             send(self._socket, answer)
-            self.onboard.endpoint.tell_time(self._clock.unix_us())
-            self._keep_beating()
-            self._ground.exchange(self.onboard, self._keep, stop)
+            self.onboard.endpoint.set_wall_clock(self._clock.unix_us())
+            self._send_wall_clock_heartbeat()
+            self._ground.exchange(self.onboard, self._store_events, stop)
         onboard = self.onboard
         events = onboard.endpoint.take_events()
         if events:
-            self._keep(events)
-        if onboard.logged:
-            self._keep_log(_LOG_BYTES)
+            self._store_events(events)
+        if onboard.has_log_data:
+            self._store_log(_LOG_BYTES)
         if new and onboard.fault and onboard.tick == 1:
             raise AutopilotError(onboard.fault)
 
-    def _keep_beating(self) -> None:
+    def _send_wall_clock_heartbeat(self) -> None:
         """A heartbeat each second of the wall clock, by which clients wait, if the vehicle's is slower."""
         now, now_us = time.monotonic(), self.onboard.now_us
-        if now - self._beaten >= _BEAT_S:
-            if now_us - self._beaten_us < _SLOW_SHARE * _BEAT_S * 1e6:
+        if now - self._heartbeat_s >= _HEARTBEAT_PERIOD_S:
+            if now_us - self._heartbeat_us < _SLOW_SHARE * _HEARTBEAT_PERIOD_S * 1e6:
                 self.onboard.endpoint.state_changed()
-            self._beaten, self._beaten_us = now, now_us
+            self._heartbeat_s, self._heartbeat_us = now, now_us
 
     def _connect(self) -> None:
         """Connect the socket: receive only from the simulator, and send to it."""
         try:
             self._socket.connect(self._simulator)
         except OSError as error:
-            raise AutopilotError(f"simulator {shown(self._simulator)}: {reason(error)}") from None
+            raise AutopilotError(
+                f"simulator {address_text(self._simulator)}: {os_error_text(error)}"
+            ) from None
 
     def _greet(self) -> None:
-        """Send a heartbeat to the simulator, at most one per `_GREETING_S`: if nobody listens there, a
+        """Send a heartbeat to the simulator, at most one per `_GREETING_PERIOD_S`: if nobody listens there, a
         receive fails without waiting."""
         now = time.monotonic()
-        if now - self._greeted >= _GREETING_S:
-            self._greeted = now
+        if now - self._greeting_s >= _GREETING_PERIOD_S:
+            self._greeting_s = now
             send(self._socket, self._greeting)
 
-    def _keep(self, events: list[Event]) -> None:
+    def _store_events(self, events: list[Event]) -> None:
         for event in events:
             if isinstance(event, ServiceFailed):
                 text = f"autopilot: internal error in {event.what}:\n{event.trace}"
                 print(text, file=sys.stderr, flush=True)
-            elif (store := _stored_by(self._storage, event)) is not None:
-                self._storing.ask(store, self._not_stored, self._stored)
+            elif (store := _store_function(self._storage, event)) is not None:
+                self._storage_worker.request(store, self._on_store_failed, self._on_stored)
 
-    def _stored(self) -> None:
+    def _on_stored(self) -> None:
         """Something was stored, which may replace what was lost."""
-        self.onboard.take_losses(self._storage.lost)
+        self.onboard.set_storage_losses(self._storage.lost)
 
-    def _not_stored(self, error: OSError) -> None:
-        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
-        self._say(f"cannot store: {error}")
+    def _on_store_failed(self, error: OSError) -> None:
+        self.onboard.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
+        self._notify(f"cannot store: {error}")
 
-    def _keep_log(self, least_bytes: int) -> None:
-        chunk = self.onboard.take_log(least_bytes)
+    def _store_log(self, min_bytes: int) -> None:
+        chunk = self.onboard.take_log(min_bytes)
         if chunk is None:
             return
         try:
-            self._storage.keep_log(chunk, self.onboard.parameters["LOG_MAX_MB"])
+            self._storage.store_log(chunk, self.onboard.parameters["LOG_MAX_MB"])
         except OSError as error:
-            self.onboard.give_up_log(error.strerror or str(error))
-            self._say(f"cannot store the flight log: {error}")
+            self.onboard.abandon_log(error.strerror or str(error))
+            self._notify(f"cannot store the flight log: {error}")
 
     def _end_log(self) -> None:
         self.onboard.end_log()
-        self._keep_log(1)
+        self._store_log(1)
 
     def close(self) -> None:
         """Store what is left of the flight log, close all sockets."""
         self._end_log()
-        self._storing.close()
+        self._storage_worker.close()
         self._socket.close()
         self._ground.close()
 
 
-def _stored_by(storage: Storage, event: Event) -> Callable[[], None] | None:
+def _store_function(storage: Storage, event: Event) -> Callable[[], None] | None:
     """The function that stores an event; None if nothing is to be stored."""
     match event:
         case MissionChanged(mission):
-            return partial(storage.keep_mission, mission)
+            return partial(storage.store_mission, mission)
         case AreasChanged(kind, items):
-            return partial(storage.keep_areas, kind, items)
+            return partial(storage.store_areas, kind, items)
         case ParameterChanged(name, value):
-            return partial(storage.keep_parameter, name, value)
+            return partial(storage.store_parameter, name, value)
         case ParametersSaved():
-            return storage.keep_parameters
-        case WorldSaved(values):
-            return partial(storage.keep_world, values)
+            return storage.store_parameters
+        case SimulatorParametersSaved(values):
+            return partial(storage.store_simulator_parameters, values)
         case SigningChanged(key, timestamp):
-            return partial(storage.keep_signing, key, timestamp)
+            return partial(storage.store_signing, key, timestamp)
     return None
 
 
-def _begin_signing(kept: Storage, key: bytes) -> None:
+def _store_signing_key(store: Storage, key: bytes) -> None:
     """Store the key, with the time of its last use if it was stored already."""
-    known = kept.load_signing()
+    known = store.load_signing()
     try:
-        kept.keep_signing(key, known.timestamp if known and known.key == key else 0)
+        store.store_signing(key, known.timestamp if known and known.key == key else 0)
     except OSError as error:
-        raise AutopilotError(f"the signing key cannot be stored: {reason(error)}") from None
+        raise AutopilotError(f"the signing key cannot be stored: {os_error_text(error)}") from None
 
 
 def _address_or_none(text: str) -> Address | None:
@@ -419,7 +429,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
-    type=NamedPath(file_okay=False, path_type=Path),
+    type=NonEmptyPath(file_okay=False, path_type=Path),
     metavar="DIR",
     help="Folder that stores mission and parameters.  [default: the user's state directory]",
 )
@@ -455,24 +465,24 @@ def main(
 ) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
 
-    def say(text: str) -> None:
+    def notify(text: str) -> None:
         if not quiet:
             print(f"autopilot: {text}", flush=True)
 
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to finish
     program: Program | None = None
-    place = home or Home()
-    in_step = ground_lockstep is not None
-    aside = Aside()
+    origin = home or Home()
+    lockstep = ground_lockstep is not None
+    worker = BackgroundWorker()
     try:
-        own = Own(own_law(law or DEFAULT_LAW), estimator, planner)
+        own = OwnCode(own_law_reference(law or DEFAULT_LAW), estimator, planner)
         table = parameters_for(load_belief(vehicle), own)
         check_names(settings, table.names)
-        kept = Storage(storage or user_state_path("plumbline"))
-        if not in_step:
-            aside.branch_off()
-        kept.lock()
-        troubles = kept.load_parameters(table)
+        store = Storage(storage or user_state_path("plumbline"))
+        if not lockstep:
+            worker.fork()
+        store.lock()
+        problems = store.load_parameters(table)
         if law:
             table.set("CTL_LAW", law_number(law))
         apply_settings(table, settings)
@@ -480,61 +490,61 @@ def main(
         if any(own):
             with watched_calls():
                 try_all(own, table.values())
-        parts = autopilot_parts((*LAWS, OWN)[int(table["CTL_LAW"])])
+        parts = autopilot_parts((*LAWS, ANY_OWN_LAW)[int(table["CTL_LAW"])])
         compiled = ready(parts)
         if not compiled:
             gc.enable()  # the compiler leaves much garbage
-            say(ONCE)
-        mission, trouble = kept.load_mission(place)
-        troubles += [trouble] if trouble else []
+            notify(COMPILING_TEXT)
+        mission, problem = store.load_mission(origin)
+        problems += [problem] if problem else []
         if signing_key is not None:
-            _begin_signing(kept, signing_key)
-        boot = LOCKSTEP_BOOT_UNIX_US if in_step else SteadyClock().unix_us()
+            _store_signing_key(store, signing_key)
+        boot = LOCKSTEP_BOOT_UNIX_US if lockstep else SteadyClock().unix_us()
         options = Options(
-            place, boot, clock_waits=in_step, log=True, own=own, setup_signing=allow_setup_signing
+            origin, boot, clock_waits=lockstep, log=True, own=own, setup_signing=allow_setup_signing
         )
 
-        troubles += kept.load_world()[1]
+        problems += store.load_simulator_parameters()[1]
 
         def build(stored: StoredMission | None) -> Onboard:
-            onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
-            onboard.restore_world(kept.load_world()[0])
+            onboard = Onboard(table, identity_of(table), options, stored, store.card, store.load_signing())
+            onboard.restore_simulator_parameters(store.load_simulator_parameters()[0])
             return onboard
 
         stations, programs = (tuple(filter(None, addresses)) for addresses in (gcs, api))
-        storing = Storing(aside=not in_step)
-        ground: GroundStations | GroundInStep
+        storage_worker = StorageWorker(threaded=not lockstep)
+        ground: GroundStations | LockstepGroundStation
         if ground_lockstep:
-            ground = GroundInStep(ground_lockstep)
+            ground = LockstepGroundStation(ground_lockstep)
         else:
-            ground = GroundStations(stations, programs, listen(tcp) if tcp else None, storing)
-        program = Program(build, mission, kept, storing, sim, ground, aside, say)
-        areas, unread = kept.load_areas(place)
-        program.take_areas(areas)
-        program.tell(troubles + unread)
-        program.onboard.rehearse()
-        rehearse(program.onboard)
+            ground = GroundStations(stations, programs, listen(tcp) if tcp else None, storage_worker)
+        program = Program(build, mission, store, storage_worker, sim, ground, worker, notify)
+        areas, unreadable = store.load_areas(origin)
+        program.restore_areas(areas)
+        program.report_problems(problems + unreadable)
+        program.onboard.warm_up()
+        warm_up(program.onboard)
         if not compiled:
             for part in parts:
-                part.done()
-        be_punctual(real_time=not in_step)
-        with StopRequest() as stop, watched_calls(not in_step) if any(own) else nullcontext():
+                part.mark_done()
+        reduce_latency(real_time=not lockstep)
+        with StopRequest() as stop, watched_calls(not lockstep) if any(own) else nullcontext():
             program.run(stop)
     except VehicleFileError as error:
-        sys.exit(complain("autopilot", EXIT_USAGE, *error.problems))
+        sys.exit(print_errors("autopilot", EXIT_USAGE, *error.problems))
     except (OwnError, ParameterError) as error:
-        sys.exit(complain("autopilot", EXIT_USAGE, str(error)))
+        sys.exit(print_errors("autopilot", EXIT_USAGE, str(error)))
     except (AutopilotError, StorageError) as error:
-        sys.exit(complain("autopilot", EXIT_ERROR, str(error)))
+        sys.exit(print_errors("autopilot", EXIT_ERROR, str(error)))
     except Stop:
         pass
     finally:
         if program is not None:
             program.close()
-        aside.close()
+        worker.close()
     if program is not None:
-        cost = "" if in_step else program.cost.summary()
-        say("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
+        cost = "" if lockstep else program.cost.summary()
+        notify("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
 
 
 if __name__ == "__main__":

@@ -13,16 +13,16 @@ from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.parameters import definitions
 
 
-def check_names(settings: Iterable[tuple[str, float]], brought: Iterable[str] = ()) -> None:
+def check_names(settings: Iterable[tuple[str, float]], own_names: Iterable[str] = ()) -> None:
     """click.UsageError with the nearest name if neither program has such a parameter and it does not belong
-    to user code (`brought`)."""
-    known = {*brought, *definitions().parameters, *_world()}
+    to user code (`own_names`)."""
+    known = {*own_names, *definitions().parameters, *_simulator_names()}
     for name, _ in settings:
         if name not in known:
             raise click.UsageError(f"--set {unknown_setting(name, known)}")
 
 
-def _world() -> set[str]:
+def _simulator_names() -> set[str]:
     """The simulator's names, from its file: the autopilot is installed with it, but imports nothing of it."""
     return set(tomllib.loads((files("sitl") / "sim_parameters.toml").read_text(encoding="utf-8"))) - {
         "groups"

@@ -12,8 +12,8 @@ class SteadyClock:
     """The time of day."""
 
     def __init__(self) -> None:
-        self._ahead_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000
+        self._offset_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000
 
     def unix_us(self) -> int:
         """us since 1970."""
-        return self._ahead_us + time.monotonic_ns() // 1000
+        return self._offset_us + time.monotonic_ns() // 1000

@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 
 from autopilot.onboard.flight_log import LogChunk
 from autopilot.services import files
-from autopilot.services.files import LOG_ENDING, LOG_FOLDER
+from autopilot.services.files import LOG_FOLDER, LOG_SUFFIX
 from autopilot.services.mission_store import (
     CorruptMission,
     StoredMission,
@@ -17,8 +17,8 @@ from autopilot.services.mission_store import (
     deserialise_items,
     serialise,
 )
+from autopilot.shell.atomic_file import DamagedError, keep_copy, remove, seal, unseal, write_atomically
 from autopilot.shell.sd_card import DirectoryCard
-from autopilot.shell.whole_file import DamagedError, keep_copy, remove, seal, unseal, write_whole
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
@@ -33,12 +33,12 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
     mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
 }
 PARAMETER_FILE = "parameters.txt"
-WORLD_FILE = "world.txt"  # parameters of the simulator
+SIMULATOR_PARAMETER_FILE = "world.txt"  # parameters of the simulator
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
 CARD_DIRECTORY = "card"  # files that clients access by FILE_TRANSFER_PROTOCOL
 LOCK_FILE = "lock"
 # stored data without which a vehicle is not armed: the fence and the parameters
-_MISSED: dict[int | str, str] = {
+_REQUIRED_TO_ARM: dict[int | str, str] = {
     mavlink.MAV_MISSION_TYPE_FENCE: "the stored fence is damaged; upload it again, or clear it",
     PARAMETER_FILE: "the stored parameters are damaged; set and save them again",
 }
@@ -90,33 +90,33 @@ class Storage:
         except OSError as error:
             return None, f"{path}: {error.strerror}; starting without a mission"
         if isinstance(mission, CorruptMission):
-            return None, f"{path}: {mission.reason}; {self._moved(path)}, starting without a mission"
+            return None, f"{path}: {mission.reason}; {self._move_aside(path)}, starting without a mission"
         return mission, ""
 
-    def _moved(self, path: Path) -> str:
+    def _move_aside(self, path: Path) -> str:
         """Move a damaged file to another name, and return a text about it."""
         try:
-            aside = keep_copy(path)
+            copy = keep_copy(path)
             remove(path)
         except OSError as error:
-            return _why(error)
-        return f"moved to {aside.name}"
+            return _error_text(error)
+        return f"moved to {copy.name}"
 
-    def _replace(self, what: int | str, name: str, data: bytes | None) -> None:
+    def _replace(self, key: int | str, name: str, data: bytes | None) -> None:
         """Replace a file's contents, or remove it (None), after a copy of a file that cannot be read."""
         path = self._directory / name
-        if what in self._lost:
+        if key in self._lost:
             keep_copy(path)
         if data is None:
             remove(path)
         else:
-            write_whole(path, data)
-        self._lost.discard(what)
+            write_atomically(path, data)
+        self._lost.discard(key)
 
     def load_areas(self, home: Home) -> tuple[dict[int, tuple[WireItem, ...]], list[str]]:
         """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each unusable file."""
         found: dict[int, tuple[WireItem, ...]] = {}
-        troubles = []
+        problems = []
         for kind, name in AREA_FILES.items():
             path = self._directory / name
             try:
@@ -129,29 +129,29 @@ class Storage:
                 continue
             except (OSError, DamagedError, MissionItemError) as error:
                 self._lost.add(kind)
-                troubles.append(f"{path}: {_why(error)}; starting without it")
-        return found, troubles
+                problems.append(f"{path}: {_error_text(error)}; starting without it")
+        return found, problems
 
     @property
     def lost(self) -> tuple[str, ...]:
         """The reasons not to arm: stored data that cannot be read, without which the vehicle must not fly."""
-        return tuple(text for what, text in _MISSED.items() if what in self._lost)
+        return tuple(text for key, text in _REQUIRED_TO_ARM.items() if key in self._lost)
 
-    def keep_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+    def store_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Store fence or rally points; without items the file is removed."""
         self._replace(kind, AREA_FILES[kind], serialise(items) if items else None)
 
     def load_parameters(self, table: ParameterTable) -> list[str]:
         """Set the stored parameters; returns a line for each stored value that is no longer valid."""
-        stored, troubles = self._load_text(PARAMETER_FILE, "starting with the defaults")
+        stored, problems = self._load_text(PARAMETER_FILE, "starting with the defaults")
         for name, value in stored.items():
             try:
                 self._parameters[name] = table.set(name, value)
             except ParameterError as error:
-                troubles.append(f"{self._directory / PARAMETER_FILE}: {error}; left out")
-        return troubles
+                problems.append(f"{self._directory / PARAMETER_FILE}: {error}; left out")
+        return problems
 
-    def _load_text(self, name: str, then: str) -> tuple[dict[str, float], list[str]]:
+    def _load_text(self, name: str, consequence: str) -> tuple[dict[str, float], list[str]]:
         """Names and numbers in a file; if it is unusable, a line with the error and its consequence."""
         path = self._directory / name
         try:
@@ -160,28 +160,32 @@ class Storage:
             return {}, []
         except (OSError, DamagedError, UnicodeDecodeError, ParameterError) as error:
             self._lost.add(name)
-            return {}, [f"{path}: {_why(error)}; {then}"]
+            return {}, [f"{path}: {_error_text(error)}; {consequence}"]
 
-    def keep_mission(self, mission: StoredMission) -> None:
+    def store_mission(self, mission: StoredMission) -> None:
         """Store the mission; for an empty mission the file is removed."""
         self._replace(MISSION_FILE, MISSION_FILE, serialise(mission.items) if mission.items else None)
 
-    def keep_parameter(self, name: str, value: float) -> None:
+    def store_parameter(self, name: str, value: float) -> None:
         """Store one more parameter."""
         self._parameters[name] = value
-        self.keep_parameters()
+        self.store_parameters()
 
-    def keep_parameters(self) -> None:
+    def store_parameters(self) -> None:
         """Store all parameters that were set; values of a file that could not be read are given up."""
         self._replace(PARAMETER_FILE, PARAMETER_FILE, seal(_lines(sorted(self._parameters.items()))))
 
-    def load_world(self) -> tuple[dict[str, float], list[str]]:
+    def load_simulator_parameters(self) -> tuple[dict[str, float], list[str]]:
         """The saved parameters of the simulator, and a line if the file is unusable."""
-        return self._load_text(WORLD_FILE, "left out")
+        return self._load_text(SIMULATOR_PARAMETER_FILE, "left out")
 
-    def keep_world(self, values: Mapping[str, float]) -> None:
+    def store_simulator_parameters(self, values: Mapping[str, float]) -> None:
         """Store the simulator's parameters; without values the file is removed."""
-        self._replace(WORLD_FILE, WORLD_FILE, seal(_lines(values.items())) if values else None)
+        self._replace(
+            SIMULATOR_PARAMETER_FILE,
+            SIMULATOR_PARAMETER_FILE,
+            seal(_lines(values.items())) if values else None,
+        )
 
     def load_signing(self) -> Signing | None:
         """The stored key with a time later than any that was used; StorageError if the file is unusable."""
@@ -196,19 +200,19 @@ class Storage:
                 f"{path}: {error}; mend or remove it: without it unsigned commands are obeyed"
             ) from None
 
-    def keep_signing(self, key: bytes | None, timestamp: int) -> None:
+    def store_signing(self, key: bytes | None, timestamp: int) -> None:
         """Store the key, readable by this user only, or remove it (None)."""
         path = self._directory / SIGNING_FILE
         if key is None:
             remove(path)
         else:
-            write_whole(path, seal(f"{key.hex()} {timestamp}\n"), private=True)
+            write_atomically(path, seal(f"{key.hex()} {timestamp}\n"), private=True)
 
-    def keep_log(self, chunk: LogChunk, most_mb: float) -> None:
-        """Store a part of a flight log; for a new log the oldest ones beyond `most_mb` are removed."""
+    def store_log(self, chunk: LogChunk, max_mb: float) -> None:
+        """Store a part of a flight log; for a new log the oldest ones beyond `max_mb` are removed."""
         if chunk.path not in self._logs:
             self._logs.add(chunk.path)
-            self.card.make_room(LOG_FOLDER, LOG_ENDING, round(most_mb * 1e6))
+            self.card.remove_oldest(LOG_FOLDER, LOG_SUFFIX, round(max_mb * 1e6))
         self.card.append(chunk.path, chunk.data)
 
 
@@ -216,5 +220,5 @@ def _lines(values: Iterable[tuple[str, float]]) -> str:
     return "".join(f"{name} {value!r}\n" for name, value in values)
 
 
-def _why(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)

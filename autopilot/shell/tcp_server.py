@@ -8,10 +8,10 @@ from contextlib import suppress
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.records import Link
 from autopilot.shell.options import Address
-from autopilot.wire.codec import whole_frames
+from autopilot.wire.codec import decodable_length
 
-_LARGEST_READ = 2048  # bytes from a client, before it is another's turn
-_LARGEST_BACKLOG = 262_144  # bytes that a client has not taken; beyond that it is stuck and is disconnected
+_MAX_READ_BYTES = 2048  # bytes from a client, before it is another's turn
+_MAX_BACKLOG_BYTES = 262_144  # bytes that a client has not taken; beyond that it is stuck and is disconnected
 MAX_CLIENTS = 16  # a new client replaces the one silent longest, if its silence has lasted this long:
 SILENCE_US = 5_000_000  # a ground station sends a heartbeat every second
 
@@ -21,35 +21,35 @@ class _Client:
 
     def __init__(self, sock: socket.socket, now_us: int) -> None:
         self.socket = sock
-        self.heard_us = now_us
-        self.came = b""
-        self.waiting = b""
+        self.received_us = now_us
+        self.received = b""
+        self.unsent = b""
 
-    def take(self) -> bytes | None:
+    def receive(self) -> bytes | None:
         """Whole frames that arrived; None at the end of the connection."""
         try:
-            read = self.socket.recv(_LARGEST_READ)
+            read = self.socket.recv(_MAX_READ_BYTES)
         except BlockingIOError:
             return b""
         except OSError:
             return None
         if not read:
             return None
-        self.came += read
-        end = whole_frames(self.came)
-        whole, self.came = self.came[:end], self.came[end:]
-        return whole
+        self.received += read
+        end = decodable_length(self.received)
+        frames, self.received = self.received[:end], self.received[end:]
+        return frames
 
-    def give(self, frames: bytes) -> bool:
+    def send(self, frames: bytes) -> bool:
         """Send, or keep what the client does not take yet; False if it is stuck or gone."""
-        self.waiting += frames
+        self.unsent += frames
         try:
-            self.waiting = self.waiting[self.socket.send(self.waiting) :]
+            self.unsent = self.unsent[self.socket.send(self.unsent) :]
         except BlockingIOError:
             pass
         except OSError:
             return False
-        return len(self.waiting) <= _LARGEST_BACKLOG
+        return len(self.unsent) <= _MAX_BACKLOG_BYTES
 
 
 class TcpServer:
@@ -63,15 +63,15 @@ class TcpServer:
         self._clients: dict[Link, _Client] = {}
         self._number = 0
 
-    def take(self, onboard: Onboard) -> tuple[bytes, Link] | None:
+    def receive(self, onboard: Onboard) -> tuple[bytes, Link] | None:
         """Accept a new connection; return the frames of one client, and of another at the next call."""
         self._accept(onboard)
         for link, client in list(self._clients.items()):
-            frames = client.take()
+            frames = client.receive()
             if frames is None:
-                self._let_go(link, onboard)
+                self._disconnect(link, onboard)
             elif frames:
-                client.heard_us = onboard.now_us
+                client.received_us = onboard.now_us
                 self._clients[link] = self._clients.pop(link)  # after the others
                 return frames, link
         return None
@@ -79,8 +79,8 @@ class TcpServer:
     def send(self, link: Link, frames: bytes, onboard: Onboard) -> None:
         """Send frames to one client; no effect if it is gone."""
         client = self._clients.get(link)
-        if client is not None and not client.give(frames):
-            self._let_go(link, onboard)
+        if client is not None and not client.send(frames):
+            self._disconnect(link, onboard)
 
     def links(self) -> tuple[Link, ...]:
         """The connections."""
@@ -101,11 +101,11 @@ class TcpServer:
         with suppress(OSError):  # no new connection
             sock, _ = self._listener.accept()
             if len(self._clients) >= MAX_CLIENTS:
-                longest = min(self._clients, key=lambda link: self._clients[link].heard_us)
-                if onboard.now_us - self._clients[longest].heard_us < SILENCE_US:
+                most_silent = min(self._clients, key=lambda link: self._clients[link].received_us)
+                if onboard.now_us - self._clients[most_silent].received_us < SILENCE_US:
                     sock.close()
                     return
-                self._let_go(longest, onboard)
+                self._disconnect(most_silent, onboard)
             sock.setblocking(False)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._number += 1
@@ -113,6 +113,6 @@ class TcpServer:
             self._clients[link] = _Client(sock, onboard.now_us)
             onboard.add_link(link)
 
-    def _let_go(self, link: Link, onboard: Onboard) -> None:
+    def _disconnect(self, link: Link, onboard: Onboard) -> None:
         self._clients.pop(link).socket.close()
         onboard.endpoint.remove_link(link)

@@ -13,7 +13,7 @@ class TickCost:
 
     def __init__(self) -> None:
         self._bins = [0] * (_BINS + 1)
-        self._longest_us = self._ticks = self._too_long = 0
+        self._longest_us = self._ticks = self._overruns = 0
         self._last_ns = -1
 
     def tick(self, period_us: int) -> None:
@@ -29,7 +29,7 @@ class TickCost:
         self._bins[min(cost_us // _BIN_US, _BINS)] += 1
         self._longest_us = max(self._longest_us, cost_us)
         self._ticks += 1
-        self._too_long += cost_us > period_us
+        self._overruns += cost_us > period_us
 
     def pause(self) -> None:
         """The time until the next tick belongs to no tick."""
@@ -37,10 +37,10 @@ class TickCost:
 
     def _percentile_us(self, share: float) -> int:
         """The upper edge of the bin that this share of the ticks does not exceed."""
-        left = share * self._ticks
+        remaining = share * self._ticks
         for k, count in enumerate(self._bins):
-            left -= count
-            if left <= 0.0:
+            remaining -= count
+            if remaining <= 0.0:
                 return min((k + 1) * _BIN_US, self._longest_us)
         return self._longest_us
 
@@ -50,5 +50,5 @@ class TickCost:
             return ""
         return (
             f"processor time of a tick: p50 {self._percentile_us(0.5)} p99 {self._percentile_us(0.99)} "
-            f"max {self._longest_us} us; {self._too_long} of {self._ticks} took longer than a tick"
+            f"max {self._longest_us} us; {self._overruns} of {self._ticks} took longer than a tick"
         )

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.guidance.legs import top_of
-from autopilot.supervisor.heading import heading_onward
-from autopilot.supervisor.machine import must_happen
-from autopilot.supervisor.mission import RELEASED_TEXT, legs_done
+from autopilot.supervisor.heading import advance_heading
+from autopilot.supervisor.machine import transition
+from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
-from autopilot.supervisor.watches.failsafe import watch_blind, watch_failsafe
+from autopilot.supervisor.watches.failsafe import watch_failsafe, watch_missing_readings
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
 from autopilot.supervisor.watches.own import watch_estimator, watch_law
@@ -23,13 +23,13 @@ from autopilot.supervisor.watches.setpoints import watch_setpoints, watch_takeof
 from autopilot.supervisor.watches.slack import watch_slack
 from autopilot.supervisor.watches.tautening import watch_tautening
 from autopilot.supervisor.watches.touchdown import watch_touchdown
-from autopilot.supervisor.watches.watched import Watch
+from autopilot.supervisor.watches.watch_result import Watch
 
 WATCHES: tuple[Watch, ...] = (
     watch_recovery,
     watch_failsafe,
     watch_rotors,
-    watch_blind,
+    watch_missing_readings,
     watch_law,
     watch_estimator,
     watch_idle,
@@ -44,18 +44,18 @@ WATCHES: tuple[Watch, ...] = (
 
 def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The flight at `view.now_us`: the first watch that finds something decides, else the legs continue."""
-    flight = heading_onward(flight, view, settings)
+    flight = advance_heading(flight, view, settings)
     for watch in WATCHES:
-        watched = watch(flight, view, settings)
-        flight = watched.flight
-        if watched.event is not None:
-            flight = must_happen(flight, watched.event, view, settings)
-        if watched.found:
-            return flight, Report(watched.texts, watched.reached)
-    return _legs_over(flight, view, settings)
+        result = watch(flight, view, settings)
+        flight = result.flight
+        if result.event is not None:
+            flight = transition(flight, result.event, view, settings)
+        if result.found:
+            return flight, Report(result.texts, result.reached)
+    return _continue_legs(flight, view, settings)
 
 
-def _legs_over(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The flight in the leg that is to be flown now, after all legs that have ended."""
     had_load = not flight.cable.released
     reached: tuple[int, ...] = ()
@@ -64,12 +64,12 @@ def _legs_over(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     while flight.phase in IN_AIR and (
         not flight.legs or leg_time_s(flight, view.now_us) >= flight.legs[0].duration_s
     ):
-        flight = _reeled(flight)
+        flight = _with_reeled_length(flight)
         if len(flight.legs) > 1:
             ended = flight.leg_start_us + round(flight.legs[0].duration_s * 1e6)
             flight = replace(flight, legs=flight.legs[1:], leg_start_us=ended)
             continue
-        flight, more = legs_done(flight, view, settings)
+        flight, more = after_last_leg(flight, view, settings)
         reached += more.reached
         texts += more.texts
     if flight.cable.released and had_load:
@@ -77,7 +77,7 @@ def _legs_over(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     return flight, Report(texts, reached)
 
 
-def _reeled(flight: Flight) -> Flight:
+def _with_reeled_length(flight: Flight) -> Flight:
     """The flight at the end of its present leg, with the cable length at which this leg ends."""
     leg = flight.legs[0] if flight.legs else None
     top = None if leg is None else top_of(leg)

@@ -24,11 +24,12 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
 
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
-FALLING = 1.0  # m/s: a load that sinks faster has fallen and was caught; it is not being lowered
+FALL_SPEED = 1.0  # m/s: a load that sinks faster has fallen and was caught; it is not being lowered
 RESCUE_SHARE = 0.5  # of gravity: deceleration of a load that was caught
 STOPPING_S = 0.3  # a climb or descent is stopped at the height it reaches in this time, by at most 2/s of it
 DESCENT_SHARE = 0.5  # of its height: a sinking load is stopped no lower
-STEEPEST = 0.5  # cosine of the cable's greatest lean from which the acceleration of the load is computed
+# cosine of the cable's greatest lean from which the acceleration of the load is computed
+MIN_CABLE_COSINE = 0.5
 
 
 def position_mode(flight: Flight) -> int:
@@ -36,7 +37,7 @@ def position_mode(flight: Flight) -> int:
     return QUAD_POSITION if flight.cable.released else LOAD_POSITION
 
 
-def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+def with_control_modes(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
     """The legs in the control modes in which they are flown: of the vehicle if the load is released."""
     if not flight.cable.released:
         return legs
@@ -45,7 +46,7 @@ def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
     )
 
 
-def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
+def commanded_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
     """Commanded position, velocity and acceleration of the load, or its present ones if none are commanded;
     those of the vehicle if the load is released."""
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
@@ -57,29 +58,29 @@ def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, 
         return view.x_load, ZERO, ZERO
     # a load that neither rises nor falls is accelerated by gravity times the tangent of the cable's lean
     cable = sub(view.x_quad, view.x_load)
-    if not cable[2] > STEEPEST * norm(cable):
+    if not cable[2] > MIN_CABLE_COSINE * norm(cable):
         return view.x_load, view.v_load, ZERO
-    pull = settings.gravity_m_s2 / cable[2]
-    return view.x_load, view.v_load, (pull * cable[0], pull * cable[1], 0.0)
+    factor = settings.gravity_m_s2 / cable[2]
+    return view.x_load, view.v_load, (factor * cable[0], factor * cable[1], 0.0)
 
 
-def swings(leg: Leg) -> bool:
+def tracks_attitude(leg: Leg) -> bool:
     """Whether the leg controls an attitude, which leaves the position uncontrolled."""
     return isinstance(leg, Swing | Calm | Posture)
 
 
-def calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
+def damping_leg(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
     """The leg that must come between a leg that does not control the position and one that does."""
     cable = sub(view.x_quad, view.x_load)
     length = norm(cable)
-    lean = scale(1.0 / length, cable)
-    rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
+    direction = scale(1.0 / length, cable)
+    rate = scale(1.0 / length, tangent(direction, sub(view.v_quad, view.v_load)))
     if isinstance(leg, Steady):
         anchor = _stopping_place(view)
     else:
         anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
-    duration = CALM_SHARE * settings.least_move_s
-    return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
+    duration = CALM_SHARE * settings.min_move_s
+    return Calm(anchor, (direction[0], direction[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
 
 
 def _stopping_place(view: View) -> Vec3:
@@ -88,31 +89,31 @@ def _stopping_place(view: View) -> Vec3:
     return (x[0], x[1], max(x[2] + STOPPING_S * climb, min(x[2], DESCENT_SHARE * x[2])))
 
 
-def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
+def stopping_legs(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
     """Legs that bring the load from its present motion to rest (none if it rests), and where it will rest."""
-    x, v, a = asked_motion(flight, view, settings)
+    x, v, a = commanded_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
             return leg.stopped(t, settings.motion.accel_m_s2)
-        slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.least_move_s)
+        slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.min_move_s)
         return (slow,), slow.end
-    accel, least_s = settings.motion.accel_m_s2, settings.least_move_s
-    brake = brake_leg(x, v, a, accel, least_s)
-    if v[2] < -FALLING or brake.end[2] < min(x[2], 0.0):  # out of a fall: brake as fast as possible
-        accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
-        brake = brake_leg(x, v, a, accel, least_s)
+    accel, min_duration_s = settings.motion.accel_m_s2, settings.min_move_s
+    brake = brake_leg(x, v, a, accel, min_duration_s)
+    if v[2] < -FALL_SPEED or brake.end[2] < min(x[2], 0.0):  # out of a fall: brake as fast as possible
+        accel, min_duration_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * min_duration_s
+        brake = brake_leg(x, v, a, accel, min_duration_s)
     return (brake,), brake.end
 
 
-def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
-    """A transfer of the load to another place, at rest at both ends, that takes at least `least_s`."""
-    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(least_s, settings.least_move_s))
+def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, min_duration_s: float = 0.0) -> Leg:
+    """A transfer of the load to another place, at rest at both ends, that takes at least `min_duration_s`."""
+    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(min_duration_s, settings.min_move_s))
 
 
-def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
+def cable_length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
     """Length of the cable (m) when the load has come to rest at `here`; it follows from its height while the
     winch works."""
     top = top_of(flight.legs[0]) if flight.legs else None

@@ -11,10 +11,10 @@ from math import hypot
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, carry_leg, transfer_leg
 from autopilot.guidance.setpoint_follower import AttitudeSetpoint, Follow, Posture, begin_following
-from autopilot.supervisor.guide import asked_of
-from autopilot.supervisor.motion import AT_REST, asked_motion, carry, position_mode, stop
+from autopilot.supervisor.motion import AT_REST, carry, commanded_motion, position_mode, stopping_legs
+from autopilot.supervisor.setpoint_source import active_setpoint
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, Phase, View, leg_time_s, pace_of, setpoint
+from autopilot.supervisor.state import Flight, Phase, View, follow_limits, leg_time_s, setpoint
 from autopilot.supervisor.step_legs import step_legs
 from autopilot.trajectory.timeline import return_place
 from missions.model import AttitudeRun, Signals
@@ -22,17 +22,15 @@ from missions.model import AttitudeRun, Signals
 P = Phase
 
 CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack vehicle moves sideways
-ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
+SET_DOWN_OFFSET = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
-BLIND_HEIGHT, BLIND_HASTE = (
-    0.5,
-    2.0,
-)  # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
+# while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
+BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
-LEAST_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
+MIN_LOAD_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
 
 
 def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -48,45 +46,45 @@ def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     if flight.cable.released:
-        legs, here = stop(flight, view, settings)
+        legs, here = stopping_legs(flight, view, settings)
         up = (here[0], here[1], flight.mission.takeoff_altitude_m)
         return (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings))
     top = (view.x_load[0], view.x_load[1], flight.mission.takeoff_altitude_m)
     return (carry(view.x_load, top, settings.motion.lift_speed_m_s, settings),)
 
 
-def _raised(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
-    """Like `stop`, but the load comes to rest clear of the ground."""
-    legs, here = stop(flight, view, settings)
-    if here[2] >= LEAST_HEIGHT:
+def _stop_above_ground(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
+    """Like `stopping_legs`, but the load comes to rest clear of the ground."""
+    legs, here = stopping_legs(flight, view, settings)
+    if here[2] >= MIN_LOAD_HEIGHT:
         return legs, here
-    up = (here[0], here[1], LEAST_HEIGHT)
+    up = (here[0], here[1], MIN_LOAD_HEIGHT)
     return (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
 
 
 def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    legs, here = _raised(flight, view, settings)
+    legs, here = _stop_above_ground(flight, view, settings)
     return (*legs, Hold(here))
 
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    legs, here = _raised(flight, view, settings)
+    legs, here = _stop_above_ground(flight, view, settings)
     goal = return_place(here, flight.area.home, flight.area.rally)
-    least = settings.motion.return_altitude_m
-    if here[2] < least and hypot(goal[0] - here[0], goal[1] - here[1]) > HOME_RADIUS:
-        up = (here[0], here[1], least)
+    min_height = settings.motion.return_altitude_m
+    if here[2] < min_height and hypot(goal[0] - here[0], goal[1] - here[1]) > HOME_RADIUS:
+        up = (here[0], here[1], min_height)
         legs, here = (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
     return (*legs, carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    asked = asked_of(flight)
-    if isinstance(asked, AttitudeSetpoint):
-        begun = Posture(asked, asked_motion(flight, view, settings)[0])
-        return (begun.onward(asked, view.attitude, view.now_us),)
-    jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
+    attitude_setpoint = active_setpoint(flight)
+    if isinstance(attitude_setpoint, AttitudeSetpoint):
+        posture = Posture(attitude_setpoint, commanded_motion(flight, view, settings)[0])
+        return (posture.onward(attitude_setpoint, view.attitude, view.now_us),)
+    jet, rate = setpoint(flight, view.now_us), follow_limits(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
-        x, v, a = asked_motion(flight, view, settings)
+        x, v, a = commanded_motion(flight, view, settings)
         return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
     leg = flight.legs[0]
     if isinstance(leg, Follow):
@@ -95,43 +93,43 @@ def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    legs, here = stop(flight, view, settings)
+    legs, here = stopping_legs(flight, view, settings)
     if flight.cable.released:
         clear = _clear_of_load(here, view, settings)
-        low = (clear[0], clear[1], min(here[2], LEAST_HEIGHT))
+        low = (clear[0], clear[1], min(here[2], MIN_LOAD_HEIGHT))
         return (
             *legs,
             carry(here, clear, flight.mission.speed_m_s, settings),
             carry(clear, low, settings.motion.lift_speed_m_s, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
-    unsure, haste = HEIGHT_SIGMAS * view.height_std, 1.0
-    if view.complaints:  # by inertial navigation, which drifts
-        unsure, haste = BLIND_HEIGHT, BLIND_HASTE
-    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + unsure))
-    speed, accel = haste * settings.motion.lift_speed_m_s, haste * settings.motion.accel_m_s2
+    height_margin, speed_factor = HEIGHT_SIGMAS * view.height_std, 1.0
+    if view.estimate_problems:  # by inertial navigation, which drifts
+        height_margin, speed_factor = BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR
+    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + height_margin))
+    speed, accel = speed_factor * settings.motion.lift_speed_m_s, speed_factor * settings.motion.accel_m_s2
     return (
         *legs,
-        carry_leg(here, low, speed, accel, settings.least_move_s),
+        carry_leg(here, low, speed, accel, settings.min_move_s),
         Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
     )
 
 
 def _clear_of_load(here: Vec3, view: View, settings: Settings) -> Vec3:
     """The place at which the vehicle descends so that it does not land on the load that it has released."""
-    reach = ASIDE * settings.cable_length_m
+    offset = SET_DOWN_OFFSET * settings.cable_length_m
     beside = (here[0] - view.x_load[0], here[1] - view.x_load[1], 0.0)
     distance = norm(beside)
-    if not distance < reach:
+    if not distance < offset:
         return here
     away = scale(1.0 / distance, beside) if distance > AT_REST else (-1.0, 0.0, 0.0)
-    return (view.x_load[0] + reach * away[0], view.x_load[1] + reach * away[1], here[2])
+    return (view.x_load[0] + offset * away[0], view.x_load[1] + offset * away[1], here[2])
 
 
 def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     clear = min(view.x_quad[2], view.x_load[2] + CLEARANCE * settings.cable_length_m)
     down = (view.x_quad[0], view.x_quad[1], clear)
-    aside = (view.x_load[0] - ASIDE * settings.cable_length_m, view.x_load[1], clear)
+    aside = (view.x_load[0] - SET_DOWN_OFFSET * settings.cable_length_m, view.x_load[1], clear)
     return (
         transfer_leg(view.x_quad, down, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
         transfer_leg(down, aside, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
@@ -141,7 +139,7 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     step = flight.mission.plan.steps[flight.mission.step]
-    legs, here = stop(flight, view, settings)
+    legs, here = stopping_legs(flight, view, settings)
     anchor = flight.mission.step_anchor
     if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
         # a step that is resumed after a pause is flown again from where it began
@@ -150,7 +148,7 @@ def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     return (*legs, *step_legs(step, here, flight, settings))
 
 
-ENTRY: dict[Phase, Callable[[Flight, View, Settings], tuple[Leg, ...]]] = {
+ENTRY_LEGS: dict[Phase, Callable[[Flight, View, Settings], tuple[Leg, ...]]] = {
     P.TAUTEN: _tauten,
     P.LIFT: _lift,
     P.HOLD: _hold,

@@ -1,10 +1,10 @@
 """When the supervisor has nothing to decide: the ticks that pass without it.
 
 After each decision `next_stretch` determines what is flown from here, until when no time limit expires, and
-what must stay true meanwhile. `may_decide` checks at each tick, in machine code, whether it still is. If so,
-`advance` would change nothing. `may_decide` may call for a decision needlessly, but never misses one. What a
-stretch cannot judge (setpoints, which come at any time, fences, winches, loads that are being caught) is
-decided at every tick.
+what must stay true meanwhile. `may_need_decision` checks at each tick, in machine code, whether it still is.
+If so, `advance` would change nothing. `may_need_decision` may call for a decision needlessly, but never
+misses one. What a stretch cannot judge (setpoints, which come at any time, fences, winches, loads that are
+being caught) is decided at every tick.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
-from autopilot.control.records import Nose, State
+from autopilot.control.records import HeadingReference, State
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, column, norm, sub
 from autopilot.geometry.packed import Each
@@ -32,73 +32,83 @@ from autopilot.guidance.setpoint_follower import Posture
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, IN_AIR, Flight, Phase, Selected, carries, leg_time_s
-from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, SLACK
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    ActionWhenArmed,
+    Flight,
+    Phase,
+    leg_time_s,
+    needs_load_estimate,
+)
+from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, TAUT_PULL_SHARE
 from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
-from autopilot.supervisor.watches.slack import LEAST_GAP, LIFT_OFF_US
-from autopilot.supervisor.watches.tautening import ASTRAY, TAUT_LATEST
+from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
+from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, MAX_TAUT_HEIGHT
 from autopilot.supervisor.watches.touchdown import (
-    LOAD_SUNK,
-    STANDS,
+    LOAD_DEPTH,
+    ON_GROUND_DEPTH,
     STILL_SPEED,
     STILL_US,
-    VEHICLE_SUNK,
+    VEHICLE_DEPTH,
 )
 
-RESTING = 0  # mode in which no rotor is controlled, besides the control modes of the legs
+UNCONTROLLED = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
 # what else ends a stretch
-NOTHING, TAUT, LOAD_DOWN, VEHICLE_DOWN = 0, 1, 2, 3
+NO_WATCH, TAUT, LOAD_DOWN, VEHICLE_DOWN = 0, 1, 2, 3
 
 
 class Stretch(NamedTuple):
     """What is flown from `first_us` on, and what ends it."""
 
-    mode: int  # RESTING or a control mode
+    mode: int  # UNCONTROLLED or a control mode
     idle: bool  # the rotors idle, while none is controlled
     first_us: Each
     stop_us: Each  # when it ends at the latest
     period_us: int  # between the ticks for which the setpoints are computed
     watch: int
-    level: float  # m: of the watch
-    still: bool  # the supervisor has already noted that load or vehicle is down, or that the cable pulls
+    threshold: float  # m: of the watch
+    condition_met: (
+        bool  # the supervisor has already noted that load or vehicle is down, or that the cable pulls
+    )
     error_limit: float  # m: of the tracked position; infinite where none is tracked
-    hangs: bool  # the load should hang on the cable
+    load_suspended: bool  # the load should hang on the cable
     taut_length: float  # m, from load to vehicle
     load_weight: float  # N
-    carried: bool  # the load must be known for the flight to continue
+    load_required: bool  # the load must be known for the flight to continue
     released: bool
     tilt_limit: float  # rad; infinite on the ground
     anchor_height: float  # m, held while an attitude is tracked
     upward: Vec3  # attitude modes: where the thrust, or the cable seen from the load, is to point
     thrust: float  # N, commanded with an attitude; NaN: the thrust that holds the height
-    nose: Nose  # where the nose is to point
+    heading: HeadingReference
     rotors_lost: int = 0  # bit i: rotor i+1 is known to be lost
 
 
-def at_rest(until_us: int, now_us: int, idle: bool) -> Stretch:
+def uncontrolled_stretch(until_us: int, now_us: int, idle: bool) -> Stretch:
     """A stretch in which no rotor is controlled."""
     return Stretch(
-        mode=RESTING,
+        mode=UNCONTROLLED,
         idle=idle,
         first_us=now_us,
         stop_us=until_us,
         period_us=1,
-        watch=NOTHING,
-        level=0.0,
-        still=False,
+        watch=NO_WATCH,
+        threshold=0.0,
+        condition_met=False,
         error_limit=inf,
-        hangs=False,
+        load_suspended=False,
         taut_length=0.0,
         load_weight=1.0,
-        carried=False,
+        load_required=False,
         released=False,
         tilt_limit=inf,
         anchor_height=0.0,
         upward=ZERO,
         thrust=nan,
-        nose=EAST_NOSE,
+        heading=EAST_NOSE,
     )
 
 
@@ -107,59 +117,60 @@ def next_stretch(
 ) -> Stretch:
     """What is flown from this tick on; ticks are `period_us` apart, the law looks ahead by `preview_s`."""
     if flight.phase not in IN_AIR:
-        return at_rest(_rest_ends_us(flight, now_us), now_us, flight.phase == Phase.ARMED)
+        return uncontrolled_stretch(_uncontrolled_end_us(flight, now_us), now_us, flight.phase == Phase.ARMED)
     leg = flight.legs[0]
-    carried = carries(flight)
-    hangs = flight.phase in CARRYING and not flight.cable.released
-    lifting_ends_us = flight.phase_start_us + LIFT_OFF_US
-    ends = [_leg_ends_us(flight, leg)]
-    if flight.phase == Phase.LIFT and now_us < lifting_ends_us:
-        hangs = False
-        ends.append(lifting_ends_us)
+    load_required = needs_load_estimate(flight)
+    load_suspended = flight.phase in CARRYING and not flight.cable.released
+    liftoff_end_us = flight.phase_start_us + LIFT_OFF_US
+    end_times = [_leg_end_us(flight, leg)]
+    if flight.phase == Phase.LIFT and now_us < liftoff_end_us:
+        load_suspended = False
+        end_times.append(liftoff_end_us)
     elif flight.phase == Phase.LOWER and isinstance(leg, Creep):
-        hangs = False
-    watch, level, end_us = _watched(flight, leg, settings)
-    ends.append(end_us)
+        load_suspended = False
+    watch, threshold, end_us = _active_watch(flight, leg, settings)
+    end_times.append(end_us)
     if _is_decided_at_every_tick(flight, leg, settings):
-        ends.append(now_us)
+        end_times.append(now_us)
     tracked = flight.phase in CARRYING and leg.control_mode == position_mode(flight)
     anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
     return Stretch(
         mode=leg.control_mode,
         idle=False,
         first_us=now_us,
-        stop_us=min(ends),
+        stop_us=min(end_times),
         period_us=max(period_us, 1),
         watch=watch,
-        level=level,
-        still=flight.still_since_us >= 0,
+        threshold=threshold,
+        condition_met=flight.condition_since_us >= 0,
         error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
-        hangs=hangs,
+        load_suspended=load_suspended,
         taut_length=flight.cable.taut_length_m,
         load_weight=settings.load_weight_n,
-        carried=carried,
+        load_required=load_required,
         released=flight.cable.released,
         tilt_limit=settings.failsafe.tilt_limit_rad,
         anchor_height=anchor_height,
         upward=upward,
         thrust=thrust,
-        nose=_nose(flight, leg, preview_s),
+        heading=_heading_reference(flight, leg, preview_s),
         rotors_lost=flight.rotors_lost,
     )
 
 
-def _rest_ends_us(flight: Flight, now_us: int) -> int:
+def _uncontrolled_end_us(flight: Flight, now_us: int) -> int:
     """When the next decision is due without a request while no rotor is controlled."""
     if flight.phase == Phase.FAILSAFE:
         return flight.phase_start_us + FAILSAFE_DISARM_US + 1
     if flight.phase == Phase.ARMED:
-        rises = flight.selected == Selected.OFFBOARD  # a setpoint may begin the take-off at any tick
-        return now_us if rises else flight.phase_start_us + IDLE_DISARM_US + 1
+        # a setpoint may begin the take-off at any tick
+        awaits_takeoff = flight.action_when_armed == ActionWhenArmed.OFFBOARD
+        return now_us if awaits_takeoff else flight.phase_start_us + IDLE_DISARM_US + 1
     return FOREVER_US
 
 
 def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> bool:
-    fenced = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
+    has_fence = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
     return bool(
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
         or isinstance(leg, Catch)
@@ -167,25 +178,25 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or flight.phase == Phase.GUIDED
         or top_of(leg) is not None
         or not flight.heading.rests
-        or (fenced and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
+        or (has_fence and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
     )
 
 
-def _watched(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, float, int]:
+def _active_watch(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, float, int]:
     """What is watched for, its level in m, and when it will have been true for long enough."""
-    noted = flight.still_since_us >= 0
+    condition_met = flight.condition_since_us >= 0
     if flight.phase == Phase.TAUTEN and len(flight.legs) == 1 and isinstance(leg, Creep):
-        level = leg.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
-        return TAUT, level, flight.still_since_us + PULL_US if noted else FOREVER_US
+        threshold = leg.begin[2] + (MAX_TAUT_HEIGHT - CLEARANCE) * settings.cable_length_m
+        return TAUT, threshold, flight.condition_since_us + PULL_US if condition_met else FOREVER_US
     if flight.phase in (Phase.LOWER, Phase.SET_DOWN) and isinstance(leg, Creep):
-        end_us = flight.still_since_us + STILL_US if noted else FOREVER_US
+        end_us = flight.condition_since_us + STILL_US if condition_met else FOREVER_US
         if leg.control_mode == LOAD_POSITION:
-            return LOAD_DOWN, LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED, end_us
-        return VEHICLE_DOWN, VEHICLE_SUNK, end_us
-    return NOTHING, 0.0, FOREVER_US
+            return LOAD_DOWN, LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED, end_us
+        return VEHICLE_DOWN, VEHICLE_DEPTH, end_us
+    return NO_WATCH, 0.0, FOREVER_US
 
 
-def _leg_ends_us(flight: Flight, leg: Leg) -> int:
+def _leg_end_us(flight: Flight, leg: Leg) -> int:
     """The first microsecond at which the present leg has ended by the comparison that `advance` makes."""
     if leg.duration_s == inf:
         return FOREVER_US
@@ -201,30 +212,37 @@ def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
         return 0.0, leg.upward(t), leg.thrust_n
     if not isinstance(leg, Swing | Calm | Posture):
         return 0.0, ZERO, nan
-    asked = leg.lean.thrust_n if isinstance(leg, Posture) else None
-    return leg.anchor[2], leg.upward(t), nan if asked is None else asked
+    thrust = leg.lean.thrust_n if isinstance(leg, Posture) else None
+    return leg.anchor[2], leg.upward(t), nan if thrust is None else thrust
 
 
-def _nose(flight: Flight, leg: Leg, ahead_s: float) -> Nose:
-    """Where the nose is to point `ahead_s` seconds from now; b1 of an attitude that body rates lead."""
+def _heading_reference(flight: Flight, leg: Leg, ahead_s: float) -> HeadingReference:
+    """The heading `ahead_s` seconds from now; b1 of an attitude that body rates lead."""
     if isinstance(leg, Posture) and leg.attitude is not None:
-        return Nose(column(leg.attitude, 0), ZERO, ZERO)
+        return HeadingReference(column(leg.attitude, 0), ZERO, ZERO)
     return flight.heading.nose(ahead_s)
 
 
 @kernel
-def may_decide(
-    at: Stretch, now_us: int, state: State, known: bool, taut: bool, tilt: float, pull: float, target: Vec3
+def may_need_decision(
+    stretch: Stretch,
+    now_us: int,
+    state: State,
+    known: bool,
+    taut: bool,
+    tilt: float,
+    pull: float,
+    target: Vec3,
 ) -> bool:
     """Whether the supervisor might have something to decide at this tick.
 
     `known`: the estimate is good enough to fly on; `tilt` in rad; `pull` of the cable in N; `target`: the
     position that load or vehicle should have now.
     """
-    elapsed = now_us - at.first_us
-    if now_us >= at.stop_us or elapsed % at.period_us != 0:
+    elapsed = now_us - stretch.first_us
+    if now_us >= stretch.stop_us or elapsed % stretch.period_us != 0:
         return True
-    if at.mode == RESTING:
+    if stretch.mode == UNCONTROLLED:
         return False
     finite = (
         isfinite(norm(state.x_quad))
@@ -233,25 +251,25 @@ def may_decide(
         and isfinite(norm(state.v_load))
         and isfinite(pull)
     )
-    if not finite or not tilt <= at.tilt_limit or not known:
+    if not finite or not tilt <= stretch.tilt_limit or not known:
         return True
-    tracked = state.x_quad if at.released else state.x_load
-    if not norm(sub(tracked, target)) <= at.error_limit:
+    tracked = state.x_quad if stretch.released else state.x_load
+    if not norm(sub(tracked, target)) <= stretch.error_limit:
         return True
-    pulled = pull / at.load_weight
-    if at.hangs:
-        gap = at.taut_length - norm(sub(state.x_quad, state.x_load))
-        if not taut or (gap > LEAST_GAP and pulled < SLACK):
+    pull_share = pull / stretch.load_weight
+    if stretch.load_suspended:
+        gap = stretch.taut_length - norm(sub(state.x_quad, state.x_load))
+        if not taut or (gap > MIN_GAP and pull_share < SLACK_PULL_SHARE):
             return True
-    if at.watch == TAUT:
-        beside = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)
-        if target[2] > at.level or not norm(beside) <= ASTRAY:
+    if stretch.watch == TAUT:
+        offset = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)
+        if target[2] > stretch.threshold or not norm(offset) <= MAX_LOAD_OFFSET:
             return True
-        return (pulled > PULLED and taut) != at.still
-    if at.watch == LOAD_DOWN:
-        return (state.x_load[2] - target[2] > at.level) != at.still
-    if at.watch == VEHICLE_DOWN:
-        sunk = state.x_quad[2] - target[2]
-        down = sunk > at.level and (sunk > STANDS or abs(state.v_quad[2]) < STILL_SPEED)
-        return down != at.still
+        return (pull_share > TAUT_PULL_SHARE and taut) != stretch.condition_met
+    if stretch.watch == LOAD_DOWN:
+        return (state.x_load[2] - target[2] > stretch.threshold) != stretch.condition_met
+    if stretch.watch == VEHICLE_DOWN:
+        depth = state.x_quad[2] - target[2]
+        down = depth > stretch.threshold and (depth > ON_GROUND_DEPTH or abs(state.v_quad[2]) < STILL_SPEED)
+        return down != stretch.condition_met
     return False

@@ -10,15 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from autopilot.guidance.legs import Steady
-from autopilot.supervisor.machine import must_happen
+from autopilot.supervisor.machine import transition
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Event, Flight, Text, View
 from autopilot.supervisor.table import TRANSITIONS
-from autopilot.supervisor.watches.failsafe import given_up
+from autopilot.supervisor.watches.failsafe import give_up_flight
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class RestartState:
     """The state of rotors, winch and gripper when the autopilot starts."""
 
     thrust_n: float  # the last one commanded
@@ -26,21 +26,21 @@ class Found:
     released: bool
 
 
-def take_up(flight: Flight, found: Found, view: View, settings: Settings) -> Flight:
+def resume_flight(flight: Flight, restart: RestartState, view: View, settings: Settings) -> Flight:
     """The flight that begins with the state found."""
-    motion, cable = settings.motion, replace(flight.cable, released=found.released)
-    if found.reeled_m != 0.0:
-        cable = replace(cable, length_m=settings.cable_length_m + found.reeled_m)
+    motion, cable = settings.motion, replace(flight.cable, released=restart.released)
+    if restart.reeled_m != 0.0:
+        cable = replace(cable, length_m=settings.cable_length_m + restart.reeled_m)
     mission = replace(
         flight.mission, speed_m_s=motion.speed_m_s, takeoff_altitude_m=motion.takeoff_altitude_m
     )
-    flight = must_happen(replace(flight, cable=cable, mission=mission), Event.FOUND, view, settings)
-    return replace(flight, legs=(Steady(found.thrust_n),), leg_start_us=view.now_us, following=())
+    flight = transition(replace(flight, cable=cable, mission=mission), Event.FOUND_IN_FLIGHT, view, settings)
+    return replace(flight, legs=(Steady(restart.thrust_n),), leg_start_us=view.now_us, following=())
 
 
-def broken_off(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, tuple[Text, ...]]:
+def abort_flight(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, tuple[Text, ...]]:
     """The flight, given up because it was not controlled for a while, and the texts about it."""
     if (flight.phase, Event.FAIL) not in TRANSITIONS:
         return flight, ()
-    ended = given_up(flight, why)
-    return must_happen(ended.flight, Event.FAIL, view, settings), ended.texts
+    ended = give_up_flight(flight, why)
+    return transition(ended.flight, Event.FAIL, view, settings), ended.texts

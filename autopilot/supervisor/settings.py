@@ -8,14 +8,14 @@ from math import cos, inf, radians
 from autopilot.guidance.heading import HeadingLimits
 from autopilot.guidance.legs import least_move_s
 from autopilot.trajectory.peaks import Body
-from autopilot.trajectory.prepare import Limits
+from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import Bounds
-from autopilot.vehicle.layout import GREATEST_FORCE_N, Layout
+from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
 from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, AutopilotParameters
-from autopilot.vehicle.rotors import authority, columns
+from autopilot.vehicle.rotors import allocation_columns, control_authority
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
-LEAST_AUTHORITY = 0.1  # least authority over moments to fly with, as a share of that of all rotors
+MIN_AUTHORITY = 0.1  # least authority over moments to fly with, as a share of that of all rotors
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,10 @@ class SetpointSettings:
     manual_loss_us: int
     guided_loss_us: int  # the same in ArduPilot's GUIDED, for setpoints that are not a place
     stick_speed_m_s: float  # of the load, for a stick at its end stop
-    fastest_m_s: float  # velocity setpoint
+    max_speed_m_s: float  # velocity setpoint
     hover_share: float  # thrust share of an attitude setpoint with which the vehicle hovers
-    guided_mode: bool  # as in ArduPilot's GUIDED: obeyed while holding, and a place remains the setpoint
-    guides_vehicle: bool  # positions are those of the vehicle, which is kept a cable length over the load
+    ardupilot_guided: bool  # as in ArduPilot's GUIDED: obeyed while holding, and a place remains the setpoint
+    target_is_vehicle: bool  # positions are those of the vehicle, which is kept a cable length over the load
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +67,8 @@ class FenceSettings:
 class WinchSettings:
     """Limits of the winch."""
 
-    shortest_m: float  # length of the cable
-    longest_m: float
+    min_length_m: float  # length of the cable
+    max_length_m: float
     speed_m_s: float
     accel_m_s2: float
     usable: bool  # the law can fly a cable length other than the one it was designed for
@@ -79,23 +79,26 @@ class RotorSettings:
     """The rotors, and the weight that they carry."""
 
     layout: Layout
-    low_n: float  # least effort of a rotor
-    high_n: float  # greatest effort of a rotor
-    thrust_n: float  # carries vehicle and load
+    min_effort_n: float  # least effort of a rotor
+    max_effort_n: float  # greatest effort of a rotor
+    hover_thrust_n: float  # carries vehicle and load
 
     def can_fly_without(self, lost: int) -> bool:
         """Whether the remaining rotors can keep vehicle and load in the air and level."""
-        return self._left(lost, yaw=False)
+        return self._keeps_authority(lost, yaw=False)
 
     def can_hold_heading_without(self, lost: int) -> bool:
         """Whether the remaining rotors can control the heading as well."""
-        return self._left(lost, yaw=True)
+        return self._keeps_authority(lost, yaw=True)
 
-    def _left(self, lost: int, yaw: bool) -> bool:
-        whole, left = (
-            authority(self.layout, gone, self.thrust_n, self.low_n, self.high_n, yaw) for gone in (0, lost)
+    def _keeps_authority(self, lost: int, yaw: bool) -> bool:
+        full, remaining = (
+            control_authority(
+                self.layout, missing, self.hover_thrust_n, self.min_effort_n, self.max_effort_n, yaw
+            )
+            for missing in (0, lost)
         )
-        return left >= LEAST_AUTHORITY * whole
+        return remaining >= MIN_AUTHORITY * full
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,12 +106,12 @@ class Settings:
     """The supervisor's parameters: those of the assumed vehicle, and the others by subject."""
 
     cable_length_m: float
-    least_move_s: float
+    min_move_s: float
     gravity_m_s2: float
     load_weight_n: float
     weight_n: float  # of vehicle and load
     ramp_lag_s: float  # time by which a sinking load lags behind its setpoint with this law
-    limits: Limits  # of the paths of missions
+    limits: PathLimits  # of the paths of missions
     motion: MotionSettings
     heading: HeadingLimits
     failsafe: FailsafeSettings
@@ -119,22 +122,22 @@ class Settings:
 
 
 def settings_from(
-    table: AutopilotParameters, ramp_lag_s: float, reels: bool, follows_shaped: bool
+    table: AutopilotParameters, ramp_lag_s: float, supports_reeling: bool, follows_shaped: bool
 ) -> Settings:
     """The supervisor's settings from the parameter table and the properties of the law.
 
-    `ramp_lag_s`: the time by which the load lags on a ramp. `reels`: the law can fly other lengths of the
-    cable. `follows_shaped`: shaping paths beforehand is worthwhile with this law.
+    `ramp_lag_s`: the time by which the load lags on a ramp. `supports_reeling`: the law can fly other
+    lengths of the cable. `follows_shaped`: shaping paths beforehand is worthwhile with this law.
     """
     length, gravity, load_mass = table["VEH_CABLE_LEN"], table["VEH_GRAVITY"], table["VEH_LOAD_MASS"]
     return Settings(
         cable_length_m=length,
-        least_move_s=least_move_s(length, gravity),
+        min_move_s=least_move_s(length, gravity),
         gravity_m_s2=gravity,
         load_weight_n=load_mass * gravity,
         weight_n=(table["VEH_QUAD_MASS"] + load_mass) * gravity,
         ramp_lag_s=ramp_lag_s,
-        limits=limits_from(table, follows_shaped),
+        limits=path_limits(table, follows_shaped),
         motion=MotionSettings(
             takeoff_altitude_m=table["MIS_TAKEOFF_ALT"],
             speed_m_s=table["MIS_SPEED"],
@@ -159,10 +162,10 @@ def settings_from(
             manual_loss_us=round(1e6 * table["COM_RC_LOSS_T"]),
             guided_loss_us=round(1e6 * table["GUID_TIMEOUT"]),
             stick_speed_m_s=table["MPC_VEL_MANUAL"],
-            fastest_m_s=table["MPC_XY_VEL_MAX"],
+            max_speed_m_s=table["MPC_XY_VEL_MAX"],
             hover_share=table["MPC_THR_HOVER"],
-            guided_mode=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
-            guides_vehicle=table["GDE_TARGET"] != 0.0,
+            ardupilot_guided=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
+            target_is_vehicle=table["GDE_TARGET"] != 0.0,
         ),
         fence=FenceSettings(
             action=int(table["GF_ACTION"]),
@@ -170,11 +173,11 @@ def settings_from(
             height_m=table["GF_MAX_VER_DIST"],
         ),
         winch=WinchSettings(
-            shortest_m=table["WNC_LEN_MIN"],
-            longest_m=table["WNC_LEN_MAX"],
+            min_length_m=table["WNC_LEN_MIN"],
+            max_length_m=table["WNC_LEN_MAX"],
             speed_m_s=table["WNC_SPEED"],
             accel_m_s2=table["WNC_ACCEL"],
-            usable=reels,
+            usable=supports_reeling,
         ),
         rotors=_rotors(table, (table["VEH_QUAD_MASS"] + load_mass) * gravity),
     )
@@ -183,11 +186,11 @@ def settings_from(
 def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     if table["VEH_ROTOR_LIM"] == 0.0:
-        low, high = -GREATEST_FORCE_N, GREATEST_FORCE_N
+        low, high = -MAX_ROTOR_FORCE_N, MAX_ROTOR_FORCE_N
     return RotorSettings(table.layout, low, high, weight_n)
 
 
-def limits_from(table: AutopilotParameters, follows_shaped: bool) -> Limits:
+def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
     """The limits within which paths are shaped: the assumed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
@@ -203,7 +206,7 @@ def limits_from(table: AutopilotParameters, follows_shaped: bool) -> Limits:
         table["VEH_TORQUE"],
         table["PLB_DRAG"],
         table["PLB_DRAG_2"],
-        columns(table.layout),
+        allocation_columns(table.layout),
     )
     bounds = Bounds(
         low + margin if limited else -inf,
@@ -214,7 +217,7 @@ def limits_from(table: AutopilotParameters, follows_shaped: bool) -> Limits:
     )
     shaping = table["MIS_SHAPE"]
     shaped = shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
-    return Limits(
+    return PathLimits(
         body,
         bounds,
         shaped,

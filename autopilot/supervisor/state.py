@@ -13,12 +13,12 @@ from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
 from autopilot.guidance.heading import EASTWARD, Heading
 from autopilot.guidance.legs import Leg
 from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, FollowLimits, Stream
-from autopilot.services.snapshot import HEIGHT_LIMIT
+from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
-from autopilot.trajectory.prepare import UNPREPARED, Prepared
+from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence
-from missions.model import NoseAim, Step
+from missions.model import HeadingCommand, Step
 
 
 class Phase(IntEnum):
@@ -71,10 +71,10 @@ class Event(Enum):
     LOAD_DOWN = "load on the ground"
     VEHICLE_DOWN = "vehicle on the ground"
     FAIL = "give up"
-    FOUND = "found in flight"
+    FOUND_IN_FLIGHT = "found in flight"
 
 
-class Selected(Enum):
+class ActionWhenArmed(Enum):
     """What begins when the vehicle is armed."""
 
     NOTHING = "hold"
@@ -83,7 +83,7 @@ class Selected(Enum):
     OFFBOARD = "offboard"
 
 
-class Guide(Enum):
+class SetpointSource(Enum):
     """Setpoint source while GUIDED."""
 
     OFFBOARD = "setpoints"
@@ -97,14 +97,14 @@ class MissionPlan:
 
     steps: tuple[Step, ...] = ()
     sequence: tuple[int, ...] = ()
-    items: int = 0
-    prepared: Prepared = UNPREPARED
-    aims: tuple[tuple[NoseAim, ...], ...] = ()  # of each step: the aims of the nose as it begins
-    again_from: int | None = None  # the step that follows the last one, if the mission has no end
+    item_count: int = 0
+    prepared: PreparedPaths = UNPREPARED
+    aims: tuple[tuple[HeadingCommand, ...], ...] = ()  # of each step: the heading aims that it sets
+    repeat_from: int | None = None  # the step that follows the last one, if the mission has no end
 
-    def after(self, step: int) -> int | None:
+    def next_step(self, step: int) -> int | None:
         """The step that follows; None after the last one."""
-        return step + 1 if step + 1 < len(self.steps) else self.again_from
+        return step + 1 if step + 1 < len(self.steps) else self.repeat_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ class CableState:
     length_m: float | None = None  # as set by the winch; None: VEH_CABLE_LEN
     reel_rate: float = 0.0  # m/s, at which the length grows now
     reel_accel: float = 0.0  # m/s^2
-    reel_to_m: float | None = None  # length that the present mission step requires
+    reel_target_m: float | None = None  # length that the present mission step requires
     taut_length_m: float = 0.0  # from load to vehicle when lifting began: the true length of the cable
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack
@@ -139,11 +139,11 @@ class CableState:
 class Setpoints:
     """The setpoints received, and the source of those that are followed while GUIDED."""
 
-    guide: Guide = Guide.OFFBOARD
+    source: SetpointSource = SetpointSource.OFFBOARD
     offboard: Stream = SILENT
     manual: Stream = SILENT
     circle: Circle | None = None
-    heeded_us: int = -1  # when the setpoint was received whose heading is the present aim
+    heading_setpoint_us: int = -1  # when the setpoint was received whose heading is the present aim
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class Area:
     home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
     rally: tuple[Vec3, ...] = ()  # where a return leads instead if that is nearer
     fence: Fence = NO_FENCE
-    guarded: bool = True  # the fence is not switched off
+    fence_enabled: bool = True  # the fence is not switched off
     breach: str = ""  # why load or vehicle may not be where it is, or where it is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
@@ -168,9 +168,10 @@ class Flight:
     legs: tuple[Leg, ...] = ()
     leg_start_us: int = 0
     following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
-    still_since_us: int = -1  # since when the condition that ends the phase holds, -1: it does not
-    selected: Selected = Selected.NOTHING
-    heeds: bool = True  # while holding, it follows any setpoint: ArduPilot's GUIDED, not its LOITER
+    condition_since_us: int = -1  # since when the condition that ends the phase holds, -1: it does not
+    action_when_armed: ActionWhenArmed = ActionWhenArmed.NOTHING
+    # while holding, it follows any setpoint: ArduPilot's GUIDED, not its LOITER
+    accepts_setpoints: bool = True
     mission: MissionProgress = MissionProgress()
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
@@ -179,7 +180,7 @@ class Flight:
     heading: Heading = EASTWARD
     returning: bool = False  # home, or landing there
     # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
-    hindrances: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    external_arming_problems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 class View(NamedTuple):
@@ -192,15 +193,15 @@ class View(NamedTuple):
     v_load: Vec3
     taut: bool
     tilt_rad: float
-    complaints: tuple[str, ...]
+    estimate_problems: tuple[str, ...]
     pull_n: float = nan  # of the cable on the vehicle, by the accelerometer; NaN: not known
     height_std: float = 0.0  # m, of heights over home, if they come from a receiver
     attitude: Mat3 = IDENTITY
-    lost: str = ""  # why not even a landing is possible by these estimates
+    estimate_loss: str = ""  # why not even a landing is possible by these estimates
     law_fault: str = ""  # why the custom law does not fly any more
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     estimator_fault: str = ""  # why the custom estimator does not fly any more
-    unseen: bool = False  # no sensor has ever seen the load
+    load_unobserved: bool = False  # no sensor has ever seen the load
 
 
 class Report(NamedTuple):
@@ -210,7 +211,7 @@ class Report(NamedTuple):
     reached: tuple[int, ...] = ()
 
 
-def off_mission(flight: Flight) -> Flight:
+def interrupt_mission(flight: Flight) -> Flight:
     """The flight with its mission interrupted, or no longer waiting to begin; the step is kept."""
     return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
 
@@ -220,46 +221,46 @@ def takeoff_event(flight: Flight) -> Event:
     return Event.TAKEOFF_ALONE if flight.cable.released else Event.TAKEOFF
 
 
-def pace_of(flight: Flight, settings: Settings) -> FollowLimits:
+def follow_limits(flight: Flight, settings: Settings) -> FollowLimits:
     """Limits for following setpoints."""
     rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
     return FollowLimits(
-        flight.mission.speed_m_s, settings.setpoints.fastest_m_s, settings.motion.accel_m_s2, rate
+        flight.mission.speed_m_s, settings.setpoints.max_speed_m_s, settings.motion.accel_m_s2, rate
     )
 
 
-def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
+def fence_violation(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
     if settings.fence.radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence.radius_m:
         return f"beyond the fence, GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
     height_m = x_load[2] + settings.cable_length_m
     if settings.fence.height_m > 0.0 and height_m > settings.fence.height_m:
-        limit = f"{HEIGHT_LIMIT} {settings.fence.height_m:g} m above home"
+        limit = f"{HEIGHT_LIMIT_PARAMETER} {settings.fence.height_m:g} m above home"
         return f"beyond the fence, {limit} (vehicle at {height_m:.2f} m)"
-    return fence.complaint(x_load[0], x_load[1])
+    return fence.violation(x_load[0], x_load[1])
 
 
-def fenced(flight: Flight, settings: Settings) -> bool:
+def is_fence_active(flight: Flight, settings: Settings) -> bool:
     """Whether the fence is in force: GF_ACTION names a reaction to a breach, and it is not switched off."""
-    return settings.fence.action != 0 and flight.area.guarded
+    return settings.fence.action != 0 and flight.area.fence_enabled
 
 
-def beyond_fence(flight: Flight, place: Vec3, settings: Settings) -> str:
+def fence_problem(flight: Flight, place: Vec3, settings: Settings) -> str:
     """Why a fence in force forbids to fly there: of the load, or of the vehicle if it has released the load;
     an empty string if it does not."""
-    if not fenced(flight, settings):
+    if not is_fence_active(flight, settings):
         return ""
-    load = below(place, settings) if flight.cable.released else place
-    return forbidden(flight.area.fence, load, settings)
+    load = load_position_below(place, settings) if flight.cable.released else place
+    return fence_violation(flight.area.fence, load, settings)
 
 
-def carries(flight: Flight) -> bool:
+def needs_load_estimate(flight: Flight) -> bool:
     """Whether the load must be known for the flight to continue: not if it is released, or lies on the ground
     while the vehicle lands beside it."""
     return not flight.cable.released and flight.phase != Phase.SET_DOWN
 
 
-def below(x_quad: Vec3, settings: Settings) -> Vec3:
+def load_position_below(x_quad: Vec3, settings: Settings) -> Vec3:
     """Where a load would hang under the vehicle."""
     return (x_quad[0], x_quad[1], x_quad[2] - settings.cable_length_m)
 

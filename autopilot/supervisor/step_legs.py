@@ -17,12 +17,12 @@ from autopilot.guidance.legs import (
     Swing,
     reel_leg,
 )
-from autopilot.supervisor.motion import AT_REST, carry, length_at
+from autopilot.supervisor.motion import AT_REST, cable_length_at, carry
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase
-from autopilot.trajectory.shaping import Shaped, unshaped
-from autopilot.trajectory.timeline import LEAST_REEL_M, RELEASE_S, MissionState, state_after
-from autopilot.trajectory.waypoint_path import Passage
+from autopilot.trajectory.shaping import ShapedSignals, unshaped_signals
+from autopilot.trajectory.timeline import MIN_REEL_M, RELEASE_S, MissionState, state_after
+from autopilot.trajectory.waypoint_path import PathSegment
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -55,21 +55,25 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
             return (carry(here, up, settings.motion.lift_speed_m_s, settings),)
         case Waypoint(hold_s=hold):
             there = destination(step, here, flight)
-            path = made(flight, flight.mission.step)
+            path = prepared_path(flight, flight.mission.step)
             go: Leg
-            if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
-                fade = min(settings.least_move_s, float(path.table[-1, 1]))
+            if (
+                isinstance(path, PathSegment)
+                and path.begin_s == 0.0
+                and norm(sub(here, path.start)) < NEAR_START
+            ):
+                fade = min(settings.min_move_s, float(path.table[-1, 1]))
                 go = Pass(path, sub(here, path.start), fade)
             else:
-                go = carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight))
-            return (go, Hold(there, max(hold - borrowed(flight), 0.0))) if hold > 0.0 else (go,)
+                go = carry(here, there, flight.mission.speed_m_s, settings, _min_duration_s(flight))
+            return (go, Hold(there, max(hold - hold_reduction_s(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
-            return (Hold(here, max(duration - borrowed(flight), 0.0)),)
+            return (Hold(here, max(duration - hold_reduction_s(flight), 0.0)),)
         case ReturnHome():
             there = destination(step, here, flight)
-            return (carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight)),)
+            return (carry(here, there, flight.mission.speed_m_s, settings, _min_duration_s(flight)),)
         case Signals():
-            return (Run(here, _signals_of(flight, flight.mission.step) or unshaped(step)),)
+            return (Run(here, _signals_of(flight, flight.mission.step) or unshaped_signals(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
         ):
@@ -80,12 +84,16 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         case Release():
             return (Hold(here, RELEASE_S),)
         case Winch(speed_m_s=speed):
-            wanted = settings.cable_length_m if flight.cable.reel_to_m is None else flight.cable.reel_to_m
-            length = length_at(flight, here, settings)
-            if abs(wanted - length) < LEAST_REEL_M:
+            target_m = (
+                settings.cable_length_m if flight.cable.reel_target_m is None else flight.cable.reel_target_m
+            )
+            length = cable_length_at(flight, here, settings)
+            if abs(target_m - length) < MIN_REEL_M:
                 return (Hold(here, 0.0),)
             return (
-                reel_leg(here, length, wanted, speed or settings.winch.speed_m_s, settings.winch.accel_m_s2),
+                reel_leg(
+                    here, length, target_m, speed or settings.winch.speed_m_s, settings.winch.accel_m_s2
+                ),
             )
         case Land():
             return ()
@@ -105,32 +113,32 @@ def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
         return ()
     end = last.jet(last.duration_s)
-    coming = flight.mission.plan.steps[step]
-    if norm(end[1]) > AT_REST or not isinstance(coming, Waypoint | Delay | ReturnHome | Signals):
+    next_step = flight.mission.plan.steps[step]
+    if norm(end[1]) > AT_REST or not isinstance(next_step, Waypoint | Delay | ReturnHome | Signals):
         return ()
-    return step_legs(coming, end[0], replace(flight, mission=replace(flight.mission, step=step)), settings)
+    return step_legs(next_step, end[0], replace(flight, mission=replace(flight.mission, step=step)), settings)
 
 
-def made(flight: Flight, step: int) -> Shaped | Passage | None:
+def prepared_path(flight: Flight, step: int) -> ShapedSignals | PathSegment | None:
     """The path that was prepared for a step of the plan; None if there is none."""
-    made = flight.mission.plan.prepared.made
-    return made[step] if 0 <= step < len(made) else None
+    paths = flight.mission.plan.prepared.paths
+    return paths[step] if 0 <= step < len(paths) else None
 
 
-def _signals_of(flight: Flight, step: int) -> Shaped | None:
+def _signals_of(flight: Flight, step: int) -> ShapedSignals | None:
     """The shaped signals that were prepared for a step of the plan; None for any other step."""
-    found = made(flight, step)
-    return found if isinstance(found, Shaped) else None
+    prepared = prepared_path(flight, step)
+    return prepared if isinstance(prepared, ShapedSignals) else None
 
 
-def borrowed(flight: Flight) -> float:
+def hold_reduction_s(flight: Flight) -> float:
     """Time (s) that the signals before and after the present step take from its hold: to come to rest, and to
     lead in."""
     before, after = _signals_of(flight, flight.mission.step - 1), _signals_of(flight, flight.mission.step + 1)
     return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
 
 
-def _least_s(flight: Flight) -> float:
+def _min_duration_s(flight: Flight) -> float:
     """Least duration (s) of the transfer of the present step within the limits of rotors, cable and tilt."""
-    least = flight.mission.plan.prepared.least_s
-    return least[flight.mission.step] if flight.mission.step < len(least) else 0.0
+    min_durations_s = flight.mission.plan.prepared.min_durations_s
+    return min_durations_s[flight.mission.step] if flight.mission.step < len(min_durations_s) else 0.0

@@ -11,7 +11,7 @@ from autopilot.supervisor.state import IN_AIR, Event, Phase
 P, E = Phase, Event
 TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.DISARMED, E.ARM): P.ARMED,
-    (P.DISARMED, E.FOUND): P.HOLD,
+    (P.DISARMED, E.FOUND_IN_FLIGHT): P.HOLD,
     (P.ARMED, E.DISARM): P.DISARMED,
     (P.ARMED, E.TAKEOFF): P.TAUTEN,
     (P.ARMED, E.TAKEOFF_ALONE): P.LIFT,

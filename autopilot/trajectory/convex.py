@@ -28,27 +28,27 @@ from autopilot.trajectory.rotor_demand import (
     FIRST_ROTOR,
     TENSION,
     Bounds,
-    commanded,
     demand,
-    slopes,
+    demand_derivatives,
+    rotor_commands,
 )
 from autopilot.trajectory.splines import DEGREE, Array, Basis
 
 SAMPLES = 4  # to an interval
 _BAND = DEGREE + 1
 _ROUNDS = 12
-_EXCESS_PRICE = 2e4  # of one newton for one second; a distance of d costs 1 per second
-_ROW_PRICE = 1e5  # of one metre
+_EXCESS_WEIGHT = 2e4  # of one newton for one second; a distance of d costs 1 per second
+_CONSTRAINT_WEIGHT = 1e5  # of one metre
 _HALVINGS = 7
-_SETTLED = 1e-3  # relative decrease of the cost below which the rounds end
+_CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
 _COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # convert an excess of cosine and tension to newtons of a rotor
-_NEAR_ENOUGH_N = 0.05  # largest excess with which the rounds may begin
-_SMOOTHER, _SMOOTHER_TRIES = 30.0, 8
-_AWAY_N = 0.6  # a round leaves out bounds that are at least this far from the demand
+_START_EXCESS_N = 0.05  # largest excess with which the rounds may begin
+_SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
+_INACTIVE_N = 0.6  # a round leaves out bounds that are at least this far from the demand
 _ACCURACY = 1e-7  # of the solver; the cost is of order one
 
 
-class Rows(NamedTuple):
+class LinearConstraints(NamedTuple):
     """Linear constraints on the path itself: low <= direction . x^(order) (time) <= high; equalities if low =
     high."""
 
@@ -59,16 +59,18 @@ class Rows(NamedTuple):
     high: Array  # (m,)
 
 
-NO_ROWS = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+NO_CONSTRAINTS = LinearConstraints(
+    np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+)
 
 
-class Goal(NamedTuple):
-    """Weights per second: `near` of |x - target|^2 at the samples, `smooth` (order, weight) of
-    |x^(order)|^2."""
+class Objective(NamedTuple):
+    """Weights per second: `tracking_weight` of |x - target|^2 at the samples, `smoothness_weights` (order,
+    weight) of |x^(order)|^2."""
 
     target: Array  # (n, 3)
-    near: float
-    smooth: tuple[tuple[int, float], ...]
+    tracking_weight: float
+    smoothness_weights: tuple[tuple[int, float], ...]
 
 
 class Solution(NamedTuple):
@@ -83,57 +85,71 @@ class Problem:
     """A spline with fixed ends, a goal and bounds."""
 
     def __init__(
-        self, basis: Basis, fixed: Array, body: Body, bounds: Bounds, goal: Goal, rows: Rows
+        self,
+        basis: Basis,
+        fixed: Array,
+        body: Body,
+        bounds: Bounds,
+        objective: Objective,
+        constraints: LinearConstraints,
     ) -> None:
         self.basis, self.fixed, self.body, self.bounds = basis, fixed, body, bounds
-        self.goal, self.rows = goal, rows
+        self.objective, self.constraints = objective, constraints
         self.times: Array = sample_times(basis)
         self.spacing = float(self.times[1] - self.times[0])
         self.values, self.first = basis.band(self.times, 8)
         lo, hi = basis.free.start, basis.free.stop
         self.lo, self.size = lo, hi - lo
         self._columns = self.first[:, None] + np.arange(_BAND) - lo
-        self._inside = (self._columns >= 0) & (self._columns < self.size)
-        self._linear = [self._matrix(self.values[order]) for order in range(8)]
+        self._is_free = (self._columns >= 0) & (self._columns < self.size)
+        self._derivative_matrices = [self._matrix(self.values[order]) for order in range(8)]
         self._hessian = self._cost_matrix()
-        self._extra, self._extra_fixed = self._row_matrix()
+        self._constraint_matrix, self._constraint_constant = self._constraint_rows()
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
         """(n, size) matrix of one derivative by the free coefficients of one axis."""
         rows = np.repeat(np.arange(len(values)), _BAND).reshape(self._columns.shape)
-        keep = self._inside
+        keep = self._is_free
         entries = (values[keep], (rows[keep], self._columns[keep]))
         return sparse.csr_matrix(entries, shape=(len(values), self.size))
 
     def _cost_matrix(self) -> sparse.csc_matrix:
         h = self.spacing
-        found = self.goal.near * h * (self._linear[0].T @ self._linear[0])
-        self._near = sparse.csc_matrix(found)
-        for order, weight in self.goal.smooth:
-            found = found + weight * h * (self._linear[order].T @ self._linear[order])
-        return sparse.csc_matrix(found)
+        hessian = (
+            self.objective.tracking_weight
+            * h
+            * (self._derivative_matrices[0].T @ self._derivative_matrices[0])
+        )
+        self._tracking_hessian = sparse.csc_matrix(hessian)
+        for order, weight in self.objective.smoothness_weights:
+            hessian = hessian + weight * h * (
+                self._derivative_matrices[order].T @ self._derivative_matrices[order]
+            )
+        return sparse.csc_matrix(hessian)
 
-    def _row_matrix(self) -> tuple[sparse.csr_matrix, Array]:
+    def _constraint_rows(self) -> tuple[sparse.csr_matrix, Array]:
         """The linear constraints: matrix (m, 3 size), and the contribution (m,) of the fixed coefficients."""
-        rows = self.rows
-        if not len(rows.time):
+        constraints = self.constraints
+        if not len(constraints.time):
             return sparse.csr_matrix((0, 3 * self.size)), np.zeros(0)
-        values, first = self.basis.band(rows.time, 7)
-        weights = values[rows.order, np.arange(len(rows.time))]
+        values, first = self.basis.band(constraints.time, 7)
+        weights = values[constraints.order, np.arange(len(constraints.time))]
         columns = first[:, None] + np.arange(_BAND)
-        data, where, at = [], [], []
-        constant = np.zeros(len(rows.time))
-        for i in range(len(rows.time)):
+        data, row_indices, column_indices = [], [], []
+        constant = np.zeros(len(constraints.time))
+        for i in range(len(constraints.time)):
             for axis in range(3):
-                if rows.direction[i, axis] == 0.0:
+                if constraints.direction[i, axis] == 0.0:
                     continue
-                w = weights[i] * rows.direction[i, axis]
+                w = weights[i] * constraints.direction[i, axis]
                 constant[i] += w @ self.fixed[columns[i], axis]
                 inside = (columns[i] >= self.lo) & (columns[i] < self.lo + self.size)
                 data += list(w[inside])
-                where += [i] * int(inside.sum())
-                at += list(columns[i][inside] - self.lo + axis * self.size)
-        return sparse.csr_matrix((data, (where, at)), shape=(len(rows.time), 3 * self.size)), constant
+                row_indices += [i] * int(inside.sum())
+                column_indices += list(columns[i][inside] - self.lo + axis * self.size)
+        return sparse.csr_matrix(
+            (data, (row_indices, column_indices)), shape=(len(constraints.time), 3 * self.size)
+        ), constant
 
     # ---- the path of given coefficients
 
@@ -142,13 +158,13 @@ class Problem:
         return band_jets(self.values, self.first, coefficients)
 
     def _cost(self, jets: Array) -> float:
-        away = jets[0] - self.goal.target
-        total = self.goal.near * float(np.sum(away * away))
-        for order, weight in self.goal.smooth:
+        deviation = jets[0] - self.objective.target
+        total = self.objective.tracking_weight * float(np.sum(deviation * deviation))
+        for order, weight in self.objective.smoothness_weights:
             total += weight * float(np.sum(jets[order] * jets[order]))
         return 0.5 * total * self.spacing
 
-    def _over(self, jets: Array) -> Array:
+    def _excess(self, jets: Array) -> Array:
         """(n,) the greatest excess at each sample, N."""
         return excess(demand(jets, self.body), self.spacing, self.bounds)
 
@@ -156,104 +172,112 @@ class Problem:
         """The cost plus the price of all excess over the bounds and the linear constraints."""
         total = self._cost(jets)
         if bounded:
-            total += _EXCESS_PRICE * self.spacing * float(np.sum(self._over(jets)))
-        if len(self.rows.time):
-            here = self._extra_fixed + self._extra @ free.T.ravel()
-            broken = np.maximum(here - self.rows.high, self.rows.low - here)
-            total += _ROW_PRICE * float(np.sum(np.maximum(broken, 0.0)))
+            total += _EXCESS_WEIGHT * self.spacing * float(np.sum(self._excess(jets)))
+        if len(self.constraints.time):
+            here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
+            violation = np.maximum(here - self.constraints.high, self.constraints.low - here)
+            total += _CONSTRAINT_WEIGHT * float(np.sum(np.maximum(violation, 0.0)))
         return total
 
     # ---- one round
 
     def solve(self, bounded: bool = True) -> Solution:
         """The coefficients with the least cost; without `bounded` the bounds are ignored."""
-        free = self._beginning() if bounded else self._unbounded(1.0)
-        jets = self.jets(self._all(free))
+        free = self._initial_guess() if bounded else self._unbounded(1.0)
+        jets = self.jets(self._all_coefficients(free))
         merit = self._merit(free, jets, bounded)
         for _ in range(_ROUNDS):
-            step = self._quadratic(free, jets if bounded else None)
+            step = self._solve_subproblem(free, jets if bounded else None)
             if step is None:
-                return Solution(self._all(free), np.inf, False)
+                return Solution(self._all_coefficients(free), np.inf, False)
             better, share = False, 1.0
             for _ in range(_HALVINGS):
-                tried = free + share * (step - free)
-                tried_jets = self.jets(self._all(tried))
-                tried_merit = self._merit(tried, tried_jets, bounded)
-                if tried_merit < merit:
+                candidate = free + share * (step - free)
+                candidate_jets = self.jets(self._all_coefficients(candidate))
+                candidate_merit = self._merit(candidate, candidate_jets, bounded)
+                if candidate_merit < merit:
                     better = True
                     break
                 share *= 0.5
             if not better:
                 break
-            fallen = merit - tried_merit
-            free, jets, merit = tried, tried_jets, tried_merit
-            if share == 1.0 and fallen < _SETTLED * max(merit, 0.1):
+            decrease = merit - candidate_merit
+            free, jets, merit = candidate, candidate_jets, candidate_merit
+            if share == 1.0 and decrease < _CONVERGENCE * max(merit, 0.1):
                 break
-        worst = float(self._over(jets).max()) if bounded else 0.0
-        return Solution(self._all(free), worst, True)
+        worst = float(self._excess(jets).max()) if bounded else 0.0
+        return Solution(self._all_coefficients(free), worst, True)
 
     def _gradient(self, jets: Array) -> Array:
         """(size, 3) gradient of the cost by the free coefficients."""
-        found = self.goal.near * (self._linear[0].T @ (jets[0] - self.goal.target))
-        for order, weight in self.goal.smooth:
-            found = found + weight * (self._linear[order].T @ jets[order])
-        return np.asarray(self.spacing * found)
+        gradient = self.objective.tracking_weight * (
+            self._derivative_matrices[0].T @ (jets[0] - self.objective.target)
+        )
+        for order, weight in self.objective.smoothness_weights:
+            gradient = gradient + weight * (self._derivative_matrices[order].T @ jets[order])
+        return np.asarray(self.spacing * gradient)
 
-    def _unbounded(self, smoother: float) -> Array:
-        """(size, 3) free coefficients of least cost without bounds; smoothness counts `smoother` times."""
-        near, rest = self._near, self.jets(self.fixed)
-        smooth = self._hessian - near
-        gradient = self._gradient(rest)
-        pull = self.goal.near * self.spacing * (self._linear[0].T @ (rest[0] - self.goal.target))
-        factor = splu(sparse.csc_matrix(near + smoother * smooth))
-        return np.asarray(-factor.solve(pull + smoother * (gradient - pull)))
+    def _unbounded(self, smoothing: float) -> Array:
+        """(size, 3) free coefficients of least cost without bounds; smoothness counts `smoothing` times."""
+        tracking, fixed_jets = self._tracking_hessian, self.jets(self.fixed)
+        smooth = self._hessian - tracking
+        gradient = self._gradient(fixed_jets)
+        tracking_gradient = (
+            self.objective.tracking_weight
+            * self.spacing
+            * (self._derivative_matrices[0].T @ (fixed_jets[0] - self.objective.target))
+        )
+        factor = splu(sparse.csc_matrix(tracking + smoothing * smooth))
+        return np.asarray(-factor.solve(tracking_gradient + smoothing * (gradient - tracking_gradient)))
 
-    def _beginning(self) -> Array:
+    def _initial_guess(self) -> Array:
         """The free coefficients to begin with: of the least smoothed path that is about within the bounds.
 
         Far outside the bounds the demand is far from linear: the thrust may turn over.
         """
-        smoother = 1.0
-        free = self._unbounded(smoother)
-        for _ in range(_SMOOTHER_TRIES):
-            if float(self._over(self.jets(self._all(free))).max()) <= _NEAR_ENOUGH_N:
+        smoothing = 1.0
+        free = self._unbounded(smoothing)
+        for _ in range(_SMOOTHING_TRIES):
+            if float(self._excess(self.jets(self._all_coefficients(free))).max()) <= _START_EXCESS_N:
                 break
-            smoother *= _SMOOTHER
-            free = self._unbounded(smoother)
+            smoothing *= _SMOOTHING_FACTOR
+            free = self._unbounded(smoothing)
         return free
 
-    def _all(self, free: Array) -> Array:
-        found = self.fixed.copy()
-        found[self.basis.free] = free
-        return found
+    def _all_coefficients(self, free: Array) -> Array:
+        coefficients = self.fixed.copy()
+        coefficients[self.basis.free] = free
+        return coefficients
 
-    def _quadratic(self, free: Array, jets: Array | None) -> Array | None:
+    def _solve_subproblem(self, free: Array, jets: Array | None) -> Array | None:
         """The free coefficients that solve the programme linearised along `jets`; None if the solver fails.
 
         The unknowns are changes from `free`: in the path itself they would affect only the last digits.
         """
         n, size = len(self.times), self.size
-        gradient = self._gradient(self.jets(self._all(free)))
+        gradient = self._gradient(self.jets(self._all_coefficients(free)))
         excesses = 0 if jets is None else n
         hessian = sparse.block_diag(
             [self._hessian] * 3 + [sparse.csc_matrix((excesses, excesses))], format="csc"
         )
-        linear = np.concatenate([gradient.T.ravel(), np.full(excesses, _EXCESS_PRICE * self.spacing)])
+        linear = np.concatenate([gradient.T.ravel(), np.full(excesses, _EXCESS_WEIGHT * self.spacing)])
         blocks: list[sparse.csr_matrix] = []
         limits: list[Array] = []
-        equal = self.rows.low == self.rows.high
-        here = self._extra_fixed + self._extra @ free.T.ravel()
-        rows = sparse.hstack([self._extra, sparse.csr_matrix((len(equal), excesses))], format="csr")
+        equal = self.constraints.low == self.constraints.high
+        here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
+        rows = sparse.hstack(
+            [self._constraint_matrix, sparse.csr_matrix((len(equal), excesses))], format="csr"
+        )
         if equal.any():
             blocks.append(rows[equal])
-            limits.append((self.rows.high - here)[equal])
-        for sign, bound in ((1.0, self.rows.high), (-1.0, -self.rows.low)):
+            limits.append((self.constraints.high - here)[equal])
+        for sign, bound in ((1.0, self.constraints.high), (-1.0, -self.constraints.low)):
             keep = ~equal & np.isfinite(bound)
             if keep.any():
                 blocks.append(sign * rows[keep])
                 limits.append((bound - sign * here)[keep])
         if jets is not None:
-            matrix, limit = self._linearised(jets)
+            matrix, limit = self._linearised_bounds(jets)
             blocks.append(matrix)
             limits.append(limit)
         variables = 3 * size + excesses
@@ -283,22 +307,22 @@ class Problem:
         solution = solver.solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             return None
-        changed: Array = free + (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
-        return changed
+        new_free: Array = free + (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
+        return new_free
 
-    def _linearised(self, jets: Array) -> tuple[sparse.csr_matrix, Array]:
+    def _linearised_bounds(self, jets: Array) -> tuple[sparse.csr_matrix, Array]:
         """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""
         n, size, bounds = len(self.times), self.size, self.bounds
-        found, slope = demand(jets, self.body), slopes(jets, self.body)
+        path_demand, slope = demand(jets, self.body), demand_derivatives(jets, self.body)
         # (n, outputs, 3, 10): derivatives by the coefficients of the band
         by_band = np.einsum("irod,oik->irdk", slope, self.values[:7])
 
         def matrix(output: int) -> sparse.csr_matrix:
-            keep = self._inside
-            lines = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+            keep = self._is_free
+            rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
             parts = [
                 sparse.csr_matrix(
-                    (by_band[:, output, axis][keep], (lines[keep], self._columns[keep])), shape=(n, size)
+                    (by_band[:, output, axis][keep], (rows[keep], self._columns[keep])), shape=(n, size)
                 )
                 for axis in range(3)
             ]
@@ -310,16 +334,16 @@ class Problem:
         limits: list[Array] = []
 
         def bound(rows: sparse.csr_matrix, value: Array, low: float, high: float, scale: float) -> None:
-            for sign, room in ((1.0, high - value), (-1.0, value - low)):
-                keep = room < _AWAY_N
+            for sign, margin in ((1.0, high - value), (-1.0, value - low)):
+                keep = margin < _INACTIVE_N
                 if keep.any():
                     blocks.append(sparse.hstack([sign * rows[keep], scale * excess_of[keep]], format="csr"))
-                    limits.append(room[keep])
+                    limits.append(margin[keep])
 
-        for rotor in range(FIRST_ROTOR, found.shape[1]):
-            bound(lag @ matrix(rotor), lag @ found[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
-        bound(matrix(TENSION), found[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
-        bound(matrix(COS_TILT), found[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
+        for rotor in range(FIRST_ROTOR, path_demand.shape[1]):
+            bound(lag @ matrix(rotor), lag @ path_demand[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
+        bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
+        bound(matrix(COS_TILT), path_demand[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
         blocks.append(sparse.hstack([sparse.csr_matrix((n, 3 * size)), excess_of], format="csr"))
         limits.append(np.zeros(n))
         return sparse.vstack(blocks, format="csr"), np.concatenate(limits)
@@ -332,17 +356,17 @@ def sample_times(basis: Basis) -> Array:
 
 def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> Array:
     """(orders, n, 3) of the spline with `coefficients` (count, 3)."""
-    near = coefficients[first[:, None] + np.arange(_BAND)]
-    return np.asarray(np.einsum("oik,ikd->oid", values, near))
+    nearby = coefficients[first[:, None] + np.arange(_BAND)]
+    return np.asarray(np.einsum("oik,ikd->oid", values, nearby))
 
 
-def excess(found: Array, spacing: float, bounds: Bounds) -> Array:
+def excess(path_demand: Array, spacing: float, bounds: Bounds) -> Array:
     """(n,) excess of the demand (n, outputs) of equally spaced samples over the bounds, in N of a rotor;
     >= 0."""
-    asked = commanded(found, spacing, bounds.rotor_tau)
-    over = np.maximum(asked.max(axis=1) - bounds.rotor_high, bounds.rotor_low - asked.min(axis=1))
-    over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - found[:, TENSION]))
-    over = np.maximum(over, _COS_SCALE * (bounds.cos_tilt - found[:, COS_TILT]))
+    commands = rotor_commands(path_demand, spacing, bounds.rotor_tau)
+    over = np.maximum(commands.max(axis=1) - bounds.rotor_high, bounds.rotor_low - commands.min(axis=1))
+    over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - path_demand[:, TENSION]))
+    over = np.maximum(over, _COS_SCALE * (bounds.cos_tilt - path_demand[:, COS_TILT]))
     return np.asarray(np.maximum(over, 0.0))
 
 

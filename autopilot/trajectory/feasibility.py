@@ -27,29 +27,29 @@ from autopilot.trajectory.peaks import (
     survey_signals,
     survey_transfer,
 )
-from autopilot.trajectory.prepare import REFUSE, Limits, prepare, shaped_path
+from autopilot.trajectory.prepare import REFUSE, PathLimits, prepare, shaped_path
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.shaping import Shaped, path_jets
+from autopilot.trajectory.shaping import ShapedSignals, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
-from autopilot.trajectory.waypoint_path import Passage, passage_jets
+from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.vehicle.model import Vehicle
-from autopilot.vehicle.rotors import ROTOR_MARGIN, columns
+from autopilot.vehicle.rotors import ROTOR_MARGIN, allocation_columns
 from missions.model import KINDS, AttitudeRun, Land, Mission, Signals, Takeoff, Term, Waypoint, Winch
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
-LEAST_TENSION = 0.3  # this and the next: the defaults of MIS_TENSION and MIS_SHAPE_ERR
-SHAPING_M = 0.05
-LEAST_HEIGHT_M = 0.3  # above home, at which a load must be carried
+MIN_TENSION_SHARE = 0.3  # this and the next: the defaults of MIS_TENSION and MIS_SHAPE_ERR
+MAX_SHAPING_M = 0.05
+MIN_HEIGHT_M = 0.3  # above home, at which a load must be carried
 _REPORT_SAMPLES = 4001
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
-_MANIFOLD = 3.0  # from here on an excess is reported as a multiple
+_MULTIPLE_FROM = 3.0  # from here on an excess is reported as a multiple
 _NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
@@ -58,10 +58,10 @@ class VehicleLimits:
     """The vehicle that is to fly, and the limits within which it flies.
 
     `thrust_reserve` is the share of the total thrust kept free for control. For shaped paths, `rotor_margin`
-    is the share of each rotor's range kept free at either limit, `least_tension` the least cable tension as
-    a share of the load's weight, `shaping_m` the greatest distance from the requested path. `speed_m_s`
-    (until the mission sets its own) and `accel_m_s2` are the peaks of transfers; `when_infeasible` says what
-    happens to a path that is impossible.
+    is the share of each rotor's range kept free at either limit, `min_tension_share` the least cable tension
+    as a share of the load's weight, `max_shaping_m` the greatest distance from the requested path.
+    `speed_m_s` (until the mission sets its own) and `accel_m_s2` are the peaks of transfers;
+    `when_infeasible` says what happens to a path that is impossible.
     """
 
     vehicle: Vehicle
@@ -69,8 +69,8 @@ class VehicleLimits:
     tilt_max_rad: float = radians(45.0)
     speed_m_s: float = 1.5
     accel_m_s2: float = 1.5
-    least_tension: float = LEAST_TENSION
-    shaping_m: float = SHAPING_M
+    min_tension_share: float = MIN_TENSION_SHARE
+    max_shaping_m: float = MAX_SHAPING_M
     rotor_margin: float = ROTOR_MARGIN
     when_infeasible: int = REFUSE
 
@@ -88,40 +88,40 @@ class VehicleLimits:
             vehicle.torque_ratio_m,
             vehicle.quad_drag_n_s_m,
             vehicle.quad_drag_quadratic_n_s2_m2,
-            columns(vehicle.layout),
+            allocation_columns(vehicle.layout),
         )
 
     @property
-    def usable_n(self) -> float:
+    def usable_thrust_n(self) -> float:
         """The total thrust (N) without the reserve."""
         return self.vehicle.greatest_thrust_n * (1.0 - self.thrust_reserve)
 
     @property
-    def says_thrust(self) -> str:
+    def thrust_text(self) -> str:
         """The thrust that the rotors give, in words."""
-        rotors, full, usable = len(self.vehicle.layout), self.vehicle.greatest_thrust_n, self.usable_n
+        rotors, full, usable = len(self.vehicle.layout), self.vehicle.greatest_thrust_n, self.usable_thrust_n
         reserve = f", {usable:.2f} N with the reserve of {100.0 * self.thrust_reserve:.0f} %"
         return (
             f"{_NUMBERS.get(rotors, str(rotors))} rotors give {full:.2f} N{reserve if usable < full else ''}"
         )
 
     @property
-    def shaping(self) -> Limits:
+    def shaping(self) -> PathLimits:
         """The limits to which the autopilot shapes paths: its MIS_ parameters, by default as delivered."""
         vehicle = self.vehicle
         margin = self.rotor_margin * (vehicle.rotor_max_n - vehicle.rotor_min_n)
         bounds = Bounds(
             vehicle.rotor_min_n + margin if vehicle.limited else -inf,
             vehicle.rotor_max_n - margin if vehicle.limited else inf,
-            self.least_tension * vehicle.load_mass_kg * vehicle.gravity_m_s2,
+            self.min_tension_share * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
             vehicle.rotor_tau_s,
         )
-        return Limits(
+        return PathLimits(
             self.body,
             bounds,
             True,
-            self.shaping_m,
+            self.max_shaping_m,
             self.when_infeasible,
             self.speed_m_s,
             self.accel_m_s2,
@@ -131,7 +131,7 @@ class VehicleLimits:
 
 @dataclass(frozen=True, slots=True)
 class PathReport:
-    """How a step is flown: shaped signals, a passage through waypoints, a transfer from rest to rest, an
+    """How a step is flown: shaped signals, a path through waypoints, a transfer from rest to rest, an
     attitude run.
 
     `distance_m` is the greatest distance between the flown and the requested path; forces are in N;
@@ -186,41 +186,39 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
 
     `shaped`: an autopilot that shapes its paths flies the signals; they pass if a path near them is possible.
     """
-    found: list[Violation] = _too_heavy(limits)
+    found: list[Violation] = _hover_violations(limits)
     if found:
         return found
     for entry in _timeline(mission, limits):
-        if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < LEAST_HEIGHT_M:
+        if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < MIN_HEIGHT_M:
             text = (
-                f"{_named(entry)}: the load would be carried {entry.end[2]:.2f} m above "
-                f"the ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
+                f"{_item_label(entry)}: the load would be carried {entry.end[2]:.2f} m above "
+                f"the ground; it must be at least {MIN_HEIGHT_M:g} m: raise altitude_m"
             )
-            found.append(
-                Violation(entry.item, "height", entry.end[2], LEAST_HEIGHT_M, entry.transfer_s, text)
-            )
+            found.append(Violation(entry.item, "height", entry.end[2], MIN_HEIGHT_M, entry.transfer_s, text))
         if isinstance(entry.step, Signals):
             jumps = list(_jumps(entry.item, entry.step))
             found += jumps
             if shaped and not jumps:
-                along = _survey(entry, limits)
-                assert along is not None
-                trouble = shaped_path(entry.step, limits.shaping).trouble
-                low = list(_judge(entry, along, limits))
-                if not trouble:
-                    found += [v for v in low if v.quantity == "height"]
-                elif low:
-                    found += low
+                extremes = _survey(entry, limits)
+                assert extremes is not None
+                problem = shaped_path(entry.step, limits.shaping).problem
+                path_violations = list(_violations_along(entry, extremes, limits))
+                if not problem:
+                    found += [v for v in path_violations if v.quantity == "height"]
+                elif path_violations:
+                    found += path_violations
                 else:
-                    text = f"{_named(entry)}: {trouble}; {_within(limits)}"
-                    found.append(Violation(entry.item, "shaping", inf, limits.shaping_m, 0.0, text))
+                    text = f"{_item_label(entry)}: {problem}; {_bounds_text(limits)}"
+                    found.append(Violation(entry.item, "shaping", inf, limits.max_shaping_m, 0.0, text))
                 continue
-        along = _survey(entry, limits)
-        if along is not None:
-            found += _judge(entry, along, limits)
+        extremes = _survey(entry, limits)
+        if extremes is not None:
+            found += _violations_along(entry, extremes, limits)
     return found
 
 
-def _within(limits: VehicleLimits) -> str:
+def _bounds_text(limits: VehicleLimits) -> str:
     """The bounds of a shaped path in words, and what to change if it cannot keep them."""
     reserve = f"{100.0 * limits.rotor_margin:.0f} % of the rotors' range free at either limit"
     return (
@@ -230,18 +228,18 @@ def _within(limits: VehicleLimits) -> str:
     )
 
 
-def _too_heavy(limits: VehicleLimits) -> list[Violation]:
+def _hover_violations(limits: VehicleLimits) -> list[Violation]:
     """The violation of a vehicle that cannot even hover with its load; empty if it can."""
     vehicle = limits.vehicle
     weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
-    if weight <= limits.usable_n:
+    if weight <= limits.usable_thrust_n:
         return []
     text = (
         f"vehicle ({vehicle.quad_mass_kg:g} kg) and load ({vehicle.load_mass_kg:g} kg) weigh {weight:.2f} N; "
-        f"{limits.says_thrust} ({_excess(weight, limits.usable_n)}): it cannot hover; lower load_mass_kg, or "
-        "raise rotor_max_n"
+        f"{limits.thrust_text} ({_excess_text(weight, limits.usable_thrust_n)}): it cannot hover; "
+        "lower load_mass_kg, or raise rotor_max_n"
     )
-    return [Violation(0, "thrust", weight, limits.usable_n, 0.0, text)]
+    return [Violation(0, "thrust", weight, limits.usable_thrust_n, 0.0, text)]
 
 
 def paths(
@@ -252,54 +250,54 @@ def paths(
     Steps after the release of the load are left out. `planner` is a custom planner of paths through
     waypoints; PlanError if its path is refused. Without `shaped`, signals are flown as requested.
     """
-    shaping = limits.shaping._replace(shaped=shaped)
+    shaping = limits.shaping._replace(shape_paths=shaped)
     prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
     if planner is not None and prepared.refusal:
         raise PlanError(prepared.refusal)
-    found = []
+    reports = []
     for entry in _timeline(mission, limits):
-        made, distance, along = prepared.made[entry.item], 0.0, None
-        slowed = made.slowed if isinstance(made, Shaped) else 1.0
+        path, distance, extremes = prepared.paths[entry.item], 0.0, None
+        slowed = path.duration_factor if isinstance(path, ShapedSignals) else 1.0
         if entry.before.released or isinstance(entry.step, Winch | Land):
             continue
-        if isinstance(made, Shaped):
-            distance = made.distance_m
-            times = linspace(-made.lead_s, made.duration_s + made.tail_s, _REPORT_SAMPLES)
-            along = survey_path(times, path_jets(made, times), 0.0, shaping.body)
+        if isinstance(path, ShapedSignals):
+            distance = path.distance_m
+            times = linspace(-path.lead_s, path.duration_s + path.tail_s, _REPORT_SAMPLES)
+            extremes = survey_path(times, path_jets(path, times), 0.0, shaping.body)
             duration_s = float(times[-1] - times[0])
-        elif isinstance(made, Passage):
-            times = linspace(made.begin_s, made.end_s, _REPORT_SAMPLES)
-            along = survey_path(times, passage_jets(made.table, times), 0.0, shaping.body)
+        elif isinstance(path, PathSegment):
+            times = linspace(path.begin_s, path.end_s, _REPORT_SAMPLES)
+            extremes = survey_path(times, sample_path(path.table, times), 0.0, shaping.body)
             duration_s = float(times[-1] - times[0])
         else:
-            along = _survey(entry, limits)
+            extremes = _survey(entry, limits)
             duration_s = entry.duration_s if isinstance(entry.step, AttitudeRun) else entry.transfer_s
-        if along is not None:
-            found.append(_path_report(entry, duration_s, distance, along, slowed))
-    return found
+        if extremes is not None:
+            reports.append(_path_report(entry, duration_s, distance, extremes, slowed))
+    return reports
 
 
 def _path_report(
-    entry: TimelineEntry, duration_s: float, distance_m: float, along: Peaks, slowed: float
+    entry: TimelineEntry, duration_s: float, distance_m: float, extremes: Peaks, slowed: float
 ) -> PathReport:
     return PathReport(
         entry.item,
         KINDS[type(entry.step)],
         duration_s,
         distance_m,
-        along.rotor_low.value,
-        along.rotor_high.value,
-        along.tension_low.value,
-        degrees(along.tilt.value),
+        extremes.rotor_low.value,
+        extremes.rotor_high.value,
+        extremes.tension_low.value,
+        degrees(extremes.tilt.value),
         slowed,
-        0.0 if isinstance(entry.step, AttitudeRun) else along.speed.value,
+        0.0 if isinstance(entry.step, AttitudeRun) else extremes.speed.value,
     )
 
 
 def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
     """The extremes along each step that moves the load, by item number."""
     surveys = {entry.item: _survey(entry, limits) for entry in _timeline(mission, limits)}
-    return {item: along for item, along in surveys.items() if along is not None}
+    return {item: extremes for item, extremes in surveys.items() if extremes is not None}
 
 
 def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
@@ -317,53 +315,59 @@ def _survey(entry: TimelineEntry, limits: VehicleLimits) -> Peaks | None:
     return None
 
 
-def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
-    def violation(quantity: str, worst: Extreme, limit: float, says: str, advice: str = "") -> Violation:
+def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
+    def violation(quantity: str, worst: Extreme, limit: float, finding: str, advice: str = "") -> Violation:
         advice = advice or _advice(entry, worst.time_s)
-        text = f"{_named(entry)}: at {worst.time_s:.1f} s {says}; {advice}"
+        text = f"{_item_label(entry)}: at {worst.time_s:.1f} s {finding}; {advice}"
         return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
-    fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
+    fall, thrust, low, high, tilt = (
+        extremes.fall,
+        extremes.thrust,
+        extremes.rotor_low,
+        extremes.rotor_high,
+        extremes.tilt,
+    )
     vehicle = limits.vehicle
-    gravity, usable = vehicle.gravity_m_s2, limits.usable_n
+    gravity, usable = vehicle.gravity_m_s2, limits.usable_thrust_n
     # a step that begins under the ground was already reported with the step that led there
-    if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
-        says = f"the load would be {-along.height_low.value:.2f} m under the ground"
+    if extremes.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
+        finding = f"the load would be {-extremes.height_low.value:.2f} m under the ground"
         lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
         advice = f"begin higher (altitude_m) or lower {lower}"
-        yield violation("height", along.height_low, 0.0, says, advice)
+        yield violation("height", extremes.height_low, 0.0, finding, advice)
     if fall.value >= gravity:
         # beyond this the cable would have to push: thrust and tilt then have no meaning
-        says = (
+        finding = (
             f"the load would have to fall at {fall.value:.1f} m/s^2 with the cable taut; gravity gives "
-            f"{gravity:.2f} m/s^2 ({_excess(fall.value, gravity)})"
+            f"{gravity:.2f} m/s^2 ({_excess_text(fall.value, gravity)})"
         )
-        yield violation("tension", fall, gravity, says)
+        yield violation("tension", fall, gravity, finding)
         return
     if thrust.value > usable:
-        says = (
-            f"the flight needs {thrust.value:.2f} N of thrust; {limits.says_thrust} "
-            f"({_excess(thrust.value, usable)})"
+        finding = (
+            f"the flight needs {thrust.value:.2f} N of thrust; {limits.thrust_text} "
+            f"({_excess_text(thrust.value, usable)})"
         )
-        yield violation("thrust", thrust, usable, says)
+        yield violation("thrust", thrust, usable, finding)
     if high.value > vehicle.rotor_max_n:
-        says = (
+        finding = (
             f"one rotor has to give {high.value:.2f} N; it gives {vehicle.rotor_max_n:.2f} N at most "
-            f"({_excess(high.value, vehicle.rotor_max_n)})"
+            f"({_excess_text(high.value, vehicle.rotor_max_n)})"
         )
-        yield violation("rotor force", high, vehicle.rotor_max_n, says)
+        yield violation("rotor force", high, vehicle.rotor_max_n, finding)
     if low.value < vehicle.rotor_min_n:
-        says = (
+        finding = (
             f"one rotor has to give {low.value:.2f} N; it gives {vehicle.rotor_min_n:.2f} N at least "
             f"({vehicle.rotor_min_n - low.value:.2f} N under)"
         )
-        yield violation("rotor force", low, vehicle.rotor_min_n, says)
+        yield violation("rotor force", low, vehicle.rotor_min_n, finding)
     if tilt.value > limits.tilt_max_rad:
         angle, bound = degrees(tilt.value), degrees(limits.tilt_max_rad)
-        says = (
+        finding = (
             f"the vehicle leans {angle:.0f} deg; the limit is {bound:.0f} deg ({angle - bound:.0f} deg over)"
         )
-        yield violation("tilt", tilt, limits.tilt_max_rad, says)
+        yield violation("tilt", tilt, limits.tilt_max_rad, finding)
 
 
 def _jumps(item: int, step: Signals) -> Iterator[Violation]:
@@ -385,7 +389,7 @@ def _jumps(item: int, step: Signals) -> Iterator[Violation]:
     end = step.duration_s
     speed = norm(evaluate(table, nextafter(end, -inf))[1])
     if speed > _JUMP_M_S:
-        rest = max((_end(term) for term in step.terms), default=inf)
+        rest = max((_end_s(term) for term in step.terms), default=inf)
         advice = f"duration_s to {rest:g}" if end < rest < inf else "the signals so that all come to rest"
         text = (
             f"items[{item}] (signals): at {end:.1f} s, its end, the load still moves at {speed:.2f} m/s; "
@@ -394,24 +398,24 @@ def _jumps(item: int, step: Signals) -> Iterator[Violation]:
         yield Violation(item, "velocity at the end", speed, _JUMP_M_S, end, text)
 
 
-def _end(term: Term) -> float:
+def _end_s(term: Term) -> float:
     """Time (s) at which a term has come to rest; inf for one that swings for ever."""
     if term.hold_s is None:
         return inf if term.factors else term.start_s + term.rise_s
     return term.start_s + term.rise_s + term.hold_s + term.fall_s
 
 
-def _named(entry: TimelineEntry) -> str:
+def _item_label(entry: TimelineEntry) -> str:
     return f"items[{entry.item}] ({KINDS[type(entry.step)]})"
 
 
-def _excess(value: float, limit: float) -> str:
+def _excess_text(value: float, limit: float) -> str:
     if limit <= 0.0:
         return f"{value - limit:.2f} over"
     times = value / limit
     return (
         f"{100.0 * (times - 1.0):.0f} % over"
-        if times < _MANIFOLD
+        if times < _MULTIPLE_FROM
         else f"{float(f'{times:.2g}'):g} times the limit"
     )
 

@@ -86,7 +86,7 @@ def unit_derivatives_4(
 
 
 @kernel
-def _against_air(v: Vec3, a: Vec3, j: Vec3, linear: float, quadratic: float) -> tuple[Vec3, Vec3, Vec3]:
+def _drag_compensation(v: Vec3, a: Vec3, j: Vec3, linear: float, quadratic: float) -> tuple[Vec3, Vec3, Vec3]:
     """-D, -D' and -D'' for a vehicle with velocity v, acceleration a and jerk j in air at rest."""
     s = norm(v)
     # s' and s'' have no limit at rest, but enter only in products with v and s, which vanish there
@@ -143,15 +143,15 @@ def flat_outputs(
     pull = axpy(gravity, E3, jet[2])
     u, u1, u2, u3, u4 = unit_derivatives_4(pull, jet[3], jet[4], jet[5], jet[6])
     # q = -u: the cable pulls the load from above
-    reach = quad_mass * cable_length
+    mass_length = quad_mass * cable_length
     mass = quad_mass + load_mass
-    F = axpy(reach, u2, scale(mass, pull))
-    F1 = axpy(reach, u3, scale(mass, jet[3]))
-    F2 = axpy(reach, u4, scale(mass, jet[4]))
+    F = axpy(mass_length, u2, scale(mass, pull))
+    F1 = axpy(mass_length, u3, scale(mass, jet[3]))
+    F2 = axpy(mass_length, u4, scale(mass, jet[4]))
     v_quad = axpy(cable_length, u1, jet[1])
     a_quad = axpy(cable_length, u2, jet[2])
     j_quad = axpy(cable_length, u3, jet[3])
-    air, air1, air2 = _against_air(v_quad, a_quad, j_quad, drag_linear, drag_quadratic)
+    air, air1, air2 = _drag_compensation(v_quad, a_quad, j_quad, drag_linear, drag_quadratic)
     F, F1, F2 = add(F, air), add(F1, air1), add(F2, air2)
     R, omega, omega_dot = _attitude(F, F1, F2, heading)
     moment = add(times(inertia, omega_dot), cross(omega, times(inertia, omega)))

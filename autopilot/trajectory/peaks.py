@@ -13,15 +13,15 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import Jet, SignalTable, evaluate, joints, signal_table
-from autopilot.trajectory.swing import swing
+from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import transfer
 from missions.model import AttitudeRun, Signals
 
 Samples = NDArray[np.float64]
 
 _SAMPLES_PER_PERIOD = 200
-_COARSEST_S = 0.01
-_STILL_SAMPLES = 201
+_MAX_SPACING_S = 0.01
+_TRANSFER_SAMPLES = 201
 # columns of a sample row
 SPEED, ACCEL, FALL, TENSION, THRUST, ROTOR_LOW, ROTOR_HIGH, TILT, HEIGHT = range(9)
 _COLUMNS = 9
@@ -57,7 +57,7 @@ class Body(NamedTuple):
     efforts: Efforts = PLUS_EFFORTS
 
 
-class Solid(NamedTuple):
+class KernelBody(NamedTuple):
     """A `Body` without its rotors, for kernels: their machine code is the same for any number of rotors."""
 
     quad_mass: float
@@ -71,9 +71,9 @@ class Solid(NamedTuple):
     drag_quadratic: float
 
 
-def for_kernels(body: Body) -> tuple[Solid, Samples]:
+def to_kernel_body(body: Body) -> tuple[KernelBody, Samples]:
     """The body in the form for kernels, and the efforts of its rotors (rotors, 4)."""
-    return Solid(*body[:-1]), np.array(body.efforts)
+    return KernelBody(*body[:-1]), np.array(body.efforts)
 
 
 class Extreme(NamedTuple):
@@ -99,25 +99,27 @@ class Peaks:
 
 
 @kernel
-def effort(efforts: Samples, i: int, thrust: float, moment: Vec3, body: Solid) -> float:
+def rotor_effort(efforts: Samples, i: int, thrust: float, moment: Vec3, body: KernelBody) -> float:
     """The demand on rotor i: (2-13) solved for it."""
     roll, pitch, yaw = moment[0] / body.arm, moment[1] / body.arm, moment[2] / body.torque_ratio
-    asked: float = thrust * efforts[i, 0] + roll * efforts[i, 1] + pitch * efforts[i, 2] + yaw * efforts[i, 3]
-    return asked
+    effort: float = (
+        thrust * efforts[i, 0] + roll * efforts[i, 1] + pitch * efforts[i, 2] + yaw * efforts[i, 3]
+    )
+    return effort
 
 
 @kernel
-def _rotor_range(thrust: float, moment: Vec3, efforts: Samples, body: Solid) -> tuple[float, float]:
+def _rotor_range(thrust: float, moment: Vec3, efforts: Samples, body: KernelBody) -> tuple[float, float]:
     """The least and the greatest demand on a rotor."""
-    least = greatest = effort(efforts, 0, thrust, moment, body)
+    lowest = highest = rotor_effort(efforts, 0, thrust, moment, body)
     for i in range(1, efforts.shape[0]):
-        asked = effort(efforts, i, thrust, moment, body)
-        least, greatest = min(least, asked), max(greatest, asked)
-    return least, greatest
+        demanded = rotor_effort(efforts, i, thrust, moment, body)
+        lowest, highest = min(lowest, demanded), max(highest, demanded)
+    return lowest, highest
 
 
 @kernel
-def _fill(row: Samples, jet: Jet, body: Solid, efforts: Samples) -> None:
+def _fill_sample(row: Samples, jet: Jet, body: KernelBody, efforts: Samples) -> None:
     """One sample: the columns named above, for a heading of 0; TILT as the cosine of the angle."""
     flat = flat_outputs(
         jet,
@@ -143,23 +145,25 @@ def _fill(row: Samples, jet: Jet, body: Solid, efforts: Samples) -> None:
 
 
 @kernel
-def _fill_signals(table: SignalTable, times: Samples, body: Solid, efforts: Samples, rows: Samples) -> None:
+def _fill_signals(
+    table: SignalTable, times: Samples, body: KernelBody, efforts: Samples, rows: Samples
+) -> None:
     for i in range(times.shape[0]):
-        _fill(rows[i], evaluate(table, times[i]), body, efforts)
+        _fill_sample(rows[i], evaluate(table, times[i]), body, efforts)
 
 
 @kernel
 def _fill_transfer(
-    p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Solid, efforts: Samples, rows: Samples
+    p0: Vec3, p1: Vec3, duration: float, times: Samples, body: KernelBody, efforts: Samples, rows: Samples
 ) -> None:
     for i in range(times.shape[0]):
-        _fill(rows[i], transfer(p0, p1, duration, times[i]), body, efforts)
+        _fill_sample(rows[i], transfer(p0, p1, duration, times[i]), body, efforts)
 
 
 @kernel
-def _fill_jets(jets: Samples, body: Solid, efforts: Samples, rows: Samples) -> None:
+def _fill_jets(jets: Samples, body: KernelBody, efforts: Samples, rows: Samples) -> None:
     for i in range(jets.shape[1]):
-        _fill(
+        _fill_sample(
             rows[i],
             (
                 (jets[0, i, 0], jets[0, i, 1], jets[0, i, 2]),
@@ -176,9 +180,9 @@ def _fill_jets(jets: Samples, body: Solid, efforts: Samples, rows: Samples) -> N
 
 
 def _peaks(times: Samples, rows: Samples) -> Peaks:
-    def extreme(column: int, greatest: bool) -> Extreme:
+    def extreme(column: int, is_max: bool) -> Extreme:
         values = rows[:, column]
-        index = int(np.argmax(values) if greatest else np.argmin(values))
+        index = int(np.argmax(values) if is_max else np.argmin(values))
         return Extreme(float(values[index]), float(times[index]))
 
     cos_tilt = extreme(TILT, False)
@@ -197,9 +201,9 @@ def _peaks(times: Samples, rows: Samples) -> Peaks:
 
 def signal_times(step: Signals) -> Samples:
     """Sample times: 200 to the shortest period or edge, at most 10 ms apart, and both sides of each joint."""
-    quickest = [sine.period_s for term in step.terms for sine in term.factors]
-    quickest += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
-    spacing = min([_COARSEST_S, *(period / _SAMPLES_PER_PERIOD for period in quickest)])
+    shortest_periods = [sine.period_s for term in step.terms for sine in term.factors]
+    shortest_periods += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
+    spacing = min([_MAX_SPACING_S, *(period / _SAMPLES_PER_PERIOD for period in shortest_periods)])
     regular = np.linspace(0.0, step.duration_s, int(step.duration_s / spacing) + 2)[:-1]
     edges = [t for t in joints(step.terms) if 0.0 < t < step.duration_s]
     sides = [nextafter(t, -inf) for t in (*edges, step.duration_s)] + edges
@@ -210,23 +214,23 @@ def survey_signals(step: Signals, anchor: Vec3, body: Body) -> Peaks:
     """Extremes along load signals that begin at `anchor`; the jumps at joints are not included."""
     times = signal_times(step)
     rows = np.empty((times.size, _COLUMNS))
-    _fill_signals(signal_table(step.terms), times, *for_kernels(body), rows)
+    _fill_signals(signal_table(step.terms), times, *to_kernel_body(body), rows)
     rows[:, HEIGHT] += anchor[2]
     return _peaks(times, rows)
 
 
 def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
     """Extremes along a rest-to-rest transfer."""
-    times = np.linspace(0.0, duration, _STILL_SAMPLES)
+    times = np.linspace(0.0, duration, _TRANSFER_SAMPLES)
     rows = np.empty((times.size, _COLUMNS))
-    _fill_transfer(p0, p1, duration, times, *for_kernels(body), rows)
+    _fill_transfer(p0, p1, duration, times, *to_kernel_body(body), rows)
     return _peaks(times, rows)
 
 
 def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
     """Extremes along a path given by samples (7, n, 3), raised by `height` m."""
     rows = np.empty((times.size, _COLUMNS))
-    _fill_jets(jets, *for_kernels(body), rows)
+    _fill_jets(jets, *to_kernel_body(body), rows)
     rows[:, HEIGHT] += height
     return _peaks(times, rows)
 
@@ -240,26 +244,28 @@ def survey_attitude(run: AttitudeRun, height: float, body: Body) -> Peaks:
     assumed to take part in all of it.
     """
     # the ends are left out: u'' jumps there, as at the joints of signals
-    times = np.linspace(0.0, run.duration_s, _STILL_SAMPLES)[1:-1]
-    lean = [swing(run.tilt_north_rad, run.tilt_east_rad, run.duration_s, float(t)) for t in times]
-    u = np.array([direction for direction, _, _ in lean])
-    u_ddot = np.array([second for _, _, second in lean])
+    times = np.linspace(0.0, run.duration_s, _TRANSFER_SAMPLES)[1:-1]
+    directions = [
+        swing_direction(run.tilt_north_rad, run.tilt_east_rad, run.duration_s, float(t)) for t in times
+    ]
+    u = np.array([direction for direction, _, _ in directions])
+    u_ddot = np.array([second for _, _, second in directions])
     force = (body.quad_mass + body.load_mass) * body.gravity * u / u[:, 2:]
     if run.controlled == "load":
         force = force + body.quad_mass * body.cable_length * u_ddot
     thrust = np.linalg.norm(force, axis=1)
     spacing = times[1] - times[0]
-    along = np.array([run.tilt_east_rad, run.tilt_north_rad])
-    along = along / max(float(np.linalg.norm(along)), 1e-12)
-    angle = np.arctan2(force[:, :2] @ along, force[:, 2])
-    turn = np.abs(np.gradient(np.gradient(angle, spacing), spacing))
+    tilt_axis = np.array([run.tilt_east_rad, run.tilt_north_rad])
+    tilt_axis = tilt_axis / max(float(np.linalg.norm(tilt_axis)), 1e-12)
+    angle = np.arctan2(force[:, :2] @ tilt_axis, force[:, 2])
+    angular_accel = np.abs(np.gradient(np.gradient(angle, spacing), spacing))
     efforts = np.array(body.efforts)
-    each = np.abs(efforts[:, 1:3]).max()
-    differential = each * max(body.inertia[0], body.inertia[1]) * turn / body.arm
-    sideways = body.gravity * np.linalg.norm(u[:, :2], axis=1) / u[:, 2]
+    max_effort = np.abs(efforts[:, 1:3]).max()
+    differential = max_effort * max(body.inertia[0], body.inertia[1]) * angular_accel / body.arm
+    load_accel = body.gravity * np.linalg.norm(u[:, :2], axis=1) / u[:, 2]
     rows = np.zeros((times.size, _COLUMNS))
-    rows[:, SPEED] = np.cumsum(sideways) * spacing
-    rows[:, ACCEL] = sideways
+    rows[:, SPEED] = np.cumsum(load_accel) * spacing
+    rows[:, ACCEL] = load_accel
     rows[:, TENSION] = body.load_mass * body.gravity / u[:, 2]
     rows[:, THRUST] = thrust
     rows[:, ROTOR_LOW] = efforts[:, 0].min() * thrust - differential

@@ -1,8 +1,8 @@
 """Preparation of a mission for its vehicle before the flight: paths are shaped, impossible ones are handled.
 
-Signals become `Shaped` paths; waypoints without a hold are flown through, along one `Passage`. A path that is
-impossible nevertheless, or possible only too far from the requested path, is flown as requested, slowed down
-or refused, depending on the user's setting.
+Signals become `ShapedSignals`; waypoints without a hold are flown through, along one path, each on a segment
+of it (`PathSegment`). A path that is impossible nevertheless, or possible only too far from the requested
+path, is flown as requested, slowed down or refused, depending on the user's setting.
 """
 
 from __future__ import annotations
@@ -16,136 +16,143 @@ from typing import NamedTuple
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
 from autopilot.trajectory.rotor_demand import Bounds
-from autopilot.trajectory.route import PlanError, Planner, Route, passages
-from autopilot.trajectory.route import slower as slower_path
-from autopilot.trajectory.route import trouble_of as route_trouble
-from autopilot.trajectory.shaping import Shaped, shape, unshaped
+from autopilot.trajectory.route import PlanError, Planner, Route, bound_violation, path_segments
+from autopilot.trajectory.route import slower as slowed_path
+from autopilot.trajectory.shaping import ShapedSignals, shape, unshaped_signals
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
-from autopilot.trajectory.waypoint_path import MOST_POINTS, NEAREST_M, Passage, passage
+from autopilot.trajectory.waypoint_path import (
+    MAX_POINTS,
+    MIN_WAYPOINT_DISTANCE_M,
+    PathSegment,
+    plan_waypoint_path,
+)
 from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
 
-AS_ASKED, SLOW_DOWN, REFUSE = 0, 1, 2
-SLOWEST = 4.0  # times as long as requested
-_SLOWER = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, SLOWEST)
+AS_REQUESTED, SLOW_DOWN, REFUSE = 0, 1, 2
+MAX_SLOWDOWN = 4.0  # times as long as requested
+_SLOWDOWN_FACTORS = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, MAX_SLOWDOWN)
 _HALVINGS = 3
-_LONGER, _LONGER_TRIES = 1.05, 60  # for lengthening a transfer
+_LENGTHENING, _LENGTHENING_TRIES = 1.05, 60  # for lengthening a transfer
 
 
-class Limits(NamedTuple):
+class PathLimits(NamedTuple):
     """The vehicle, what is allowed along a path, and what to do with a path that is impossible within it."""
 
     body: Body
     bounds: Bounds
-    shaped: bool  # False: signals are flown exactly as requested, even beyond the bounds
+    shape_paths: bool  # False: signals are flown exactly as requested, even beyond the bounds
     distance_m: float  # greatest distance of a shaped path from the requested one
-    when_infeasible: int  # AS_ASKED, SLOW_DOWN or REFUSE
+    when_infeasible: int  # AS_REQUESTED, SLOW_DOWN or REFUSE
     speed_m_s: float  # peaks along paths through waypoints, until the mission sets its own speed
     accel_m_s2: float
     time_optimal: bool  # paths through waypoints are as quick as the bounds allow, without the peaks
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """`made` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
+class PreparedPaths:
+    """`paths` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
     refused."""
 
-    made: tuple[Shaped | Passage | None, ...] = ()
+    paths: tuple[ShapedSignals | PathSegment | None, ...] = ()
     notes: tuple[str, ...] = ()
     refusal: str = ""
     pending: bool = False  # the paths are not ready yet
-    least_s: tuple[float, ...] = ()  # for each step: least duration of its transfer, 0 if no bound applies
+    # for each step: least duration of its transfer, 0 if no bound applies
+    min_durations_s: tuple[float, ...] = ()
 
 
-UNPREPARED = Prepared()
-PENDING = Prepared(pending=True)
+UNPREPARED = PreparedPaths()
+PENDING = PreparedPaths(pending=True)
 
 
 def prepare(
     steps: Sequence[Step],
     sequence: Sequence[int],
-    limits: Limits,
+    limits: PathLimits,
     home: Vec3 = ZERO,
     planner: Planner | None = None,
-) -> Prepared:
+) -> PreparedPaths:
     """Prepare the steps; `sequence` has the mission item of each, by which the notes name it, and `home` is
     where a return leads. `planner` is a custom planner of paths through waypoints: it returns a path along
     the route, or raises PlanError."""
-    made: list[Shaped | Passage | None] = []
+    paths: list[ShapedSignals | PathSegment | None] = []
     notes: list[str] = []
     refusal = ""
     start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
     entries = tuple(timeline(steps, start, home, limits.accel_m_s2))
     if planner is None:
-        chains = _passages(entries, limits)
+        segments = _waypoint_segments(entries, limits)
     else:
-        chains, own_notes, refusal = _planned(entries, sequence, limits, planner)
-        notes += own_notes
+        segments, planner_notes, refusal = _custom_segments(entries, sequence, limits, planner)
+        notes += planner_notes
     for index, (step, item) in enumerate(zip(steps, sequence, strict=True)):
         if not isinstance(step, Signals):
-            made.append(chains.get(index))
+            paths.append(segments.get(index))
             continue
-        if not limits.shaped:
-            made.append(unshaped(step))
+        if not limits.shape_paths:
+            paths.append(unshaped_signals(step))
             continue
-        found = shaped_path(step, limits)
-        if found.slowed_for:
-            notes.append(f"Item {item} flown {found.path.slowed:.2f} times as long: {found.slowed_for}")
-        if found.trouble:
-            if limits.when_infeasible != AS_ASKED:
-                refusal = refusal or f"item {item}: {found.trouble}"
-            notes.append(f"Item {item}: {found.trouble}")
-        made.append(unshaped(step) if found.trouble else found.path)
-    least = tuple(_transfer_times(entries, limits)) if limits.shaped else ()
-    return Prepared(tuple(made), tuple(notes), refusal, least_s=least)
+        result = shaped_path(step, limits)
+        if result.slowdown_reason:
+            notes.append(
+                f"Item {item} flown {result.path.duration_factor:.2f} times as long: {result.slowdown_reason}"
+            )
+        if result.problem:
+            if limits.when_infeasible != AS_REQUESTED:
+                refusal = refusal or f"item {item}: {result.problem}"
+            notes.append(f"Item {item}: {result.problem}")
+        paths.append(unshaped_signals(step) if result.problem else result.path)
+    min_durations_s = tuple(_min_transfer_times(entries, limits)) if limits.shape_paths else ()
+    return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s)
 
 
-def _transfer_times(entries: Sequence[TimelineEntry], limits: Limits) -> Iterator[float]:
+def _min_transfer_times(entries: Sequence[TimelineEntry], limits: PathLimits) -> Iterator[float]:
     """For each step the least time (s) of its transfer within the bounds; 0 if they need no longer one."""
     for entry in entries:
         duration = entry.transfer_s
         if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
             yield 0.0
             continue
-        for _ in range(_LONGER_TRIES):
+        for _ in range(_LENGTHENING_TRIES):
             if _transfer_fits(survey_transfer(entry.begin, entry.end, duration, limits.body), limits.bounds):
                 break
-            duration *= _LONGER
+            duration *= _LENGTHENING
         yield 0.0 if duration == entry.transfer_s else duration
 
 
-def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
+def _transfer_fits(peaks: Peaks, bounds: Bounds) -> bool:
     return (
-        along.rotor_high.value <= bounds.rotor_high
-        and along.rotor_low.value >= bounds.rotor_low
-        and along.tension_low.value >= bounds.tension_low
-        and cos(along.tilt.value) >= bounds.cos_tilt
+        peaks.rotor_high.value <= bounds.rotor_high
+        and peaks.rotor_low.value >= bounds.rotor_low
+        and peaks.tension_low.value >= bounds.tension_low
+        and cos(peaks.tilt.value) >= bounds.cos_tilt
     )
 
 
-def _passages(entries: Sequence[TimelineEntry], limits: Limits) -> dict[int, Passage]:
-    """For each step that is a waypoint of a passage, by its index, its stretch of the passage. Passages that
+def _waypoint_segments(entries: Sequence[TimelineEntry], limits: PathLimits) -> dict[int, PathSegment]:
+    """For each step that is flown through, by its index, its segment of a path through waypoints. Paths that
     would touch the ground are left out."""
-    found: dict[int, Passage] = {}
-    for first, points, speed in _chains(entries, limits.speed_m_s):
+    segments: dict[int, PathSegment] = {}
+    for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
-        path, times = passage(
+        path, times = plan_waypoint_path(
             points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
         )
         table = path.table()
         if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
             for i in range(len(points) - 1):
-                found[first + i] = Passage(table, float(times[i]), float(times[i + 1]), points[0])
-    return found
+                segments[first + i] = PathSegment(table, float(times[i]), float(times[i + 1]), points[0])
+    return segments
 
 
-def _planned(
-    entries: Sequence[TimelineEntry], sequence: Sequence[int], limits: Limits, planner: Planner
-) -> tuple[dict[int, Passage], list[str], str]:
+def _custom_segments(
+    entries: Sequence[TimelineEntry], sequence: Sequence[int], limits: PathLimits, planner: Planner
+) -> tuple[dict[int, PathSegment], list[str], str]:
     """The same by a custom planner, with notes, and the reason if its path is refused."""
-    found: dict[int, Passage] = {}
+    segments: dict[int, PathSegment] = {}
     notes: list[str] = []
-    for first, points, speed in _chains(entries, limits.speed_m_s):
+    for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         route = Route(
             tuple(points), speed, limits.accel_m_s2, limits.time_optimal, limits.body, limits.bounds
         )
@@ -154,23 +161,27 @@ def _planned(
             path = planner(route)
         except PlanError as error:
             return {}, [*notes, f"Item {item}: {error}"], f"item {item}: {error}"
-        trouble = route_trouble(path, route)
-        if trouble and limits.when_infeasible == SLOW_DOWN:
-            slowed = [(factor, slower_path(path, factor)) for factor in _SLOWER]
-            fitting = [(factor, one) for factor, one in slowed if not route_trouble(one, route)]
+        problem = bound_violation(path, route)
+        if problem and limits.when_infeasible == SLOW_DOWN:
+            candidates = [(factor, slowed_path(path, factor)) for factor in _SLOWDOWN_FACTORS]
+            fitting = [
+                (factor, segment) for factor, segment in candidates if not bound_violation(segment, route)
+            ]
             if fitting:
                 factor, path = fitting[0]
-                notes.append(f"Item {item} flown {factor:.2f} times as long: {trouble}")
-                trouble = ""
-        if trouble:
-            notes.append(f"Item {item}: {trouble}")
-            if limits.when_infeasible != AS_ASKED:
-                return {}, notes, f"item {item}: {trouble}"
-        found |= {first + i: one for i, one in enumerate(passages(path, route))}
-    return found, notes, ""
+                notes.append(f"Item {item} flown {factor:.2f} times as long: {problem}")
+                problem = ""
+        if problem:
+            notes.append(f"Item {item}: {problem}")
+            if limits.when_infeasible != AS_REQUESTED:
+                return {}, notes, f"item {item}: {problem}"
+        segments |= {first + i: segment for i, segment in enumerate(path_segments(path, route))}
+    return segments, notes, ""
 
 
-def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[int, list[Vec3], float]]:
+def _waypoint_chains(
+    entries: Sequence[TimelineEntry], speed: float
+) -> Iterator[tuple[int, list[Vec3], float]]:
     """Stretches of consecutive waypoints, all but the last without a hold: the index of the first, the points
     (the first is where the setpoint rests, which must be known), and the speed."""
     points: list[Vec3] = []
@@ -183,10 +194,10 @@ def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[in
             points = []
             continue
         speed = entry.before.speed_m_s
-        if points and (dist(points[-1], there) < NEAREST_M or len(points) > MOST_POINTS):
+        if points and (dist(points[-1], there) < MIN_WAYPOINT_DISTANCE_M or len(points) > MAX_POINTS):
             yield first, points, speed
             points = []
-        if not points and dist(here, there) >= NEAREST_M:
+        if not points and dist(here, there) >= MIN_WAYPOINT_DISTANCE_M:
             points, first = [here], index
         if points:
             points.append(there)
@@ -197,71 +208,72 @@ def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[in
         yield first, points, speed
 
 
-def trouble_of(found: Shaped, limits: Limits) -> str:
+def shaping_problem(shaped: ShapedSignals, limits: PathLimits) -> str:
     """Why the shaped path is not acceptable; empty if it is."""
-    if found.reason:
-        return found.reason
-    if found.distance_m > limits.distance_m:
+    if shaped.reason:
+        return shaped.reason
+    if shaped.distance_m > limits.distance_m:
         return (
-            f"the nearest path that can be flown is {found.distance_m:.3f} m off; "
+            f"the nearest path that can be flown is {shaped.distance_m:.3f} m off; "
             f"allowed are {limits.distance_m:.3f} m"
         )
     return ""
 
 
-class ShapedPath(NamedTuple):
-    """The path flown for signals; why not at the requested speed (`slowed_for`) or not at all (`trouble`)."""
+class ShapingResult(NamedTuple):
+    """The path flown for signals; why not at the requested speed (`slowdown_reason`), or not at all
+    (`problem`)."""
 
-    path: Shaped
-    trouble: str = ""
-    slowed_for: str = ""
+    path: ShapedSignals
+    problem: str = ""
+    slowdown_reason: str = ""
 
 
 @lru_cache(maxsize=16)
-def shaped_path(step: Signals, limits: Limits) -> ShapedPath:
+def shaped_path(step: Signals, limits: PathLimits) -> ShapingResult:
     """Signals shaped to the vehicle, slowed down if that is allowed and necessary.
 
     Cached: hard signals take seconds, and a mission is checked in the same process before it is flown.
     """
-    found = shape(step, limits.body, limits.bounds)
-    trouble = trouble_of(found, limits)
-    if trouble and limits.when_infeasible == SLOW_DOWN:
+    shaped = shape(step, limits.body, limits.bounds)
+    problem = shaping_problem(shaped, limits)
+    if problem and limits.when_infeasible == SLOW_DOWN:
         slowed = slow_down(step, limits)
         if slowed is not None:
-            return ShapedPath(slowed, slowed_for=trouble)
-    return ShapedPath(found, trouble)
+            return ShapingResult(slowed, slowdown_reason=problem)
+    return ShapingResult(shaped, problem)
 
 
-def slow_down(step: Signals, limits: Limits) -> Shaped | None:
+def slow_down(step: Signals, limits: PathLimits) -> ShapedSignals | None:
     """The signals slowed down no more than necessary, to a few percent; None if that does not help either."""
 
-    def tried(factor: float) -> Shaped | None:
-        found = shape(slower(step, factor), limits.body, limits.bounds)
-        return None if trouble_of(found, limits) else replace(found, slowed=factor)
+    def shape_slowed(factor: float) -> ShapedSignals | None:
+        shaped = shape(slowed_signals(step, factor), limits.body, limits.bounds)
+        return None if shaping_problem(shaped, limits) else replace(shaped, duration_factor=factor)
 
     # shaping takes longest for an impossible path, so the search tries few of them
     low, best = 1.0, None
-    factors = list(_SLOWER)
+    factors = list(_SLOWDOWN_FACTORS)
     while factors:
         half = (len(factors) - 1) // 2
-        found = tried(factors[half])
-        if found is None:
+        shaped = shape_slowed(factors[half])
+        if shaped is None:
             low, factors = factors[half], factors[half + 1 :]
         else:
-            best, factors = found, factors[:half]
+            best, factors = shaped, factors[:half]
     if best is None:
         return None
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + best.slowed)
-        found = tried(middle)
-        if found is None:
+        middle = 0.5 * (low + best.duration_factor)
+        shaped = shape_slowed(middle)
+        if shaped is None:
             low = middle
         else:
-            best = found
+            best = shaped
     return best
 
 
-def slower(step: Signals, factor: float) -> Signals:
+def slowed_signals(step: Signals, factor: float) -> Signals:
     """The same path at 1 / factor of the speed."""
 
     def sine(s: Sine) -> Sine:

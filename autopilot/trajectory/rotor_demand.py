@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.trajectory.flatness import flat_outputs
-from autopilot.trajectory.peaks import Body, Solid, effort, for_kernels
+from autopilot.trajectory.peaks import Body, KernelBody, rotor_effort, to_kernel_body
 from autopilot.trajectory.signals import Jet
 
 Array = NDArray[np.float64]
 
 TENSION, COS_TILT, FIRST_ROTOR = 0, 1, 2  # outputs
 # steps of the central differences, m/s ... m/s^6: each changes a rotor force by about as much
-_NUDGE = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
+_DIFFERENCE_STEPS = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
 
 
 class Bounds(NamedTuple):
@@ -38,7 +38,7 @@ class Bounds(NamedTuple):
 
 
 @kernel
-def _asked(jet: Jet, body: Solid, efforts: Array, out: Array) -> None:
+def _fill_outputs(jet: Jet, body: KernelBody, efforts: Array, out: Array) -> None:
     flat = flat_outputs(
         jet,
         0.0,
@@ -53,7 +53,7 @@ def _asked(jet: Jet, body: Solid, efforts: Array, out: Array) -> None:
     out[TENSION] = flat.tension
     out[COS_TILT] = flat.R[2][2]
     for i in range(efforts.shape[0]):
-        out[FIRST_ROTOR + i] = effort(efforts, i, flat.thrust, flat.moment, body)
+        out[FIRST_ROTOR + i] = rotor_effort(efforts, i, flat.thrust, flat.moment, body)
 
 
 @kernel
@@ -70,51 +70,55 @@ def _jet_of(jets: Array, i: int) -> Jet:
 
 
 @kernel
-def fill_demand(jets: Array, body: Solid, efforts: Array, out: Array) -> None:
+def fill_demand(jets: Array, body: KernelBody, efforts: Array, out: Array) -> None:
     """Fill `out` (n, 2 + rotors) with the demand of `jets` (7 or more, n, 3)."""
     for i in range(jets.shape[1]):
-        _asked(_jet_of(jets, i), body, efforts, out[i])
+        _fill_outputs(_jet_of(jets, i), body, efforts, out[i])
 
 
 @kernel
-def fill_slopes(jets: Array, body: Solid, efforts: Array, nudge: Array, scratch: Array, out: Array) -> None:
+def fill_demand_derivatives(
+    jets: Array, body: KernelBody, efforts: Array, steps: Array, scratch: Array, out: Array
+) -> None:
     """Fill `out` (n, 2 + rotors, 7, 3) with the derivative of each output by each entry of the jet except the
     position; `jets` is unchanged at the end. `scratch` is (2, 2 + rotors)."""
     high, low = scratch[0], scratch[1]
     for i in range(jets.shape[1]):
         for order in range(1, 7):
             for axis in range(3):
-                kept = jets[order, i, axis]
-                jets[order, i, axis] = kept + nudge[order]
-                _asked(_jet_of(jets, i), body, efforts, high)
-                jets[order, i, axis] = kept - nudge[order]
-                _asked(_jet_of(jets, i), body, efforts, low)
-                jets[order, i, axis] = kept
-                r = 0.5 / nudge[order]
+                original = jets[order, i, axis]
+                jets[order, i, axis] = original + steps[order]
+                _fill_outputs(_jet_of(jets, i), body, efforts, high)
+                jets[order, i, axis] = original - steps[order]
+                _fill_outputs(_jet_of(jets, i), body, efforts, low)
+                jets[order, i, axis] = original
+                r = 0.5 / steps[order]
                 for output in range(out.shape[1]):
                     out[i, output, order, axis] = r * (high[output] - low[output])
 
 
 def demand(jets: Array, body: Body) -> Array:
     """(n, 2 + rotors) demand of the path with `jets` (7, n, 3)."""
-    solid, efforts = for_kernels(body)
+    kernel_body, efforts = to_kernel_body(body)
     out = np.empty((jets.shape[1], FIRST_ROTOR + len(efforts)))
-    fill_demand(jets, solid, efforts, out)
+    fill_demand(jets, kernel_body, efforts, out)
     return out
 
 
-def slopes(jets: Array, body: Body) -> Array:
+def demand_derivatives(jets: Array, body: Body) -> Array:
     """(n, 2 + rotors, 7, 3) derivatives of the demand by the jets (7, n, 3)."""
-    solid, efforts = for_kernels(body)
+    kernel_body, efforts = to_kernel_body(body)
     outputs = FIRST_ROTOR + len(efforts)
     out = np.zeros((jets.shape[1], outputs, 7, 3))
-    fill_slopes(jets.copy(), solid, efforts, np.array(_NUDGE), np.empty((2, outputs)), out)
+    fill_demand_derivatives(
+        jets.copy(), kernel_body, efforts, np.array(_DIFFERENCE_STEPS), np.empty((2, outputs)), out
+    )
     return out
 
 
-def commanded(found: Array, spacing: float, tau: float) -> Array:
+def rotor_commands(path_demand: Array, spacing: float, tau: float) -> Array:
     """(n, rotors) commands F + tau F' to rotors with the lag `tau`, for samples `spacing` s apart."""
-    forces = found[:, FIRST_ROTOR:]
+    forces = path_demand[:, FIRST_ROTOR:]
     if tau == 0.0 or len(forces) < 3:
         return forces
     return np.asarray(forces + tau * np.gradient(forces, spacing, axis=0))

@@ -18,15 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
-from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
 from autopilot.trajectory.splines import COLUMNS, DEGREE, PieceTable
-from autopilot.trajectory.waypoint_path import Passage, passage_jets
+from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 
 Array = NDArray[np.float64]
 
-FINE_S = 0.01  # between the samples at which a path is checked
-NEAR_M = 0.05  # greatest distance at which the path may pass a waypoint
-MOST_PIECES, LONGEST_S = 5000, 3600.0
+SAMPLE_SPACING_S = 0.01  # between the samples at which a path is checked
+POINT_TOLERANCE_M = 0.05  # greatest distance at which the path may pass a waypoint
+MAX_PIECES, MAX_DURATION_S = 5000, 3600.0
 # how much position and derivatives may jump where two pieces meet, and at the ends, where the load rests: a
 # smaller jump is less than the errors of any flight
 _JUMPS = (("position", 1e-3, "m"), ("velocity", 1e-2, "m/s"), ("acceleration", 5e-2, "m/s^2"))
@@ -62,17 +62,17 @@ def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLik
     """A path of n polynomials: `coefficients[k][i]`, of shape (n, m, 3) with m up to 10, belongs to
     (t - breaks_s[k])^i between breaks_s[k] and breaks_s[k + 1], of n + 1 breaks; `passes_s` are the times at
     which the points of the route are passed. ValueError if the shapes do not fit."""
-    breaks, found = np.asarray(breaks_s, np.float64), np.asarray(coefficients, np.float64)
-    if found.ndim != 3 or found.shape[2] != 3 or not 1 <= found.shape[1] <= DEGREE + 1:
+    breaks, powers = np.asarray(breaks_s, np.float64), np.asarray(coefficients, np.float64)
+    if powers.ndim != 3 or powers.shape[2] != 3 or not 1 <= powers.shape[1] <= DEGREE + 1:
         raise ValueError(
-            f"coefficients are of shape {found.shape}; must be (pieces, up to {DEGREE + 1} of them, 3)"
+            f"coefficients are of shape {powers.shape}; must be (pieces, up to {DEGREE + 1} of them, 3)"
         )
-    if breaks.shape != (len(found) + 1,):
-        raise ValueError(f"breaks_s are of shape {breaks.shape}; must be ({len(found) + 1},)")
-    table = np.zeros((len(found), COLUMNS))
+    if breaks.shape != (len(powers) + 1,):
+        raise ValueError(f"breaks_s are of shape {breaks.shape}; must be ({len(powers) + 1},)")
+    table = np.zeros((len(powers), COLUMNS))
     table[:, 0], table[:, 1] = breaks[:-1], breaks[1:]
-    by_power = table[:, 2:].reshape(len(found), 3, DEGREE + 1)
-    by_power[:, :, : found.shape[1]] = found.transpose(0, 2, 1)
+    by_power = table[:, 2:].reshape(len(powers), 3, DEGREE + 1)
+    by_power[:, :, : powers.shape[1]] = powers.transpose(0, 2, 1)
     return Path(table, tuple(np.asarray(passes_s, np.float64).ravel().tolist()))
 
 
@@ -103,13 +103,13 @@ def slower(path: Path, factor: float) -> Path:
 def use(path: Path, route: Route) -> float:
     """How many times as long, roughly, the path should take to stay within what the route allows; 1 or less
     if it already does."""
-    times, jets = _fine(path)
-    asked = 0.0
+    times, jets = _sample_finely(path)
+    min_factor = 0.0
     if not route.time_optimal:
         too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / route.speed_m_s
-        asked = max(too_fast, float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / route.accel_m_s2)))
+        min_factor = max(too_fast, float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / route.accel_m_s2)))
     over = float(excess(demand(jets, route.body), float(times[1] - times[0]), route.bounds).max())
-    return max(asked, 1.0 + over if over > 0.0 else 0.0)
+    return max(min_factor, 1.0 + over if over > 0.0 else 0.0)
 
 
 def check_path(path: Path, route: Route) -> None:
@@ -118,32 +118,34 @@ def check_path(path: Path, route: Route) -> None:
     table, passes = path.table, path.passes_s
     if len(passes) != len(route.points):
         raise PlanError(f"passes_s are {len(passes)} times; must be {len(route.points)}, one for each point")
-    if not 1 <= len(table) <= MOST_PIECES:
-        raise PlanError(f"the path has {len(table)} pieces; must be 1 ... {MOST_PIECES}")
+    if not 1 <= len(table) <= MAX_PIECES:
+        raise PlanError(f"the path has {len(table)} pieces; must be 1 ... {MAX_PIECES}")
     if not (np.isfinite(table).all() and np.isfinite(passes).all()):
         raise PlanError("the path contains a value that is not a number")
-    for what, times in (("breaks_s", [*table[:, 0], table[-1, 1]]), ("passes_s", passes)):
+    for name, times in (("breaks_s", [*table[:, 0], table[-1, 1]]), ("passes_s", passes)):
         for before, after in pairwise(times):
             if after <= before:
-                told = f"{after:g} s comes after {before:g} s"
-                raise PlanError(f"the times {what} of the path must increase; {told}")
+                detail = f"{after:g} s comes after {before:g} s"
+                raise PlanError(f"the times {name} of the path must increase; {detail}")
         if times[0] != 0.0:
-            raise PlanError(f"the times {what} of the path begin at {times[0]:g} s; must begin at 0")
+            raise PlanError(f"the times {name} of the path begin at {times[0]:g} s; must begin at 0")
     if (table[1:, 0] != table[:-1, 1]).any():
         raise PlanError("the pieces of the path do not follow one another: each must begin where one ends")
     last_s = float(table[-1, 1])
-    if abs(passes[-1] - last_s) > 1e-9 or last_s > LONGEST_S:
+    if abs(passes[-1] - last_s) > 1e-9 or last_s > MAX_DURATION_S:
         raise PlanError(
             f"the path ends at {last_s:g} s and passes its last point at {passes[-1]:g} s; must be the same, "
-            f"and at most {LONGEST_S:g} s"
+            f"and at most {MAX_DURATION_S:g} s"
         )
     _check_joints(table)
-    passed = passage_jets(table, np.array(passes))[0]
-    for i, (there, point) in enumerate(zip(passed, route.points, strict=True)):
-        off = float(np.linalg.norm(there - point))
-        if not off <= NEAR_M:
-            raise PlanError(f"the path passes point {i} {off:.2f} m beside it; must be {NEAR_M:g} m at most")
-    lowest = float(_fine(path)[1][0, :, 2].min())
+    passed = sample_path(table, np.array(passes))[0]
+    for i, (passed_point, point) in enumerate(zip(passed, route.points, strict=True)):
+        off_m = float(np.linalg.norm(passed_point - point))
+        if not off_m <= POINT_TOLERANCE_M:
+            raise PlanError(
+                f"the path passes point {i} {off_m:.2f} m beside it; must be {POINT_TOLERANCE_M:g} m at most"
+            )
+    lowest = float(_sample_finely(path)[1][0, :, 2].min())
     if lowest <= 0.0:
         raise PlanError(f"the path leads to {lowest:.2f} m above home; must be above the ground")
 
@@ -153,36 +155,41 @@ def _check_joints(table: PieceTable) -> None:
     # on the left and on the right of each break; beyond the ends the load rests
     starts = _derivatives(table, np.zeros(len(table)))
     ends = _derivatives(table, table[:, 1] - table[:, 0])
-    for order, (what, most, unit) in enumerate((*_JUMPS, _JUMP_JERK)):
-        if order and (moving := max(np.abs(starts[order, 0]).max(), np.abs(ends[order, -1]).max())) > most:
-            raise PlanError(f"the path begins or ends with a {what} of {moving:.3g} {unit}; must be at rest")
+    for order, (quantity, limit, unit) in enumerate((*_JUMPS, _JUMP_JERK)):
+        if order and (moving := max(np.abs(starts[order, 0]).max(), np.abs(ends[order, -1]).max())) > limit:
+            raise PlanError(
+                f"the path begins or ends with a {quantity} of {moving:.3g} {unit}; must be at rest"
+            )
         jumps = np.abs(starts[order, 1:] - ends[order, :-1]).max(axis=1, initial=0.0)
-        if len(jumps) and jumps.max() > most:
+        if len(jumps) and jumps.max() > limit:
             at = float(table[1 + int(jumps.argmax()), 0])
-            raise PlanError(f"the {what} of the path jumps by {jumps.max():.3g} {unit} at {at:.2f} s")
+            raise PlanError(f"the {quantity} of the path jumps by {jumps.max():.3g} {unit} at {at:.2f} s")
 
 
 def _derivatives(table: PieceTable, since: Array) -> Array:
     """(4, n, 3) position to jerk of each piece, `since` s after its beginning."""
     c = table[:, 2:].reshape(len(table), 3, DEGREE + 1)
     powers = np.arange(DEGREE + 1, dtype=np.float64)
-    found = np.empty((4, len(table), 3))
+    derivatives = np.empty((4, len(table), 3))
     for order in range(4):
-        found[order] = np.einsum("kan,kn->ka", c, since[:, None] ** powers)
+        derivatives[order] = np.einsum("kan,kn->ka", c, since[:, None] ** powers)
         c = np.concatenate([c[:, :, 1:] * powers[1:], np.zeros((len(table), 3, 1))], axis=2)
-    return found
+    return derivatives
 
 
-def trouble_of(path: Path, route: Route) -> str:
+def bound_violation(path: Path, route: Route) -> str:
     """A bound that the path breaks, in words; empty if it keeps them all."""
-    times, jets = _fine(path)
+    times, jets = _sample_finely(path)
     spacing, bounds = float(times[1] - times[0]), route.bounds
-    found = demand(jets, route.body)
-    if not excess(found, spacing, bounds).max() > 0.0:
+    path_demand = demand(jets, route.body)
+    if not excess(path_demand, spacing, bounds).max() > 0.0:
         return ""
-    asked = commanded(found, spacing, bounds.rotor_tau)
-    high, low = float(asked.max()), float(asked.min())
-    tension, tilt = float(found[:, TENSION].min()), degrees(acos(max(-1.0, found[:, COS_TILT].min())))
+    commands = rotor_commands(path_demand, spacing, bounds.rotor_tau)
+    high, low = float(commands.max()), float(commands.min())
+    tension, tilt = (
+        float(path_demand[:, TENSION].min()),
+        degrees(acos(max(-1.0, path_demand[:, COS_TILT].min()))),
+    )
     if high > bounds.rotor_high:
         return f"a rotor would have to give {high:.2f} N; allowed are {bounds.rotor_high:.2f} N"
     if low < bounds.rotor_low:
@@ -192,13 +199,13 @@ def trouble_of(path: Path, route: Route) -> str:
     return f"the vehicle would lean {tilt:.0f} deg; allowed are {degrees(acos(bounds.cos_tilt)):.0f} deg"
 
 
-def passages(path: Path, route: Route) -> list[Passage]:
+def path_segments(path: Path, route: Route) -> list[PathSegment]:
     """The stretches of the path, from each point to the next."""
-    return [Passage(path.table, begin, end, route.points[0]) for begin, end in pairwise(path.passes_s)]
+    return [PathSegment(path.table, begin, end, route.points[0]) for begin, end in pairwise(path.passes_s)]
 
 
-def _fine(path: Path) -> tuple[Array, Array]:
+def _sample_finely(path: Path) -> tuple[Array, Array]:
     """Times (n,) and jets (7, n, 3) along the path."""
     last_s = float(path.table[-1, 1])
-    times = np.linspace(0.0, last_s, max(int(last_s / FINE_S), 50) + 1)
-    return times, passage_jets(path.table, times)
+    times = np.linspace(0.0, last_s, max(int(last_s / SAMPLE_SPACING_S), 50) + 1)
+    return times, sample_path(path.table, times)

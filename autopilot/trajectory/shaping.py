@@ -5,8 +5,8 @@ moment; elsewhere a path may demand more than rotors, cable or tilt allow. Aroun
 the path is replaced by a spline. It leaves the requested path and returns to it without a jump up to the
 sixth derivative, and stays as near to it as the limits allow (`autopilot.trajectory.convex`). As the whole
 path is known, the vehicle prepares before a jump: a window around the beginning of the signals opens before
-it (the lead), in which the load stays within `HELD_M` of its position; a window around the end closes after
-it (the tail).
+it (the lead), in which the load stays within `LEAD_TOLERANCE_M` of its position; a window around the end
+closes after it (the tail).
 
 Times are seconds from the beginning of the requested signals; paths are relative to the position there.
 """
@@ -22,40 +22,41 @@ import numpy as np
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
-from autopilot.trajectory.convex import NO_ROWS, SAMPLES, Goal, Problem, Rows, excess
+from autopilot.trajectory.convex import NO_CONSTRAINTS, SAMPLES, LinearConstraints, Objective, Problem, excess
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
 from autopilot.trajectory.signals import REST, Jet, SignalTable, evaluate, joints, signal_table
 from autopilot.trajectory.splines import COLUMNS, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
 from missions.model import Signals
 
-HELD_M = 0.005  # how far the load may leave its position before the signals begin
+LEAD_TOLERANCE_M = 0.005  # how far the load may leave its position before the signals begin
 INTERVAL_S = 0.04  # of the splines
-_HELD_S = 0.005  # between samples of that bound: at 10 m/s^2 it is exceeded by 0.03 mm between them
+_LEAD_SAMPLE_S = 0.005  # between samples of that bound: at 10 m/s^2 it is exceeded by 0.03 mm between them
 WINDOW_S = 0.45  # before and after a place that cannot be flown
-LONGEST_S = 15.0  # of one window; a longer one is no local change of the path
-_WIDER = 1.6  # a window whose path exceeds the bounds is widened by this factor, ...
-_TRIES = 3  # ... up to this number of tries, ...
-_LONG_S = 4.0  # ... unless it is longer than this and off by a rotor's whole range: not because of its ends
+MAX_WINDOW_S = 15.0  # of one window; a longer one is no local change of the path
+_WIDENING = 1.6  # a window whose path exceeds the bounds is widened by this factor, ...
+_WIDENING_TRIES = 3  # ... up to this number of tries, ...
+# ... unless it is longer than this and off by a rotor's whole range: not because of its ends
+_LONG_WINDOW_S = 4.0
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
-_INSIDE_N = 0.03  # by which its samples must stay inside them
+_SAMPLE_MARGIN_N = 0.03  # by which its samples must stay inside them
 # in the cost, this distance counts as much as a sixth derivative that takes a quarter of a rotor's range: the
-# share `_SMOOTH_SHARE` of `full_crackle`
+# share `_SMOOTHNESS_SHARE` of `reference_sixth_derivative`
 _DISTANCE_M = 1e-3
-_SMOOTH_SHARE = 0.5
-_SMOOTH_S = 0.02  # the time in which the sixth derivative may change by as much
-# a jump of the n-th derivative counts if smoothing it over `_JUMP_S` takes a share of `full_crackle` of more
-# than `_JUMP_SHARE`
+_SMOOTHNESS_SHARE = 0.5
+_SMOOTHNESS_S = 0.02  # the time in which the sixth derivative may change by as much
+# a jump of the n-th derivative counts if smoothing it over `_JUMP_S` takes more than the share `_JUMP_SHARE`
+# of `reference_sixth_derivative`
 _JUMP_S = 0.15
 _JUMP_SHARE = 0.01
 _REST_M_S = 1e-2
-_FAR_OFF = 10.0  # times the range of a rotor
+_HUGE_EXCESS = 10.0  # times the range of a rotor
 
 
 @dataclass(frozen=True, slots=True)
-class Shaped:
+class ShapedSignals:
     """Signals to be flown: `pieces` where the path is a spline, the requested path elsewhere.
 
     The path begins `lead_s` before the requested signals and ends `tail_s` after them.
@@ -68,20 +69,20 @@ class Shaped:
     tail_s: float
     distance_m: float  # greatest distance between the flown and the requested path
     excess_n: float  # by which a bound is still exceeded
-    slowed: float  # how many times as long as in the mission the signals last
+    duration_factor: float  # how many times as long as in the mission the signals last
     reason: str  # why the path cannot be flown, or ""
 
     def jet(self, t: float) -> Jet:
         """The path to fly at t (s from the beginning of the requested signals) with derivatives 1 ... 6."""
         return evaluate_shaped(self.table, self.pieces, self.duration_s, t)
 
-    def asked(self, t: float) -> Jet:
+    def requested(self, t: float) -> Jet:
         """The requested path at t."""
-        return evaluate_asked(self.table, self.duration_s, t)
+        return evaluate_requested(self.table, self.duration_s, t)
 
 
 @kernel
-def evaluate_asked(table: SignalTable, duration: float, t: float) -> Jet:
+def evaluate_requested(table: SignalTable, duration: float, t: float) -> Jet:
     """The requested path: at rest before the signals begin, and after they end if they end at rest."""
     if t < 0.0:
         return REST
@@ -100,7 +101,7 @@ def evaluate_shaped(table: SignalTable, pieces: PieceTable, duration: float, t: 
     row = find_piece(pieces, t)
     if row >= 0:
         return evaluate_piece(pieces, row, t)
-    return evaluate_asked(table, duration, t)
+    return evaluate_requested(table, duration, t)
 
 
 @kernel
@@ -115,54 +116,64 @@ def _fill(table: SignalTable, pieces: PieceTable, duration: float, times: Array,
 _NO_PIECES: PieceTable = np.zeros((0, COLUMNS))
 
 
-def unshaped(step: Signals) -> Shaped:
+def unshaped_signals(step: Signals) -> ShapedSignals:
     """The signals exactly as requested."""
     table = signal_table(step.terms)
-    return Shaped(table, _NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
+    return ShapedSignals(table, _NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
 
 
-def path_jets(shaped: Shaped, times: Array) -> Array:
+def path_jets(shaped: ShapedSignals, times: Array) -> Array:
     """(7, n, 3) jets of the path to fly."""
     out = np.empty((7, times.size, 3))
     _fill(shaped.table, shaped.pieces, shaped.duration_s, times, out)
     return out
 
 
-def asked_jets(table: SignalTable, duration: float, times: Array) -> Array:
+def requested_jets(table: SignalTable, duration: float, times: Array) -> Array:
     """(7, n, 3) jets of the requested path."""
     out = np.empty((7, times.size, 3))
     _fill(table, _NO_PIECES, duration, times, out)
     return out
 
 
-def full_crackle(body: Body, rotor_range: float) -> float:
+def reference_sixth_derivative(body: Body, rotor_range: float) -> float:
     """The sixth derivative of a sideways path (m/s^6) that takes half the range of a rotor (N), at hover.
 
     Linearised about hover: pitch = m_Q L x'''' / (m g^2), and its second derivative times J is 2 l F for a
     plus quadrotor.
     """
-    reach = body.quad_mass * body.cable_length
+    mass_length = body.quad_mass * body.cable_length
     weight = (body.quad_mass + body.load_mass) * body.gravity
-    each = max(max(abs(roll), abs(pitch)) for _, roll, pitch, _ in body.efforts)
-    return 0.5 / each * body.arm * rotor_range * weight * body.gravity / (max(body.inertia[:2]) * reach)
+    max_effort = max(max(abs(roll), abs(pitch)) for _, roll, pitch, _ in body.efforts)
+    return (
+        0.5
+        / max_effort
+        * body.arm
+        * rotor_range
+        * weight
+        * body.gravity
+        / (max(body.inertia[:2]) * mass_length)
+    )
 
 
-def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
+def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
     """The signals shaped so that the vehicle can fly them within the bounds; `reason` is set if it cannot."""
-    asked = unshaped(step)
-    table, duration = asked.table, step.duration_s
-    end_speed = float(np.linalg.norm(asked_jets(table, duration, np.array([nextafter(duration, -inf)]))[1]))
+    requested = unshaped_signals(step)
+    table, duration = requested.table, step.duration_s
+    end_speed = float(
+        np.linalg.norm(requested_jets(table, duration, np.array([nextafter(duration, -inf)]))[1])
+    )
     if end_speed > _REST_M_S:
-        return _refused(asked, f"the signals end at {end_speed:.2f} m/s; they must end at rest")
+        return _refused(requested, f"the signals end at {end_speed:.2f} m/s; they must end at rest")
     places = sorted([*_jumps(step, table, body, bounds), *_violations(table, duration, body, bounds)])
     spans = _windows(places, WINDOW_S)
     windows: list[_Window] = []
     while len(windows) < len(spans):
         begin, end = spans[len(windows)]
-        window = _widened(step, table, begin, end, body, bounds)
+        window = _solve_widening(step, table, begin, end, body, bounds)
         if window is None:
             text = f"from {max(begin, 0.0):.1f} s to {min(end, duration):.1f} s it exceeds what can be flown"
-            return _refused(asked, text)
+            return _refused(requested, text)
         if windows and window.begin < windows[-1].end:
             # it overlaps its neighbour after widening: one window for both
             last = len(windows) - 1
@@ -171,16 +182,16 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
         else:
             windows.append(window)
     if not windows:
-        return asked
+        return requested
     rows = np.vstack([window.pieces for window in windows])
     lead, tail = max(-windows[0].begin, 0.0), max(windows[-1].end - duration, 0.0)
     worst = max(window.excess_n for window in windows)
-    shaped = Shaped(table, rows, duration, lead, tail, 0.0, worst, 1.0, "")
-    times = _span(-lead, duration + tail, _FINE_S)
-    away = path_jets(shaped, times)[0] - asked_jets(table, duration, times)[0]
-    distance = float(np.sqrt(np.max(np.sum(away * away, axis=1))))
-    reason = "" if worst <= _TOLERANCE_N else _too_much(worst, bounds)
-    return Shaped(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
+    shaped = ShapedSignals(table, rows, duration, lead, tail, 0.0, worst, 1.0, "")
+    times = _sample_times(-lead, duration + tail, _FINE_S)
+    deviation = path_jets(shaped, times)[0] - requested_jets(table, duration, times)[0]
+    distance = float(np.sqrt(np.max(np.sum(deviation * deviation, axis=1))))
+    reason = "" if worst <= _TOLERANCE_N else _excess_reason(worst, bounds)
+    return ShapedSignals(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
 
 
 class _Window(NamedTuple):
@@ -192,38 +203,40 @@ class _Window(NamedTuple):
     excess_n: float
 
 
-def _widened(
+def _solve_widening(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
 ) -> _Window | None:
     """The first of increasingly wide windows that keeps the bounds, or else the one that exceeds them least;
     None if there is none."""
-    found: _Window | None = None
-    wider = 0.0
-    for _ in range(_TRIES):
-        b, e = begin - wider, end + wider
-        if e - b > LONGEST_S:
+    best: _Window | None = None
+    widening = 0.0
+    for _ in range(_WIDENING_TRIES):
+        b, e = begin - widening, end + widening
+        if e - b > MAX_WINDOW_S:
             break
-        tried = _solve(step, table, b, e, body, bounds)
-        if tried is not None and (found is None or tried.excess_n < found.excess_n):
-            found = tried
-        mendable_n = _rotor_range(bounds) if e - b > _LONG_S else inf
-        if found is not None and (found.excess_n <= _TOLERANCE_N or found.excess_n > mendable_n):
+        candidate = _solve(step, table, b, e, body, bounds)
+        if candidate is not None and (best is None or candidate.excess_n < best.excess_n):
+            best = candidate
+        max_excess_n = _rotor_range(bounds) if e - b > _LONG_WINDOW_S else inf
+        if best is not None and (best.excess_n <= _TOLERANCE_N or best.excess_n > max_excess_n):
             break
-        wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
-    return found
+        widening = (widening + WINDOW_S) * _WIDENING - WINDOW_S
+    return best
 
 
-def _too_much(excess_n: float, bounds: Bounds) -> str:
+def _excess_reason(excess_n: float, bounds: Bounds) -> str:
     """The excess of a path that could not be brought within the bounds, in words; in N unless it is huge."""
-    far = excess_n > _FAR_OFF * _rotor_range(bounds)
-    return f"a rotor or the cable is asked for {'far' if far else f'{excess_n:.2f} N'} too much"
+    is_huge = excess_n > _HUGE_EXCESS * _rotor_range(bounds)
+    return f"a rotor or the cable is asked for {'far' if is_huge else f'{excess_n:.2f} N'} too much"
 
 
-def _refused(asked: Shaped, reason: str) -> Shaped:
-    return Shaped(asked.table, asked.pieces, asked.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason)
+def _refused(requested: ShapedSignals, reason: str) -> ShapedSignals:
+    return ShapedSignals(
+        requested.table, requested.pieces, requested.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason
+    )
 
 
-def _span(begin: float, end: float, spacing: float) -> Array:
+def _sample_times(begin: float, end: float, spacing: float) -> Array:
     return np.linspace(begin, end, max(int((end - begin) / spacing), 2) + 1)
 
 
@@ -234,13 +247,13 @@ def _rotor_range(bounds: Bounds) -> float:
 
 def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
     """Times at which derivatives jump by more than the rotors can follow."""
-    full = full_crackle(body, _rotor_range(bounds))
+    reference = reference_sixth_derivative(body, _rotor_range(bounds))
     times = {t for t in (*joints(step.terms), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
     for time in sorted(times):
-        sides = asked_jets(table, step.duration_s, np.array([nextafter(time, -inf), time]))
+        sides = requested_jets(table, step.duration_s, np.array([nextafter(time, -inf), time]))
         jump = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
-        takes = sum(jump[n] * _JUMP_S ** (n - 6) for n in range(1, 7))
-        if takes > _JUMP_SHARE * full:
+        sixth_derivative = sum(jump[n] * _JUMP_S ** (n - 6) for n in range(1, 7))
+        if sixth_derivative > _JUMP_SHARE * reference:
             yield time, time
 
 
@@ -248,9 +261,12 @@ def _violations(
     table: SignalTable, duration: float, body: Body, bounds: Bounds
 ) -> Iterable[tuple[float, float]]:
     """Stretches of the requested path that exceed the bounds."""
-    times = _span(0.0, duration, _COARSE_S)
+    times = _sample_times(0.0, duration, _COARSE_S)
     # samples on both sides of a joint have no common slope: the lag is considered only in the optimisation
-    over = excess(demand(asked_jets(table, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0)) > 0.0
+    over = (
+        excess(demand(requested_jets(table, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0))
+        > 0.0
+    )
     edges = np.flatnonzero(np.diff(np.concatenate([[False], over, [False]]).astype(np.int8)))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         yield float(times[first]), float(times[after - 1])
@@ -258,14 +274,14 @@ def _violations(
 
 def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple[float, float]]:
     """Stretches `margin` wider on each side than the places; stretches near each other are merged."""
-    found: list[tuple[float, float]] = []
+    windows: list[tuple[float, float]] = []
     for begin, end in places:
         b, e = begin - margin, end + margin
-        if found and b < found[-1][1] + margin:
-            found[-1] = (found[-1][0], max(found[-1][1], e))
+        if windows and b < windows[-1][1] + margin:
+            windows[-1] = (windows[-1][0], max(windows[-1][1], e))
         else:
-            found.append((b, e))
-    return found
+            windows.append((b, e))
+    return windows
 
 
 def _solve(
@@ -274,17 +290,21 @@ def _solve(
     """The spline from begin to end; None if the solver finds none."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
-    ends = asked_jets(table, step.duration_s, np.array([begin, end]))
+    ends = requested_jets(table, step.duration_s, np.array([begin, end]))
     origin = ends[0, 0].copy()
     ends[0] -= origin
-    fixed = basis.ends(ends[:, 0], ends[:, 1])
+    fixed = basis.end_coefficients(ends[:, 0], ends[:, 1])
     times = np.linspace(begin, end, SAMPLES * intervals + 1)
-    target = asked_jets(table, step.duration_s, times)[0] - origin
-    full = full_crackle(body, _rotor_range(bounds))
-    smooth = 1.0 / (_SMOOTH_SHARE * full) ** 2
-    goal = Goal(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTH_S**2)))
-    inner = bounds._replace(rotor_low=bounds.rotor_low + _INSIDE_N, rotor_high=bounds.rotor_high - _INSIDE_N)
-    problem = Problem(basis, fixed, body, inner, goal, _rows(step, table, begin, end, origin))
+    target = requested_jets(table, step.duration_s, times)[0] - origin
+    reference = reference_sixth_derivative(body, _rotor_range(bounds))
+    smooth = 1.0 / (_SMOOTHNESS_SHARE * reference) ** 2
+    objective = Objective(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTHNESS_S**2)))
+    inner = bounds._replace(
+        rotor_low=bounds.rotor_low + _SAMPLE_MARGIN_N, rotor_high=bounds.rotor_high - _SAMPLE_MARGIN_N
+    )
+    problem = Problem(
+        basis, fixed, body, inner, objective, _path_constraints(step, table, begin, end, origin)
+    )
     solution = problem.solve()
     if not solution.solved:
         return None
@@ -292,40 +312,42 @@ def _solve(
     return _Window(begin, end, pieces, _fine_excess(pieces, begin, end, body, bounds))
 
 
-def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: Array) -> Rows:
-    """Constraints: the load stays within HELD_M of its position until the signals begin, and each rise with
-    `rise_90_by_s` is nine tenths done by then."""
+def _path_constraints(
+    step: Signals, table: SignalTable, begin: float, end: float, origin: Array
+) -> LinearConstraints:
+    """Constraints: the load stays within LEAD_TOLERANCE_M of its position until the signals begin, and each
+    rise with `rise_90_by_s` is nine tenths done by then."""
     times: list[float] = []
     axes: list[int] = []
     low: list[float] = []
     high: list[float] = []
     if begin < 0.0:
-        held = _span(begin, 0.0, _HELD_S)[1:]
+        lead_times = _sample_times(begin, 0.0, _LEAD_SAMPLE_S)[1:]
         for axis in range(3):
-            times += held.tolist()
-            axes += [axis] * held.size
-            low += [-HELD_M] * held.size
-            high += [HELD_M] * held.size
+            times += lead_times.tolist()
+            axes += [axis] * lead_times.size
+            low += [-LEAD_TOLERANCE_M] * lead_times.size
+            high += [LEAD_TOLERANCE_M] * lead_times.size
     for term in step.terms:
         if term.rise_90_by_s is None or not begin < term.start_s + term.rise_90_by_s < end:
             continue
         axis = "xyz".index(term.axis)
         time = term.start_s + term.rise_90_by_s
-        made = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
-        asked = float(asked_jets(table, step.duration_s, np.array([time]))[0, 0, axis])
-        bound = asked + (0.9 - made) * term.amplitude_m - origin[axis]
+        share_done = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
+        requested_position = float(requested_jets(table, step.duration_s, np.array([time]))[0, 0, axis])
+        bound = requested_position + (0.9 - share_done) * term.amplitude_m - origin[axis]
         times.append(time)
         axes.append(axis)
         low.append(bound if term.amplitude_m > 0.0 else -inf)
         high.append(bound if term.amplitude_m < 0.0 else inf)
     if not times:
-        return NO_ROWS
+        return NO_CONSTRAINTS
     order = np.zeros(len(times), np.int64)
-    return Rows(np.array(times), order, np.eye(3)[axes], np.array(low), np.array(high))
+    return LinearConstraints(np.array(times), order, np.eye(3)[axes], np.array(low), np.array(high))
 
 
 def _fine_excess(pieces: PieceTable, begin: float, end: float, body: Body, bounds: Bounds) -> float:
-    times = _span(begin, nextafter(end, -inf), _FINE_S)
+    times = _sample_times(begin, nextafter(end, -inf), _FINE_S)
     jets = np.empty((7, times.size, 3))
     _fill(np.zeros((0, 7)), pieces, 0.0, times, jets)
     return float(excess(demand(jets, body), float(times[1] - times[0]), bounds).max())

@@ -92,8 +92,10 @@ def signal_table(terms: Sequence[Term]) -> SignalTable:
             axis = next((i for i in range(3) if amplitude[i] != 0.0), 0)
             # cos is even: fold to omega >= 0, so that equal frequencies have equal keys
             key = (begin, end, float(axis), abs(omega))
-            turn = -phase if omega < 0.0 else phase
-            merged[key] = merged.get(key, 0j) + amplitude[axis] * complex(cos(turn), sin(turn))
+            folded_phase = -phase if omega < 0.0 else phase
+            merged[key] = merged.get(key, 0j) + amplitude[axis] * complex(
+                cos(folded_phase), sin(folded_phase)
+            )
     table = np.zeros((len(merged), _COLUMNS))
     for row, ((begin, end, axis_number, omega), phasor) in zip(table, merged.items(), strict=True):
         row[0:2] = begin, end

@@ -47,7 +47,7 @@ class Basis:
         self.spacing = (end - begin) / intervals
         inner = np.arange(intervals + 1, dtype=np.float64)
         knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
-        self._one = scipy.interpolate.BSpline(knots, np.eye(self.count), DEGREE)
+        self._splines = scipy.interpolate.BSpline(knots, np.eye(self.count), DEGREE)
 
     def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
         """(orders, n, 10): derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
@@ -57,23 +57,23 @@ class Basis:
         columns = first[:, None] + np.arange(DEGREE + 1)
         values = np.empty((orders, times.size, DEGREE + 1))
         for order in range(orders):
-            every = self._one(u, nu=order) / self.spacing**order
-            values[order] = np.take_along_axis(every, columns, axis=1)
+            all_values = self._splines(u, nu=order) / self.spacing**order
+            values[order] = np.take_along_axis(all_values, columns, axis=1)
         return values, first
 
-    def ends(self, before: Array, after: Array) -> Array:
+    def end_coefficients(self, before: Array, after: Array) -> Array:
         """(count, 3) coefficients: those that follow from the jets (7, 3) at the two ends; the others 0."""
-        found = np.zeros((self.count, 3))
+        coefficients = np.zeros((self.count, 3))
         for at, jet, part in ((0.0, before, slice(0, ORDERS)), (1.0, after, slice(-ORDERS, None))):
             u = np.array([at * self.intervals])
-            rows = np.vstack([self._one(u, nu=n)[0] for n in range(ORDERS)])[:, part]
+            rows = np.vstack([self._splines(u, nu=n)[0] for n in range(ORDERS)])[:, part]
             scaled = jet * self.spacing ** np.arange(ORDERS)[:, None]
-            found[part] = np.linalg.solve(rows, scaled)
-        return found
+            coefficients[part] = np.linalg.solve(rows, scaled)
+        return coefficients
 
     def pieces(self, coefficients: Array, origin: Array) -> PieceTable:
         """The table of the spline with these coefficients (count, 3), moved by `origin` (3,)."""
-        spline = scipy.interpolate.BSpline(self._one.t, coefficients, DEGREE)
+        spline = scipy.interpolate.BSpline(self._splines.t, coefficients, DEGREE)
         left = np.arange(self.intervals, dtype=np.float64)
         table = np.empty((self.intervals, COLUMNS))
         table[:, 0], table[:, 1] = self.breaks[:-1], self.breaks[1:]

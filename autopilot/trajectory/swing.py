@@ -9,7 +9,7 @@ from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, scale
 
 
 @kernel
-def swing(
+def swing_direction(
     tilt_north_rad: float, tilt_east_rad: float, duration_s: float, t: float
 ) -> tuple[Vec3, Vec3, Vec3]:
     """Unit vector u(t), ENU, tilted from the vertical by theta(t) = tilt sin^2(pi t / duration), u' and u''.

@@ -43,15 +43,15 @@ SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
-LEAST_REEL_M = 1e-4  # a winch this near to its length has nothing to do
+MIN_REEL_M = 1e-4  # a winch this near to its length has nothing to do
 
 
-def cable_trouble(wanted_m: float, shortest_m: float, longest_m: float) -> str:
+def cable_length_problem(target_m: float, min_length_m: float, max_length_m: float) -> str:
     """Why a winch refuses this cable length, given WNC_LEN_MIN and WNC_LEN_MAX; empty if it does not."""
-    if shortest_m - LEAST_REEL_M <= wanted_m <= longest_m + LEAST_REEL_M:
+    if min_length_m - MIN_REEL_M <= target_m <= max_length_m + MIN_REEL_M:
         return ""
-    limits = f"{shortest_m:g} ... {longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
-    return f"a cable of {wanted_m:.2f} m; must be {limits}"
+    limits = f"{min_length_m:g} ... {max_length_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
+    return f"a cable of {target_m:.2f} m; must be {limits}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ def timeline(
     before = start
     for item, step in enumerate(steps):
         after = state_after(step, before, home)
-        moving, waiting = _seconds(step, before, after, accel_m_s2)
+        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2)
         place = home if isinstance(step, ReturnHome) else None
         yield TimelineEntry(item, step, before, after, moving, moving + waiting, place)
         before = after
@@ -140,15 +140,15 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
             return before if here is None else replace(before, expected=(here[0], here[1], 0.0), known=known)
         case Speed(speed_m_s=speed):
             return replace(before, speed_m_s=speed)
-        case Winch(length_m=longer):
-            low = None if here is None else (here[0], here[1], here[2] - longer)
-            cable = None if before.cable_m is None else before.cable_m + longer
-            return replace(before, expected=low, cable_m=cable)
+        case Winch(length_m=length_change):
+            lowered = None if here is None else (here[0], here[1], here[2] - length_change)
+            cable = None if before.cable_m is None else before.cable_m + length_change
+            return replace(before, expected=lowered, cable_m=cable)
         case Release():
             if before.released:
                 return before
-            over = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
-            return replace(before, expected=over, known=False, released=True)
+            above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
+            return replace(before, expected=above, known=False, released=True)
         case Signals(duration_s=duration, terms=terms):
             x, v, *_ = evaluate(signal_table(terms), duration)
             known = before.known and dot(v, v) <= AT_REST_M2_S2
@@ -166,7 +166,9 @@ def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
     return min((home, *rally), key=lambda place: dist(place[:2], here[:2]))
 
 
-def _seconds(step: Step, before: MissionState, after: MissionState, accel: float) -> tuple[float, float]:
+def _travel_and_wait_s(
+    step: Step, before: MissionState, after: MissionState, accel: float
+) -> tuple[float, float]:
     """Time (s) in which the load travels, and in which it does not."""
     speed, waiting = before.speed_m_s, 0.0
     match step:

@@ -6,8 +6,8 @@ The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint 
 
 x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
 matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
-are those of the least integral for a given total time (`share_times`). The total follows from the form that
-was requested:
+are those of the least integral for a given total time (`optimal_time_shares`). The total follows from the
+form that was requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -39,23 +39,25 @@ from autopilot.trajectory.transfer import transfer_duration
 
 Indices = NDArray[np.int64]
 
-TURN_S = 0.25  # tau
-NEAREST_M = 0.05  # waypoints closer to each other than this are flown from rest to rest
-MOST_POINTS = 40  # of one passage
+ROTATION_TIME_S = 0.25  # tau
+MIN_WAYPOINT_DISTANCE_M = 0.05  # waypoints closer to each other than this are flown from rest to rest
+MAX_POINTS = 40  # of one path
 _PER_SEGMENT = 8  # intervals to the shortest segment
-_MOST_INTERVALS = 400
+_MAX_INTERVALS = 400
 _SAMPLES = 4  # to an interval, of the integral
 _FINE_S = 0.01
-_MOST_FINE = 20_000  # samples, 50 to an interval: a flight of hours needs no more memory than one of minutes
-_SPLIT_ROUNDS = 6
-_MOST_SPLIT = 8  # most segments for which times are optimised; beyond it the rule of thumb applies
-_SCALE_ROUNDS = 8
-_LONGER = 1.15
+# 50 to an interval: a flight of hours needs no more memory than one of minutes
+_MAX_FINE_SAMPLES = 20_000
+_TIME_SHARE_ITERATIONS = 6
+# most segments for which times are optimised; beyond it the approximate shares apply
+_MAX_OPTIMISED_SEGMENTS = 8
+_SCALING_ROUNDS = 8
+_LENGTHENING = 1.15
 _BAND = DEGREE + 1
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class PathSegment:
     """A stretch of a path through waypoints, from `begin_s` to `end_s` on its clock; m, ENU from home."""
 
     table: PieceTable
@@ -87,7 +89,7 @@ def _fill(table: PieceTable, times: Array, out: Array) -> None:
                 out[order, i, axis] = jet[order][axis]
 
 
-def passage_jets(table: PieceTable, times: Array) -> Array:
+def sample_path(table: PieceTable, times: Array) -> Array:
     """(7, n, 3) jets along the path."""
     out = np.empty((7, times.size, 3))
     _fill(table, times, out)
@@ -101,39 +103,39 @@ class MinimumSnap:
         segments = np.diff(times)
         count = ceil(_PER_SEGMENT * times[-1] / segments.min())
         # `_PER_SEGMENT` intervals to the shortest segment, but within the limits on their number
-        intervals = int(np.clip(count, 2 * ORDERS, _MOST_INTERVALS))
+        intervals = int(np.clip(count, 2 * ORDERS, _MAX_INTERVALS))
         self.basis = basis = Basis(0.0, float(times[-1]), intervals)
         self.origin: Array = points[0]
         ends = np.zeros((2, ORDERS, 3))
         ends[1, 0] = points[-1] - self.origin
-        self.coefficients: Array = basis.ends(ends[0], ends[1])
+        self.coefficients: Array = basis.end_coefficients(ends[0], ends[1])
         self._times = np.linspace(0.0, times[-1], _SAMPLES * intervals + 1)
         self.values, self.first = basis.band(self._times, 7)
         spacing = float(self._times[1])
         four, six = (self._matrix(self.values[order], self.first) for order in (4, 6))
-        hessian = spacing * (four.T @ four + TURN_S**4 * (six.T @ six))
+        hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
         inner = times[1:-1]
-        passed = self._matrix(*self._at(inner))
+        passing = self._matrix(*self._at(inner))
         free, fixed = slice(basis.free.start, basis.free.stop), self.coefficients
-        H, A = hessian[free, free], passed[:, free]
+        H, A = hessian[free, free], passing[:, free]
         n = H.shape[0]
         # the scale keeps the two kinds of rows comparable in size for pivoting
         scale = float(np.median(H.diagonal()))
         system = sparse.bmat([[H / scale, A.T], [A, None]], format="csc")
-        right = np.vstack(
+        right_side = np.vstack(
             [
                 -(hessian @ fixed)[free] / scale,
-                (points[1:-1] - self.origin) - passed @ fixed,
+                (points[1:-1] - self.origin) - passing @ fixed,
             ]
         )
         self.coefficients = fixed.copy()
         factor = splu(system)
-        solved = factor.solve(right)
+        solved = factor.solve(right_side)
         # one step of refinement with the residual: the least integral is small compared with its terms
-        solved += factor.solve(right - system @ solved)
+        solved += factor.solve(right_side - system @ solved)
         self.coefficients[free] = solved[:n]
         snap, turn = four @ self.coefficients, six @ self.coefficients
-        self.cost = spacing * float(np.sum(snap * snap) + TURN_S**4 * np.sum(turn * turn))
+        self.cost = spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
 
     def _at(self, times: Array) -> tuple[Array, Indices]:
         values, first = self.basis.band(times, 1)
@@ -142,15 +144,15 @@ class MinimumSnap:
     def _matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
         n = len(values)
         columns = first[:, None] + np.arange(_BAND)
-        lines = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
         return sparse.csr_matrix(
-            (values.ravel(), (lines.ravel(), columns.ravel())), shape=(n, self.basis.count)
+            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
         )
 
     def jets(self) -> tuple[Array, Array]:
         """Times (n,) and jets (7, n, 3) along the path, relative to its first point."""
-        whole = float(self.basis.breaks[-1])
-        times = np.linspace(0.0, whole, int(np.clip(whole / _FINE_S, 50, _MOST_FINE)) + 1)
+        total_s = float(self.basis.breaks[-1])
+        times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
         values, first = self.basis.band(times, 7)
         return times, band_jets(values, first, self.coefficients)
 
@@ -159,7 +161,7 @@ class MinimumSnap:
         return self.basis.pieces(self.coefficients, self.origin)
 
 
-def rule_of_thumb(points: Array) -> Array:
+def approximate_time_shares(points: Array) -> Array:
     """Share of the total time for each segment, about as transfers at speed 1 and acceleration 1 would take
     them without the stops in between."""
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -171,33 +173,37 @@ def rule_of_thumb(points: Array) -> Array:
     return np.asarray(times / times.sum())
 
 
-def share_times(points: Array, whole: float) -> Array:
-    """The share of `whole` seconds for each segment that minimises the integral."""
-    begin = np.log(rule_of_thumb(points))
-    if not 1 < len(begin) <= _MOST_SPLIT:
+def optimal_time_shares(points: Array, total_s: float) -> Array:
+    """The share of `total_s` seconds for each segment that minimises the integral."""
+    begin = np.log(approximate_time_shares(points))
+    if not 1 < len(begin) <= _MAX_OPTIMISED_SEGMENTS:
         return np.exp(begin)
 
     def shares(x: Array) -> Array:
-        found = np.exp(x - x.max())
-        return np.asarray(found / found.sum())
+        scaled = np.exp(x - x.max())
+        return np.asarray(scaled / scaled.sum())
 
     def cost(x: Array) -> float:
-        return float(np.log(MinimumSnap(points, _clock(shares(x), whole)).cost))
+        return float(np.log(MinimumSnap(points, _point_times(shares(x), total_s)).cost))
 
     bounds = [(value - 0.7, value + 0.7) for value in begin]
-    found = scipy.optimize.minimize(
-        cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": _SPLIT_ROUNDS, "eps": 1e-3}
+    result = scipy.optimize.minimize(
+        cost,
+        begin,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": _TIME_SHARE_ITERATIONS, "eps": 1e-3},
     )
-    return shares(found.x)
+    return shares(result.x)
 
 
-def _clock(shares: Array, whole: float) -> Array:
+def _point_times(shares: Array, total_s: float) -> Array:
     """Times at the points, in whole microseconds, so that stretches join exactly on the vehicle's clock."""
-    times = np.concatenate([[0.0], np.cumsum(shares)]) * whole
+    times = np.concatenate([[0.0], np.cumsum(shares)]) * total_s
     return np.asarray(np.round(times * 1e6) * 1e-6)
 
 
-def passage(
+def plan_waypoint_path(
     points: Sequence[Vec3],
     speed: float,
     accel: float,
@@ -209,39 +215,39 @@ def passage(
 
     `speed` (m/s) and `accel` (m/s^2) are peaks; if `time_optimal`, only the bounds apply.
     """
-    at = np.array(points)
+    waypoints = np.array(points)
     length = float(sum(dist(a, b) for a, b in pairwise(points)))
-    whole = transfer_duration(length, speed, accel)
-    shares = share_times(at, whole)
+    total_s = transfer_duration(length, speed, accel)
+    shares = optimal_time_shares(waypoints, total_s)
 
-    def tried(seconds: float) -> tuple[MinimumSnap, Array, float]:
+    def evaluate(seconds: float) -> tuple[MinimumSnap, Array, float]:
         """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""
-        times = _clock(shares, seconds)
-        path = MinimumSnap(at, times)
+        times = _point_times(shares, seconds)
+        path = MinimumSnap(waypoints, times)
         fine, jets = path.jets()
         over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
         too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / speed
         too_hard = float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / accel))
-        asked = 0.0 if time_optimal else max(too_fast, too_hard)
-        return path, times, max(asked, 1.0 + over if over > 0.0 else 0.0)
+        min_factor = 0.0 if time_optimal else max(too_fast, too_hard)
+        return path, times, max(min_factor, 1.0 + over if over > 0.0 else 0.0)
 
-    path, times, factor = tried(whole)
+    path, times, factor = evaluate(total_s)
     if not time_optimal:
         # peaks scale with time almost exactly: two rounds are accurate to one part in a thousand
         for _ in range(2):
-            whole *= min(factor, 2.0)
-            path, times, factor = tried(whole)
-    for _ in range(4 * _SCALE_ROUNDS):
+            total_s *= min(factor, 2.0)
+            path, times, factor = evaluate(total_s)
+    for _ in range(4 * _SCALING_ROUNDS):
         if factor <= 1.0 + 1e-3:
             break
-        whole *= _LONGER if factor > 1.05 else 1.01
-        path, times, factor = tried(whole)
+        total_s *= _LENGTHENING if factor > 1.05 else 1.01
+        path, times, factor = evaluate(total_s)
     if time_optimal:
-        low, high = 0.0, whole
+        low, high = 0.0, total_s
         best = path, times
-        for _ in range(_SCALE_ROUNDS):
+        for _ in range(_SCALING_ROUNDS):
             middle = 0.5 * (low + high) if low > 0.0 else 0.7 * high
-            path, times, factor = tried(middle)
+            path, times, factor = evaluate(middle)
             if factor <= 1.0 + 1e-3:
                 best, high = (path, times), middle
             else:

@@ -16,7 +16,7 @@ from autopilot.geometry.packed import Row
 
 ELECTRONICS_W = 3.0  # on the ground: flight computer and radio
 # (share of the charge left, open-circuit voltage of a cell); a common lithium-polymer cell
-CELL = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4.2))
+CELL_VOLTAGES = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4.2))
 
 
 class Battery(NamedTuple):
@@ -25,11 +25,11 @@ class Battery(NamedTuple):
     capacity_as: float  # A s
     cells: float
     resistance: float  # ohm
-    watts_per: float  # W / N^(3/2), of one rotor
+    rotor_power_coefficient: float  # W / N^(3/2), of one rotor
 
 
 @kernel
-def watts_per(hover_w: float, weight: float, rotors: int) -> float:
+def rotor_power_coefficient(hover_w: float, weight: float, rotors: int) -> float:
     """W / N^(3/2) of each of `rotors` rotors that together draw `hover_w` (W) and carry `weight` (N)."""
     each = weight / rotors
     return hover_w / (rotors * (each * sqrt(each)))
@@ -38,10 +38,10 @@ def watts_per(hover_w: float, weight: float, rotors: int) -> float:
 @kernel
 def open_voltage(charge: float) -> float:
     """Open-circuit voltage of a cell with this share of its charge, limited to 0 ... 1."""
-    found = CELL[0][1]
-    for i in range(len(CELL) - 1):
-        low, v_low = CELL[i]
-        high, v_high = CELL[i + 1]
+    found = CELL_VOLTAGES[0][1]
+    for i in range(len(CELL_VOLTAGES) - 1):
+        low, v_low = CELL_VOLTAGES[i]
+        high, v_high = CELL_VOLTAGES[i + 1]
         passed = if_above(charge, low, if_above(charge, high, high, charge) - low, 0.0)
         found += (v_high - v_low) * passed / (high - low)
     return found
@@ -62,22 +62,22 @@ def terminal_voltage(used_as: float, current: float, battery: Battery) -> float:
 
 
 @kernel
-def work_of(forces: Row, rotors: int) -> float:
+def rotor_power_term(forces: Row, rotors: int) -> float:
     """The sum of F^(3/2) (N^(3/2)) over these rotors; one with a negative force adds nothing."""
-    work = 0.0
+    power_term = 0.0
     for i in range(rotors):
-        lifting = if_above(forces[i], 0.0, forces[i], 0.0)
-        work += lifting * sqrt(lifting)
-    return work
+        upward_force = if_above(forces[i], 0.0, forces[i], 0.0)
+        power_term += upward_force * sqrt(upward_force)
+    return power_term
 
 
 @kernel
-def drawn_current(work: float, used_as: float, battery: Battery) -> float:
-    """Current in A, for the result of `work_of` and the charge used before (A s)."""
-    power = ELECTRONICS_W + battery.watts_per * work
+def drawn_current(power_term: float, used_as: float, battery: Battery) -> float:
+    """Current in A, for the result of `rotor_power_term` and the charge used before (A s)."""
+    power = ELECTRONICS_W + battery.rotor_power_coefficient * power_term
     open_v = battery.cells * open_voltage(charge_left(used_as, battery))
     if battery.resistance == 0.0:
         return power / open_v
     # at most what the battery can give
-    root = open_v * open_v - 4.0 * battery.resistance * power
-    return (open_v - sqrt(if_above(root, 0.0, root, 0.0))) / (2.0 * battery.resistance)
+    discriminant = open_v * open_v - 4.0 * battery.resistance * power
+    return (open_v - sqrt(if_above(discriminant, 0.0, discriminant, 0.0))) / (2.0 * battery.resistance)

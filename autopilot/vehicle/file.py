@@ -14,18 +14,18 @@ from typing import Any
 
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
-from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError
-from missions.toml_files import shown
+from missions.toml_files import format_value
 
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
     """The true vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
     keys, where = vehicle_keys(name_or_path)
     found = VEHICLES.record(Vehicle, keys, where)
-    wrong = [f"{where}: parameters.{line}" for line in _wrong_parameters(found)]
-    if wrong:
-        raise VehicleFileError(wrong)
+    problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
+    if problems:
+        raise VehicleFileError(problems)
     return found
 
 
@@ -36,7 +36,7 @@ def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
     believed = _believed(table, name_or_path)
     if not believed:
         return load_vehicle(name_or_path)
-    with _told_of(where, table):
+    with _errors_naming_reference(where, table):
         belief = load_vehicle(believed)
     if "parameters" not in table:
         return belief
@@ -50,7 +50,7 @@ def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
     return _believed(table, name_or_path) or name_or_path
 
 
-def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
+def _parameter_problems(vehicle: Vehicle) -> Iterator[str]:
     """What is wrong with the parameters with which a vehicle is delivered."""
     if not vehicle.parameters:
         return
@@ -61,7 +61,7 @@ def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
         if name not in known and name.startswith("SIM_"):
             yield f"{name}: is the simulator's, and these are the autopilot's; other keys say what is true"
         elif name not in known:
-            yield unknown_parameter(name, known)
+            yield unknown_parameter_text(name, known)
         elif known[name].from_vehicle:
             yield f"{name}: is {known[name].from_vehicle}; write that key instead"
         else:
@@ -78,7 +78,7 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
     believed = _believed(table, name_or_path)
     if not believed:
         return table, where
-    with _told_of(where, table):
+    with _errors_naming_reference(where, table):
         keys, other = _table(believed)
     if keys.get("believed"):
         raise VehicleFileError([f"{where}: believed: {other} has a `believed` of its own; name that one"])
@@ -91,19 +91,19 @@ def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
 
 
 @contextmanager
-def _told_of(where: str, table: dict[str, Any]) -> Iterator[None]:
+def _errors_naming_reference(where: str, table: dict[str, Any]) -> Iterator[None]:
     """Make a VehicleFileError of the assumed vehicle name the file and the key that refer to it."""
     try:
         yield
     except VehicleFileError as error:
-        lines = [f"{where}: believed = {shown(table['believed'])}; {line}" for line in error.problems]
+        lines = [f"{where}: believed = {format_value(table['believed'])}; {line}" for line in error.problems]
         raise VehicleFileError(lines) from None
 
 
 def _believed(table: dict[str, Any], name_or_path: str | PathLike[str]) -> str:
     """Name or path of the vehicle assumed for this table; empty: itself."""
-    named = table.get("believed")
-    if not isinstance(named, str) or not named or named in VEHICLES.names():
-        return named if isinstance(named, str) else ""
-    beside = Path(name_or_path).parent / named
-    return str(beside) if beside.suffix or beside.is_file() else named
+    name = table.get("believed")
+    if not isinstance(name, str) or not name or name in VEHICLES.names():
+        return name if isinstance(name, str) else ""
+    path_beside_file = Path(name_or_path).parent / name
+    return str(path_beside_file) if path_beside_file.suffix or path_beside_file.is_file() else name

@@ -34,9 +34,9 @@ def law_files() -> tuple[LawFile, ...]:
         if not entry.name.endswith(".py"):
             continue
         text = entry.read_text(encoding="utf-8")
-        law, own = _LAW.search(text), _PARAMETERS.search(text)
+        law, parameter_text = _LAW.search(text), _PARAMETERS.search(text)
         if law is not None:
-            parameters = tomllib.loads(own.group(1)) if own is not None else {}
+            parameters = tomllib.loads(parameter_text.group(1)) if parameter_text is not None else {}
             found.append(LawFile(law.group(1), int(law.group(2)), parameters))
     found.sort(key=lambda law: law.number)
     if [law.number for law in found] != list(range(len(found))):

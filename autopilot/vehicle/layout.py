@@ -9,8 +9,9 @@ from __future__ import annotations
 from math import cos, pi, sin
 from typing import NamedTuple
 
-GREATEST_FORCE_N = 1000.0  # of a rotor
-FEWEST, MOST = 4, 14  # HIL_ACTUATOR_CONTROLS has sixteen controls, of which gripper and winch take two
+MAX_ROTOR_FORCE_N = 1000.0  # of a rotor
+# HIL_ACTUATOR_CONTROLS has sixteen controls, of which gripper and winch take two
+MIN_ROTORS, MAX_ROTORS = 4, 14
 
 
 class Rotor(NamedTuple):
@@ -34,16 +35,18 @@ PLUS: Layout = (
 )
 
 
-def regular(count: int, ahead: bool, spins: tuple[float, ...]) -> Layout:
-    """Rotors at equal angles on a circle, counterclockwise from the rear; `ahead`: an arm points backward,
-    otherwise the gap between two. Each of `spins` is the sign of a rotor's moment about the upward axis."""
-    first = pi if ahead else pi - pi / count
-    places = [first + 2.0 * pi * i / count for i in range(count)]
+def regular_layout(count: int, arm_backward: bool, spins: tuple[float, ...]) -> Layout:
+    """Rotors at equal angles on a circle, counterclockwise from the rear; `arm_backward`: an arm points
+    backward, otherwise the gap between two. Each of `spins` is the sign of a rotor's moment about the upward
+    axis."""
+    first = pi if arm_backward else pi - pi / count
+    angles = [first + 2.0 * pi * i / count for i in range(count)]
     return tuple(
-        Rotor(_tidy(cos(angle)), _tidy(sin(angle)), spin) for angle, spin in zip(places, spins, strict=True)
+        Rotor(_without_rounding_error(cos(angle)), _without_rounding_error(sin(angle)), spin)
+        for angle, spin in zip(angles, spins, strict=True)
     )
 
 
-def _tidy(value: float) -> float:
+def _without_rounding_error(value: float) -> float:
     """The value without the rounding error of angles, so that a rotor on an axis lies exactly on it."""
     return round(value, 12) + 0.0

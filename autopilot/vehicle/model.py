@@ -12,13 +12,13 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from autopilot.vehicle.layout import FEWEST, GREATEST_FORCE_N, MOST, Layout, Rotor, regular
-from autopilot.vehicle.rotors import allocate, flies, sizes
+from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, MAX_ROTORS, MIN_ROTORS, Layout, Rotor, regular_layout
+from autopilot.vehicle.rotors import is_controllable, mixer_table, thrust_and_moment_per_force
 
-LEAST_ROTOR_MAX_N = 0.01
+MIN_ROTOR_MAX_N = 0.01
 
 # sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are similar
-SHARE_OF_ARM = {
+ARM_RATIOS = {
     "gear_height_m": 0.5,
     "gear_spread_m": 0.65,
     "rotor_reach_m": 1.6,
@@ -45,8 +45,8 @@ def _force(unlimited: float, low: float, high: float) -> Any:
 
 Moment = Annotated[float, Field(ge=1e-6, le=100.0)]
 Offset = Annotated[float, Field(ge=-1.0, le=1.0)]
-RotorMin = Annotated[float, _force(-inf, -GREATEST_FORCE_N, GREATEST_FORCE_N)]
-RotorMax = Annotated[float, _force(inf, LEAST_ROTOR_MAX_N, GREATEST_FORCE_N)]
+RotorMin = Annotated[float, _force(-inf, -MAX_ROTOR_FORCE_N, MAX_ROTOR_FORCE_N)]
+RotorMax = Annotated[float, _force(inf, MIN_ROTOR_MAX_N, MAX_ROTOR_FORCE_N)]
 
 
 class OneRotor(BaseModel):
@@ -79,7 +79,7 @@ class Vehicle(BaseModel):
         description="the vehicle that autopilot and `gcs check` take it for, a shipped name or a file beside "
         "this one; keys that are left out are as there",
     )
-    rotors: int = Field(4, ge=FEWEST, le=MOST, description="number of rotors")
+    rotors: int = Field(4, ge=MIN_ROTORS, le=MAX_ROTORS, description="number of rotors")
     frame: Literal["plus", "x"] = Field(
         "plus",
         description="rotors at equal angles, counterclockwise from the rear; `plus`: an arm points backward, "
@@ -93,7 +93,7 @@ class Vehicle(BaseModel):
     rotor: tuple[OneRotor, ...] = Field(
         (),
         strict=False,
-        max_length=MOST,
+        max_length=MAX_ROTORS,
         description="rotors at any places, each a table [[rotor]], in place of `rotors`, `frame` and `spin`",
     )
 
@@ -236,9 +236,9 @@ class Vehicle(BaseModel):
     def layout(self) -> Layout:
         """The positions of its rotors and how they differ."""
         if not self.rotor:
-            signs = self.spin or ("-+" * MOST)[: self.rotors]
+            signs = self.spin or ("-+" * MAX_ROTORS)[: self.rotors]
             spins = tuple(1.0 if sign == "+" else -1.0 for sign in signs)
-            return regular(self.rotors, self.frame == "plus", spins)
+            return regular_layout(self.rotors, self.frame == "plus", spins)
         return tuple(
             Rotor(
                 r.x_m / self.arm_m,
@@ -253,7 +253,7 @@ class Vehicle(BaseModel):
     @property
     def greatest_thrust_n(self) -> float:
         """Thrust (N) at which the first rotor reaches its limit."""
-        return sizes(allocate(self.layout))[0] * self.rotor_max_n
+        return thrust_and_moment_per_force(mixer_table(self.layout))[0] * self.rotor_max_n
 
     @property
     def limited(self) -> bool:
@@ -262,17 +262,17 @@ class Vehicle(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _sizes_follow_the_arm(cls, table: Any) -> Any:
+    def _with_default_sizes(cls, table: Any) -> Any:
         if not isinstance(table, dict):
             return table
         arm = table.get("arm_m")
         # a missing or wrong arm is reported once, and not for each size derived from it
         length = arm if isinstance(arm, int | float) and 0.01 <= arm <= 5.0 else 1.0
-        sizes = {key: share * length for key, share in SHARE_OF_ARM.items()}
+        sizes = {key: share * length for key, share in ARM_RATIOS.items()}
         return {**sizes, **table}
 
     @model_validator(mode="after")
-    def _consistent(self) -> Vehicle:
+    def _check_consistency(self) -> Vehicle:
         if not self.rotor_min_n < self.rotor_max_n:
             raise ValueError(
                 f"rotor_max_n = {self.rotor_max_n:g}; must be > rotor_min_n = {self.rotor_min_n:g}"
@@ -298,24 +298,24 @@ class Vehicle(BaseModel):
                 f"rotor_max_n = {self.rotor_max_n:g}; must be finite, because battery, esc_steps or "
                 "thrust_curve say what becomes of a share of it"
             )
-        self._rotors_fit()
+        self._check_rotors()
         return self
 
     @classmethod
     def _default(cls, key: str) -> Any:
         return cls.model_fields[key].default
 
-    def _rotors_fit(self) -> None:
-        said = [key for key in ("rotors", "frame", "spin") if getattr(self, key) != self._default(key)]
-        if self.rotor and said:
-            raise ValueError(f"{said[0]}: leave it out, because [[rotor]] says where each rotor is")
-        if self.rotor and len(self.rotor) < FEWEST:
+    def _check_rotors(self) -> None:
+        given = [key for key in ("rotors", "frame", "spin") if getattr(self, key) != self._default(key)]
+        if self.rotor and given:
+            raise ValueError(f"{given[0]}: leave it out, because [[rotor]] says where each rotor is")
+        if self.rotor and len(self.rotor) < MIN_ROTORS:
             raise ValueError(
-                f"rotor: there must be {FEWEST} ... {MOST} tables [[rotor]], not {len(self.rotor)}"
+                f"rotor: there must be {MIN_ROTORS} ... {MAX_ROTORS} tables [[rotor]], not {len(self.rotor)}"
             )
         if set(self.spin) - {"+", "-"} or (self.spin and len(self.spin) != self.rotors):
             raise ValueError(f'spin = "{self.spin}"; must be {self.rotors} signs + or -, one a rotor')
-        if not flies(self.layout):
+        if not is_controllable(self.layout):
             raise ValueError(
                 "rotor places and spins: the vehicle cannot be held level with these; put rotors on all "
                 "sides, and let them turn both ways"

@@ -29,9 +29,9 @@ def _document() -> dict[str, Any]:
     document = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
     document["CTL_LAW"]["values"] = {str(law.number): law.name for law in law_files()}
     for law in law_files():
-        own = dict(law.parameters)
-        document["groups"].update(own.pop("groups", {}))
-        document.update(own)
+        own_parameters = dict(law.parameters)
+        document["groups"].update(own_parameters.pop("groups", {}))
+        document.update(own_parameters)
     return document
 
 
@@ -42,7 +42,7 @@ DEFAULT_LAW = LAWS[_DOCUMENT["CTL_LAW"]["default"]]
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 
 # what a builder measures on the bench: a setting of the simulator's value also sets the autopilot's
-MEASURED = {
+BENCH_MEASURED = {
     "SIM_ACT_DELAY_MS": "VEH_ACT_DELAY",
     "SIM_ROTOR_TAU_MS": "VEH_ROTOR_TAU",
     "SIM_SENS_LAT_MS": "VEH_IMU_DELAY",
@@ -61,9 +61,9 @@ def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]])
     for name, value in given:
         if name in table or not name.startswith("SIM_"):
             table.set(name, value)
-        elif name in MEASURED and MEASURED[name] not in names:
-            belief = table.describe(MEASURED[name])
-            table.set(belief.name, min(max(value, belief.low), belief.high))
+        elif name in BENCH_MEASURED and BENCH_MEASURED[name] not in names:
+            assumed = table.describe(BENCH_MEASURED[name])
+            table.set(assumed.name, min(max(value, assumed.low), assumed.high))
 
 
 @cache
@@ -83,21 +83,21 @@ class AutopilotParameters(ParameterTable):
 
 
 def autopilot_parameters(
-    belief: Vehicle, law: str = "", brought: Iterable[Parameter] = ()
+    belief: Vehicle, law: str = "", own_parameters: Iterable[Parameter] = ()
 ) -> AutopilotParameters:
     """The table, with the vehicle's numbers and the parameters it is delivered with taken from `belief`.
 
-    `law`: the name of a custom law, to which CTL_LAW is set. `brought` are the parameters of custom classes;
-    ParameterError if one of them already exists.
+    `law`: the name of a custom law, to which CTL_LAW is set. `own_parameters` are the parameters of custom
+    classes; ParameterError if one of them already exists.
     """
-    delivered = belief.parameters
+    vehicle_defaults = belief.parameters
     found = [
-        replace(one, default=one.checked(delivered[one.name])) if one.name in delivered else one
+        replace(one, default=one.checked(vehicle_defaults[one.name])) if one.name in vehicle_defaults else one
         for one in definitions().definitions(vehicle_values(belief))
     ]
     if law:
         found = [_with_law(one, law) if one.name == "CTL_LAW" else one for one in found]
-    return AutopilotParameters([*found, *brought], belief.layout)
+    return AutopilotParameters([*found, *own_parameters], belief.layout)
 
 
 def _with_law(parameter: Parameter, law: str) -> Parameter:

@@ -9,15 +9,15 @@ class RateError(ValueError):
     """A rate that does not divide the tick rate."""
 
 
-def divider(tick_hz: float, job_hz: float, job: str, least_hz: float = 1.0) -> int:
+def divider(tick_hz: float, job_hz: float, job: str, min_hz: float = 1.0) -> int:
     """The number n such that a job runs on every n-th tick.
 
-    RateError if n is no whole number: it names both rates, and the possible whole rates from `least_hz` on.
+    RateError if n is no whole number: it names both rates, and the possible whole rates from `min_hz` on.
     """
     ratio = tick_hz / job_hz
     n = round(ratio)
     if n < 1 or abs(ratio - n) > 1e-6 * ratio:
-        rates = (tick_hz / n for n in range(1, int(tick_hz / least_hz) + 1))
+        rates = (tick_hz / n for n in range(1, int(tick_hz / min_hz) + 1))
         allowed = ", ".join(f"{rate:g}" for rate in rates if rate.is_integer())
         raise RateError(
             f"{job} = {job_hz:g} Hz does not divide the sensor rate of {tick_hz:g} Hz; "

@@ -26,7 +26,7 @@ _HEADER_V1 = 6
 _HEADER_V2 = 10
 _CRC = 2
 _SIGNATURE = 13
-LONGEST_FRAME = _HEADER_V2 + 255 + _CRC + _SIGNATURE
+MAX_FRAME_BYTES = _HEADER_V2 + 255 + _CRC + _SIGNATURE
 _SIGNED = 0x01  # the only incompatibility flag that is defined
 
 _HEADER2 = struct.Struct("<BBBBBBBHB")  # the MAVLink 2 header; the message id is 24 bits, low part first
@@ -189,7 +189,7 @@ def announced_length(data: bytes, start: int) -> int:
     return _HEADER_V2 + data[start + 1] + _CRC + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
 
 
-def split(frames: bytes) -> list[bytes]:
+def split_frames(frames: bytes) -> list[bytes]:
     """The single frames of bytes in which our own frames follow one another."""
     found, start = [], 0
     while start < len(frames):
@@ -199,7 +199,7 @@ def split(frames: bytes) -> list[bytes]:
     return found
 
 
-def whole_frames(stream: bytes) -> int:
+def decodable_length(stream: bytes) -> int:
     """How many bytes of a stream can be decoded; the bytes behind them may be the beginning of a frame."""
     start = 0
     while start < len(stream):
@@ -253,13 +253,13 @@ class Received:
         return message
 
 
-class Field:
+class FieldReader:
     """Reads one number of a message from its frame without decoding the rest."""
 
     def __init__(self, message_type: Any, name: str) -> None:
         self._offset, self._number = _BY_TYPE[message_type].number(name)
 
-    def of(self, frame: bytes) -> Any:
+    def read(self, frame: bytes) -> Any:
         """The field of a whole frame; bytes that were cut off the payload are zero."""
         body = _HEADER_V2 if frame[0] == _MAGIC_V2 else _HEADER_V1
         begin = body + self._offset
@@ -300,20 +300,20 @@ def message_at(data: bytes, start: int) -> tuple[Received | None, int]:
     return Received(message_id, system, component, sequence, data[start:stop]), stop
 
 
-def decode(datagram: bytes, patience: int | None = None) -> tuple[list[Received], int]:
+def decode(datagram: bytes, max_skipped: int | None = None) -> tuple[list[Received], int]:
     """The messages of a datagram in their order, and how many of its bytes were not part of one.
 
     Nothing is raised, whatever the bytes are: behind a byte that begins no frame, or a frame with a wrong
     checksum, the search continues at the next byte. Because searching costs time, it ends when more than
-    `patience` bytes were not part of a message (None: no limit). A frame of an unknown id cannot be checked;
-    it is skipped as a whole if it ends with the datagram or before what may be another frame.
+    `max_skipped` bytes were not part of a message (None: no limit). A frame of an unknown id cannot be
+    checked; it is skipped as a whole if it ends with the datagram or before what may be another frame.
     """
     received: list[Received] = []
     end = len(datagram)
     good = unknown = 0  # bytes of messages, and of whole frames that cannot be checked
     start = 0
     while start < end:
-        if patience is not None and start - good - unknown > patience:
+        if max_skipped is not None and start - good - unknown > max_skipped:
             break
         message, stop = message_at(datagram, start)
         if message is not None:

@@ -6,8 +6,8 @@ in the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those o
     HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
 
     end = put_frame(HIL_SENSOR, values, payload, buffer, at, Origin(sequence, 1, 26))
-    if holds(HIL_SENSOR, datagram, start, payload):
-        message = taken(HIL_SENSOR, payload)                            # message.time_usec, message.xacc, ...
+    if match_frame(HIL_SENSOR, datagram, start, payload):
+        message = unpack_payload(HIL_SENSOR, payload)                   # message.time_usec, message.xacc, ...
 
 All functions also work in Python, with the same bytes. Only plain frames are read here, those of MAVLink 2
 without a signature; anything else in a datagram is left to `codec.decode`.
@@ -30,8 +30,8 @@ from autopilot.geometry.row_moves import field_putter, field_taker, is_numbers, 
 Bytes = NDArray[np.uint8]
 
 HEADER = 10
-PAYLOAD_ROOM = 256  # bytes of an array that holds any payload
-FRAME_ROOM = HEADER + 255 + 2
+MAX_PAYLOAD_BYTES = 256  # bytes of an array that holds any payload
+MAX_FRAME_BYTES = HEADER + 255 + 2
 _MAGIC = 0xFD
 # (bytes, NumPy's type) of a number on the wire; times fit into 63 bits
 _NUMBERS = {
@@ -49,7 +49,7 @@ _NUMBERS = {
 }
 
 
-def _table() -> NDArray[np.int64]:
+def _crc_table() -> NDArray[np.int64]:
     """CRC-16/MCRF4XX of each byte."""
     values = np.arange(256, dtype=np.int64)
     for _ in range(8):
@@ -57,7 +57,7 @@ def _table() -> NDArray[np.int64]:
     return values
 
 
-_CRC_TABLE = _table()
+_CRC_TABLE = _crc_table()
 
 
 class _Layout(NamedTuple):
@@ -97,7 +97,7 @@ def wire_record(message_type: Any, module: str) -> Any:
     return record
 
 
-def _places(layout: _Layout) -> tuple[tuple[int, str], ...]:
+def _number_offsets(layout: _Layout) -> tuple[tuple[int, str], ...]:
     """The first byte and NumPy's type of each number."""
     sizes = {number: np.dtype(number).itemsize for _, _, number in layout.fields}
     return tuple(
@@ -105,10 +105,10 @@ def _places(layout: _Layout) -> tuple[tuple[int, str], ...]:
     )
 
 
-def _numbers(layout: _Layout) -> tuple[str, list[str]]:
+def _number_sources(layout: _Layout) -> tuple[str, list[str]]:
     """Source code of the views of `payload` through which its numbers are accessed, and of each number."""
     views, found = set(), []
-    for first, number in _places(layout):
+    for first, number in _number_offsets(layout):
         size = np.dtype(number).itemsize
         if first % size:  # an extension field: these are not ordered by size
             found.append(f"payload[{first} : {first + size}].view(np.{number})[0]")
@@ -122,16 +122,16 @@ def _numbers(layout: _Layout) -> tuple[str, list[str]]:
 def _python_putter(record: Any) -> Any:
     """put(kind, values, payload, buffer, at, origin) for Python: an assignment for each number."""
     layout = _LAYOUTS[record]
-    views, numbers = _numbers(layout)
+    views, numbers = _number_sources(layout)
     lines = "".join(f"    {number} = values[{i}]\n" for i, number in enumerate(numbers))
-    known: dict[str, Any] = {"np": np, "framed": _framed}
+    namespace: dict[str, Any] = {"np": np, "framed": _write_frame}
     exec(
         "def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:\n"
         f"{views}{lines}    return framed(payload, {layout.size}, {layout.message_id}, {layout.crc_extra}, "
         "buffer, at, origin)\n",
-        known,
+        namespace,
     )
-    return known["put"]
+    return namespace["put"]
 
 
 @cache
@@ -139,58 +139,61 @@ def _kernel_putter(record: Any) -> Any:
     """The same for kernels: all stores together, which compiles faster."""
     layout = _LAYOUTS[record]
     size, message_id, crc_extra = layout.size, layout.message_id, layout.crc_extra
-    put_fields = field_putter(_places(layout))
+    put_fields = field_putter(_number_offsets(layout))
 
     def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
         put_fields(values, payload)
-        return _framed(payload, size, message_id, crc_extra, buffer, at, origin)
+        return _write_frame(payload, size, message_id, crc_extra, buffer, at, origin)
 
     return put
 
 
 @cache
-def _python_taker(record: Any) -> Any:
+def _python_unpacker(record: Any) -> Any:
     """take(kind, payload) for Python."""
     layout = _LAYOUTS[record]
-    views, numbers = _numbers(layout)
+    views, numbers = _number_sources(layout)
     parts, i = [], 0
     for _, count, number in layout.fields:
         wide = "np.float64" if number.startswith("float") else "np.int64"
         each = [f"{wide}({one})" for one in numbers[i : i + max(count, 1)]]
         parts.append(f"({', '.join(each)},)" if count else each[0])
         i += max(count, 1)
-    known: dict[str, Any] = {"np": np, "record": record}
-    exec(f"def take(kind: Any, payload: Any) -> Any:\n{views}    return record({', '.join(parts)})\n", known)
-    return known["take"]
+    namespace: dict[str, Any] = {"np": np, "record": record}
+    exec(
+        f"def take(kind: Any, payload: Any) -> Any:\n{views}    return record({', '.join(parts)})\n",
+        namespace,
+    )
+    return namespace["take"]
 
 
 @cache
-def _kernel_taker(record: Any) -> Any:
+def _kernel_unpacker(record: Any) -> Any:
     """The same for kernels: all loads together."""
     layout = _LAYOUTS[record]
     parts = []
     for _, count, number in layout.fields:
         wide = types.float64 if number.startswith("float") else types.int64
         parts.append(types.UniTuple(wide, count) if count else wide)
-    take_fields = field_taker(_places(layout), types.BaseTuple.from_types(parts, record))
+    read_fields = field_taker(_number_offsets(layout), types.BaseTuple.from_types(parts, record))
 
     def take(kind: Any, payload: Any) -> Any:
-        return take_fields(payload)
+        return read_fields(payload)
 
     return take
 
 
 @cache
-def _finder(record: Any) -> Any:
+def _matcher(record: Any) -> Any:
     """find(kind, data, start, payload) for Python and for kernels."""
     layout = _LAYOUTS[record]
-    known: dict[str, Any] = {"copied": _copied}
+    namespace: dict[str, Any] = {"copied": _copy_payload}
     exec(
         "def find(kind: Any, data: Any, start: Any, payload: Any) -> Any:\n"
         f"    return copied(data, start, {layout.message_id}, {layout.size}, {layout.crc_extra}, payload)\n",
-        known,
+        namespace,
     )
-    return known["find"]
+    return namespace["find"]
 
 
 @kernel
@@ -204,7 +207,7 @@ def _checksum(data: Any, first: int, end: int, crc_extra: int) -> int:
 
 
 @kernel
-def _framed(
+def _write_frame(
     payload: Bytes, size: int, message_id: int, crc_extra: int, buffer: Bytes, at: int, origin: Origin
 ) -> int:
     """Write the frame of a payload of this size; returns where the next frame may begin."""
@@ -241,7 +244,7 @@ def frame_end(data: Any, start: int) -> int:
 
 
 @kernel
-def _copied(data: Any, start: int, message_id: int, size: int, crc_extra: int, payload: Bytes) -> bool:
+def _copy_payload(data: Any, start: int, message_id: int, size: int, crc_extra: int, payload: Bytes) -> bool:
     """Copy the payload of the whole frame at `start` if its id is this one and its checksum is correct."""
     if data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16 != message_id:
         return False
@@ -266,17 +269,17 @@ def put_frame(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, or
     return int(_python_putter(kind)(kind, values, payload, buffer, at, origin))
 
 
-def holds(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
+def match_frame(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
     """Whether the frame at `start`, which `frame_end` found whole, is an intact one of this message.
 
     If so, its payload is written to `payload`, followed by zeros.
     """
-    return bool(_finder(kind)(kind, data, start, payload))
+    return bool(_matcher(kind)(kind, data, start, payload))
 
 
-def taken(kind: Any, payload: Bytes) -> Any:
+def unpack_payload(kind: Any, payload: Bytes) -> Any:
     """The record of this type that the bytes at the beginning of `payload` contain."""
-    return _python_taker(kind)(kind, payload)
+    return _python_unpacker(kind)(kind, payload)
 
 
 def _record_of(kind: Any) -> Any:
@@ -292,15 +295,15 @@ def _put_frame(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origi
     return _kernel_putter(record)
 
 
-@overload(holds)
-def _holds(kind: Any, data: Any, start: Any, payload: Any) -> Any:
+@overload(match_frame)
+def _match_frame(kind: Any, data: Any, start: Any, payload: Any) -> Any:
     record = _record_of(kind)
-    return None if record is None else _finder(record)
+    return None if record is None else _matcher(record)
 
 
-@overload(taken)
-def _taken(kind: Any, payload: Any) -> Any:
+@overload(unpack_payload)
+def _unpack_payload(kind: Any, payload: Any) -> Any:
     record = _record_of(kind)
     if record is None or not is_row(payload, types.uint8):
         return None
-    return _kernel_taker(record)
+    return _kernel_unpacker(record)

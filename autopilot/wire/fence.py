@@ -15,7 +15,7 @@ from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import MissionItemError, WireItem
 
-Spot = tuple[float, float]  # east, north, m
+EastNorth = tuple[float, float]  # east, north, m
 
 _INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 _OUTSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
@@ -37,9 +37,9 @@ class Polygon:
     """An area with straight sides; `inclusion`: stay inside it, otherwise outside it."""
 
     inclusion: bool
-    corners: tuple[Spot, ...]
+    corners: tuple[EastNorth, ...]
 
-    def holds(self, x: float, y: float) -> bool:
+    def contains(self, x: float, y: float) -> bool:
         """Whether the point is inside: a ray from it to the east crosses an odd number of sides."""
         inside = False
         x1, y1 = self.corners[-1]
@@ -55,10 +55,10 @@ class Disc:
     """A round area."""
 
     inclusion: bool
-    centre: Spot
+    centre: EastNorth
     radius: float
 
-    def holds(self, x: float, y: float) -> bool:
+    def contains(self, x: float, y: float) -> bool:
         """Whether the point is inside."""
         return hypot(x - self.centre[0], y - self.centre[1]) <= self.radius
 
@@ -72,12 +72,12 @@ class Fence:
 
     zones: tuple[Zone, ...] = ()
 
-    def complaint(self, x: float, y: float) -> str:
+    def violation(self, x: float, y: float) -> str:
         """Why the point may not be flown over, or an empty string."""
-        wanted = [zone for zone in self.zones if zone.inclusion]
-        if wanted and not any(zone.holds(x, y) for zone in wanted):
+        inclusions = [zone for zone in self.zones if zone.inclusion]
+        if inclusions and not any(zone.contains(x, y) for zone in inclusions):
             return "outside the fence"
-        if any(zone.holds(x, y) for zone in self.zones if not zone.inclusion):
+        if any(zone.contains(x, y) for zone in self.zones if not zone.inclusion):
             return "in an exclusion zone of the fence"
         return ""
 
@@ -85,7 +85,7 @@ class Fence:
 NO_FENCE = Fence()
 
 
-def _spot(seq: int, item: WireItem, home: Home) -> Spot:
+def _east_north(seq: int, item: WireItem, home: Home) -> EastNorth:
     if item.frame not in _FRAMES:
         text = f"frame {item.frame}; must be one of 0, 3, 5, 6"
         raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
@@ -100,7 +100,7 @@ def _spot(seq: int, item: WireItem, home: Home) -> Spot:
 def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
     """The fence that the items describe, or MissionItemError for the first that cannot be part of one."""
     zones: list[Zone] = []
-    corners: list[Spot] = []
+    corners: list[EastNorth] = []
     expected, kind = 0, 0
     for seq, item in enumerate(items):
         if corners and item.command != kind:
@@ -114,7 +114,7 @@ def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
                 text = f"a polygon of {expected} corners, and one of its corners says {item.param1:g}"
                 raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
             kind, expected = item.command, int(item.param1)
-            corners.append(_spot(seq, item, home))
+            corners.append(_east_north(seq, item, home))
             if len(corners) == expected:
                 zones.append(Polygon(kind == _INSIDE_POLYGON, tuple(corners)))
                 corners = []
@@ -122,9 +122,9 @@ def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
             if not 0.0 < item.param1 < 1e6:
                 text = f"radius = {item.param1:g} m; must be > 0"
                 raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
-            zones.append(Disc(item.command == _INSIDE_CIRCLE, _spot(seq, item, home), item.param1))
+            zones.append(Disc(item.command == _INSIDE_CIRCLE, _east_north(seq, item, home), item.param1))
         elif item.command == _RETURN:
-            _spot(seq, item, home)
+            _east_north(seq, item, home)
         else:
             raise MissionItemError(
                 seq, f"command {item.command} is no part of a fence", mavlink.MAV_MISSION_UNSUPPORTED
@@ -142,6 +142,6 @@ def read_rally(items: Sequence[WireItem], home: Home) -> tuple[Vec3, ...]:
         if item.command != mavlink.MAV_CMD_NAV_RALLY_POINT:
             text = f"command {item.command} is no rally point"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
-        east, north = _spot(seq, item, home)
+        east, north = _east_north(seq, item, home)
         places.append((east, north, 0.0))
     return tuple(places)

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 from missions.nearest import nearest
 
-_LIKENESS = 0.75  # names of one group are much alike
-_MOST_MEANT = 4
+_MIN_SIMILARITY = 0.75  # names of one group are much alike
+_MAX_SUGGESTIONS = 4
 
 
-def unknown_parameter(name: str, names: Iterable[str]) -> str:
+def unknown_parameter_text(name: str, names: Iterable[str]) -> str:
     """The text that `name` does not exist, with the names that may be meant, or else all of its group.
 
     These are the nearest spelling, and names that differ only in the group, as those of other autopilots may:
@@ -18,13 +18,15 @@ def unknown_parameter(name: str, names: Iterable[str]) -> str:
     """
     known = sorted(names)
     group, _, quantity = name.partition("_")
-    near = nearest(name, known, _LIKENESS)
-    alike = [one for one in known if quantity and one.partition("_")[2] == quantity.upper() and one != near]
-    meant = [*filter(None, [near]), *alike][:_MOST_MEANT]
+    near = nearest(name, known, _MIN_SIMILARITY)
+    same_quantity = [
+        one for one in known if quantity and one.partition("_")[2] == quantity.upper() and one != near
+    ]
+    meant = [*filter(None, [near]), *same_quantity][:_MAX_SUGGESTIONS]
     if meant:
         return f"{name}: no such parameter; did you mean {' or '.join(meant)}? docs/parameters.md lists all"
-    kin = [one for one in known if one.startswith(group + "_")]
-    if kin:
-        return f"{name}: no such parameter; there are {', '.join(kin)}"
+    same_group = [one for one in known if one.startswith(group + "_")]
+    if same_group:
+        return f"{name}: no such parameter; there are {', '.join(same_group)}"
     groups = ", ".join(sorted({one.partition("_")[0] + "_" for one in known}))
     return f"{name}: no such parameter; names begin with one of {groups}"

@@ -12,9 +12,9 @@ import struct
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 
-from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.wire.parameter_names import unknown_parameter_text
 
-_MOST_REMEMBERED = 8
+_MAX_CACHED = 8
 NAME_LENGTH = 16  # PARAM_VALUE.param_id
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*")
 _FLOAT32 = struct.Struct("<f")
@@ -106,18 +106,18 @@ class ParameterTable:
         self._parameters = {parameter.name: parameter for parameter in listed}
         if len(self._parameters) != len(listed):
             names = [parameter.name for parameter in listed]
-            twice = sorted({name for name in names if names.count(name) > 1})
-            raise ParameterError(f"parameters defined twice: {', '.join(twice)}")
+            duplicates = sorted({name for name in names if names.count(name) > 1})
+            raise ParameterError(f"parameters defined twice: {', '.join(duplicates)}")
         self.names = tuple(self._parameters)
         self.version = 0
-        self.learned: set[str] = set()  # names that another process owns
+        self.remote_names: set[str] = set()  # names that another process owns
         self._values = {parameter.name: float(parameter.default) for parameter in listed}
         self._index = {name: index for index, name in enumerate(self.names)}
         self._frozen = False
-        self._remembered: dict[Hashable, bytes] = {}  # made from the table's version `_remembered_of`
-        self._remembered_of = self.version
+        self._cache: dict[Hashable, bytes] = {}  # made from the table's version `_cached_version`
+        self._cached_version = self.version
 
-    def learn(self, parameter: Parameter) -> None:
+    def add_remote(self, parameter: Parameter) -> None:
         """Add a parameter that another process owns, at its default; all later names move up by one."""
         if parameter.name in self._parameters:
             raise ParameterError(f"{parameter.name}: defined already")
@@ -126,7 +126,7 @@ class ParameterTable:
         self.names = tuple(self._parameters)
         self._index = {name: index for index, name in enumerate(self.names)}
         self._values[parameter.name] = float(parameter.default)
-        self.learned.add(parameter.name)
+        self.remote_names.add(parameter.name)
         self.version += 1
 
     def __getitem__(self, name: str) -> float:
@@ -168,13 +168,13 @@ class ParameterTable:
         self.version += 1
         return stored
 
-    def remembered(self, what: Hashable, make: Callable[[], bytes]) -> bytes:
-        """The bytes of `what`, made from this table by `make`, and made again only after it has changed."""
-        if self._remembered_of != self.version or len(self._remembered) >= _MOST_REMEMBERED:
-            self._remembered, self._remembered_of = {}, self.version
-        if what not in self._remembered:
-            self._remembered[what] = make()
-        return self._remembered[what]
+    def cached(self, key: Hashable, make: Callable[[], bytes]) -> bytes:
+        """The bytes of `key`, made from this table by `make`, and made again only after it has changed."""
+        if self._cached_version != self.version or len(self._cache) >= _MAX_CACHED:
+            self._cache, self._cached_version = {}, self.version
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
 
     def freeze(self) -> None:
         """From now on parameters marked `fixed` keep their value."""
@@ -191,7 +191,7 @@ class ParameterTable:
         }
 
     def _unknown(self, name: str) -> ParameterError:
-        return ParameterError(unknown_parameter(name, self.names))
+        return ParameterError(unknown_parameter_text(name, self.names))
 
 
 def parse_text(text: str) -> dict[str, float]:

@@ -14,14 +14,14 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 KEY_BYTES = 32
 UNITS_PER_S = 100_000
-NEWEST = 2**48 - 1
+MAX_TIMESTAMP = 2**48 - 1
 _EPOCH_UNIX_US = 1_420_070_400_000_000
 _UNIT_US = 10
 _SIGNATURE = 13  # bytes: link, time, digest
 _DIGEST = 6
 _MAGIC, _SIGNED = 0xFD, 0x01
-_NEW_STREAM_LATE = 60 * UNITS_PER_S  # the first time of a sender may be this far behind ours
-_MOST_STREAMS = 256
+_NEW_STREAM_MAX_LAG = 60 * UNITS_PER_S  # the first time of a sender may be this far behind ours
+_MAX_STREAMS = 256
 
 # messages accepted without a signature: they change nothing, and radios cannot sign
 ALLOWED_UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_RADIO_STATUS})
@@ -35,7 +35,7 @@ class NoKeyError(ValueError):
 
 def timestamp_of(unix_us: int) -> int:
     """The time of a signature, from a Unix time in us."""
-    return min(max((unix_us - _EPOCH_UNIX_US) // _UNIT_US, 0), NEWEST)
+    return min(max((unix_us - _EPOCH_UNIX_US) // _UNIT_US, 0), MAX_TIMESTAMP)
 
 
 def key_of_text(text: str) -> bytes:
@@ -61,7 +61,9 @@ class Signing:
         self.key = key
         self.timestamp = timestamp  # no frame of ours had a later one
         self._floor = floor
-        self._heard: dict[tuple[int, int, int], int] = {}  # link, system, component: their last time
+        self._last_timestamps: dict[
+            tuple[int, int, int], int
+        ] = {}  # link, system, component: their last time
 
     def advance(self, timestamp: int) -> None:
         """Take over the time of the clock, so that our times do not lag behind it."""
@@ -71,7 +73,7 @@ class Signing:
         """The function that signs the frames of one link."""
 
         def sign(frame: bytes) -> bytes:
-            self.timestamp = min(self.timestamp + 1, NEWEST)
+            self.timestamp = min(self.timestamp + 1, MAX_TIMESTAMP)
             tail = bytes((link_id,)) + self.timestamp.to_bytes(6, "little")
             return frame + tail + self._digest(frame + tail)
 
@@ -87,12 +89,14 @@ class Signing:
         link_id = frame[-_SIGNATURE]
         timestamp = int.from_bytes(frame[-_SIGNATURE + 1 : -_DIGEST], "little")
         stream = (link_id, system, component)
-        last = self._heard.get(stream, max(self.timestamp - _NEW_STREAM_LATE - 1, self._floor))
-        if timestamp <= last:
+        last_timestamp = self._last_timestamps.get(
+            stream, max(self.timestamp - _NEW_STREAM_MAX_LAG - 1, self._floor)
+        )
+        if timestamp <= last_timestamp:
             return False  # not later than the sender's last frame
-        if stream not in self._heard and len(self._heard) >= _MOST_STREAMS:
+        if stream not in self._last_timestamps and len(self._last_timestamps) >= _MAX_STREAMS:
             return False
-        self._heard[stream] = timestamp
+        self._last_timestamps[stream] = timestamp
         self.advance(timestamp)
         return True
 

@@ -8,15 +8,15 @@ from autopilot.wire.compiled import (
     Bytes,
     Origin,
     frame_end,
-    holds,
+    match_frame,
     put_frame,
-    taken,
+    unpack_payload,
     wire_record,
 )
 from autopilot.wire.convert.simulator import (
     NO_FORCES,
     Forces,
-    forces_in,
+    forces_from_row,
     hil_actuator_controls_values,
     read_hil_actuator_controls,
 )
@@ -52,19 +52,28 @@ def put_answer(
     reel_rate: float,
 ) -> int:
     """Write HIL_ACTUATOR_CONTROLS at the beginning of a buffer; returns its number of bytes. `forces`: 14, in
-    N; `payload` is scratch of PAYLOAD_ROOM bytes."""
+    N; `payload` is scratch of MAX_PAYLOAD_BYTES bytes."""
     values = hil_actuator_controls_values(
-        time_us, forces_in(forces, 0), armed, lockstep, gripper_open, reel_rate
+        time_us, forces_from_row(forces, 0), armed, lockstep, gripper_open, reel_rate
     )
     return put_frame(HIL_ACTUATOR_CONTROLS, values, payload, buffer, 0, Origin(sequence, system, component))
 
 
 @kernel
-def answer_in(datagram: bytes, system: int, payload: Bytes) -> Answer:
+def read_answer(datagram: bytes, system: int, payload: Bytes) -> Answer:
     """Whether a datagram is exactly the plain frame of an answer of this system; and `time_us`, `forces` (N),
     `armed`, `gripper_open` and `reel_rate` of this answer."""
-    plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
-    if not (plain and datagram[_SYSTEM] == system and holds(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)):
+    is_plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
+    if not (
+        is_plain and datagram[_SYSTEM] == system and match_frame(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)
+    ):
         return (False, 0, NO_FORCES, False, False, 0.0)
-    said = read_hil_actuator_controls(taken(HIL_ACTUATOR_CONTROLS, payload))
-    return (True, said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
+    controls = read_hil_actuator_controls(unpack_payload(HIL_ACTUATOR_CONTROLS, payload))
+    return (
+        True,
+        controls.time_us,
+        controls.forces,
+        controls.armed,
+        controls.gripper_open,
+        controls.reel_rate,
+    )

@@ -10,7 +10,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Received, announced_length, message_at
+from autopilot.wire.codec import MAGICS, MAX_FRAME_BYTES, Received, announced_length, message_at
 from autopilot.wire.dialect import plumbline as mavlink
 
 _STAMP = struct.Struct(">Q")
@@ -55,7 +55,7 @@ def _read(file: BinaryIO) -> Iterator[tuple[int, Received]]:
     buffer = b""
     while chunk := file.read(_CHUNK):
         buffer += chunk
-        used = yield from _records(buffer, len(buffer) - _STAMP.size - LONGEST_FRAME)
+        used = yield from _records(buffer, len(buffer) - _STAMP.size - MAX_FRAME_BYTES)
         buffer = buffer[used:]
     yield from _records(buffer, len(buffer))
 

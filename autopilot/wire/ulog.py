@@ -1,6 +1,6 @@
 """Flight logs in PX4's ULog format, version 1: bytes out, no file.
 
-A log consists of its definitions (`beginning`), followed by messages in the order of their time. Flight
+A log consists of its definitions (`header`), followed by messages in the order of their time. Flight
 Review, PlotJuggler and pyulog read it.
 """
 
@@ -30,7 +30,7 @@ _CODES = {
     "bool": "?",
     "char": "c",
 }
-_LONGEST_TEXT = 1000
+_MAX_TEXT_BYTES = 1000
 RECORD_HEAD = 5  # bytes before the time of a record
 
 
@@ -80,16 +80,16 @@ class UlogWriter:
         self._records = [struct.Struct("<HBH" + packer.format[1:]) for packer in packers]
         self._sizes = [2 + packer.size for packer in packers]
 
-    def beginning(
+    def header(
         self,
         time_us: int,
-        facts: Mapping[str, str | int],
+        info: Mapping[str, str | int],
         parameters: Mapping[str, float],
         defaults: Mapping[str, float],
     ) -> bytes:
         """Header, definitions and subscriptions; `defaults` are those that differ from the parameters."""
         parts = [_MAGIC + bytes((_VERSION,)) + _TIME.pack(time_us), _message(b"B", _FLAGS)]
-        parts += [_fact(name, value) for name, value in facts.items()]
+        parts += [_info(name, value) for name, value in info.items()]
         parts += [_message(b"F", topic.format.encode()) for topic in self._topics]
         parts += [parameter(name, value) for name, value in parameters.items()]
         for name, value in defaults.items():
@@ -112,7 +112,7 @@ def parameter(name: str, value: float) -> bytes:
 def text(time_us: int, severity: int, line: str) -> bytes:
     """A logged text; MAV_SEVERITY 0 ... 7 is its level in the log."""
     level = ord("0") + min(max(severity, 0), 7)
-    return _message(b"L", bytes((level,)) + _TIME.pack(time_us) + line.encode()[:_LONGEST_TEXT])
+    return _message(b"L", bytes((level,)) + _TIME.pack(time_us) + line.encode()[:_MAX_TEXT_BYTES])
 
 
 def dropout(duration_ms: int) -> bytes:
@@ -130,7 +130,7 @@ def _keyed(kind: str, name: str, value: bytes) -> bytes:
     return bytes((len(key),)) + key + value
 
 
-def _fact(name: str, value: str | int) -> bytes:
+def _info(name: str, value: str | int) -> bytes:
     if isinstance(value, str):
         encoded = value.encode()
         return _message(b"I", _keyed(f"char[{len(encoded)}]", name, encoded))

@@ -8,7 +8,7 @@ from autopilot.wire.codec import Received
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.records import WireItem
-from autopilot.wire.parameter_encoding import from_the_wire
+from autopilot.wire.parameter_encoding import decode_parameter_value
 
 VEHICLE_SYSTEM = 1
 SETUP_MESSAGES = (
@@ -33,7 +33,7 @@ class VehicleSetup:
         ignored."""
         message = received.message
         if received.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
-            value = from_the_wire(message.param_value, message.param_type)
+            value = decode_parameter_value(message.param_value, message.param_type)
             if received.system == VEHICLE_SYSTEM and math.isfinite(value):
                 self.parameters[message.param_id] = value
         elif received.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION:

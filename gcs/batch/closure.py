@@ -20,11 +20,11 @@ from pathlib import Path
 PACKAGES = ("autopilot", "gcs", "missions", "sitl")  # of this project; other libraries are not followed
 ROOT = Path(__file__).resolve().parents[2]
 
-_NO_DATA = (".py", ".pyc", ".html")  # code is found by its imports; pages are templates of reports
+_NOT_DATA = (".py", ".pyc", ".html")  # code is found by its imports; pages are templates of reports
 # the beginning of an import statement; a whole one that begins a line; one after another statement in a line
-_BEGIN = rb"(?:from[ \t]+[\w.]+[ \t]+import\b|import[ \t])"
-_IMPORT = re.compile(rb"^[ \t]*(" + _BEGIN + rb"(?:[^\n(\\]|\\\n|\([^)]*\))*)", re.MULTILINE)
-_WITHIN_A_LINE = re.compile(rb"[:;][ \t]*" + _BEGIN)
+_IMPORT_START = rb"(?:from[ \t]+[\w.]+[ \t]+import\b|import[ \t])"
+_IMPORT = re.compile(rb"^[ \t]*(" + _IMPORT_START + rb"(?:[^\n(\\]|\\\n|\([^)]*\))*)", re.MULTILINE)
+_INLINE_IMPORT = re.compile(rb"[:;][ \t]*" + _IMPORT_START)
 
 
 def fingerprint(entries: Iterable[str], root: Path = ROOT) -> str:
@@ -42,29 +42,29 @@ def fingerprint(entries: Iterable[str], root: Path = ROOT) -> str:
 def closure(entries: Iterable[str], root: Path = ROOT) -> set[Path]:
     """Source files of the modules `entries` and of all modules that they import, directly or indirectly, and
     the data files of their packages."""
-    ahead = list(entries)
-    for entry in ahead:
-        if _source(entry, root) is None:
+    pending = list(entries)
+    for entry in pending:
+        if _source_file(entry, root) is None:
             raise ValueError(f"{entry} is no module below {root}; must be a module of {', '.join(PACKAGES)}")
-    seen: set[str] = set()
+    visited: set[str] = set()
     files: set[Path] = set()
-    while ahead:
-        module = ahead.pop()
-        if module in seen:
+    while pending:
+        module = pending.pop()
+        if module in visited:
             continue
-        seen.add(module)
-        path = _source(module, root)
+        visited.add(module)
+        path = _source_file(module, root)
         if path is None:
             continue
         files.add(path)
         if path.name == "__init__.py":
-            files.update(_data(path.parent))
+            files.update(_data_files(path.parent))
         parent = module.rpartition(".")[0]  # is executed before the module
-        ahead += [*([parent] if parent else []), *_imports(path, module)]
+        pending += [*([parent] if parent else []), *_imports(path, module)]
     return files
 
 
-def _source(module: str, root: Path) -> Path | None:
+def _source_file(module: str, root: Path) -> Path | None:
     """The file of a module of this project, or None if there is no such module."""
     parts = module.split(".")
     if parts[0] not in PACKAGES:
@@ -74,15 +74,15 @@ def _source(module: str, root: Path) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _data(package: Path) -> Iterator[Path]:
+def _data_files(package: Path) -> Iterator[Path]:
     """The data files beside the code of a package, and in its folders that contain no code."""
     for path in package.iterdir():
         if path.name.startswith(".") or path.name == "__pycache__":
             continue
-        if path.is_file() and path.suffix not in _NO_DATA:
+        if path.is_file() and path.suffix not in _NOT_DATA:
             yield path
         elif path.is_dir() and not any(path.glob("*.py")):
-            yield from _data(path)
+            yield from _data_files(path)
 
 
 def _imports(path: Path, module: str) -> Iterator[str]:
@@ -101,7 +101,7 @@ def _imports(path: Path, module: str) -> Iterator[str]:
 def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
     """Dotted names that a source in this package imports, and whether it calls `iter_modules`."""
     names: list[str] = []
-    with _nothing_collected():  # a syntax tree has many objects, none of which is garbage
+    with _without_collection():  # a syntax tree has many objects, none of which is garbage
         finds_modules = b"iter_modules" in source and any(
             map(_calls_iter_modules, ast.walk(ast.parse(source)))
         )
@@ -113,8 +113,10 @@ def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
             case ast.ImportFrom():
                 base = node.module or ""
                 if node.level:
-                    above = package.split(".")
-                    base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
+                    package_parts = package.split(".")
+                    base = ".".join(
+                        [*package_parts[: len(package_parts) - node.level + 1], *([base] if base else [])]
+                    )
                 names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
     return tuple(names), finds_modules
 
@@ -123,21 +125,21 @@ def _import_statements(source: bytes) -> ast.Module:
     """A syntax tree with all import statements of a source. If each of them begins a line, only these lines
     are parsed, which takes a tenth of the time. The whole source is parsed if this fails, for example because
     a text looks like an import."""
-    if not _WITHIN_A_LINE.search(source):
+    if not _INLINE_IMPORT.search(source):
         with suppress(SyntaxError):
             return ast.parse(b"\n".join(_IMPORT.findall(source)))
     return ast.parse(source)
 
 
 @contextmanager
-def _nothing_collected() -> Iterator[None]:
+def _without_collection() -> Iterator[None]:
     """Disable garbage collection within the context, if it was enabled."""
-    was = gc.isenabled()
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if was:
+        if was_enabled:
             gc.enable()
 
 
@@ -151,11 +153,11 @@ def _calls_iter_modules(node: ast.AST) -> bool:
 def _statements(tree: ast.AST) -> Iterator[ast.AST]:
     """All statements of a module, nested ones too. Expressions contain none and are skipped, because they
     make up most of a tree."""
-    ahead = [tree]
-    while ahead:
-        node = ahead.pop()
+    pending = [tree]
+    while pending:
+        node = pending.pop()
         yield node
         for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-            inside = getattr(node, block, ())
-            if isinstance(inside, list):  # the body of a lambda is an expression
-                ahead += inside
+            block_statements = getattr(node, block, ())
+            if isinstance(block_statements, list):  # the body of a lambda is an expression
+                pending += block_statements

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
-from autopilot.shell.options import can_branch_off
+from autopilot.shell.options import can_fork
 from gcs.batch.runner import Running
 from gcs.errors import GcsError, from_clone
 
@@ -26,81 +26,85 @@ Stopped = Callable[[], bool]
 # returns the results of the flights that were flown before `Stopped` returned True; must be picklable
 FlyMany = Callable[[tuple[F, ...], Clock, Stopped], list[R]]
 
-_AHEAD = 2  # groups waiting for each worker
+_QUEUED_GROUPS = 2  # groups waiting for each worker
 _POLL_S = 0.2
 
 
 def fly_group(fly: FlyMany[F, R], group: tuple[F, ...]) -> list[R]:
     """Fly a group of flights; runs in a worker."""
-    return fly(group, time.monotonic, _is_recalled)
+    return fly(group, time.monotonic, _is_stopped)
 
 
-RECALLED: list[Any] = []  # in a worker of `OwnProcesses`: the event that requests that no more flights begin
+STOP_EVENTS: list[
+    Any
+] = []  # in a worker of `LocalProcesses`: the event that requests that no more flights begin
 
 
-def _is_recalled() -> bool:
-    return any(event.is_set() for event in RECALLED)
+def _is_stopped() -> bool:
+    return any(event.is_set() for event in STOP_EVENTS)
 
 
 @runtime_checkable
-class Recallable(Protocol):
-    """An executor that can be recalled: its workers then begin no more flights, not even the remaining
-    flights of groups that they have begun."""
+class Stoppable(Protocol):
+    """An executor that can be stopped: its workers then start no more flights, not even the remaining flights
+    of groups that they have started."""
 
-    def recall(self) -> None: ...
+    def request_stop(self) -> None: ...
 
 
-class OwnProcesses(ProcessPoolExecutor):
+class LocalProcesses(ProcessPoolExecutor):
     """Worker processes on this machine. The groups that they have already fetched cannot be cancelled, so an
-    event recalls them.
+    event stops them.
 
     They are forked, with all modules that are loaded here, if no thread can hold a lock. Otherwise each of
     them imports the modules again, which takes seconds.
     """
 
     def __init__(self, jobs: int) -> None:
-        branches = can_branch_off()
-        context = get_context("fork" if branches else "spawn")
-        self._recalled = context.Event()
-        super().__init__(jobs, mp_context=context, initializer=_begin_worker, initargs=(self._recalled,))
-        if branches:
-            self.submit(_nothing)  # starts all processes now
+        is_forked = can_fork()
+        context = get_context("fork" if is_forked else "spawn")
+        self._stop_event = context.Event()
+        super().__init__(
+            jobs, mp_context=context, initializer=_initialize_worker, initargs=(self._stop_event,)
+        )
+        if is_forked:
+            self.submit(_no_op)  # starts all processes now
 
-    def recall(self) -> None:
-        self._recalled.set()
+    def request_stop(self) -> None:
+        self._stop_event.set()
 
 
-class PoolCrew(Generic[F, R]):
-    """A crew that consists of the `workers` of an executor; each calls `fly` with its flights."""
+class PoolBackend(Generic[F, R]):
+    """A backend that consists of the `workers` of an executor; each calls `fly` with its flights."""
 
     def __init__(self, executor: Executor, workers: int, fly: FlyMany[F, R]) -> None:
         self._executor, self._workers, self._fly = executor, workers, fly
         self._futures: set[Future[list[R]]] = set()
 
     @property
-    def has_room(self) -> bool:
-        return len(self._futures) < self._workers * _AHEAD
+    def has_capacity(self) -> bool:
+        return len(self._futures) < self._workers * _QUEUED_GROUPS
 
     @property
     def is_idle(self) -> bool:
         return not self._futures
 
     def start(self, group: tuple[F, ...]) -> None:
-        with _killed_is_an_error():
+        with _killed_worker_as_error():
             self._futures.add(self._executor.submit(fly_group, self._fly, group))
 
     def collect(self) -> Sequence[R]:
         done, self._futures = wait(self._futures, _POLL_S, FIRST_COMPLETED)
-        with _killed_is_an_error():
+        with _killed_worker_as_error():
             return [result for future in done for result in future.result()]
 
     def running(self) -> Running:
         return ()
 
-    def recall(self) -> Sequence[R]:
+    def stop(self) -> Sequence[R]:
         """Wait for the flights in progress, one or eight per worker; a second Ctrl-C does not wait."""
-        if isinstance(self._executor, Recallable):
-            self._executor.recall()
+        if isinstance(self._executor, Stoppable):
+            self._executor.request_stop()
         for future in self._futures:
             future.cancel()
         ended, _ = wait([future for future in self._futures if not future.cancelled()])
@@ -109,9 +113,9 @@ class PoolCrew(Generic[F, R]):
 
 
 @contextmanager
-def own_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
+def local_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
     """`jobs` worker processes on this machine."""
-    executor = OwnProcesses(jobs)
+    executor = LocalProcesses(jobs)
     try:
         yield executor, jobs
     finally:
@@ -141,7 +145,7 @@ def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
 
 
 @contextmanager
-def _killed_is_an_error() -> Iterator[None]:
+def _killed_worker_as_error() -> Iterator[None]:
     try:
         yield
     except BrokenProcessPool:
@@ -151,25 +155,25 @@ def _killed_is_an_error() -> Iterator[None]:
         ) from None
 
 
-def _nothing() -> None:
+def _no_op() -> None:
     """Do nothing."""
 
 
-def _begin_worker(recalled: Any) -> None:
+def _initialize_worker(stop_event: Any) -> None:
     """Prepare a worker: the parent handles Ctrl-C and a closed terminal; a worker whose parent is gone ends.
 
     The parent writes the results to stdout. Text printed in a worker, for example by a custom law, goes to
     stderr.
     """
-    RECALLED.append(recalled)
+    STOP_EVENTS.append(stop_event)
     sys.stdout = sys.stderr
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+        threading.Thread(target=_exit_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(parent: Any) -> None:
+def _exit_with(parent: Any) -> None:
     parent.join()
     os._exit(1)

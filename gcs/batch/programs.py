@@ -29,7 +29,7 @@ class Program(Protocol):
     @property
     def running(self) -> bool: ...
     def last_line(self) -> str: ...
-    def obituary(self) -> str: ...
+    def exit_report(self) -> str: ...
     def terminate(self) -> None: ...
     def finish(self) -> None: ...
 
@@ -37,24 +37,25 @@ class Program(Protocol):
 F = TypeVar("F", bound=Titled)
 
 
-def cores(most: int | None = None) -> tuple[int, ...]:
-    """The cores that this process may use, at most `most` of them."""
+def cores(max_count: int | None = None) -> tuple[int, ...]:
+    """The cores that this process may use, at most `max_count` of them."""
     if hasattr(os, "sched_getaffinity"):
         found = tuple(sorted(os.sched_getaffinity(0)))
     else:
         found = tuple(range(os.cpu_count() or 1))
-    return found[:most]
+    return found[:max_count]
 
 
-def keep_on_core(child: Child, core: int) -> Child:
+def pin_to_core(child: Child, core: int) -> Child:
     """Keep a process and all processes that it starts on one core, if the system has a call for it."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(child.pid, {core})
     return child
 
 
-class ProgramCrew(Generic[F]):
-    """A crew that runs one program on each of `cores`; a result is a flight and whether it met its criteria.
+class ProgramBackend(Generic[F]):
+    """A backend that runs one program on each of `cores`; a result is a flight and whether it met its
+    criteria.
 
     `start` starts the program of a flight on a core. Its exit code must be 0 (met) or 3 (not met).
     """
@@ -70,7 +71,7 @@ class ProgramCrew(Generic[F]):
         self._failure = ""
 
     @property
-    def has_room(self) -> bool:
+    def has_capacity(self) -> bool:
         return len(self._programs) < len(self._cores)
 
     @property
@@ -94,13 +95,13 @@ class ProgramCrew(Generic[F]):
             if program.exit_code in (EXIT_DONE, EXIT_NOT_MET):
                 ended.append((flight, program.exit_code == EXIT_DONE))
             else:  # the next call raises the first failure, so that the flights that ended well are stored
-                self._failure = self._failure or f"{flight.title}: {program.obituary()}"
+                self._failure = self._failure or f"{flight.title}: {program.exit_report()}"
         return ended
 
     def running(self) -> Running:
         return tuple((flight.title, program.last_line()) for flight, program in self._programs.values())
 
-    def recall(self) -> Sequence[tuple[F, bool]]:
+    def stop(self) -> Sequence[tuple[F, bool]]:
         """End all programs and the processes that they started; interrupted flights give no result."""
         for _, program in self._programs.values():
             program.terminate()

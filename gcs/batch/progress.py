@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.progress import ProgressColumn
 
 
-_FIRST_S = 2.0  # after this time without a flight, the display says that the first are on their way
+_FIRST_HINT_S = 2.0  # after this time without a flight, the display says that the first are on their way
 _MINUTES_S = 120.0  # times of this or more are shown in minutes
 
 
@@ -23,22 +23,22 @@ class BatchDisplay(LiveBars):
         """`stored` flights of `total` are reused from an earlier run."""
         super().__init__(quiet)
         self._stored, self._total = stored, total
-        self._began_s = time.monotonic()
+        self._start_s = time.monotonic()
         self.flown = 0  # in this run
         self.completed = 0  # of these
-        self._told = -1  # `flown` at the last plain line
+        self._last_reported = -1  # `flown` at the last plain line
 
     @property
     def elapsed_s(self) -> float:
         """Wall time since the display was made."""
-        return time.monotonic() - self._began_s
+        return time.monotonic() - self._start_s
 
     def add(self, flown: int, completed: int, running: Running = ()) -> None:
         """Count `flown` more flights, of which `completed` completed; `running` are running now."""
         self.flown += flown
         self.completed += completed
         last = flown > 0 and self._stored + self.flown == self._total
-        plain = (lambda: self._line(running)) if self.flown != self._told else None
+        plain = (lambda: self._line(running)) if self.flown != self._last_reported else None
         self._show(lambda: self._rows(running), plain, at_once=last)
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
@@ -55,19 +55,19 @@ class BatchDisplay(LiveBars):
             }
         }
         for title, line in running:
-            said = line.removeprefix("gcs:").strip()
-            rows[title] = {"description": f"{title}: {said or 'starting'}", "total": None}
+            text = line.removeprefix("gcs:").strip()
+            rows[title] = {"description": f"{title}: {text or 'starting'}", "total": None}
         return rows
 
     def _figures(self) -> str:
         if not self.flown:
-            return "flights, the first are on their way" if self.elapsed_s > _FIRST_S else "flights"
+            return "flights, the first are on their way" if self.elapsed_s > _FIRST_HINT_S else "flights"
         flights_per_s = self.flown / max(self.elapsed_s, 1e-3)
         share = f"{100.0 * self.completed / self.flown:.0f} % of them completed"
-        return f"flights flown, {share}, {pace(flights_per_s)}"
+        return f"flights flown, {share}, {rate_text(flights_per_s)}"
 
     def _line(self, running: Running) -> str:
-        self._told = self.flown
+        self._last_reported = self.flown
         titles = f"; running: {'; '.join(title for title, _ in running)}" if running else ""
         return f"{self._stored + self.flown} of {self._total} {self._figures()}{self._remaining()}{titles}"
 
@@ -76,11 +76,11 @@ class BatchDisplay(LiveBars):
         if not left or not self.flown:
             return ""
         left_s = left * self.elapsed_s / self.flown
-        told = f"{left_s:.0f} s" if left_s < _MINUTES_S else f"{left_s / 60.0:.0f} min"
-        return f", {told} remaining"
+        text = f"{left_s:.0f} s" if left_s < _MINUTES_S else f"{left_s / 60.0:.0f} min"
+        return f", {text} remaining"
 
 
-def pace(flights_per_s: float) -> str:
+def rate_text(flights_per_s: float) -> str:
     """The rate per second or, below one, per minute."""
     if flights_per_s >= 1.0:
         return f"{flights_per_s:.1f} flights/s"

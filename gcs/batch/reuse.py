@@ -36,18 +36,18 @@ class Origin:
 
         `stored` was read from a file; if it does not have the form of `to_json`, all three differ.
         """
-        mine = self.to_json()
-        theirs = stored if isinstance(stored, Mapping) else {}
-        return tuple(name for name in mine if name not in theirs or theirs[name] != mine[name])
+        current = self.to_json()
+        recorded = stored if isinstance(stored, Mapping) else {}
+        return tuple(name for name in current if name not in recorded or recorded[name] != current[name])
 
 
 def origin_of(settings: Mapping[str, Any], entries: Iterable[str]) -> Origin:
     """The origin of flights that the modules `entries` fly now under `settings`."""
-    return Origin(settings, version("plumbline"), code_of(tuple(entries)))
+    return Origin(settings, version("plumbline"), code_fingerprint(tuple(entries)))
 
 
 @cache
-def code_of(entries: tuple[str, ...]) -> str:
+def code_fingerprint(entries: tuple[str, ...]) -> str:
     """The fingerprint of these modules and all that they import; the files are read once per run."""
     return fingerprint(entries)
 

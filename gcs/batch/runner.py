@@ -1,6 +1,6 @@
 """The loop in which many flights are flown: start, collect, store, report progress, stop without loss.
 
-A crew flies: `gcs.batch.pool` (processes on this machine, or a Dask cluster) or `gcs.batch.programs` (a
+A backend flies: `gcs.batch.pool` (processes on this machine, or a Dask cluster) or `gcs.batch.programs` (a
 program for each flight). The loop runs in the calling thread, which also stores the results.
 """
 
@@ -16,14 +16,14 @@ F_contra = TypeVar("F_contra", contravariant=True)
 R_co = TypeVar("R_co", covariant=True)
 
 Running = tuple[tuple[str, str], ...]  # of each running flight: its title, the last line that it wrote
-_MOST_KEPT = 1000  # results held in memory
+_MAX_BUFFERED = 1000  # results held in memory
 
 
-class Crew(Protocol[F_contra, R_co]):
+class Backend(Protocol[F_contra, R_co]):
     """What flies the flights, which are handed over in groups."""
 
     @property
-    def has_room(self) -> bool:
+    def has_capacity(self) -> bool:
         """Whether another group may be started."""
 
     @property
@@ -39,66 +39,66 @@ class Crew(Protocol[F_contra, R_co]):
     def running(self) -> Running:
         """The flights that run now, as far as they are known in this process."""
 
-    def recall(self) -> Sequence[R_co]:
+    def stop(self) -> Sequence[R_co]:
         """Start nothing more and end what runs; return the complete results."""
 
 
 class _Buffer(Generic[R]):
-    """Buffered results for the store, which is called at most every `keep_s` seconds."""
+    """Buffered results for the store, which is called at most every `store_interval_s` seconds."""
 
-    def __init__(self, store: Callable[[Sequence[R]], None], keep_s: float) -> None:
-        self._store, self._keep_s = store, keep_s
-        self._kept: list[R] = []
+    def __init__(self, store: Callable[[Sequence[R]], None], store_interval_s: float) -> None:
+        self._store, self._store_interval_s = store, store_interval_s
+        self._results: list[R] = []
         self._stored_s = time.monotonic()
 
     def add(self, results: Sequence[R]) -> None:
-        """Buffer results; store all buffered results if it is time or there are `_MOST_KEPT`."""
-        self._kept += results
-        if len(self._kept) >= _MOST_KEPT or time.monotonic() - self._stored_s >= self._keep_s:
+        """Buffer results; store all buffered results if it is time or there are `_MAX_BUFFERED`."""
+        self._results += results
+        if len(self._results) >= _MAX_BUFFERED or time.monotonic() - self._stored_s >= self._store_interval_s:
             self.flush()
 
     def flush(self) -> None:
         """Store all buffered results."""
-        kept, self._kept, self._stored_s = self._kept, [], time.monotonic()
-        if kept:
-            self._store(kept)
+        buffered, self._results, self._stored_s = self._results, [], time.monotonic()
+        if buffered:
+            self._store(buffered)
 
 
 def fly_all(
     groups: Iterable[tuple[F, ...]],
-    crew: Crew[F, R],
+    backend: Backend[F, R],
     store: Callable[[Sequence[R]], None],
-    tell: Callable[[Sequence[R], Running], None],
+    report: Callable[[Sequence[R], Running], None],
     stopped: Callable[[], bool],
-    keep_s: float = 0.0,
+    store_interval_s: float = 0.0,
 ) -> bool:
     """Fly all groups of flights; False if it was stopped before the end.
 
-    `store` receives every result once, at most every `keep_s` seconds, also if the loop ends by a request to
-    stop or by an exception. `tell` receives the results since its last call and the flights that run now; it
-    is called several times a second.
+    `store` receives every result once, at most every `store_interval_s` seconds, also if the loop ends by a
+    request to stop or by an exception. `report` receives the results since its last call and the flights that
+    run now; it is called several times a second.
     """
-    waiting = iter(groups)
+    remaining = iter(groups)
     exhausted = False
-    buffer = _Buffer(store, keep_s)
+    buffer = _Buffer(store, store_interval_s)
     try:
         while not stopped():
-            while not exhausted and crew.has_room:
-                group = next(waiting, None)
+            while not exhausted and backend.has_capacity:
+                group = next(remaining, None)
                 if group is None:
                     exhausted = True
                 else:
-                    crew.start(group)
-            tell((), crew.running())
-            if crew.is_idle:
+                    backend.start(group)
+            report((), backend.running())
+            if backend.is_idle:
                 return True
-            results = crew.collect()
+            results = backend.collect()
             buffer.add(results)
-            tell(results, crew.running())
+            report(results, backend.running())
         return False
     finally:
         buffer.flush()  # before waiting for running flights, which a second Ctrl-C abandons
-        results = crew.recall()
+        results = backend.stop()
         buffer.add(results)
         buffer.flush()
-        tell(results, ())
+        report(results, ())

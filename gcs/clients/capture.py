@@ -15,7 +15,7 @@ from gcs.clients.datagrams import messages
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: there is no wall clock in lockstep
 
-_LEFT_OUT = {mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_SIM_BOOT}
+_NOT_RECORDED = {mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_SIM_BOOT}
 
 
 class FrameLog(Protocol):
@@ -55,7 +55,7 @@ class Capture:
             one.frame
             for datagram in (*self._truth, *self._vehicle, *self._sent)
             for one in messages(datagram)[0]
-            if one.id not in _LEFT_OUT
+            if one.id not in _NOT_RECORDED
         ]
         if frames:
             self._log.write(unix_us, *frames)

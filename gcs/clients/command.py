@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
+from gcs.clients.operation import GROUND, Result, Retry, Status, Target, is_addressed_to
 
 RETRY_US = 500_000
 SENDS = 5
-PATIENCE_US = 5_000_000  # after IN_PROGRESS
+IN_PROGRESS_TIMEOUT_US = 5_000_000  # after IN_PROGRESS
 FORCE = 21196.0  # the MAVLink number that makes arming and disarming unconditional
 UNUSED = math.nan
 
@@ -44,13 +44,13 @@ class CommandOperation:
             self.result is not None
             or message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
             or message.command != self._command
-            or not addressed(message, GROUND)
+            or not is_addressed_to(message, GROUND)
             or not self._retry.sent
         ):
             return
         if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
             self.percent = min(message.progress, 100) if message.progress != 255 else 0
-            self._retry.wait(now_us, PATIENCE_US)
+            self._retry.wait(now_us, IN_PROGRESS_TIMEOUT_US)
             return
         text = f"{self.name}: {_RESULTS.get(message.result, f'result {message.result}')}"
         accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
@@ -64,7 +64,7 @@ class CommandOperation:
             self.result = Result(Status.UNANSWERED, text)
             return []
         confirmation = self._retry.sent
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         return [self._message(confirmation)]
 
     def _message(self, confirmation: int) -> Any:

@@ -27,7 +27,7 @@ class Connection:
         self._link_timeout_us = link_timeout_us
         self._writer = FrameWriter(*GROUND)
         self._next_heartbeat_us: int | None = None
-        self._heard_us: int | None = None
+        self._last_received_us: int | None = None
 
     def sign_with(self, signing: Signing) -> None:
         """From now on sign our frames, and accept only signed frames of the vehicle."""
@@ -38,7 +38,7 @@ class Connection:
         """The vehicle's messages in `datagram`; all other contents are dropped."""
         received, junk = messages(datagram)
         self.junk_bytes += junk
-        ours = []
+        accepted = []
         for one in received:
             if self.target is not None and one.system != self.target.system:
                 continue
@@ -48,10 +48,10 @@ class Connection:
                 if self.target is None:
                     self.target = Target(one.system, one.component)
                 if self.target == (one.system, one.component):
-                    self._heard_us = now_us
+                    self._last_received_us = now_us
             if self.target is not None:
-                ours.append(one)
-        return ours
+                accepted.append(one)
+        return accepted
 
     @property
     def next_heartbeat_us(self) -> int:
@@ -79,7 +79,7 @@ class Connection:
 
     def lost(self, now_us: int) -> bool:
         """True if a vehicle was heard and has been silent for longer than the link timeout."""
-        return self._heard_us is not None and now_us - self._heard_us > self._link_timeout_us
+        return self._last_received_us is not None and now_us - self._last_received_us > self._link_timeout_us
 
 
 def is_vehicle(heartbeat: Any) -> bool:

@@ -7,10 +7,10 @@ from functools import lru_cache
 from autopilot.wire.codec import Received, decode
 
 # the client, the capture and lockstep read each datagram within one window of some ten datagrams
-_REMEMBERED = 128
+_CACHE_SIZE = 128
 
 
-@lru_cache(maxsize=_REMEMBERED)
+@lru_cache(maxsize=_CACHE_SIZE)
 def messages(datagram: bytes) -> tuple[tuple[Received, ...], int]:
     """`decode(datagram)`: the messages, which must not be changed, and the number of bytes outside messages.
 

@@ -13,13 +13,13 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US
-from gcs.clients.flight import FlightClient, Row, Stage
-from gcs.clients.insisting import Insisting
+from gcs.clients.flight import FlightClient, Stage, StageRow
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Target
+from gcs.clients.repeated_operation import RepeatedOperation
 
 READY_LIMIT_US = 120_000_000  # its estimator settles for half a minute of its own time
-AGAIN_US = 500_000  # after a refusal: it answers, and may report that it is ready, before it is
+RETRY_PAUSE_US = 500_000  # after a refusal: it answers, and may report that it is ready, before it is
 _STREAMS_US = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 50_000,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000,
@@ -51,9 +51,9 @@ class Firmware:
     """What distinguishes one third-party autopilot from others."""
 
     title: str
-    begins_with_home: bool  # item 0 of a mission is home
-    takes_off_low: bool  # accepts a take-off to less than the length of the cable
-    tells_ready: bool  # reports readiness by the pre-arm bit of SYS_STATUS
+    item_0_is_home: bool  # item 0 of a mission is home
+    accepts_low_takeoff: bool  # accepts a take-off to less than the length of the cable
+    reports_ready: bool  # reports readiness by the pre-arm bit of SYS_STATUS
     before_arming: Callable[[Target], Operation]  # the mode in which it is armed
 
 
@@ -85,11 +85,11 @@ class FirmwareFlight(FlightClient):
         self._firmware = firmware
 
     @property
-    def watched(self) -> frozenset[int]:
+    def watched_messages(self) -> frozenset[int]:
         return _WATCHED
 
-    def row(self, stage: Stage) -> Row:
-        row = super().row(stage)
+    def stage_row(self, stage: Stage) -> StageRow:
+        row = super().stage_row(stage)
         match stage:
             case Stage.STREAMS:
                 return replace(row, operations=_streams)
@@ -98,18 +98,18 @@ class FirmwareFlight(FlightClient):
             case Stage.READY:
                 return replace(
                     row,
-                    operations=self._prepare,
-                    limit_us=READY_LIMIT_US if self._firmware.tells_ready else 0,
+                    operations=self._set_arming_mode,
+                    limit_us=READY_LIMIT_US if self._firmware.reports_ready else 0,
                 )
             case Stage.ARM:
                 return replace(row, operations=_arm)
         return row
 
-    def _prepare(self, client: FlightClient) -> list[Operation]:
+    def _set_arming_mode(self, client: FlightClient) -> list[Operation]:
         assert client.connection.target is not None
         return [self._firmware.before_arming(client.connection.target)]
 
-    def _watch(self) -> None:
+    def _update_facts(self) -> None:
         view = self.view
         self._was_armed = self._was_armed or bool(view.armed)
         state = view.latest.get("EXTENDED_SYS_STATE")
@@ -119,8 +119,8 @@ class FirmwareFlight(FlightClient):
         if not self._was_airborne:
             return
         self._item_flown = self._item()
-        told = [message.seq for message in (current, reached) if message is not None]
-        if len(self.items) - 1 in told:
+        reported_items = [message.seq for message in (current, reached) if message is not None]
+        if len(self.items) - 1 in reported_items:
             self._mission_over = True
 
     def _item(self) -> int:
@@ -131,13 +131,13 @@ class FirmwareFlight(FlightClient):
 def _upload(client: FlightClient) -> list[Operation]:
     assert client.connection.target is not None
     target = client.connection.target
-    return [Insisting(lambda: MissionUpload(target, client.items), AGAIN_US, READY_LIMIT_US)]
+    return [RepeatedOperation(lambda: MissionUpload(target, client.items), RETRY_PAUSE_US, READY_LIMIT_US)]
 
 
 def _arm(client: FlightClient) -> list[Operation]:
     assert client.connection.target is not None
     target = client.connection.target
-    return [Insisting(lambda: command.arm(target), AGAIN_US, READY_LIMIT_US)]
+    return [RepeatedOperation(lambda: command.arm(target), RETRY_PAUSE_US, READY_LIMIT_US)]
 
 
 def _streams(client: FlightClient) -> list[Operation]:

@@ -15,7 +15,7 @@ from autopilot.wire.items import WireItem
 from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE
 from missions.model import Delay, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint
 
-SLACK_SHARE = 0.6  # of the cable's length: height of the vehicle above the load that lies on the ground
+SLACK_FRACTION = 0.6  # of the cable's length: height of the vehicle above the load that lies on the ground
 SETTLE_S = 2.0  # hold time above the load on the ground, and again once it hangs
 _GROUND_SPEED = 1.0  # speed type of DO_CHANGE_SPEED
 _UNCHANGED = -1.0  # throttle
@@ -34,57 +34,66 @@ def firmware_items(
     steps: Sequence[Step],
     home: Home,
     cable_m: float,
-    stands_m: float,
-    begins_with_home: bool,
-    takes_off_low: bool = True,
+    gear_height_m: float,
+    item_0_is_home: bool,
+    accepts_low_takeoff: bool = True,
 ) -> tuple[WireItem, ...]:
-    """The items of these steps, for a vehicle that stands `stands_m` (its centre of mass) above the ground.
+    """The items of these steps, for a vehicle whose centre of mass is `gear_height_m` above the ground when
+    it stands.
 
     Heights of the items are relative to where the vehicle stood, as firmware interprets them.
-    `begins_with_home`: item 0 is home and is not flown, as with ArduPilot. `takes_off_low`: the vehicle first
-    flies above the load with the cable slack; else it lifts the load from beside it. After a release, the
-    places are those of the vehicle.
+    `item_0_is_home`: item 0 is home and is not flown, as with ArduPilot. `accepts_low_takeoff`: the vehicle
+    first flies above the load with the cable slack; else it lifts the load from beside it. After a release,
+    the places are those of the vehicle.
     """
     items: list[WireItem] = []
-    if begins_with_home:
+    if item_0_is_home:
         items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=ZERO, home=home))
-    east, north, height, above = 0.0, 0.0, 0.0, cable_m - stands_m
+    east, north, height, above_load = 0.0, 0.0, 0.0, cable_m - gear_height_m
 
-    def here() -> Vec3:
-        return east, north, height + above
+    def vehicle_position() -> Vec3:
+        return east, north, height + above_load
 
     for step in steps:
         match step:
             case Takeoff():
                 height = step.altitude_m
                 # the vehicle stands beside the load: it flies above it with the cable slack, then lifts it
-                low = (east, north, max(SLACK_SHARE * cable_m - stands_m, 0.0))
-                first = low if takes_off_low else here()
+                low = (east, north, max(SLACK_FRACTION * cable_m - gear_height_m, 0.0))
+                first = low if accepts_low_takeoff else vehicle_position()
                 items.append(_item(mavlink.MAV_CMD_NAV_TAKEOFF, place=first, home=home))
-                if takes_off_low:
+                if accepts_low_takeoff:
                     items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, SETTLE_S, place=low, home=home))
-                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, SETTLE_S, place=here(), home=home))
+                items.append(
+                    _item(mavlink.MAV_CMD_NAV_WAYPOINT, SETTLE_S, place=vehicle_position(), home=home)
+                )
             case Waypoint():
                 east, north, height = step.east_m, step.north_m, step.altitude_m
-                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, step.hold_s, place=here(), home=home))
+                items.append(
+                    _item(mavlink.MAV_CMD_NAV_WAYPOINT, step.hold_s, place=vehicle_position(), home=home)
+                )
             case ReturnHome():
                 east, north = 0.0, 0.0
-                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=here(), home=home))
+                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=vehicle_position(), home=home))
             case Speed():
                 items.append(
                     _item(mavlink.MAV_CMD_DO_CHANGE_SPEED, _GROUND_SPEED, step.speed_m_s, _UNCHANGED)
                 )
             case Delay():
-                items.append(_item(mavlink.MAV_CMD_NAV_LOITER_TIME, step.duration_s, place=here(), home=home))
+                items.append(
+                    _item(
+                        mavlink.MAV_CMD_NAV_LOITER_TIME, step.duration_s, place=vehicle_position(), home=home
+                    )
+                )
             case Release():
                 items.append(_item(mavlink.MAV_CMD_DO_GRIPPER, 1.0, float(mavlink.GRIPPER_ACTION_RELEASE)))
-                above = 0.0
+                above_load = 0.0
             case Land():
                 items.append(_item(mavlink.MAV_CMD_NAV_LAND, place=(east, north, 0.0), home=home))
             case _:
-                what = _NAMES.get(type(step).__name__, type(step).__name__)
+                description = _NAMES.get(type(step).__name__, type(step).__name__)
                 raise FirmwareMissionError(
-                    f"it asks for {what}; this autopilot flies take-off, waypoints, speeds, delays, "
+                    f"it asks for {description}; this autopilot flies take-off, waypoints, speeds, delays, "
                     "release and landing"
                 )
     return tuple(items)

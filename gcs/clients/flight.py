@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Literal
 
-from autopilot.wire.codec import Field, Received
+from autopilot.wire.codec import FieldReader, Received
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients import command
@@ -33,7 +33,7 @@ from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
-from gcs.mission_items import of_mission
+from gcs.mission_items import in_mission_terms
 from missions.model import Mission
 
 REPORT_INTERVAL_US = 8_000
@@ -60,13 +60,17 @@ class Outcome:
     name: OutcomeName
     reason: str = ""
 
-    def because(self, why: str) -> Outcome:
-        """The outcome with `why`, if not empty, in front of its reason."""
-        return replace(self, reason="; ".join(filter(None, (why, self.reason)))) if why else self
+    def with_reason(self, reason_before: str) -> Outcome:
+        """The outcome with `reason_before`, if not empty, in front of its reason."""
+        return (
+            replace(self, reason="; ".join(filter(None, (reason_before, self.reason))))
+            if reason_before
+            else self
+        )
 
-    def of_mission(self, mission: Mission) -> Outcome:
+    def in_mission_terms(self, mission: Mission) -> Outcome:
         """The outcome with its reason in the mission's terms; the vehicle counts the uploaded items."""
-        return replace(self, reason=of_mission(self.reason, mission))
+        return replace(self, reason=in_mission_terms(self.reason, mission))
 
 
 class Stage(Enum):
@@ -97,16 +101,18 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Row:
+class StageRow:
     """A stage of the table."""
 
-    after: Stage
-    refused: Stage = Stage.OVER
+    next_stage: Stage
+    stage_if_refused: Stage = Stage.OVER
     operations: Callable[[FlightClient], Sequence[Operation]] | None = None
-    done: Callable[[FlightClient], bool] | None = None  # awaited after the operations have ended
-    barred: Callable[[FlightClient], str] | None = None  # why the flight cannot continue from here, or empty
+    is_done: Callable[[FlightClient], bool] | None = None  # awaited after the operations have ended
+    obstacle: Callable[[FlightClient], str] | None = (
+        None  # why the flight cannot continue from here, or empty
+    )
     limit_us: int | None = None
-    late: Callable[[FlightClient], Outcome] | None = None
+    on_timeout: Callable[[FlightClient], Outcome] | None = None
 
 
 class FlightClient:
@@ -125,7 +131,7 @@ class FlightClient:
     ) -> None:
         self.outcome: Outcome | None = None
         self.fell_silent = False  # the vehicle fell silent, which ended the flight
-        self.begun = False  # the vehicle was armed
+        self.started = False  # the vehicle was armed
         self.stage = Stage.FIND
         self.view = VehicleView()
         self.connection = Connection(link_timeout_us)
@@ -134,31 +140,31 @@ class FlightClient:
         self._limit_s = limit_s if limit_s is not None else expected_s * TIME_FACTOR + TIME_MARGIN_S
         self._operations: list[Operation] = []
         self._parameters: ParameterList | None = None  # while they are being requested
-        self._stage_began_us: int | None = None  # the ground station's clock
-        self._flight_began_us: int | None = None  # the vehicle's clock
+        self._stage_start_us: int | None = None  # the ground station's clock
+        self._flight_start_us: int | None = None  # the vehicle's clock
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
         self._texts_armed = 0  # texts that came before arming
         self._was_armed = False
         self._was_airborne = False
         self._mission_over = False
-        self._by_hand = False  # the user controls the flight through this client
-        self._beat: bytes | None = None  # the last heartbeat that was examined
+        self._is_manual = False  # the user controls the flight through this client
+        self._last_heartbeat: bytes | None = None  # the last heartbeat that was examined
         self._in_mission = False  # the vehicle has flown the mission
-        self._left_for = ""  # the mode for which it has left the mission
+        self._mode_after_mission = ""  # the mode for which it has left the mission
         self._texts_in_mission = 0  # texts that came before the last heartbeat in mission mode
         self._item_flown = 0  # the last one in the air
         self._setpoint: tuple[int, int] | None = None  # phase and item of the last setpoint
-        self._given_up_us: int | None = None  # the vehicle's clock at the failure
-        self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
+        self._failed_us: int | None = None  # the vehicle's clock at the failure
+        self._pending_outcome: Outcome | None = None  # the outcome, once the aftermath is captured
 
     # ---- what differs between autopilots
 
     @property
-    def watched(self) -> frozenset[int]:
+    def watched_messages(self) -> frozenset[int]:
         """Messages from which the state of the flight is derived."""
         return _WATCHED
 
-    def row(self, stage: Stage) -> Row:
+    def stage_row(self, stage: Stage) -> StageRow:
         """The row of the table above."""
         return _TABLE[stage]
 
@@ -176,16 +182,16 @@ class FlightClient:
                 self._operations[0].receive(one.message, now_us)
             if self._parameters is not None and one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
                 self._parameters.receive(one.message, now_us)
-            if self.stage is Stage.FLY and one.id in self.watched and self._is_news(one):
-                self._watch()
+            if self.stage is Stage.FLY and one.id in self.watched_messages and self._has_changed(one):
+                self._update_facts()
 
     def poll(self, now_us: int) -> list[bytes]:
         """Advance to `now_us`; return the datagrams to send now."""
         if self.outcome is not None:
             return []
         datagrams = self.connection.poll(now_us)
-        if self._stage_began_us is None:
-            self._stage_began_us = now_us
+        if self._stage_start_us is None:
+            self._stage_start_us = now_us
         if self.connection.lost(now_us):
             self.fell_silent = True
             self._end(Outcome("lost", f"the vehicle fell silent while {self.stage.value}"))
@@ -201,33 +207,34 @@ class FlightClient:
         known."""
         return self.connection.next_heartbeat_us if self.stage is Stage.FLY else 0
 
-    def fly_on(self) -> None:
+    def start_manual_control(self) -> None:
         """The user takes control of the flight: it has no time limit from now on."""
         self._limit_s = math.inf
-        self._by_hand = True
+        self._is_manual = True
 
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it has not ended."""
         if self.outcome is None:
-            self._end(self._pending or Outcome("interrupted", reason))
+            self._end(self._pending_outcome or Outcome("interrupted", reason))
 
-    def lose(self, reason: str) -> None:
+    def end_as_lost(self, reason: str) -> None:
         """End the flight because a process or the link is gone."""
         if self.outcome is None:
-            self._end((self._pending or Outcome("lost")).because(reason))
+            self._end((self._pending_outcome or Outcome("lost")).with_reason(reason))
 
-    def explain_silence(self, why: str) -> None:
-        """Add to the outcome why the vehicle fell silent, if it did; `why` is empty if that is not known."""
+    def explain_silence(self, explanation: str) -> None:
+        """Add to the outcome why the vehicle fell silent, if it did; `explanation` is empty if that is not
+        known."""
         if self.fell_silent and self.outcome is not None:
-            self.outcome = self.outcome.because(why)
+            self.outcome = self.outcome.with_reason(explanation)
 
     # ---- the table at work
 
     def _advance(self, now_us: int) -> bool:
         """Finish the current operation or stage if it has ended; True if something changed."""
         if self.stage is Stage.FLY:
-            return self._judge()
-        row = self.row(self.stage)
+            return self._check_end()
+        row = self.stage_row(self.stage)
         if self._operations:
             result = self._operations[0].result
             if result is None:
@@ -236,55 +243,55 @@ class FlightClient:
                 self._refused(row, result, now_us)
                 return True
             if result.status is Status.UNANSWERED:
-                self._end(Outcome("lost", result.silence(self.connection.signatures.trouble)))
+                self._end(Outcome("lost", result.silence_text(self.connection.signatures.problem)))
                 return True
             self._operations.pop(0)
             return True
-        if row.done is None or row.done(self):
-            reason = row.barred(self) if row.barred else ""
+        if row.is_done is None or row.is_done(self):
+            reason = row.obstacle(self) if row.obstacle else ""
             if reason:
                 self._end(Outcome("refused", reason))
             else:
-                self._enter(row.after, now_us)
+                self._enter(row.next_stage, now_us)
             return True
-        began = self._stage_began_us if self._stage_began_us is not None else now_us
-        if row.limit_us is not None and now_us - began > row.limit_us:
-            if row.late is None:
-                self._enter(row.after, now_us)
+        start_us = self._stage_start_us if self._stage_start_us is not None else now_us
+        if row.limit_us is not None and now_us - start_us > row.limit_us:
+            if row.on_timeout is None:
+                self._enter(row.next_stage, now_us)
             else:
-                self._end(row.late(self))
+                self._end(row.on_timeout(self))
             return True
         return False
 
-    def _refused(self, row: Row, result: Result, now_us: int) -> None:
-        if row.refused is row.after:  # the flight continues without it
+    def _refused(self, row: StageRow, result: Result, now_us: int) -> None:
+        if row.stage_if_refused is row.next_stage:  # the flight continues without it
             self._operations.pop(0)
             return
-        reasons = self.view.complaints_since(self._texts_before)
-        outcome = self._pending or Outcome("refused", result.refusal(reasons))
-        if row.refused is Stage.OVER:
+        reasons = self.view.problems_since(self._texts_before)
+        outcome = self._pending_outcome or Outcome("refused", result.refusal_text(reasons))
+        if row.stage_if_refused is Stage.OVER:
             self._end(outcome)
         else:
-            self._pending = outcome
-            self._enter(row.refused, now_us)
+            self._pending_outcome = outcome
+            self._enter(row.stage_if_refused, now_us)
 
     def _enter(self, stage: Stage, now_us: int) -> None:
         if stage is Stage.OVER:
-            self._end(self._pending or Outcome("completed"))
+            self._end(self._pending_outcome or Outcome("completed"))
             return
         self.stage = stage
-        self._stage_began_us = now_us
+        self._stage_start_us = now_us
         self._texts_before = len(self.view.texts)
-        self.begun = self.begun or stage is Stage.START
+        self.started = self.started or stage is Stage.START
         if stage is Stage.ARM:
             self._texts_armed = len(self.view.texts)
         if stage is Stage.STREAMS and self.connection.target is not None:
             self._parameters = ParameterList(self.connection.target)
         if stage is Stage.FLY:
-            self._flight_began_us = self.view.time_us
+            self._flight_start_us = self.view.time_us
             self._operations, self._parameters = [], None
             return
-        operations = self.row(stage).operations
+        operations = self.stage_row(stage).operations
         self._operations = list(operations(self)) if operations else []
 
     def _end(self, outcome: Outcome) -> None:
@@ -294,18 +301,18 @@ class FlightClient:
 
     # ---- the flight itself
 
-    def _is_news(self, one: Received) -> bool:
+    def _has_changed(self, one: Received) -> bool:
         """Whether a watched message may contain something new compared with the last of its kind."""
         if one.id != mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
             return True
-        before, self._setpoint = self._setpoint, (_PHASE.of(one.frame), _SEQ.of(one.frame))
+        before, self._setpoint = self._setpoint, (_PHASE.read(one.frame), _SEQ.read(one.frame))
         return self._setpoint != before
 
-    def _watch(self) -> None:
+    def _update_facts(self) -> None:
         """Record facts from the latest messages, which the next messages may no longer contain."""
         view = self.view
         phase = view.phase
-        self._watch_mode()
+        self._update_mode()
         self._was_armed = self._was_armed or bool(view.armed)
         if phase is not None and phase not in _GROUND_PHASES and not self._was_airborne:
             self._was_airborne = True
@@ -320,75 +327,75 @@ class FlightClient:
             self._item_flown = setpoint.seq
         if setpoint is not None and setpoint.phase in _LANDING_PHASES:
             self._mission_over = self._mission_over or setpoint.seq == len(self.items) - 1
-        if self._pending is None:
-            reason = self._trouble()
+        if self._pending_outcome is None:
+            reason = self._failure()
             if reason:
-                self._pending = Outcome("diverged", reason)
-                self._given_up_us = view.time_us or 0
+                self._pending_outcome = Outcome("diverged", reason)
+                self._failed_us = view.time_us or 0
 
-    def _watch_mode(self) -> None:
+    def _update_mode(self) -> None:
         """Record if the vehicle leaves the mission mode, which this client never requests, and for which
         mode."""
         view = self.view
-        beat = view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-        if beat == self._beat or not view.armed:
+        heartbeat = view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+        if heartbeat == self._last_heartbeat or not view.armed:
             return
-        self._beat = beat
+        self._last_heartbeat = heartbeat
         if view.mode in _MISSION_MODES:
-            self._in_mission, self._left_for, self._texts_in_mission = True, "", len(view.texts)
+            self._in_mission, self._mode_after_mission, self._texts_in_mission = True, "", len(view.texts)
         elif self._in_mission:
-            self._left_for = view.mode or ""
+            self._mode_after_mission = view.mode or ""
 
-    def _who_ended_it(self) -> str:
+    def _why_mission_was_left(self) -> str:
         """Why the vehicle left the mission: its own reason if it reported one, else a command by another
         ground station."""
-        if not self._left_for or self._by_hand:
+        if not self._mode_after_mission or self._is_manual:
             return ""
-        said = self.view.complaints_since(self._texts_in_mission)
-        what = _ORDERS.get(self._left_for, f"mode {self._left_for}")
-        return "; ".join(said) or f"{what} commanded by another ground station"
+        reasons = self.view.problems_since(self._texts_in_mission)
+        action = _ACTION_OF_MODE.get(self._mode_after_mission, f"mode {self._mode_after_mission}")
+        return "; ".join(reasons) or f"{action} commanded by another ground station"
 
-    def _trouble(self) -> str:
+    def _failure(self) -> str:
         """Why the autopilot has given up; empty if it has not."""
         if self.view.phase == _FAILSAFE:
-            cries = self.view.complaints_since(self._texts_armed, mavlink.MAV_SEVERITY_CRITICAL)
-            return "; ".join(cries) or "the autopilot went into failsafe"
+            texts = self.view.problems_since(self._texts_armed, mavlink.MAV_SEVERITY_CRITICAL)
+            return "; ".join(texts) or "the autopilot went into failsafe"
         if self._was_airborne:
-            return "; ".join(self.view.complaints_since(self._texts_before, mavlink.MAV_SEVERITY_CRITICAL))
+            return "; ".join(self.view.problems_since(self._texts_before, mavlink.MAV_SEVERITY_CRITICAL))
         return ""
 
-    def _judge(self) -> bool:
+    def _check_end(self) -> bool:
         """End the flight if an end condition holds; True if it does."""
         view = self.view
         now_us = view.time_us
         if now_us is None:
             return False
-        if self._flight_began_us is None:
-            self._flight_began_us = now_us
-        if self._pending is not None and self._given_up_us is not None:
-            if now_us - self._given_up_us < AFTERMATH_US:
+        if self._flight_start_us is None:
+            self._flight_start_us = now_us
+        if self._pending_outcome is not None and self._failed_us is not None:
+            if now_us - self._failed_us < AFTERMATH_US:
                 return False
-            self._end(self._pending)
+            self._end(self._pending_outcome)
             return True
         if self._was_armed and view.armed is False:
-            self._end(self._landed())
+            self._end(self._landed_outcome())
             return True
-        if now_us - self._flight_began_us > self._limit_s * 1e6:
+        if now_us - self._flight_start_us > self._limit_s * 1e6:
             where = f"still in phase {view.phase_name or 'unknown'}, item {self._item()}"
             self._end(Outcome("timeout", f"not landed after {self._limit_s:.0f} s of flight: {where}"))
             return True
         return False
 
-    def _landed(self) -> Outcome:
+    def _landed_outcome(self) -> Outcome:
         if self._mission_over:
             return Outcome("completed")
         if self._was_airborne:
             where = f"item {self._item_flown} of {len(self.items) - 1}"
-            ended = Outcome(
+            outcome = Outcome(
                 "interrupted", f"the vehicle was disarmed before the end of the mission, at {where}"
             )
-            return ended.because(self._who_ended_it())
-        reasons = self.view.complaints_since(self._texts_armed)
+            return outcome.with_reason(self._why_mission_was_left())
+        reasons = self.view.problems_since(self._texts_armed)
         return Outcome("refused", "; ".join(["the vehicle disarmed before take-off", *reasons]))
 
     # ---- progress for display
@@ -396,13 +403,13 @@ class FlightClient:
     @property
     def progress(self) -> Progress:
         view = self.view
-        flying = self._flight_began_us is not None
+        flying = self._flight_start_us is not None
         time_us = view.time_us or 0
         fraction = 0.0
         if self.outcome is not None and self.outcome.name == "completed":
             fraction = 1.0
-        elif self._flight_began_us is not None and self._expected_s > 0.0:
-            fraction = min(1.0, (time_us - self._flight_began_us) * 1e-6 / self._expected_s)
+        elif self._flight_start_us is not None and self._expected_s > 0.0:
+            fraction = min(1.0, (time_us - self._flight_start_us) * 1e-6 / self._expected_s)
         return Progress(
             stage=self.stage,
             phase=(view.phase_name or self.stage.value) if flying else self.stage.value,
@@ -417,12 +424,12 @@ class FlightClient:
 
     def _item(self) -> int:
         setpoint = self.view.latest.get("LOAD_SETPOINT")
-        return int(setpoint.seq) if setpoint is not None and self._flight_began_us is not None else 0
+        return int(setpoint.seq) if setpoint is not None and self._flight_start_us is not None else 0
 
 
 _FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
 _MISSION_MODES = ("mission", "auto")  # of PX4 and of ArduPilot
-_ORDERS = {"land": "landing", "return": "return", "rtl": "return", "hold": "hold", "guided": "hold"}
+_ACTION_OF_MODE = {"land": "landing", "return": "return", "rtl": "return", "hold": "hold", "guided": "hold"}
 _GROUND_PHASES = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 _WATCHED = frozenset(
     {
@@ -433,7 +440,7 @@ _WATCHED = frozenset(
         mavlink.MAVLINK_MSG_ID_STATUSTEXT,
     }
 )
-_PHASE, _SEQ = (Field(mavlink.MAVLink_load_setpoint_message, name) for name in ("phase", "seq"))
+_PHASE, _SEQ = (FieldReader(mavlink.MAVLink_load_setpoint_message, name) for name in ("phase", "seq"))
 _LANDING_PHASES = {mavlink.PLUMBLINE_PHASE_LOWER, mavlink.PLUMBLINE_PHASE_SET_DOWN}
 
 
@@ -450,11 +457,11 @@ def _upload(client: FlightClient) -> list[Operation]:
     return [MissionUpload(client.connection.target, client.items)]
 
 
-def _single(make: Callable[..., Operation]) -> Callable[[FlightClient], list[Operation]]:
+def _one_operation(make: Callable[..., Operation]) -> Callable[[FlightClient], list[Operation]]:
     return lambda client: [make(client.connection.target)]
 
 
-def _found(client: FlightClient) -> bool:
+def _is_found(client: FlightClient) -> bool:
     return client.connection.target is not None and client.view.armed is not None
 
 
@@ -462,7 +469,7 @@ def _already_armed(client: FlightClient) -> str:
     return "the vehicle is armed already; land and disarm it first" if client.view.armed else ""
 
 
-def _ready(client: FlightClient) -> bool:
+def _is_ready(client: FlightClient) -> bool:
     return client.view.ready_to_arm is True
 
 
@@ -471,13 +478,19 @@ def _not_found(client: FlightClient) -> Outcome:
 
 
 _TABLE = {
-    Stage.FIND: Row(
-        Stage.STREAMS, done=_found, barred=_already_armed, limit_us=FIND_LIMIT_US, late=_not_found
+    Stage.FIND: StageRow(
+        Stage.STREAMS,
+        is_done=_is_found,
+        obstacle=_already_armed,
+        limit_us=FIND_LIMIT_US,
+        on_timeout=_not_found,
     ),
-    Stage.STREAMS: Row(Stage.UPLOAD, refused=Stage.UPLOAD, operations=_streams),
-    Stage.UPLOAD: Row(Stage.READY, operations=_upload),
-    Stage.READY: Row(Stage.ARM, done=_ready, limit_us=READY_LIMIT_US),
-    Stage.ARM: Row(Stage.START, operations=_single(command.arm)),
-    Stage.START: Row(Stage.FLY, refused=Stage.DISARM, operations=_single(command.start_mission)),
-    Stage.DISARM: Row(Stage.OVER, operations=_single(command.disarm)),
+    Stage.STREAMS: StageRow(Stage.UPLOAD, stage_if_refused=Stage.UPLOAD, operations=_streams),
+    Stage.UPLOAD: StageRow(Stage.READY, operations=_upload),
+    Stage.READY: StageRow(Stage.ARM, is_done=_is_ready, limit_us=READY_LIMIT_US),
+    Stage.ARM: StageRow(Stage.START, operations=_one_operation(command.arm)),
+    Stage.START: StageRow(
+        Stage.FLY, stage_if_refused=Stage.DISARM, operations=_one_operation(command.start_mission)
+    ),
+    Stage.DISARM: StageRow(Stage.OVER, operations=_one_operation(command.disarm)),
 }

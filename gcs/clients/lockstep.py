@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autopilot.wire.codec import Field, FrameWriter, layout_of
+from autopilot.wire.codec import FieldReader, FrameWriter, layout_of
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
@@ -18,9 +18,9 @@ from gcs.clients.flight import FlightClient
 from gcs.clients.operation import GROUND
 
 _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
-_TC1, _TS1 = (Field(mavlink.MAVLink_timesync_message, name) for name in ("tc1", "ts1"))
+_TC1, _TS1 = (FieldReader(mavlink.MAVLink_timesync_message, name) for name in ("tc1", "ts1"))
 _TIMES = {
-    message_id: Field(kind, "time_usec")
+    message_id: FieldReader(kind, "time_usec")
     for message_id, kind in mavlink.mavlink_map.items()
     if "time_usec" in kind.fieldnames
 }
@@ -41,11 +41,11 @@ class LockstepTurns:
     def question(self, datagram: bytes) -> int | None:
         """The vehicle's time in ns if `datagram` contains its question, else None."""
         for one in messages(datagram)[0]:
-            if one.id == mavlink.MAVLINK_MSG_ID_TIMESYNC and _TC1.of(one.frame) == 0:
-                return int(_TS1.of(one.frame))
+            if one.id == mavlink.MAVLINK_MSG_ID_TIMESYNC and _TC1.read(one.frame) == 0:
+                return int(_TS1.read(one.frame))
         return None
 
-    def repeated(self, question_ns: int) -> bytes | None:
+    def repeated_answer(self, question_ns: int) -> bytes | None:
         """The earlier answer if this question was already answered; empty if it is older than the last
         answered question; None if it is new."""
         if self._answered_ns is None or question_ns > self._answered_ns:
@@ -75,10 +75,10 @@ class TruthQueue:
         """Add datagrams in the order of their arrival."""
         for datagram in datagrams:
             received, _ = messages(datagram)
-            times = [_TIMES[one.id].of(one.frame) for one in received if one.id in _TIMES]
+            times = [_TIMES[one.id].read(one.frame) for one in received if one.id in _TIMES]
             self._waiting.append((max(times, default=0), datagram))
 
-    def until(self, now_us: int) -> list[bytes]:
+    def take_until(self, now_us: int) -> list[bytes]:
         """Remove and return the datagrams whose times are at most `now_us`."""
         ready = [datagram for time_us, datagram in self._waiting if time_us <= now_us]
         self._waiting = [(time_us, datagram) for time_us, datagram in self._waiting if time_us > now_us]

@@ -7,7 +7,7 @@ from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
-from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
+from gcs.clients.operation import GROUND, Result, Retry, Status, Target, is_addressed_to
 
 RETRY_US = 300_000
 SENDS = 12  # of one message; with 20 % lost each way, all twelve fail once in two hundred thousand
@@ -23,8 +23,8 @@ def _result_text(result: int) -> str:
     return str(entry.name).removeprefix("MAV_MISSION_").replace("_", " ").lower()
 
 
-def _ours(message: Any, kind: int = _MISSION) -> bool:
-    return addressed(message, GROUND) and getattr(message, "mission_type", _MISSION) == kind
+def _is_ours(message: Any, kind: int = _MISSION) -> bool:
+    return is_addressed_to(message, GROUND) and getattr(message, "mission_type", _MISSION) == kind
 
 
 class MissionUpload:
@@ -41,8 +41,8 @@ class MissionUpload:
         self._items = tuple(items)
         self._kind = kind  # MAV_MISSION_TYPE
         self._name = _NAMES.get(kind, "upload")
-        self._asked: list[int] = []  # items requested and not yet sent
-        self._last: int | None = None
+        self._requested: list[int] = []  # items requested and not yet sent
+        self._last_requested: int | None = None
         self._next = 0  # items 0 ... next-1 were requested
         self._restarts = 0
         self._retry = Retry(RETRY_US, SENDS)
@@ -52,14 +52,14 @@ class MissionUpload:
         return self._next, len(self._items)
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message, self._kind):
+        if self.result is not None or not self._retry.sent or not _is_ours(message, self._kind):
             return
         kind = message.get_msgId()
         if kind in (mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST):
             if message.seq < len(self._items):
-                if message.seq not in self._asked:
-                    self._asked.append(message.seq)
-                self._last = message.seq
+                if message.seq not in self._requested:
+                    self._requested.append(message.seq)
+                self._last_requested = message.seq
                 self._next = max(self._next, message.seq + 1)
         elif kind == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
             self._acknowledged(message.type)
@@ -80,31 +80,31 @@ class MissionUpload:
     def _restart(self) -> None:
         self._restarts += 1
         self._next = 0
-        self._last = None
-        self._asked.clear()
+        self._last_requested = None
+        self._requested.clear()
         self._retry.restart()
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None:
             return []
-        if self._asked:
-            answers = [self._item(seq) for seq in self._asked]
-            self._asked.clear()
+        if self._requested:
+            answers = [self._item(seq) for seq in self._requested]
+            self._requested.clear()
             self._retry.restart()
-            self._retry.asked(now_us)
+            self._retry.record_sent(now_us)
             return answers
         if not self._retry.due(now_us):
             return []
         if self._retry.exhausted:
-            if self._last is None or self._restarts >= RESTARTS:
+            if self._last_requested is None or self._restarts >= RESTARTS:
                 text = f"{self._name}: no answer at item {self._next} of {len(self._items)}"
                 self.result = Result(Status.UNANSWERED, text)
                 return []
             self._restart()
-        self._retry.asked(now_us)
-        if self._last is None:
+        self._retry.record_sent(now_us)
+        if self._last_requested is None:
             return [mavlink.MAVLink_mission_count_message(*self._target, len(self._items), self._kind)]
-        return [self._item(self._last)]
+        return [self._item(self._last_requested)]
 
     def _item(self, seq: int) -> Any:
         """Item `seq` with its place in whole numbers, whichever request came: a float32 resolves it only to a
@@ -135,14 +135,14 @@ class MissionDownload:
         self._target = target
         self._count: int | None = None
         self._retry = Retry(RETRY_US, SENDS)
-        self._acknowledge = False
+        self._ack_is_due = False
 
     @property
     def progress(self) -> tuple[int, int]:
         return len(self.items), self._count or 0
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message, self.kind):
+        if self.result is not None or not self._retry.sent or not _is_ours(message, self.kind):
             return
         kind = message.get_msgId()
         if kind == mavlink.MAVLINK_MSG_ID_MISSION_COUNT and self._count is None:
@@ -174,21 +174,23 @@ class MissionDownload:
             self.result = Result(Status.REFUSED, f"download: refused: {_result_text(message.type)}")
         if self.result is None and self._count is not None and len(self.items) == self._count:
             self.result = Result(Status.DONE, f"download: {self._count} items")
-            self._acknowledge = True
+            self._ack_is_due = True
 
     def poll(self, now_us: int) -> list[Any]:
-        if self._acknowledge:
-            self._acknowledge = False
+        if self._ack_is_due:
+            self._ack_is_due = False
             return [
                 mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, self.kind)
             ]
         if self.result is not None or not self._retry.due(now_us):
             return []
         if self._retry.exhausted:
-            of = "?" if self._count is None else self._count
-            self.result = Result(Status.UNANSWERED, f"download: no answer at item {len(self.items)} of {of}")
+            total = "?" if self._count is None else self._count
+            self.result = Result(
+                Status.UNANSWERED, f"download: no answer at item {len(self.items)} of {total}"
+            )
             return []
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         if self._count is None:
             return [mavlink.MAVLink_mission_request_list_message(*self._target, self.kind)]
         return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), self.kind)]
@@ -207,7 +209,7 @@ class MissionClear:
         return 0, 0
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message):
+        if self.result is not None or not self._retry.sent or not _is_ours(message):
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
             accepted = message.type == mavlink.MAV_MISSION_ACCEPTED
@@ -220,5 +222,5 @@ class MissionClear:
         if self._retry.exhausted:
             self.result = Result(Status.UNANSWERED, f"clear: no answer after {self._retry.sends} tries")
             return []
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         return [mavlink.MAVLink_mission_clear_all_message(*self._target, _MISSION)]

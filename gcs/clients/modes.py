@@ -33,11 +33,11 @@ _AUTO_MODES = {
     8: "follow",
     9: "precision-land",
 }
-_FLOWN = ("position", "offboard", "takeoff", "hold", "mission", "return", "land")
-# the modes of `_FLOWN`: main mode and sub-mode
+_SUPPORTED = ("position", "offboard", "takeoff", "hold", "mission", "return", "land")
+# the modes of `_SUPPORTED`: main mode and sub-mode
 _PX4: dict[str, tuple[int, int]] = {
-    **{name: (main, 0) for main, name in _MAIN_MODES.items() if name in _FLOWN},
-    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _FLOWN},
+    **{name: (main, 0) for main, name in _MAIN_MODES.items() if name in _SUPPORTED},
+    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _SUPPORTED},
 }
 MODES = tuple(sorted(_PX4))
 # other names of some modes: those of ArduPilot's clients, and PX4's names in MAVLink

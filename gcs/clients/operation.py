@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-_REFUSING = ("denied", "refused", "rejected", "mission item")  # in the words of vehicles
+_REFUSAL_WORDS = ("denied", "refused", "rejected", "mission item")  # in the words of vehicles
 
-_STEM = 3  # letters: a vehicle's text that begins with the same letters as the subject names the subject
+_STEM_LENGTH = (
+    3  # letters: a vehicle's text that begins with the same letters as the subject names the subject
+)
 
 
 class Target(NamedTuple):
@@ -48,22 +50,24 @@ class Result:
     def done(self) -> bool:
         return self.status is Status.DONE
 
-    def refusal(self, words: Sequence[str]) -> str:
-        """The text of a refusal: first those of the vehicle's texts `words` that refuse, then the others. If
+    def refusal_text(self, texts: Sequence[str]) -> str:
+        """The text of a refusal: first those of the vehicle's texts `texts` that refuse, then the others. If
         none of them refuses, `text` comes first."""
-        own = [one for one in words if self.subject and self._refuses(one)]
-        if not own:
-            return "; ".join([self.text, *words])
-        told = "; ".join([*own, *(one for one in words if one not in own)])
-        says_what = told.lower().startswith(self.subject[:_STEM].lower())  # arm: Arming denied ...
-        return told if says_what else f"{self.subject}: {told}"
+        refusals = [one for one in texts if self.subject and self._refuses(one)]
+        if not refusals:
+            return "; ".join([self.text, *texts])
+        joined = "; ".join([*refusals, *(one for one in texts if one not in refusals)])
+        names_subject = joined.lower().startswith(
+            self.subject[:_STEM_LENGTH].lower()
+        )  # arm: Arming denied ...
+        return joined if names_subject else f"{self.subject}: {joined}"
 
-    def _refuses(self, words: str) -> bool:
-        return words.startswith(self.subject) or any(one in words.lower() for one in _REFUSING)
+    def _refuses(self, text: str) -> bool:
+        return text.startswith(self.subject) or any(one in text.lower() for one in _REFUSAL_WORDS)
 
-    def silence(self, trouble: str) -> str:
-        """The text if no answer came, with a reason: the known `trouble` of the link, or else the guess."""
-        return "; ".join(filter(None, (self.text, trouble or self.guess)))
+    def silence_text(self, link_problem: str) -> str:
+        """The text if no answer came, with a reason: the known `link_problem`, or else the guess."""
+        return "; ".join(filter(None, (self.text, link_problem or self.guess)))
 
 
 class Operation(Protocol):
@@ -100,7 +104,7 @@ class Retry:
         """True if no tries are left; if also `due`, the last try was not answered."""
         return self.sent >= self.sends
 
-    def asked(self, now_us: int) -> None:
+    def record_sent(self, now_us: int) -> None:
         """Record that the question was sent."""
         self.sent += 1
         self._next_us = now_us + self.interval_us
@@ -115,7 +119,7 @@ class Retry:
         self._next_us = None
 
 
-def addressed(message: Any, ground: Target) -> bool:
+def is_addressed_to(message: Any, ground: Target) -> bool:
     """True if `message` is addressed to `ground` or to all systems (0 means all)."""
     system = getattr(message, "target_system", 0)
     component = getattr(message, "target_component", 0)

@@ -9,9 +9,9 @@ import math
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_encoding import from_the_wire
+from autopilot.wire.parameter_encoding import decode_parameter_value
 from autopilot.wire.parameter_table import NAME_LENGTH, decimal_from_float32, float32
-from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
+from gcs.clients.operation import GROUND, Result, Retry, Status, Target, is_addressed_to
 
 RETRY_US = 500_000
 SENDS = 6
@@ -51,7 +51,7 @@ class ParameterList:
         if message.param_index not in self._found:
             self._found[message.param_index] = (
                 message.param_id,
-                from_the_wire(message.param_value, message.param_type),
+                decode_parameter_value(message.param_value, message.param_type),
             )
             self._retry.restart()
             self._retry.wait(now_us, RETRY_US)
@@ -65,7 +65,7 @@ class ParameterList:
             text = f"parameters: {len(self._found)} of {self._count or '?'} came, then no answer"
             self.result = Result(Status.UNANSWERED, text)
             return []
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         if self._count is None:
             return [mavlink.MAVLink_param_request_list_message(*self._target)]
         gaps = [index for index in range(self._count) if index not in self._found][:BURST]
@@ -95,7 +95,7 @@ class ParameterGet:
             self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
             self.result = Result(Status.REFUSED, error, self.name)
         elif _is_value(message, self.name):
-            self.value = from_the_wire(message.param_value, message.param_type)
+            self.value = decode_parameter_value(message.param_value, message.param_type)
             self.result = Result(Status.DONE, f"{self.name} = {self.value:.9g}")
 
     def poll(self, now_us: int) -> list[Any]:
@@ -105,7 +105,7 @@ class ParameterGet:
             text = f"{self.name}: no answer after {self._retry.sends} tries"
             self.result = Result(Status.UNANSWERED, text, guess="has the vehicle this parameter?")
             return []
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         return [mavlink.MAVLink_param_request_read_message(*self._target, _name_bytes(self.name), -1)]
 
 
@@ -118,7 +118,7 @@ class ParameterSet:
         self.unknown = False  # the vehicle says that it has none of this name
         self._target = target
         self._value = float32(value)
-        self._held: float | None = None
+        self._reported: float | None = None
         self._retry = Retry(RETRY_US, SENDS)
 
     @property
@@ -133,25 +133,25 @@ class ParameterSet:
             self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
             self.result = Result(Status.REFUSED, error, self.name)
         elif _is_value(message, self.name):
-            held = from_the_wire(message.param_value, message.param_type)
-            if float32(held) == self._value:
+            reported = decode_parameter_value(message.param_value, message.param_type)
+            if float32(reported) == self._value:
                 self.result = Result(Status.DONE, f"{self.name} = {decimal_from_float32(self._value):.9g}")
             else:  # refused, or an answer to an older question: the next tries decide which
-                self._held = held
+                self._reported = reported
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None or not self._retry.due(now_us):
             return []
-        if self._retry.exhausted or (self._held is not None and self._retry.sent >= 3):
-            wanted = decimal_from_float32(self._value)
-            if self._held is None:
-                text = f"{self.name} = {wanted:.9g}: no answer after {self._retry.sent} tries"
+        if self._retry.exhausted or (self._reported is not None and self._retry.sent >= 3):
+            requested = decimal_from_float32(self._value)
+            if self._reported is None:
+                text = f"{self.name} = {requested:.9g}: no answer after {self._retry.sent} tries"
                 self.result = Result(Status.UNANSWERED, text)
             else:
-                text = f"{self.name} = {wanted:.9g}: the vehicle keeps {self._held:.9g}"
+                text = f"{self.name} = {requested:.9g}: the vehicle keeps {self._reported:.9g}"
                 self.result = Result(Status.REFUSED, text, self.name)
             return []
-        self._retry.asked(now_us)
+        self._retry.record_sent(now_us)
         return [
             mavlink.MAVLink_param_set_message(
                 *self._target, _name_bytes(self.name), self._value, mavlink.MAV_PARAM_TYPE_REAL32
@@ -171,6 +171,6 @@ def _error(message: Any, name: str) -> str | None:
     """The text of a PARAM_ERROR about `name`; None if `message` is something else."""
     if message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_ERROR:
         return None
-    if message.param_id != name or not addressed(message, GROUND):
+    if message.param_id != name or not is_addressed_to(message, GROUND):
         return None
     return f"{name}: {_ERRORS.get(message.error, f'refused (error {message.error})')}"

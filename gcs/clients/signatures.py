@@ -29,7 +29,7 @@ class Signatures:
     def __init__(self, signing: Signing | None = None) -> None:
         self._signing = signing
         self._verified = False  # a signed frame was heard
-        self._trouble = ""
+        self._problem = ""
 
     def accepts(self, one: Received) -> bool:
         """Whether the message is accepted."""
@@ -37,26 +37,26 @@ class Signatures:
         is_signed = one.frame[0] == _V2 and bool(one.frame[2] & mavlink.MAVLINK_IFLAG_SIGNED)
         if signing is None:
             if is_signed:
-                self._trouble = _NO_KEY
+                self._problem = _NO_KEY
             return True
-        heard = signing.accepts(one.frame, one.id, one.system, one.component)
-        if is_signed and heard:
+        is_accepted = signing.accepts(one.frame, one.id, one.system, one.component)
+        if is_signed and is_accepted:
             self._verified = True
         elif not is_signed:
             if one.id != mavlink.MAVLINK_MSG_ID_RADIO_STATUS:  # radios cannot sign
-                self._trouble = _UNSIGNED
+                self._problem = _UNSIGNED
         else:
             # if a signing state without earlier time stamps accepts it, the key is right
             by_key = Signing(signing.key).accepts(one.frame, one.id, one.system, one.component)
-            self._trouble = _OTHER_TIME if by_key else _OTHER_KEY
-        return heard
+            self._problem = _OTHER_TIME if by_key else _OTHER_KEY
+        return is_accepted
 
     @property
-    def met(self) -> bool:
+    def are_valid(self) -> bool:
         """Whether a signed frame of the vehicle was accepted, or no signatures are required."""
         return self._signing is None or self._verified
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """What does not match, and what to do; empty if no problem is known."""
-        return "" if self._verified else self._trouble
+        return "" if self._verified else self._problem

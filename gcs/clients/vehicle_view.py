@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from autopilot.wire.codec import Field, Received
+from autopilot.wire.codec import FieldReader, Received
 from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.modes import mode_name
@@ -20,11 +20,11 @@ _RECALLED = re.compile(r"\[(\d+)/(\d+), (-?\d+\.\d) s ago\] (.*)", re.DOTALL)
 _STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
 _IDS = {kind.msgname: message_id for message_id, kind in mavlink.mavlink_map.items()}
 _CLOCKS = [
-    (kind.id, Field(kind, "time_usec"))
+    (kind.id, FieldReader(kind, "time_usec"))
     for kind in (mavlink.MAVLink_load_setpoint_message, mavlink.MAVLink_cascade_errors_message)
 ]
 _SOURCES = {
-    message_id: Field(kind, "source")
+    message_id: FieldReader(kind, "source")
     for message_id, kind in mavlink.mavlink_map.items()
     if "source" in kind.fieldnames
 }
@@ -62,7 +62,7 @@ class Text(NamedTuple):
     text: str
 
 
-class Newest(Mapping[str, Any]):
+class LatestMessages(Mapping[str, Any]):
     """The newest message of each name; a message is decoded only when it is read."""
 
     def __init__(self) -> None:
@@ -91,8 +91,8 @@ class VehicleView:
     """The state of the vehicle, updated by `update`; a property is None until the vehicle has sent it."""
 
     def __init__(self) -> None:
-        self.latest = Newest()  # of the vehicle
-        self.truth = Newest()  # of the simulated world
+        self.latest = LatestMessages()  # of the vehicle
+        self.truth = LatestMessages()  # of the simulated world
         self.texts: list[Text] = []
         self.recalled: list[Text] = []  # earlier texts that the vehicle sent again on request
         self.recalled_all = False  # the last of these has come
@@ -104,32 +104,32 @@ class VehicleView:
             self._text(received.message, now_us)
             return
         source = _SOURCES.get(received.id)
-        if source is not None and source.of(received.frame) == mavlink.PLUMBLINE_SOURCE_TRUTH:
+        if source is not None and source.read(received.frame) == mavlink.PLUMBLINE_SOURCE_TRUTH:
             self.truth.put(received)
         else:
             self.latest.put(received)
 
     def _text(self, message: Any, now_us: int) -> None:
         if not message.id:
-            self._said(now_us, message.severity, message.text)
+            self._add_text(now_us, message.severity, message.text)
             return
         chunks = self._chunks.setdefault(message.id, [])
         if message.chunk_seq == len(chunks):
             chunks.append(message.text)
         if len(message.text.encode()) < _TEXT_LENGTH:
-            self._said(now_us, message.severity, "".join(chunks))
+            self._add_text(now_us, message.severity, "".join(chunks))
             del self._chunks[message.id]
 
-    def _said(self, now_us: int, severity: int, text: str) -> None:
-        again = _RECALLED.fullmatch(text)
-        if again is None:
+    def _add_text(self, now_us: int, severity: int, text: str) -> None:
+        match = _RECALLED.fullmatch(text)
+        if match is None:
             self.texts.append(Text(now_us, severity, text))
             return
-        number, total, age_s, said = again.groups()
-        self.recalled.append(Text(now_us - round(float(age_s) * 1e6), severity, said))
+        number, total, age_s, original = match.groups()
+        self.recalled.append(Text(now_us - round(float(age_s) * 1e6), severity, original))
         self.recalled_all = number == total
 
-    def complaints_since(self, count: int, severity: int = mavlink.MAV_SEVERITY_WARNING) -> list[str]:
+    def problems_since(self, count: int, severity: int = mavlink.MAV_SEVERITY_WARNING) -> list[str]:
         """Texts at least as severe as `severity` that came after the first `count` texts, without repeats."""
         found = [text.text for text in self.texts[count:] if text.severity <= severity]
         return list(dict.fromkeys(found))
@@ -187,7 +187,7 @@ class VehicleView:
     def time_us(self) -> int | None:
         """The vehicle's clock since boot, from its most frequent messages if there are any."""
         frames = [(clock, self.latest.frame(message_id)) for message_id, clock in _CLOCKS]
-        times = [clock.of(frame) for clock, frame in frames if frame is not None]
+        times = [clock.read(frame) for clock, frame in frames if frame is not None]
         if times:
             return int(max(times))
         clock = self.latest.get(BOOT_CLOCK)

@@ -48,10 +48,10 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
         else:
             from gcs.report.overview import overview
 
-            table, missed = overview(found, console.width)
+            table, hidden = overview(found, console.width)
             console.print(table)
-            too = f" What differs too: {', '.join(missed)}." if missed else ""
-            click.echo(f"The page and --json have all figures.{too}")
+            also_differs = f" What differs too: {', '.join(hidden)}." if hidden else ""
+            click.echo(f"The page and --json have all figures.{also_differs}")
         if any(row.best for _, rows in figures(found) for row in rows):
             click.echo(STAR)
     click.echo(f"comparison: {page}")

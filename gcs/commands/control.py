@@ -16,13 +16,17 @@ from gcs.shell.link import Address
 from gcs.shell.session import Session
 
 
-def _send(address: Address, make: Callable[[Session], Operation], begins: bool = False) -> None:
-    """Send one command and print the answer. `begins`: a disarmed vehicle executes it once it is armed."""
+def _send(address: Address, make: Callable[[Session], Operation], needs_arming: bool = False) -> None:
+    """Send one command and print the answer. `needs_arming`: a disarmed vehicle executes it when armed."""
     with Session(address) as session:
         session.find()
         text = session.run(make(session)).text
-        waits = "; it begins when the vehicle is armed: gcs arm" if begins and not session.view.armed else ""
-        click.echo(text + waits)
+        arming_hint = (
+            "; it begins when the vehicle is armed: gcs arm"
+            if needs_arming and not session.view.armed
+            else ""
+        )
+        click.echo(text + arming_hint)
 
 
 @click.command("arm")
@@ -64,7 +68,7 @@ def start_command(address: Address) -> None:
 
     A disarmed vehicle accepts the command and starts when it is armed.
     """
-    _send(address, lambda session: command.start_mission(session.target), begins=True)
+    _send(address, lambda session: command.start_mission(session.target), needs_arming=True)
 
 
 @click.command("pause")
@@ -105,7 +109,7 @@ def takeoff_command(height: float | None, altitude: float | None, address: Addre
             return command.takeoff(session.target)
         return command.takeoff(session.target, vehicle_home(session).altitude_m + altitude_m)
 
-    _send(address, make, begins=True)
+    _send(address, make, needs_arming=True)
 
 
 @click.command("goto", context_settings={"ignore_unknown_options": True})  # -1 is a number here
@@ -137,8 +141,8 @@ def goto_command(
     with Session(address) as session:
         session.find()
         move = reposition(session, (east, north, up), frame == "load", speed)
-        way = "" if isnan(move.distance_m) else f"; {move.distance_m:.1f} m to go"
-        click.echo(session.run(move.operation).text + way)
+        distance_text = "" if isnan(move.distance_m) else f"; {move.distance_m:.1f} m to go"
+        click.echo(session.run(move.operation).text + distance_text)
 
 
 @click.command("land")

@@ -8,7 +8,7 @@ import click
 
 from autopilot.shell.options import WholeNumber
 from gcs.commands.options import OUTPUT_FILE, OUTPUT_FOLDER, fresh_option, json_option, print_json
-from gcs.shell.display import say
+from gcs.shell.display import notify
 
 
 @click.group("experiments")
@@ -60,4 +60,4 @@ def thesis_command(
     if not quiet:
         print_tables(report.records)
     click.echo(f"report: {out / PAGE_FILE}")
-    say(f"thesis: {len(report.records)} flights, {len(report.drawn)} figures")
+    notify(f"thesis: {len(report.records)} flights, {len(report.drawn)} figures")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from autopilot.shell.options import MOST_SEED, MOST_SPEED, WholeNumber
+from autopilot.shell.options import MAX_SEED, MAX_SPEED, WholeNumber
 from gcs.commands.options import (
     OUTPUT_FOLDER,
     AddressType,
@@ -27,14 +27,14 @@ from gcs.commands.options import (
     vehicle_option,
 )
 from gcs.errors import EXIT_DONE, EXIT_REQUIRED
-from gcs.shell.display import say, to_reader
+from gcs.shell.display import notify, write_to_stdout
 from gcs.shell.link import DEFAULT_PORT, Address
 
 if TYPE_CHECKING:
     from gcs.analysis.record import Record
     from gcs.clients.flight import Outcome
 
-_OWN = (
+_STARTED_ONLY = (
     "law",
     "estimator",
     "planner",
@@ -60,12 +60,12 @@ _OWN = (
     help="Fly with a third-party autopilot, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
 )
 @click.option(
-    "--seed", type=WholeNumber(0, MOST_SEED), default=1, show_default=True, help="Seed of all noise."
+    "--seed", type=WholeNumber(0, MAX_SEED), default=1, show_default=True, help="Seed of all noise."
 )
 @click.option("--lockstep", is_flag=True, help="Fly as fast as possible, reproducible to the byte (default).")
 @click.option(
     "--speed",
-    type=PositiveType(most=MOST_SPEED),
+    type=PositiveType(max_value=MAX_SPEED),
     help="Fly at NUMBER times real time; other ground stations can watch on ports 14550 and 14540.",
 )
 @click.option(
@@ -156,7 +156,9 @@ def fly_command(
     if real_time and speed is None:
         speed = 1.0
     if connect is not None:
-        given = [name for name in _OWN if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+        given = [
+            name for name in _STARTED_ONLY if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        ]
         if given:
             option = "--set" if given[0] == "settings" else f"--{given[0].replace('_', '-')}"
             raise click.UsageError(
@@ -175,7 +177,7 @@ def fly_command(
         for name in ("law", "estimator", "planner"):
             if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
                 raise click.UsageError(f"--{name} is for our own autopilot; --autopilot brings its own", ctx)
-        from gcs.workflows.own_firmware import firmware_program
+        from gcs.workflows.firmware_processes import firmware_program
 
         program = firmware_program(firmware)
     page = None
@@ -196,26 +198,31 @@ def fly_command(
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
-    from gcs.workflows.requirements import conclude, judge, read_requirements, reporting
+    from gcs.workflows.requirements import (
+        check_requirements,
+        junit_on_error,
+        parse_requirements,
+        report_verdicts,
+    )
 
     requirements = []
     if required:
         from gcs.analysis.definitions import METRICS
 
-        requirements = read_requirements(required, list(METRICS), "gcs fly --json and docs/report.md")
+        requirements = parse_requirements(required, list(METRICS), "gcs fly --json and docs/report.md")
 
-    unread: list[OSError] = []
+    output_errors: list[OSError] = []
 
-    def told(record: Record, outcome: Outcome) -> None:
+    def report(record: Record, outcome: Outcome) -> None:
         try:
             if as_json:
-                to_reader(lambda: print_json(record))
+                write_to_stdout(lambda: print_json(record))
             elif not quiet:
-                to_reader(lambda: print_record(record))
+                write_to_stdout(lambda: print_record(record))
         except OSError as error:  # of stdout, for example on a full disk: the report is made nevertheless
-            unread.append(error)
+            output_errors.append(error)
         reason = f": {outcome.reason}" if outcome.reason else ""
-        say(f"{mission}: {outcome.name}{reason}")
+        notify(f"{mission}: {outcome.name}{reason}")
 
     options = FlightOptions(
         mission=mission,
@@ -239,13 +246,15 @@ def fly_command(
         pictures=pictures,
     )
     run = f"gcs fly {mission}"
-    with reporting(run, junit):
-        flight = fly(options, told, page, processes)
-    if unread:
-        raise unread[0]
+    with junit_on_error(run, junit):
+        flight = fly(options, report, page, processes)
+    if output_errors:
+        raise output_errors[0]
     if not (as_json or quiet):
-        to_reader(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
+        write_to_stdout(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
     wall_s = flight.record["wall_s"] or 0.0
     outcome = flight.outcome
-    met = conclude(run, junit, outcome.name, wall_s, judge(requirements, flight.record), outcome.reason)
-    return flight.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)
+    all_met = report_verdicts(
+        run, junit, outcome.name, wall_s, check_requirements(requirements, flight.record), outcome.reason
+    )
+    return flight.exit_code or (EXIT_DONE if all_met else EXIT_REQUIRED)

@@ -15,7 +15,7 @@ from gcs.commands.options import (
     vehicle_option,
 )
 from gcs.errors import EXIT_DONE, EXIT_ERROR
-from gcs.shell.display import told_if_slow
+from gcs.shell.display import notify_if_slow
 
 
 @click.command("missions")
@@ -75,7 +75,7 @@ def check_command(
     if planner and as_asked:
         raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)
 
-    from gcs.workflows.before_flight import CHECKING
+    from gcs.workflows.before_flight import CHECKING_TEXT
     from gcs.workflows.check_mission import check_mission
 
     if planner:
@@ -84,7 +84,7 @@ def check_command(
         with own_planner(planner, vehicle) as own:
             found = check_mission(mission, vehicle, as_asked, own)
     else:
-        with told_if_slow(CHECKING, as_json):
+        with notify_if_slow(CHECKING_TEXT, as_json):
             found = check_mission(mission, vehicle, as_asked)
     if as_json:
         print_json(asdict(found))

@@ -24,5 +24,5 @@ def new_command(kind: str, name: str) -> None:
     gcs new vehicle mine
     gcs new sensors room
     """
-    made = new_file(kind, name)
-    click.echo(f"{made.path} is written; it flies as it is:\n\n    {made.fly}\n")
+    written = new_file(kind, name)
+    click.echo(f"{written.path} is written; it flies as it is:\n\n    {written.fly}\n")

@@ -12,20 +12,20 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from autopilot.shell.options import NamedPath, WholeNumber
+from autopilot.shell.options import NonEmptyPath, WholeNumber
 from gcs.errors import InputError
 from gcs.folders import check_writable
-from gcs.shell.display import keep_stdout_for_results, to_reader, to_results
+from gcs.shell.display import reserve_stdout_for_results, results_to_stdout, write_to_stdout
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 from missions.units import split_unit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-Completing = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
-def names_or_files(names: Callable[[], Iterable[str]]) -> Completing:
+def names_or_files(names: Callable[[], Iterable[str]]) -> Completer:
     """Shell completion of a word that is one of these names, or the path of a file."""
 
     def complete(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -76,7 +76,7 @@ class TruthType(click.ParamType):  # type: ignore[type-arg]
         return address
 
 
-class OutputPath(NamedPath):
+class OutputPath(NonEmptyPath):
     """The path that a command writes to; refused before anything is done if it cannot be written."""
 
     def __init__(self, is_folder: bool) -> None:
@@ -116,20 +116,20 @@ class FiniteType(click.ParamType):  # type: ignore[type-arg]
 
 
 class PositiveType(click.ParamType):  # type: ignore[type-arg]
-    """A finite number > 0, and at most `most` if there is a bound."""
+    """A finite number > 0, and at most `max_value` if there is a bound."""
 
     name = "NUMBER"
 
-    def __init__(self, most: float = math.inf) -> None:
-        self._most = most
+    def __init__(self, max_value: float = math.inf) -> None:
+        self._max_value = max_value
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
             number = float(value)
         except ValueError:
             number = math.nan
-        if not (0.0 < number <= self._most and math.isfinite(number)):
-            bound = f" and <= {self._most:g}" if math.isfinite(self._most) else ""
+        if not (0.0 < number <= self._max_value and math.isfinite(number)):
+            bound = f" and <= {self._max_value:g}" if math.isfinite(self._max_value) else ""
             self.fail(f"{value!r}; must be a number > 0{bound}", param, ctx)
         return number
 
@@ -225,7 +225,7 @@ class LawType(click.ParamType):  # type: ignore[type-arg]
             try:
                 load_law(law)
             except OwnError as error:
-                raise _unusable(error, param) from None
+                raise _own_code_error(error, param) from None
         return law
 
     def shell_complete(
@@ -252,7 +252,7 @@ def law_option(function: F) -> F:
     )
 
 
-def _unusable(error: Exception, param: click.Parameter | None) -> InputError:
+def _own_code_error(error: Exception, param: click.Parameter | None) -> InputError:
     """The error for an unusable custom class; no usage error, as the command's help does not explain it."""
     return InputError(f"{param.opts[0]} {error}" if param else str(error))
 
@@ -271,7 +271,7 @@ class OwnType(click.ParamType):  # type: ignore[type-arg]
         try:
             self._load(str(value))
         except OwnError as error:
-            raise _unusable(error, param) from None
+            raise _own_code_error(error, param) from None
         return str(value)
 
 
@@ -351,35 +351,35 @@ def json_option(function: F) -> F:
         "as_json",
         is_flag=True,
         is_eager=True,  # before a custom class is loaded, which may print
-        callback=_json_alone,
+        callback=_reserve_stdout,
         help="Print only the result, as JSON.",
     )(function)
 
 
-def _json_alone(ctx: click.Context, _: click.Parameter, as_json: bool) -> bool:
+def _reserve_stdout(ctx: click.Context, _: click.Parameter, as_json: bool) -> bool:
     # a sweep also flies in this process: what a custom law prints in its flights does not belong on stdout
     if (as_json or ctx.info_name == "sweep") and not ctx.resilient_parsing:  # set during completion
-        keep_stdout_for_results()
+        reserve_stdout_for_results()
     return as_json
 
 
 def print_json(record: Mapping[str, Any] | Sequence[Any]) -> None:
     """Print `record` on stdout; numbers that JSON cannot express become null."""
-    with to_results():
-        click.echo(json.dumps(_plain(record), indent=2, allow_nan=False))
+    with results_to_stdout():
+        click.echo(json.dumps(_json_value(record), indent=2, allow_nan=False))
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_json_value(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
 
 
-def spoken(key: str) -> str:
+def display_name(key: str) -> str:
     """A key of a record as displayed: `cable_tension_n` is `cable tension (N)`."""
     name, unit = split_unit(key)
     return name.replace("_", " ") + (f" ({unit.sign})" if unit else "")
@@ -395,4 +395,4 @@ def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> No
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
         for line in lines
     )
-    to_reader(lambda: click.echo(text))
+    write_to_stdout(lambda: click.echo(text))

@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 import click
 
 from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table
-from gcs.shell.display import say
+from gcs.shell.display import notify
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_MOST_DECIMALS = 6
-_NUMBERS = {  # the identified quantities as displayed
+_MAX_DECIMALS = 6
+_QUANTITIES = {  # the identified quantities as displayed
     "tracked_length_m": "cable length, by the distance of the load (m)",
     "length_m": "cable length, by the swing (m)",
     "drag_per_m": "quadratic drag / mass of the load (1/m)",
@@ -32,7 +32,7 @@ _NUMBERS = {  # the identified quantities as displayed
     "attitude_delay_s": "delay of the attitude (s)",
     "vehicle_drag_per_m": "quadratic drag / mass of the vehicle (1/m)",
 }
-_WORDS = {
+_SCORE_TITLES = {
     "ahead_2s": "predicted 2 s ahead",
     "ahead_5s": "predicted 5 s ahead",
     "pose_alone": "from the vehicle's pose alone",
@@ -68,10 +68,10 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 
     record = identify(file, columns, as_json)
     if record["doubt"]:
-        say(record["doubt"])
-    names = [_NUMBERS[name] for name in record["not_told"]]
+        notify(record["doubt"])
+    names = [_QUANTITIES[name] for name in record["not_told"]]
     if names:
-        say(
+        notify(
             f"the recording does not tell: {', '.join(names)}; load and vehicle move too little for it: "
             "record a longer or faster flight, with swings, turns and stops"
         )
@@ -81,7 +81,11 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     _print_rows(record)
     print_table(
         [
-            (_NUMBERS[name], *with_interval(one["value"], one["half_width"]), _told(name, record))
+            (
+                _QUANTITIES[name],
+                *with_interval(one["value"], one["half_width"]),
+                _determined_text(name, record),
+            )
             for name, one in record["identified"].items()
         ]
     )
@@ -108,15 +112,19 @@ def replay_command(file: Path, columns: str | None, out: Path | None, as_json: b
 
     record, folder = replay(file, columns, out, as_json)
     if record["doubt"]:
-        say(record["doubt"])
+        notify(record["doubt"])
     if as_json:
         print_json(record)
         return
     _print_rows(record)
     for name, scores in record.items():
         if isinstance(scores, dict) and name != "innovations":
-            shown = ", ".join(_shown(key, value) for key, value in scores.items() if math.isfinite(value))
-            click.echo(f"{_WORDS[name]}: {shown or 'nothing; no stretch without a break is so long'}")
+            scores_text = ", ".join(
+                _score_text(key, value) for key, value in scores.items() if math.isfinite(value)
+            )
+            click.echo(
+                f"{_SCORE_TITLES[name]}: {scores_text or 'nothing; no stretch without a break is so long'}"
+            )
     for name, one in record.get("innovations", {}).items():
         click.echo(
             f"innovations of {name}: {one['mean_square_per_axis']:.2f} per axis, {one['refused']} refused"
@@ -126,28 +134,28 @@ def replay_command(file: Path, columns: str | None, out: Path | None, as_json: b
 
 
 def _print_rows(record: dict[str, Any]) -> None:
-    broken = f", broken at {record['breaks']} rows" if record["breaks"] else ""
+    breaks = f", broken at {record['breaks']} rows" if record["breaks"] else ""
     jitter = f", jitter {1e3 * record['row_jitter_s']:.1f} ms" if record["row_jitter_s"] else ""
     source = ": the true states of a simulated flight" if record["true_states"] else ""
-    click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}{source}")
+    click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{breaks}{source}")
 
 
 def with_interval(value: float, half_width: float) -> tuple[str, str]:
-    """A number and +- half its interval, both to two digits of the latter and at most `_MOST_DECIMALS`
+    """A number and +- half its interval, both to two digits of the latter and at most `_MAX_DECIMALS`
     decimals; a half interval that needs more decimals is written with an exponent."""
     if not math.isfinite(half_width):
         return f"{value:z.4f}", "+- ?"
-    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else _MOST_DECIMALS
-    decimals = min(max(digits, 0), _MOST_DECIMALS)
+    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else _MAX_DECIMALS
+    decimals = min(max(digits, 0), _MAX_DECIMALS)
     width = f"{half_width:.{decimals}f}" if digits == decimals or digits < 0 else f"{half_width:.1e}"
     return f"{value:z.{decimals}f}", f"+- {width}"
 
 
-def _told(name: str, record: dict[str, Any]) -> str:
+def _determined_text(name: str, record: dict[str, Any]) -> str:
     return "not determined by this recording" if name in record["not_told"] else ""
 
 
-def _shown(key: str, value: float) -> str:
+def _score_text(key: str, value: float) -> str:
     if key == "median_m":
         return f"median {1e3 * value:.1f} mm"
     if key == "inside_95":

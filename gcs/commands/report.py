@@ -35,14 +35,14 @@ def report_command(
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. The command
     writes summary.json, flight.parquet, overview.png and report.html, all from the telemetry alone.
     """
-    from gcs.shell.display import say
-    from gcs.workflows.report import make_common, make_mcap, print_record, report_again
+    from gcs.shell.display import notify
+    from gcs.workflows.report import make_common, make_mcap, print_record, remake_report
 
     if mcap:
         from gcs.analysis.mcap import require_libraries
 
         require_libraries()  # before the work, not after it
-    record, folder = report_again(source, out, quiet or as_json, pictures)
+    record, folder = remake_report(source, out, quiet or as_json, pictures)
     if as_json:
         print_json(record)
     elif not quiet:
@@ -50,10 +50,10 @@ def report_command(
     if record["outcome"] == "no telemetry":
         raise InputError(f"{source}: holds no telemetry of a Plumbline vehicle")
     if not record["samples"]:
-        say(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
-    beside = [make_common(source, folder)] if common else []
-    beside += [make_mcap(source, folder)] if mcap else []
+        notify(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
+    extra_files = [make_common(source, folder)] if common else []
+    extra_files += [make_mcap(source, folder)] if mcap else []
     if not as_json:
-        for path in beside:
+        for path in extra_files:
             click.echo(f"{path.name}: {path}")
         click.echo(f"report: {folder / 'report.html'}")

@@ -7,8 +7,15 @@ from typing import Any
 
 import click
 
-from gcs.commands.options import connect_option, json_option, print_json, print_table, spoken, truth_option
-from gcs.shell.display import say
+from gcs.commands.options import (
+    connect_option,
+    display_name,
+    json_option,
+    print_json,
+    print_table,
+    truth_option,
+)
+from gcs.shell.display import notify
 from gcs.shell.link import Address
 from gcs.workflows.status import vehicle_status, vehicle_texts
 
@@ -27,7 +34,7 @@ def status_command(as_json: bool, address: Address, truth_at: Address | None) ->
         print_json(record)
         return
     texts = record.pop("texts")
-    print_table([(spoken(name), _shown(value)) for name, value in record.items()])
+    print_table([(display_name(name), _value_text(value)) for name, value in record.items()])
     if texts:
         click.echo()
         print_table(_lines(texts))
@@ -48,14 +55,14 @@ def texts_command(as_json: bool, address: Address) -> None:
     elif texts:
         print_table(_lines(texts))
     else:
-        say("the vehicle has sent no texts yet, or keeps none")
+        notify("the vehicle has sent no texts yet, or keeps none")
 
 
 def _lines(texts: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
     return [(f"{one['age_s']:.1f} s ago", one["severity"], one["text"]) for one in texts]
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):

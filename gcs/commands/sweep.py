@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from autopilot.shell.options import WholeNumber
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.commands.options import (
@@ -26,7 +26,7 @@ from gcs.commands.options import (
     vehicle_option,
 )
 from gcs.errors import EXIT_DONE, EXIT_REQUIRED
-from gcs.shell.display import say, to_results
+from gcs.shell.display import notify, results_to_stdout
 
 
 @click.command("sweep")
@@ -132,24 +132,24 @@ def sweep_command(
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
-    from gcs.batch.progress import pace
+    from gcs.batch.progress import rate_text
     from gcs.workflows.requirements import (
+        ALL_FLOWN,
         COMPLETED,
-        WHOLE,
-        conclude,
-        judge,
-        read_requirements,
-        reporting,
-        unjudged,
+        check_requirements,
+        junit_on_error,
+        parse_requirements,
+        report_verdicts,
+        uncovered_failures,
     )
     from gcs.workflows.sweep import FIGURES, SweepOptions, run_sweep
 
-    requirements = read_requirements(required, FIGURES, "gcs sweep --json")
+    requirements = parse_requirements(required, FIGURES, "gcs sweep --json")
     run = f"gcs sweep {mission}"
     options = SweepOptions(
         mission=mission,
         laws=laws or (DEFAULT_LAW,),
-        own=Own(estimator=estimator or "", planner=planner or ""),
+        own=OwnCode(estimator=estimator or "", planner=planner or ""),
         sensors=sensors,
         vehicle=vehicle,
         varied=varied,
@@ -165,27 +165,30 @@ def sweep_command(
         quiet=quiet or as_json,
         command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
     )
-    with reporting(run, junit, WHOLE):
+    with junit_on_error(run, junit, ALL_FLOWN):
         sweep = run_sweep(options)
     if as_json:
         print_json(sweep.record)
     else:
-        done = sweep.done
-        flew = f", {pace(done.flights_per_s)}" if done.flown else ""
-        if done.flown < done.flights:
-            flew += f"; {done.flights - done.flown} of them were there already"
-        say(
-            f"{sweep.name}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}"
+        counts = sweep.counts
+        rate = f", {rate_text(counts.flights_per_s)}" if counts.flown else ""
+        if counts.flown < counts.flights:
+            rate += f"; {counts.flights - counts.flown} of them were there already"
+        notify(
+            f"{sweep.name}: {counts.flights} of {sweep.planned} flights flown, "
+            f"{counts.completed} completed{rate}"
         )
-        with to_results():
+        with results_to_stdout():
             for one in () if quiet else sweep.flights:
                 click.echo(
                     f"{one['law']}, {one['kind']} (flight {one['index']}, {one['told']}): {one['command']}"
                 )
             click.echo(f"{'table' if table_only else 'report'}: {sweep.result}")
-    outcome = COMPLETED if sweep.done.whole else "interrupted"
-    verdicts = judge(requirements, sweep.record)
-    met = conclude(run, junit, outcome, sweep.done.wall_s, verdicts, case=WHOLE)
-    if sweep.done.whole and (remark := unjudged(requirements, sweep.done.flights, sweep.done.completed)):
-        say(remark)
-    return sweep.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)
+    outcome = COMPLETED if sweep.counts.is_complete else "interrupted"
+    verdicts = check_requirements(requirements, sweep.record)
+    all_met = report_verdicts(run, junit, outcome, sweep.counts.wall_s, verdicts, case=ALL_FLOWN)
+    if sweep.counts.is_complete and (
+        remark := uncovered_failures(requirements, sweep.counts.flights, sweep.counts.completed)
+    ):
+        notify(remark)
+    return sweep.exit_code or (EXIT_DONE if all_met else EXIT_REQUIRED)

@@ -53,7 +53,7 @@ def view_command(
         connect=addresses,
         host=bind,
         port=port,
-        opens=not no_open,
+        opens_browser=not no_open,
         truth=None if no_truth else truth_at or SITL_TRUTH,
     )
     if feed is not None:

@@ -26,7 +26,7 @@ def warmup_command(law: str, all_laws: bool, sweeps: bool, quiet: bool) -> None:
     Sweeps fly eight flights at the same time, which is faster. With fewer than a thousand flights for a law,
     they do so only if the code for this is already compiled: by --sweeps, or by a larger sweep.
     """
-    from gcs.workflows.warmup import all_sweep_parts, parts_here, warm_up
+    from gcs.workflows.warmup import all_sweep_parts, in_process_parts, warm_up
 
     laws = LAWS if all_laws else (law,)
-    warm_up([*parts_here(laws), *(all_sweep_parts(laws) if sweeps else ())], quiet)
+    warm_up([*in_process_parts(laws), *(all_sweep_parts(laws) if sweeps else ())], quiet)

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gcs.batch.programs import keep_on_core
-from gcs.batch.runner import Crew, Running, fly_all
+from gcs.batch.programs import pin_to_core
+from gcs.batch.runner import Backend, Running, fly_all
 from gcs.experiments import store
 from gcs.experiments.plan import SEED, SENSORS, Experiment
 from gcs.shell.processes import Child
@@ -24,7 +24,7 @@ def start(experiment: Experiment, directory: Path, core: int) -> Child:
     program = [sys.executable, "-m", "gcs"]
     child = Child("gcs", [*program, *arguments, "--out", str(directory)], directory / LOG_FILE)
     # in lockstep it and its children take turns, so they share one core, which no other flight uses
-    return keep_on_core(child, core)
+    return pin_to_core(child, core)
 
 
 def missing(plan: Sequence[Experiment], directory: Path, fresh: bool) -> list[Experiment]:
@@ -35,7 +35,7 @@ def missing(plan: Sequence[Experiment], directory: Path, fresh: bool) -> list[Ex
 def fly_missing(
     waiting: Sequence[Experiment],
     directory: Path,
-    crew: Crew[Experiment, EndedFlight],
+    backend: Backend[Experiment, EndedFlight],
     tell: Callable[[Sequence[EndedFlight], Running], None],
     stopped: Callable[[], bool],
 ) -> bool:
@@ -45,4 +45,4 @@ def fly_missing(
         for experiment, _ in ended:
             store.mark_complete(directory / experiment.name, store.experiment_origin(experiment))
 
-    return fly_all(((experiment,) for experiment in waiting), crew, store_ended, tell, stopped)
+    return fly_all(((experiment,) for experiment in waiting), backend, store_ended, tell, stopped)

@@ -15,7 +15,12 @@ MARK_FILE = "flown.json"  # written when a flight is complete; says which code f
 _RESULT_OUTCOMES = ("completed", "diverged", "timeout")  # outcomes that are results of the experiment
 # entry points of the code that flies an experiment: `gcs fly` from reading the mission file on, and the
 # programs that it starts
-ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.shell.program", "autopilot.shell.program")
+ENTRIES = (
+    "gcs.workflows.started_flight",
+    "missions.fileformat",
+    "sitl.shell.program",
+    "autopilot.shell.program",
+)
 
 
 def experiment_origin(experiment: Experiment) -> Origin:

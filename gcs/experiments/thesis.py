@@ -16,7 +16,7 @@ from gcs.experiments.page import PAGE_FILE, render_page
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
 from gcs.experiments.results import experiment_record, write_results
 from gcs.experiments.table import markdown
-from gcs.folders import RESULTS_FILE, keep_others, make_folder
+from gcs.folders import RESULTS_FILE, check_no_other_results, make_folder
 
 FLIGHTS = "flights"
 FIGURES = "figures"
@@ -66,7 +66,7 @@ def _order(record: Record) -> tuple[int, int, int]:
 
 def make_output_directory(out: Path) -> None:
     """Create `out`; a GcsError says in one line why that is impossible."""
-    keep_others(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
+    check_no_other_results(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(out / FLIGHTS, out)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import Fate, MissionItemError, WireItem, fate, located_steps
+from autopilot.wire.items import Handling, MissionItemError, WireItem, handling_of, located_steps
 from gcs.formats.items import FormatError, command_name
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, read_waypoints, write_waypoints
@@ -83,7 +83,7 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
         _, where = remaining.pop(0)
         problems.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
     for number, (item, _) in zip(numbers, remaining, strict=True):
-        if fate(item.command) is Fate.KEPT:
+        if handling_of(item.command) is Handling.KEPT:
             kept_items.setdefault(item.command, []).append(number)
     while True:
         try:
@@ -137,7 +137,7 @@ def _command_text(command: int) -> str:
 def _advice(item: WireItem, text: str) -> str:
     if item.command in _ALTERNATIVES:
         return f"cannot be flown; {_ALTERNATIVES[item.command]}"
-    if fate(item.command) is not Fate.FLOWN:
+    if handling_of(item.command) is not Handling.FLOWN:
         return "cannot be flown; take it out, or use waypoints"
     return text
 

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from gcs.clients.flight import Progress
 
 _REFRESH_S = 0.1
-_PLAIN_S = 10.0  # between two plain lines of the same stage
-_WONDERS_S = 2.0  # of silence, after which a user is told what is being done
-_OPENS_AFTER_S = 0.5  # a short step needs no bar
+_LINE_INTERVAL_S = 10.0  # between two plain lines of the same stage
+_NOTIFY_AFTER_S = 2.0  # of silence, after which a user is told what is being done
+_BAR_DELAY_S = 0.5  # a short step needs no bar
 
 Row = Mapping[str, Any]  # description, completed, total and the fields of one bar
 
 
-def say(line: str) -> None:
+def notify(line: str) -> None:
     """Print one line of trouble or news to stderr. If stderr was closed (`2>&1 | head`), nothing stops."""
     try:
         print(f"gcs: {line}", file=sys.stderr, flush=True)
@@ -35,9 +35,9 @@ def say(line: str) -> None:
 
 
 @contextmanager
-def told_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
-    """Print what is being done if it takes longer than `_WONDERS_S`."""
-    timer = Timer(_WONDERS_S, say, (line,))
+def notify_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
+    """Print what is being done if it takes longer than `_NOTIFY_AFTER_S`."""
+    timer = Timer(_NOTIFY_AFTER_S, notify, (line,))
     timer.daemon = True
     if not quiet:
         timer.start()
@@ -47,39 +47,39 @@ def told_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
         timer.cancel()
 
 
-_aside: list[TextIO] = []  # stdout, while `sys.stdout` is stderr
+_real_stdout: list[TextIO] = []  # stdout, while `sys.stdout` is stderr
 
 
-def keep_stdout_for_results() -> None:
-    """From here on, only `to_results` and `to_reader` write to stdout. Anything else that is printed in this
-    process, for example by a custom law, goes to stderr."""
-    if not _aside:
-        _aside.append(sys.stdout)
+def reserve_stdout_for_results() -> None:
+    """From here on, only `results_to_stdout` and `write_to_stdout` write to stdout. Anything else that is
+    printed in this process, for example by a custom law, goes to stderr."""
+    if not _real_stdout:
+        _real_stdout.append(sys.stdout)
         sys.stdout = sys.stderr
 
 
-def give_stdout_back() -> None:
+def restore_stdout() -> None:
     """From here on, all that is printed goes to stdout again."""
-    if _aside:
-        sys.stdout = _aside.pop()
+    if _real_stdout:
+        sys.stdout = _real_stdout.pop()
 
 
 @contextmanager
-def to_results() -> Iterator[None]:
+def results_to_stdout() -> Iterator[None]:
     """Within the block, `sys.stdout` is stdout, even if stdout is kept for results."""
-    if not _aside:
+    if not _real_stdout:
         yield
         return
-    others, sys.stdout = sys.stdout, _aside[0]
+    replacement, sys.stdout = sys.stdout, _real_stdout[0]
     try:
         yield
     finally:
-        _aside[0], sys.stdout = sys.stdout, others
+        _real_stdout[0], sys.stdout = sys.stdout, replacement
 
 
-def to_reader(write: Callable[[], None]) -> None:
+def write_to_stdout(write: Callable[[], None]) -> None:
     """Write to stdout by `write`. If its reader has closed it (`| head`), the work continues silently."""
-    with to_results():
+    with results_to_stdout():
         try:
             write()
             sys.stdout.flush()
@@ -87,7 +87,7 @@ def to_reader(write: Callable[[], None]) -> None:
             sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115 - it is stdout from here on
 
 
-def is_live() -> bool:
+def stderr_is_terminal() -> bool:
     """True if stderr is a terminal that can redraw."""
     return sys.stderr.isatty()
 
@@ -107,7 +107,7 @@ class LiveBars:
         self._tasks: dict[str, TaskID] = {}
         self._next_s = time.monotonic() + delay_s
         self._stage: str | None = None  # of the last plain line
-        self._plain_s = 0.0
+        self._last_line_s = 0.0
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
         """Columns of the bars."""
@@ -131,15 +131,17 @@ class LiveBars:
         if self._quiet or (now_s < self._next_s and not at_once):
             return
         self._next_s = now_s + _REFRESH_S
-        if is_live():
+        if stderr_is_terminal():
             self._draw(rows())
-        elif plain is not None and (at_once or stage != self._stage or now_s - self._plain_s > _PLAIN_S):
-            self._stage, self._plain_s = stage, now_s
-            say(plain())
+        elif plain is not None and (
+            at_once or stage != self._stage or now_s - self._last_line_s > _LINE_INTERVAL_S
+        ):
+            self._stage, self._last_line_s = stage, now_s
+            notify(plain())
 
-    def _line_said(self) -> None:
+    def _note_line(self) -> None:
         """Note that a plain line was printed, so that the next one is not due soon."""
-        self._plain_s = time.monotonic()
+        self._last_line_s = time.monotonic()
 
     def _draw(self, rows: Mapping[str, Row]) -> None:
         bars = self._bars or self._open()
@@ -178,13 +180,13 @@ class FlightDisplay(LiveBars):
     def __init__(self, title: str, quiet: bool) -> None:
         super().__init__(quiet)
         self._title = title
-        self._began: tuple[float, float] | None = None  # wall clock and vehicle clock, first message
+        self._start: tuple[float, float] | None = None  # wall clock and vehicle clock, first message
 
     def update(self, progress: Progress) -> None:
         """Show `progress` if it is due."""
         now_s = time.monotonic()
-        if self._began is None and progress.sim_time_s > 0.0:
-            self._began = (now_s, progress.sim_time_s)
+        if self._start is None and progress.sim_time_s > 0.0:
+            self._start = (now_s, progress.sim_time_s)
         self._show(
             lambda: {"flight": self._row(progress, now_s)},
             lambda: self._line(self._fields(progress, now_s)),
@@ -213,16 +215,16 @@ class FlightDisplay(LiveBars):
         return {
             "phase": progress.phase,
             "item": f"item {progress.item}/{progress.items - 1}" if progress.sim_time_s else "",
-            "error": _or_dash(progress.load_error_m, 1e3, "mm"),
-            "rotors": _or_dash(progress.rotor_use, 1e2, "%"),
+            "error": _number_or_dash(progress.load_error_m, 1e3, "mm"),
+            "rotors": _number_or_dash(progress.rotor_use, 1e2, "%"),
             "clock": f"{progress.sim_time_s:6.1f} s",
             "pace": self._pace(progress, now_s),
         }
 
     def _pace(self, progress: Progress, now_s: float) -> str:
-        if self._began is None or now_s - self._began[0] < 2.0 * _REFRESH_S:
+        if self._start is None or now_s - self._start[0] < 2.0 * _REFRESH_S:
             return ""
-        pace = f"x{(progress.sim_time_s - self._began[1]) / (now_s - self._began[0]):.1f}"
+        pace = f"x{(progress.sim_time_s - self._start[1]) / (now_s - self._start[0]):.1f}"
         return "" if pace == "x0.0" else pace  # too little simulated time has passed
 
     def _line(self, fields: dict[str, str]) -> str:
@@ -239,30 +241,30 @@ class CompileDisplay(LiveBars):
 
     _transient = True
 
-    def update(self, running: Mapping[str, str], remain: int, total: int, left: str) -> None:
+    def update(self, running: Mapping[str, str], remain: int, total: int, remaining: str) -> None:
         """Show the kernel of each running part (`running`: kernels by the parts' titles), that `remain` of
-        `total` parts are not done, and the text `left` on the remaining time."""
+        `total` parts are not done, and the text `remaining` on the remaining time."""
         self._show(
             lambda: {
                 "all": {
                     "description": "compiling the flight software, once",
                     "completed": total - remain,
                     "total": total,
-                    "kernel": left,
+                    "kernel": remaining,
                 },
                 **{
                     title: {"description": f"  {title}", "completed": 0, "total": None, "kernel": kernel}
                     for title, kernel in running.items()
                 },
             },
-            lambda: f"compiling {_parts(running)}; {left}",
+            lambda: f"compiling {_parts(running)}; {remaining}",
         )
 
-    def done(self, title: str, seconds: float, left: str) -> None:
+    def done(self, title: str, seconds: float, remaining: str) -> None:
         """If stderr is no terminal, print that a part is done, how long it took, and what is left."""
-        if not self._quiet and not is_live():
-            say(f"compiled {title} in {seconds:.0f} s; {left}")
-            self._line_said()
+        if not self._quiet and not stderr_is_terminal():
+            notify(f"compiled {title} in {seconds:.0f} s; {remaining}")
+            self._note_line()
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, TimeElapsedColumn
@@ -277,16 +279,16 @@ class StepDisplay(LiveBars):
     _transient = True
 
     def __init__(self, title: str, quiet: bool = False, long: bool = False) -> None:
-        super().__init__(quiet, _OPENS_AFTER_S)
+        super().__init__(quiet, _BAR_DELAY_S)
         self._title = title
         self._long = long
 
     def update(self, done: int, total: int, title: str | None = None) -> None:
         """Show that `done` of `total` are done; a `total` of 0 means that it is unknown."""
-        named = title or self._title
-        row = {"description": named, "completed": done, "total": total or None}
-        far = f": {done} of {total}" if total else ""
-        self._show(lambda: {"step": row}, (lambda: named + far) if self._long else None)
+        shown_title = title or self._title
+        row = {"description": shown_title, "completed": done, "total": total or None}
+        done_text = f": {done} of {total}" if total else ""
+        self._show(lambda: {"step": row}, (lambda: shown_title + done_text) if self._long else None)
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
@@ -299,5 +301,5 @@ def _parts(running: Mapping[str, str]) -> str:
     return ", ".join(f"{title} ({kernel})" if kernel else title for title, kernel in running.items())
 
 
-def _or_dash(value: float | None, scale: float, unit: str) -> str:
+def _number_or_dash(value: float | None, scale: float, unit: str) -> str:
     return f"{'-':>4} {unit}" if value is None else f"{value * scale:4.0f} {unit}"

@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 VEHICLE, TRUTH, EVENT, COMMAND = b"V", b"T", b"E", b"C"
 _BUFFER = 8 * 1024 * 1024  # bytes; the system may grant less
-_LONGEST = 70_000  # bytes of one message
-_LARGEST = 60_000  # bytes of datagrams in one message
-_HEAD = struct.Struct("<cq")
+_MAX_MESSAGE = 70_000  # bytes of one message
+_MAX_BODY = 60_000  # bytes of datagrams in one message
+_HEADER = struct.Struct("<cq")
 # both kinds preserve message boundaries; SOCK_SEQPACKET, where available, also shows that the pipe was closed
 _KIND = socket.SOCK_SEQPACKET if sys.platform == "linux" else socket.SOCK_DGRAM
 
 
-class Piece(NamedTuple):
+class FeedMessage(NamedTuple):
     """One message: its kind, its time on the vehicle's clock (us), and its contents."""
 
     kind: bytes
@@ -48,16 +48,16 @@ class FeedEnd:
     def fileno(self) -> int:
         return self._socket.fileno()
 
-    def tell(self, kind: bytes, time_us: int, datagrams: list[bytes]) -> None:
+    def send_datagrams(self, kind: bytes, time_us: int, datagrams: list[bytes]) -> None:
         """Send datagrams: joined in one message if they fit, otherwise one message each."""
         body = b"".join(datagrams)
-        if len(body) <= _LARGEST:
+        if len(body) <= _MAX_BODY:
             self._send(kind, time_us, body)
             return
         for datagram in datagrams:
             self._send(kind, time_us, datagram)
 
-    def tell_event(self, record: dict[str, Any]) -> None:
+    def send_event(self, record: dict[str, Any]) -> None:
         """Send a record, in order with the datagrams and likewise without waiting."""
         self._send(EVENT, 0, json.dumps(record).encode())
 
@@ -65,39 +65,39 @@ class FeedEnd:
         if not body or self.closed:
             return
         try:
-            self._socket.send(_HEAD.pack(kind, time_us) + body)
+            self._socket.send(_HEADER.pack(kind, time_us) + body)
         except BlockingIOError:
             return
         except OSError:
             self.closed = True
 
-    def read(self, most: int = 256) -> list[Piece]:
-        """The messages that have arrived, without waiting, but at most `most`."""
-        pieces: list[Piece] = []
-        while len(pieces) < most and not self.closed:
+    def read(self, max_count: int = 256) -> list[FeedMessage]:
+        """The messages that have arrived, without waiting, but at most `max_count`."""
+        messages: list[FeedMessage] = []
+        while len(messages) < max_count and not self.closed:
             try:
-                message = self._socket.recv(_LONGEST)
+                message = self._socket.recv(_MAX_MESSAGE)
             except BlockingIOError:
                 break
             except OSError:
                 message = b""
-            if len(message) < _HEAD.size:
+            if len(message) < _HEADER.size:
                 self.closed = True
                 break
-            kind, time_us = _HEAD.unpack_from(message)
-            pieces.append(Piece(kind, time_us, message[_HEAD.size :]))
-        return pieces
+            kind, time_us = _HEADER.unpack_from(message)
+            messages.append(FeedMessage(kind, time_us, message[_HEADER.size :]))
+        return messages
 
     def close(self) -> None:
         self._socket.close()
 
 
-def pipe() -> tuple[FeedEnd, socket.socket]:
+def feed_pipe() -> tuple[FeedEnd, socket.socket]:
     """The end for this process, and the one for a child process."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, _KIND)
-    return FeedEnd(ours), theirs
+    parent_end, child_end = socket.socketpair(socket.AF_UNIX, _KIND)
+    return FeedEnd(parent_end), child_end
 
 
-def inherited(descriptor: int) -> FeedEnd:
+def inherited_feed(descriptor: int) -> FeedEnd:
     """The end that was inherited from the parent process."""
     return FeedEnd(socket.socket(fileno=descriptor))

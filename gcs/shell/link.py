@@ -70,7 +70,7 @@ class UdpSocket:
             self._socket.close()
             raise GcsError(_bind_problem(host, port, error)) from None
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-        self._waits_s = 0.0  # receive timeout of the socket
+        self._timeout_s = 0.0  # receive timeout of the socket
 
     @property
     def address(self) -> str:
@@ -82,7 +82,7 @@ class UdpSocket:
         return self._socket.fileno()
 
     @property
-    def waiting(self) -> bool:
+    def has_datagram(self) -> bool:
         """Whether a datagram has arrived and was not read yet."""
         return bool(select.select([self], [], [], 0.0)[0])
 
@@ -106,10 +106,10 @@ class UdpSocket:
 
     def wait(self, timeout_s: float) -> list[bytes]:
         """The next datagram, if one arrives within the time; takes one system call, with `select` three."""
-        if timeout_s != self._waits_s:
-            self._waits_s = timeout_s
-            whole = int(timeout_s)
-            value = struct.pack("ll", whole, round((timeout_s - whole) * 1e6))
+        if timeout_s != self._timeout_s:
+            self._timeout_s = timeout_s
+            seconds = int(timeout_s)
+            value = struct.pack("ll", seconds, round((timeout_s - seconds) * 1e6))
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
         try:
             datagram, self._peer = self._socket.recvfrom(_DATAGRAM)
@@ -117,7 +117,7 @@ class UdpSocket:
             return []
         return [datagram]
 
-    def answer_to(self, peer: tuple[str, int]) -> None:
+    def set_peer(self, peer: tuple[str, int]) -> None:
         """Send to this address from now on."""
         self._peer = peer
 

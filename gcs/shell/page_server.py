@@ -30,10 +30,10 @@ from websockets.http11 import Request, Response
 from gcs.errors import GcsError
 from gcs.shell.link import PAGE_PORT
 
-_WHOLE_ADDRESS = ": open the whole address that gcs has printed, which holds a key"
+_ADDRESS_HINT = ": open the whole address that gcs has printed, which holds a key"
 SOCKET = "socket"  # path of the web socket beside the page
 REPORT = "report"  # path of the folder with the report
-_MOST_BYTES = 4096  # of one request of a page
+_MAX_REQUEST_BYTES = 4096  # of one request of a page
 _TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -42,12 +42,12 @@ _TYPES = {
     ".png": "image/png",
     ".svg": "image/svg+xml",
 }
-_OURS = (
+_PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self' {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 # a report contains its scripts and pictures, and may load nothing else
-_OF_REPORTS = (
+_REPORT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
@@ -62,18 +62,18 @@ class Site:
 
 
 @dataclass
-class Pages:
-    """Callbacks for open pages: `opened` returns the records that a page receives when it opens."""
+class PageCallbacks:
+    """Callbacks for open pages: `on_open` returns the records that a page receives when it opens."""
 
-    opened: Callable[[], Sequence[dict[str, Any]]]
-    asked: Callable[[Any, Any], None]  # a page, and the record that it sent
-    count_changed: Callable[[int], None] = field(default=lambda count: None)
+    on_open: Callable[[], Sequence[dict[str, Any]]]
+    on_request: Callable[[Any, Any], None]  # a page, and the record that it sent
+    on_count_changed: Callable[[int], None] = field(default=lambda count: None)
 
 
 class PageServer:
     """The server; `async with` opens and closes it."""
 
-    def __init__(self, site: Site, pages: Pages, host: str, port: int | None) -> None:
+    def __init__(self, site: Site, pages: PageCallbacks, host: str, port: int | None) -> None:
         self.site = site
         self._pages = pages
         self._host = host
@@ -93,12 +93,12 @@ class PageServer:
         """How many pages are open."""
         return len(self._open)
 
-    def tell_all(self, record: dict[str, Any]) -> None:
+    def send_to_all(self, record: dict[str, Any]) -> None:
         """Send a record to all pages that are open."""
         if self._open:
             broadcast(self._open, json.dumps(record, allow_nan=False, separators=(",", ":")))
 
-    def tell(self, page: Any, record: dict[str, Any]) -> None:
+    def send_to(self, page: Any, record: dict[str, Any]) -> None:
         """Send a record to one page, if it is still open."""
         if page in self._open:
             broadcast([page], json.dumps(record, allow_nan=False, separators=(",", ":")))
@@ -108,7 +108,7 @@ class PageServer:
             self._server = await self._serve(PAGE_PORT if self._port is None else self._port)
         except OSError as error:
             if self._port is not None or error.errno != errno.EADDRINUSE:
-                raise GcsError(_trouble(self._host, self._port or PAGE_PORT, error)) from None
+                raise GcsError(_bind_problem(self._host, self._port or PAGE_PORT, error)) from None
             self._server = await self._serve(0)  # any free port
         self._port = next(iter(self._server.sockets)).getsockname()[1]
         return self
@@ -123,67 +123,67 @@ class PageServer:
 
     async def _serve(self, port: int) -> Server:
         return await serve(
-            self._talk,
+            self._serve_socket,
             self._host,
             port,
-            process_request=self._answer,
+            process_request=self._handle_request,
             compression=None,
-            max_size=_MOST_BYTES,
+            max_size=_MAX_REQUEST_BYTES,
             server_header=None,
             ping_interval=None,
         )
 
     # ---- web socket
 
-    async def _talk(self, page: ServerConnection) -> None:
-        for record in self._pages.opened():
+    async def _serve_socket(self, page: ServerConnection) -> None:
+        for record in self._pages.on_open():
             await page.send(json.dumps(record, allow_nan=False, separators=(",", ":")))
         self._open.add(page)
-        self._pages.count_changed(len(self._open))
+        self._pages.on_count_changed(len(self._open))
         try:
             async for text in page:
                 with suppress(ValueError, RecursionError):
-                    self._pages.asked(page, json.loads(text))
+                    self._pages.on_request(page, json.loads(text))
         except ConnectionClosed:
             pass
         finally:
             self._open.discard(page)
-            self._pages.count_changed(len(self._open))
+            self._pages.on_count_changed(len(self._open))
 
     # ---- requests
 
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request; None permits the web socket to open."""
         hosts = request.headers.get_all("Host")
-        if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return _refused(http.HTTPStatus.MISDIRECTED_REQUEST)
+        if len(hosts) != 1 or not self._is_own_host(hosts[0]):
+            return _error_response(http.HTTPStatus.MISDIRECTED_REQUEST)
         path = request.path.split("?", 1)[0]
         _, token, name = [*path.split("/", 2), "-", "-"][:3]
         if not hmac.compare_digest(token.encode("utf-8", "replace"), self._token.encode()):
-            return _refused(http.HTTPStatus.FORBIDDEN)
+            return _error_response(http.HTTPStatus.FORBIDDEN)
         if name == SOCKET:
             if request.headers.get_all("Origin") != [f"http://{hosts[0]}"]:
-                return _refused(http.HTTPStatus.FORBIDDEN)
+                return _error_response(http.HTTPStatus.FORBIDDEN)
             return None
         if name in self.site.texts:
             socket = f"ws://{hosts[0]}"
-            return _found(
-                self.site.texts[name], Path(name or "page.html").suffix, _OURS.format(socket=socket)
+            return _ok_response(
+                self.site.texts[name], Path(name or "page.html").suffix, _PAGE_POLICY.format(socket=socket)
             )
-        return self._of_report(name)
+        return self._report_file(name)
 
-    def _of_report(self, name: str) -> Response:
+    def _report_file(self, name: str) -> Response:
         folder, _, file = name.partition("/")
         path = None if self.site.report is None else self.site.report / file
         inside = file and "/" not in file and "\\" not in file and not file.startswith(".")
         if folder != REPORT or path is None or not inside or path.is_symlink() or not path.is_file():
-            return _refused(http.HTTPStatus.NOT_FOUND)
+            return _error_response(http.HTTPStatus.NOT_FOUND)
         try:
-            return _found(path.read_bytes(), path.suffix, _OF_REPORTS)
+            return _ok_response(path.read_bytes(), path.suffix, _REPORT_POLICY)
         except OSError:
-            return _refused(http.HTTPStatus.NOT_FOUND)
+            return _error_response(http.HTTPStatus.NOT_FOUND)
 
-    def _is_ours(self, host: str) -> bool:
+    def _is_own_host(self, host: str) -> bool:
         """Whether a Host header names this server: the loopback interface, or the address that is served."""
         name, _, port = host.rpartition(":")
         if port != str(self._port):
@@ -212,15 +212,15 @@ def _headers(policy: str) -> Headers:
     )
 
 
-def _found(body: bytes, suffix: str, policy: str) -> Response:
+def _ok_response(body: bytes, suffix: str, policy: str) -> Response:
     headers = _headers(policy)
     headers["Content-Type"] = _TYPES.get(suffix, "application/octet-stream")
     headers["Content-Length"] = str(len(body))
     return Response(200, "OK", headers, body)
 
 
-def _refused(status: http.HTTPStatus) -> Response:
-    hint = "" if status is not http.HTTPStatus.FORBIDDEN else _WHOLE_ADDRESS
+def _error_response(status: http.HTTPStatus) -> Response:
+    hint = "" if status is not http.HTTPStatus.FORBIDDEN else _ADDRESS_HINT
     body = f"{status.phrase}{hint}\n".encode()
     headers = _headers("default-src 'none'")
     headers["Content-Type"] = "text/plain; charset=utf-8"
@@ -228,7 +228,7 @@ def _refused(status: http.HTTPStatus) -> Response:
     return Response(status.value, status.phrase, headers, body)
 
 
-def _trouble(host: str, port: int, error: OSError) -> str:
+def _bind_problem(host: str, port: int, error: OSError) -> str:
     if error.errno == errno.EADDRINUSE:
         return f"port {port} of {host} is in use by another program; choose another with --port"
     reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)

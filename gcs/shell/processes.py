@@ -19,16 +19,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
-from autopilot.shell.options import ARGUMENTS_FOLLOW
+from autopilot.shell.options import ARGUMENTS_ON_STDIN
 from gcs.errors import GcsError
-from gcs.shell.display import say
+from gcs.shell.display import notify
 
 STOP_S = 3.0  # from SIGTERM to SIGKILL
 STOPPED_LIMIT_S = (
     15.0  # that a child may be stopped (SIGSTOP), before its silence is taken for that of another program
 )
-_WORKING_SHARE = 0.05  # of a processor: a child that waits, and asks again now and then, uses less
-LOOK_S = 1.0  # between two looks at the states of the children
+_BUSY_SHARE = 0.05  # of a processor: a child that waits, and asks again now and then, uses less
+CHECK_INTERVAL_S = 1.0  # between two looks at the states of the children
 _PR_SET_PDEATHSIG = 1
 _LAST_LINE = 4096  # bytes at the end of the log in which the last line is searched
 
@@ -41,12 +41,12 @@ class Child:
         name: str,
         command: Sequence[str],
         log: Path,
-        inherits: Sequence[int] = (),
+        descriptors: Sequence[int] = (),
         folder: Path | None = None,
         environment: Mapping[str, str] | None = None,
-        waits: bool = False,
+        is_preloaded: bool = False,
     ) -> None:
-        """With `waits` it is a program of Plumbline, which waits for its arguments (`take`)."""
+        """With `is_preloaded` it is a program of Plumbline, which waits for its arguments (`start_with`)."""
         self.name = name
         self.log = log
         self.exit_code: int | None = None
@@ -55,15 +55,15 @@ class Child:
                 command,
                 cwd=folder,
                 env={**os.environ, **environment} if environment else None,
-                stdin=subprocess.PIPE if waits else subprocess.DEVNULL,
+                stdin=subprocess.PIPE if is_preloaded else subprocess.DEVNULL,
                 stdout=stderr,
                 stderr=subprocess.STDOUT,
                 process_group=0,
-                pass_fds=inherits,
+                pass_fds=descriptors,
                 preexec_fn=_die_with_parent(),  # noqa: PLW1509, there are no threads
             )
 
-    def take(self, arguments: Sequence[str], log: Path) -> bool:
+    def start_with(self, arguments: Sequence[str], log: Path) -> bool:
         """Let it start with these arguments and write to this file; False if it ended while it waited."""
         pipe = self._process.stdin
         if pipe is None or not self.running:
@@ -95,7 +95,7 @@ class Child:
             return False
         return state in ("T", "t")
 
-    def used_s(self) -> float:
+    def cpu_time_s(self) -> float:
         """Processor time that it has used so far; 0 if the system does not report it."""
         try:
             fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
@@ -112,14 +112,14 @@ class Child:
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         return lines[-1] if lines else ""
 
-    def obituary(self) -> str:
+    def exit_report(self) -> str:
         """One line on why it has ended."""
         line = self.last_line().removeprefix(f"{self.name}: ")
         code = self.exit_code if self.exit_code is not None else 0
-        how = f"ended with exit code {code}"
+        ending = f"ended with exit code {code}"
         if code < 0:
-            how = f"was killed by {signal.Signals(-code).name}"
-        return f"{self.name} {how}{': ' + line if line else ', without a word'}"
+            ending = f"was killed by {signal.Signals(-code).name}"
+        return f"{self.name} {ending}{': ' + line if line else ', without a word'}"
 
     def terminate(self) -> None:
         """Ask it to end."""
@@ -147,25 +147,28 @@ class Processes:
         self._children: list[Child] = []
         self._loaded: dict[str, Child] = {}  # by name, loaded programs that wait to be started
         self._cpus_before: set[int] | None = None
-        self._looked_s = 0.0
-        self._used = 0.0, 0.0  # time of the last look, and processor time that the children had used then
-        self._works = False
-        self._stopped_s: dict[int, float] = {}  # time since which a child is stopped, by its process id
+        self._last_check_s = 0.0
+        self._last_usage = (
+            0.0,
+            0.0,
+        )  # time of the last look, and processor time that the children had used then
+        self._are_busy = False
+        self._stopped_since_s: dict[int, float] = {}  # time since which a child is stopped, by its process id
 
     def load(self, name: str) -> Child:
         """Let a program of Plumbline load what it needs, which takes a second, before it is started."""
-        with _told(name):
-            command = [sys.executable, "-m", name, ARGUMENTS_FOLLOW]
-            child = self._loaded[name] = Child(name, command, Path(os.devnull), waits=True)
+        with _start_errors(name):
+            command = [sys.executable, "-m", name, ARGUMENTS_ON_STDIN]
+            child = self._loaded[name] = Child(name, command, Path(os.devnull), is_preloaded=True)
         return child
 
-    def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
+    def start(self, name: str, arguments: Sequence[str], log: Path, descriptors: Sequence[int] = ()) -> Child:
         """Start `python -m NAME ARGUMENTS` with its output in `log`: the loaded process if there is one, else
         a new one, which inherits these open descriptors."""
-        with _told(name):
+        with _start_errors(name):
             child = self._loaded.pop(name, None)
-            if child is None or not child.take(arguments, log):
-                child = Child(name, [sys.executable, "-m", name, *arguments], log, inherits)
+            if child is None or not child.start_with(arguments, log):
+                child = Child(name, [sys.executable, "-m", name, *arguments], log, descriptors)
         self._children.append(child)
         return child
 
@@ -174,46 +177,48 @@ class Processes:
     ) -> Child:
         """Start a third-party program, called `name`, in a folder, with its output in `log` and these
         environment variables beside ours."""
-        with _told(name):
+        with _start_errors(name):
             child = Child(name, command, log, (), folder, environment)
         self._children.append(child)
         return child
 
-    def ended(self) -> str:
+    def end_reason(self) -> str:
         """Why a child has ended, or that it has been stopped for too long; empty while all run."""
         for child in self._children:
             if not child.running:
-                return child.obituary()
-        return self._stopped(time.monotonic())
+                return child.exit_report()
+        return self._stopped_too_long(time.monotonic())
 
-    def works(self) -> bool:
+    def are_busy(self) -> bool:
         """Whether the children have used the processor since the last look, as when preparing paths."""
-        now_s, used_s = time.monotonic(), sum(child.used_s() for child in self._children)
-        before_s, before_used_s = self._used
-        if now_s - before_s < LOOK_S:
-            return self._works
-        self._used = now_s, used_s
-        self._works = used_s - before_used_s > _WORKING_SHARE * (now_s - before_s)
-        return self._works
+        now_s, cpu_time_s = time.monotonic(), sum(child.cpu_time_s() for child in self._children)
+        before_s, before_cpu_s = self._last_usage
+        if now_s - before_s < CHECK_INTERVAL_S:
+            return self._are_busy
+        self._last_usage = now_s, cpu_time_s
+        self._are_busy = cpu_time_s - before_cpu_s > _BUSY_SHARE * (now_s - before_s)
+        return self._are_busy
 
-    def stopped(self) -> str:
+    def stopped_children(self) -> str:
         """The children that are stopped by a signal at this moment; empty if none is."""
         names = [f"{child.name} (process {child.pid})" for child in self._children if child.stopped]
         return f"{' and '.join(names)} stopped by a signal" if names else ""
 
-    def _stopped(self, now_s: float) -> str:
-        if now_s - self._looked_s < LOOK_S:
+    def _stopped_too_long(self, now_s: float) -> str:
+        if now_s - self._last_check_s < CHECK_INTERVAL_S:
             return ""
-        self._looked_s = now_s
-        since = {
-            child.pid: self._stopped_s.get(child.pid, now_s) for child in self._children if child.stopped
+        self._last_check_s = now_s
+        stopped_since_s = {
+            child.pid: self._stopped_since_s.get(child.pid, now_s)
+            for child in self._children
+            if child.stopped
         }
         for child in self._children:
-            if child.pid in since and child.pid not in self._stopped_s:
-                say(f"{child.name} (process {child.pid}) is stopped by a signal: waiting for it")
-        self._stopped_s = since
+            if child.pid in stopped_since_s and child.pid not in self._stopped_since_s:
+                notify(f"{child.name} (process {child.pid}) is stopped by a signal: waiting for it")
+        self._stopped_since_s = stopped_since_s
         for child in self._children:
-            stopped_s = now_s - since.get(child.pid, now_s)
+            stopped_s = now_s - stopped_since_s.get(child.pid, now_s)
             if stopped_s >= STOPPED_LIMIT_S:
                 return (
                     f"{child.name} (process {child.pid}) has been stopped by a signal for {stopped_s:.0f} s"
@@ -231,8 +236,8 @@ class Processes:
             return
         self._cpus_before = os.sched_getaffinity(0)
         core = {_current_core(self._cpus_before)}
-        moved = [(child.pid, core) for child in self._children if child.running]
-        for pid, cores in (*moved, (0, self._cpus_before - core or core)):
+        affinities = [(child.pid, core) for child in self._children if child.running]
+        for pid, cores in (*affinities, (0, self._cpus_before - core or core)):
             try:
                 os.sched_setaffinity(pid, cores)
             except OSError:  # the process has just ended, or may not be moved
@@ -261,7 +266,7 @@ class Processes:
 
 
 @contextmanager
-def _told(name: str) -> Iterator[None]:
+def _start_errors(name: str) -> Iterator[None]:
     """Raise GcsError if a program cannot be started."""
     try:
         yield

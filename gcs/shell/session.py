@@ -23,9 +23,9 @@ FIND_S = 5.0
 TRUTH_S = 2.0  # the truth states five times a second of its clock to which run it belongs
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may arrive a little later
 _TICK_S = 0.02
-_STANDS_STILL = "it or its simulator is stopped (SIGSTOP, a debugger), or the link loses messages: try again"
+_STALLED = "it or its simulator is stopped (SIGSTOP, a debugger), or the link loses messages: try again"
 
-Seen = Callable[[bytes, int], None]  # called with a datagram and its time
+OnDatagram = Callable[[bytes, int], None]  # called with a datagram and its time
 
 
 class Session:
@@ -36,10 +36,10 @@ class Session:
     ) -> None:
         self.view = VehicleView()
         self.address = address
-        self.on_received: Seen | None = None
-        self.on_sent: Seen | None = None
-        self.on_truth: Seen | None = None
-        self.deaf = ""  # why the vehicle has not answered, if that is because its key is missing
+        self.on_received: OnDatagram | None = None
+        self.on_sent: OnDatagram | None = None
+        self.on_truth: OnDatagram | None = None
+        self.unanswered_reason = ""  # why the vehicle has not answered, if that is because its key is missing
         self._truth: TruthLink | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection(link_timeout_us)
@@ -58,7 +58,7 @@ class Session:
     def lost(self) -> bool:
         """True if the vehicle was connected and has been silent for too long. A datagram that has arrived but
         was not read yet counts as received: on a busy machine this process may be late."""
-        return self._connection.lost(monotonic_us()) and not self._socket.waiting
+        return self._connection.lost(monotonic_us()) and not self._socket.has_datagram
 
     def find_with_truth(self, truth: TruthLink) -> Target:
         """As `find`; from then on the truth of the vehicle's world is received too, and is awaited briefly.
@@ -67,26 +67,28 @@ class Session:
         """
         target = self.find()
         try:
-            truth.of_vehicle(int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id))
+            truth.set_vehicle_run(int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id))
         except RefusedError:  # another firmware, or a vehicle without a simulator
-            truth.of_vehicle(None)
+            truth.set_vehicle_run(None)
         except GcsError:
-            truth.of_vehicle(None, silent=self.deaf or _STANDS_STILL)
+            truth.set_vehicle_run(None, silence_reason=self.unanswered_reason or _STALLED)
         self._truth = truth
-        if not self.deaf:
-            self.watch(lambda: truth.heard, TRUTH_S)
+        if not self.unanswered_reason:
+            self.watch(lambda: truth.received, TRUTH_S)
         return target
 
     def find(self) -> Target:
         """Wait for the vehicle's heartbeat."""
         signatures = self._connection.signatures
         self.watch(
-            lambda: self.view.armed is not None and signatures.met, self._find_s, "waiting for the vehicle"
+            lambda: self.view.armed is not None and signatures.are_valid,
+            self._find_s,
+            "waiting for the vehicle",
         )
-        if self._connection.target is None or self.view.armed is None or not signatures.met:
-            if signatures.trouble:
+        if self._connection.target is None or self.view.armed is None or not signatures.are_valid:
+            if signatures.problem:
                 raise NoVehicleError(
-                    f"no vehicle with a valid signature on UDP {self.address}: {signatures.trouble}"
+                    f"no vehicle with a valid signature on UDP {self.address}: {signatures.problem}"
                 )
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(
@@ -135,17 +137,17 @@ class Session:
         if result is None:
             raise NoVehicleError(f"{label or 'the exchange'}: the vehicle fell silent")
         if result.status is Status.UNANSWERED:
-            self.deaf = self.signing_trouble
-            raise NoVehicleError(result.silence(self.signing_trouble))
+            self.unanswered_reason = self.signing_problem
+            raise NoVehicleError(result.silence_text(self.signing_problem))
         if result.status is Status.REFUSED:
             self.watch(lambda: False, REASON_S)
-            raise RefusedError(result.refusal(self.view.complaints_since(texts_before)))
+            raise RefusedError(result.refusal_text(self.view.problems_since(texts_before)))
         return result
 
     @property
-    def signing_trouble(self) -> str:
+    def signing_problem(self) -> str:
         """Why no request is answered, if that is because the key that signs messages is missing."""
-        return self._connection.signatures.trouble
+        return self._connection.signatures.problem
 
     def request(self, message_id: int) -> Any:
         """The newest message of that id, requested if the vehicle has not sent one by itself."""

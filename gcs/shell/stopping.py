@@ -11,7 +11,7 @@ import signal
 from types import FrameType, TracebackType
 
 from autopilot.shell.options import stop_signals
-from gcs.shell.display import say
+from gcs.shell.display import notify
 
 
 class StopRequest:
@@ -19,22 +19,22 @@ class StopRequest:
 
     def __init__(self, hint: str) -> None:
         self.hint = hint
-        self._asked = False
+        self._is_requested = False
         self._process = os.getpid()
         self._before: dict[signal.Signals, object] = {}
 
     def __bool__(self) -> bool:
-        return self._asked
+        return self._is_requested
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._process:
             return  # a forked process: the terminal signals both, and the parent decides
-        if self._asked:
+        if self._is_requested:
             if number != signal.SIGHUP:
                 raise KeyboardInterrupt
             return
-        self._asked = True
-        say(self.hint)
+        self._is_requested = True
+        notify(self.hint)
 
     def __enter__(self) -> StopRequest:
         for number in stop_signals():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import TracebackType
 
-from gcs.clients.truth import Truth
+from gcs.clients.truth import TruthFilter
 from gcs.errors import GcsError
 from gcs.shell.link import SITL_TRUTH, Address, UdpSocket
 
@@ -17,37 +17,37 @@ class TruthLink:
 
         GcsError if the given port is in use.
         """
-        named = address or SITL_TRUTH
-        self._where = str(named)
-        self._truth = Truth(self._where, vouched=address is not None)
+        used_address = address or SITL_TRUTH
+        self._address = str(used_address)
+        self._truth = TruthFilter(self._address, port_is_given=address is not None)
         self._socket: UdpSocket | None = None
         try:
-            self._socket = UdpSocket(named.host, named.port)
+            self._socket = UdpSocket(used_address.host, used_address.port)
         except GcsError:
             if address is not None:
-                trouble = "is in use by another program, or not of this machine"
-                raise GcsError(f"--truth: UDP {named} {trouble}") from None
+                problem = "is in use by another program, or not of this machine"
+                raise GcsError(f"--truth: UDP {used_address} {problem}") from None
 
-    def of_vehicle(self, run: int | None, silent: str = "") -> None:
+    def set_vehicle_run(self, run: int | None, silence_reason: str = "") -> None:
         """Set the run of the world in which the vehicle reports to fly; None: it does not report one, or has
-        not answered, and `silent` states why."""
-        self._truth.of_vehicle(run, silent)
+        not answered, and `silence_reason` states why."""
+        self._truth.set_vehicle_run(run, silence_reason)
 
     def drain(self) -> list[bytes]:
         """All datagrams of the vehicle's own world that have arrived."""
-        return [] if self._socket is None else self._truth.take(self._socket.drain_with_senders())
+        return [] if self._socket is None else self._truth.select(self._socket.drain_with_senders())
 
     @property
     def missing(self) -> str:
         """Why there is no truth so far, and what to do; empty if there is truth."""
         if self._socket is None:
-            return f"UDP {self._where} is in use by another program; --truth PORT names another port"
+            return f"UDP {self._address} is in use by another program; --truth PORT names another port"
         return self._truth.missing
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether the truth of the vehicle's own world has arrived."""
-        return self._truth.heard
+        return self._truth.received
 
     def close(self) -> None:
         if self._socket is not None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.connection import is_vehicle
 from gcs.clients.datagrams import messages
-from gcs.shell.display import say
+from gcs.shell.display import notify
 from gcs.shell.link import Address, UdpSocket, monotonic_us, open_address
 
-GONE_US = 2_000_000  # after this silence another vehicle that sends is assumed to be this one, started again
+REPLACEMENT_US = (
+    2_000_000  # after this silence another vehicle that sends is assumed to be this one, started again
+)
 
 Sender = tuple[str, int]
 
@@ -21,18 +23,18 @@ class VehicleSocket:
         self._address = address
         self._socket: UdpSocket = open_address(address)
         self._vehicle: Sender | None = None
-        self._heard_us = 0
+        self._last_received_us = 0
         self._autopilots: dict[Sender, int] = {}  # senders before there was a vehicle, with their system ids
         self._others: dict[Sender, int] = {}  # vehicles that are ignored, with their system ids
-        self._told: set[Sender] = set()
+        self._reported: set[Sender] = set()
 
     def fileno(self) -> int:
         return self._socket.fileno()
 
     @property
-    def waiting(self) -> bool:
+    def has_datagram(self) -> bool:
         """Whether a datagram has arrived and was not read yet."""
-        return self._socket.waiting
+        return self._socket.has_datagram
 
     def send(self, datagram: bytes) -> None:
         """Send to the vehicle; before there is one, to the last sender."""
@@ -41,37 +43,37 @@ class VehicleSocket:
     def drain(self) -> list[bytes]:
         """All datagrams that have arrived from the accepted senders, without waiting."""
         now_us = monotonic_us()
-        heard = self._socket.drain_with_senders()
-        return [datagram for datagram, sender in heard if self._takes(datagram, sender, now_us)]
+        received = self._socket.drain_with_senders()
+        return [datagram for datagram, sender in received if self._accepts(datagram, sender, now_us)]
 
-    def _takes(self, datagram: bytes, sender: Sender, now_us: int) -> bool:
+    def _accepts(self, datagram: bytes, sender: Sender, now_us: int) -> bool:
         if sender == self._vehicle:
-            self._heard_us = now_us
-            self._tell_of_others()
+            self._last_received_us = now_us
+            self._report_others()
             return True
-        system, autopilot = _speaks_in(datagram)
-        if self._vehicle is not None and now_us - self._heard_us < GONE_US:
+        system, autopilot = _system_ids(datagram)
+        if self._vehicle is not None and now_us - self._last_received_us < REPLACEMENT_US:
             if autopilot is not None:
                 self._others[sender] = autopilot
             return sender not in self._others
         if self._vehicle is None and autopilot is not None:
             self._autopilots[sender] = autopilot
         if system is not None:
-            self._vehicle, self._heard_us = sender, now_us
+            self._vehicle, self._last_received_us = sender, now_us
             self._others |= self._autopilots
             self._autopilots.clear()
             self._others.pop(sender, None)
         if system is not None or self._vehicle is None:
-            self._socket.answer_to(sender)
+            self._socket.set_peer(sender)
         return True
 
-    def _tell_of_others(self) -> None:
+    def _report_others(self) -> None:
         """Print once for each that it is another vehicle, now that the first one is still sending."""
         for sender, system in self._others.items():
-            if sender not in self._told:
-                self._told.add(sender)
+            if sender not in self._reported:
+                self._reported.add(sender)
                 other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
-                say(
+                notify(
                     f"another vehicle (system {system}) speaks on UDP {self._address} from {other} and is "
                     f"not heard, nor does it hear what is said to {ours}; give each a port of its own: "
                     "autopilot --gcs"
@@ -81,7 +83,7 @@ class VehicleSocket:
         self._socket.close()
 
 
-def _speaks_in(datagram: bytes) -> tuple[int | None, int | None]:
+def _system_ids(datagram: bytes) -> tuple[int | None, int | None]:
     """System ids: of the vehicle whose heartbeat the datagram contains, and of the autopilot that sent any
     message in it."""
     vehicle = autopilot = None

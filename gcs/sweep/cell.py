@@ -7,11 +7,11 @@ from functools import lru_cache
 
 from autopilot.core.flight_core import Setup
 from autopilot.geometry.packed import Row, packed
-from autopilot.onboard.onboard import build_setup, plan_of
-from autopilot.own.chosen import Own, parameters_for
+from autopilot.onboard.onboard import build_setup, mission_plan
+from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import MissionPlan
-from autopilot.trajectory.prepare import Limits
+from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.layout import Layout
@@ -21,12 +21,12 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.flight import TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
-from gcs.sweep.plan import simulated
+from gcs.sweep.plan import simulator_settings
 from gcs.sweep.wire import wire_of
 from missions.model import Mission
 from sitl.plant.records import Truth
-from sitl.sensors.chosen import with_chosen
 from sitl.sensors.files import load_profile
+from sitl.sensors.overrides import with_overrides
 from sitl.sensors.profile import Profile
 from sitl.settings import Settings, settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
@@ -41,7 +41,7 @@ class Cell:
     mission: Mission
     setup: Setup
     plan: MissionPlan
-    items: int  # number of mission items
+    item_count: int  # number of mission items
     limit_us: int  # longest time that the flight may last
     truth: Truth
     layout: Layout
@@ -63,7 +63,7 @@ def _cell(
     vehicle: str,
     sensors: str,
     set_values: tuple[tuple[str, float], ...],
-    own: Own,
+    own: OwnCode,
     digests: tuple[str, ...],
 ) -> Cell:
     home = Home()
@@ -72,24 +72,24 @@ def _cell(
     apply_settings(table, set_values)
     truth = truth_of(file)
     sim_table = sim_parameters(truth)
-    for name, value in simulated(dict(set_values)).items():
+    for name, value in simulator_settings(dict(set_values)).items():
         sim_table.set(name, value)
     settings = settings_of(sim_table)
     profile = _profile(sensors)
-    every = control_divider(1e6 / settings.tick_us, table)
-    setup = build_setup(table, every, own)
+    divider = control_divider(1e6 / settings.tick_us, table)
+    setup = build_setup(table, divider, own)
     items = tuple(encode_mission(mission, home))
     return Cell(
         mission=mission,
         setup=setup,
         plan=_plan(items, setup.settings.limits) if setup.planner is None else _own_plan(items, setup),
-        items=len(items),
+        item_count=len(items),
         limit_us=round(1e6 * (expected_duration_s(mission) * TIME_FACTOR + TIME_MARGIN_S)),
         truth=apply_parameters(truth, sim_table),
         layout=file.layout,
         profile=profile,
         settings=settings,
-        wire=packed(wire_of(with_chosen(profile, settings.chosen), settings.noise_scale, home)),
+        wire=packed(wire_of(with_overrides(profile, settings.overrides), settings.noise_scale, home)),
     )
 
 
@@ -100,10 +100,10 @@ def _profile(name: str) -> Profile:
 
 def _own_plan(items: tuple[WireItem, ...], setup: Setup) -> MissionPlan:
     """The plan of a mission by a custom planner."""
-    return plan_of(StoredMission(items), Home(), setup.settings.limits, planner=setup.planner)
+    return mission_plan(StoredMission(items), Home(), setup.settings.limits, planner=setup.planner)
 
 
 @lru_cache(maxsize=64)
-def _plan(items: tuple[WireItem, ...], limits: Limits) -> MissionPlan:
+def _plan(items: tuple[WireItem, ...], limits: PathLimits) -> MissionPlan:
     """The plan of a mission; cached, as shaping its paths takes seconds and depends on nothing else."""
-    return plan_of(StoredMission(items), Home(), limits)
+    return mission_plan(StoredMission(items), Home(), limits)

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.core.flight_core import LAID_OUT_WAITING, FlightCore, commanded_rate
-from autopilot.core.tick import any_law
+from autopilot.core.flight_core import SETPOINTS_LOCKSTEP, FlightCore, commanded_rate
+from autopilot.core.tick import placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.packed import packed, place_of, unpack
@@ -25,16 +25,16 @@ from autopilot.onboard.onboard import Onboard
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.quiescence import Stretch
-from autopilot.supervisor.requests.arming import arming_complaints
+from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.state import IN_AIR, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.mission_items import of_mission
+from gcs.mission_items import in_mission_terms
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
-from gcs.sweep.wire import most_readings, wire_rate
+from gcs.sweep.wire import max_readings, rounded_reel_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
 from sitl.plant.chain.records import new_chain
@@ -53,7 +53,7 @@ _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
 @dataclass(frozen=True)
-class Boarding:
+class StartTimes:
     """The times at which the ground station, in lockstep, arms the vehicle and starts the mission."""
 
     arm_us: int
@@ -61,7 +61,7 @@ class Boarding:
 
 
 @dataclass
-class Flown:
+class FlightResult:
     """The result of a flight; NaN for a figure that was not measured. Figures are those of the mission."""
 
     outcome: str = ""  # as `gcs fly` names it
@@ -91,7 +91,7 @@ class _NoLog:
         """Discard a frame."""
 
 
-def boarding(mission: Mission, conditions: Conditions) -> Boarding:
+def start_times(mission: Mission, conditions: Conditions) -> StartTimes:
     """The times at which the real ground station arms and starts: from a flight over the wire to then."""
     times: dict[Phase, int] = {}
 
@@ -106,80 +106,85 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
             f"{outcome.reason} (MIS_INFEASIBLE says what becomes of a path that cannot be flown: 0 as asked, "
             "1 slower)"
         )
-    return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
+    return StartTimes(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 
 
-class SweptFlight:
+class SweepFlight:
     """A flight in progress."""
 
-    def __init__(self, cell: Cell, seed: int, boarding: Boarding, trace: Floats | None = None) -> None:
+    def __init__(self, cell: Cell, seed: int, start_times: StartTimes, trace: Floats | None = None) -> None:
         self.cell = cell
         self.tick_us = cell.settings.tick_us
-        self.core = FlightCore(cell.setup, LAID_OUT_WAITING)
+        self.core = FlightCore(cell.setup, SETPOINTS_LOCKSTEP)
         self.item = 0  # mission item that was flown last
-        self.core.change(with_plan(self.core.flight, cell.plan))
+        self.core.replace_flight(with_plan(self.core.flight, cell.plan))
         self.world = new_world(cell.truth, cell.profile, cell.settings, seed, cell.layout)
         self.chain = new_chain(cell.truth, unpack(World, self.world.world, 0).plant)
-        self.core.take_inbox(new_inbox(most_readings(self.world)))
+        self.core.use_inbox(new_inbox(max_readings(self.world)))
         self.figures = packed(NO_FIGURES)
-        self.asked: Floats = _NO_ROWS
+        self.requested_path: Floats = _NO_ROWS
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
-        self.arm_us, self.start_us = boarding.arm_us, boarding.start_us
-        self.flown = Flown()
-        self._warned: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
+        self.arm_us, self.start_us = start_times.arm_us, start_times.start_us
+        self.result = FlightResult()
+        self._warnings: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
         self.airborne_us = -1
         self.mission_us = 0
-        self.begun = False  # the first tick has been flown
+        self.started = False  # the first tick has been flown
 
     # ---- the loop
 
-    def run(self) -> Flown:
+    def run(self) -> FlightResult:
         """Fly to the end."""
-        while not self.flown.outcome:
-            self.turn(_NEVER)
+        while not self.result.outcome:
+            self.advance(_NEVER)
         return self.conclude()
 
-    def turn(self, last_tick: int) -> None:
+    def advance(self, last_tick: int) -> None:
         """Fly until the supervisor or the ground station acts, at most to the end of this tick."""
         before_us, slack_before = self.now_us, self.slack_events
-        self.core.move_cable(before_us + (self.tick_us if self.begun else 0))
+        self.core.move_cable(before_us + (self.tick_us if self.started else 0))
         flight = self.core.flight
-        reel_rate = wire_rate(commanded_rate(flight, before_us, self.tick_us * 1e-6))
+        reel_rate = rounded_reel_rate(commanded_rate(flight, before_us, self.tick_us * 1e-6))
         stop_tick = min(self.stop_tick(before_us), last_tick)
-        undecided = self._fly(self.begun, False, flight.cable.released, reel_rate, stop_tick)
-        self.begun = True
+        needs_decision = self._fly(self.started, False, flight.cable.released, reel_rate, stop_tick)
+        self.started = True
         now_us = self.now_us
-        self._note(flight.phase, now_us - before_us, self.slack_events - slack_before)
-        if undecided:
+        self._account(flight.phase, now_us - before_us, self.slack_events - slack_before)
+        if needs_decision:
             self._decide(now_us)
             self._fly(True, True, False, 0.0, self.tick)
         self.core.raise_interruption()
         self._ground_turn(now_us)
-        self._judge(now_us)
+        self._check_end(now_us)
 
-    def flown_in_lanes(self, ticks: int, slack_before: int) -> None:
+    def account_lane_ticks(self, ticks: int, slack_before: int) -> None:
         """Account for ticks that were flown in lanes: times and slack events, the ground station, the end."""
-        self._note(self.core.flight.phase, ticks * self.tick_us, self.slack_events - slack_before)
+        self._account(self.core.flight.phase, ticks * self.tick_us, self.slack_events - slack_before)
         self._ground_turn(self.now_us)
-        self._judge(self.now_us)
+        self._check_end(self.now_us)
 
-    def _fly(self, begun: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int) -> bool:
+    def _fly(
+        self, started: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int
+    ) -> bool:
         fly, code = self._entry()
-        rest = (begun, decided, gripper_open, reel_rate, stop_tick, self.chain)
-        return fly(code, self.world, self.core.rows, self.core.law, *self._own, *rest)
+        arguments = (started, decided, gripper_open, reel_rate, stop_tick, self.chain)
+        return fly(code, self.world, self.core.rows, self.core.law, *self._flight_rows, *arguments)
 
     @property
-    def _own(self) -> tuple[Any, ...]:
-        return self.cell.wire, self.figures, self.asked, self.trace
+    def _flight_rows(self) -> tuple[Any, ...]:
+        return self.cell.wire, self.figures, self.requested_path, self.trace
 
     def _entry(self) -> tuple[Callable[..., bool], Code]:
-        kind = type(self.chain)
-        if kind not in _ENTRIES:
-            world, core, law = self.world, self.core.rows, any_law(self.core.law_rows)
+        cable_type = type(self.chain)
+        if cable_type not in _ENTRIES:
+            world, core, law = self.world, self.core.rows, placeholder_law(self.core.law_rows)
             code = Code(code_of_world(world, self.chain), code_of_autopilot(core, law))
-            rest = (False, False, False, 0.0, 0, self.chain)
-            _ENTRIES[kind] = entry_of(fly_stretch, code, world, core, law, *self._own, *rest), code
-        return _ENTRIES[kind]
+            arguments = (False, False, False, 0.0, 0, self.chain)
+            _ENTRIES[cable_type] = (
+                entry_of(fly_stretch, code, world, core, law, *self._flight_rows, *arguments),
+                code,
+            )
+        return _ENTRIES[cable_type]
 
     def compile(self) -> None:
         """Compile or load the machine code that is the same for all laws."""
@@ -207,29 +212,29 @@ class SweptFlight:
             due.append(self.airborne_us + self.cell.limit_us + self.tick_us)
         return -(-min(due, default=now_us + self.cell.limit_us) // self.tick_us)
 
-    def _note(self, phase: Phase, passed_us: int, slack_events: int) -> None:
+    def _account(self, phase: Phase, elapsed_us: int, slack_events: int) -> None:
         """Add time and slack events of a stretch that was flown in this phase."""
         if phase in _LOAD_CARRIED:
-            self.flown.slack_events += slack_events
+            self.result.slack_events += slack_events
         if phase == Phase.MISSION:
-            self.mission_us += passed_us
+            self.mission_us += elapsed_us
             mission = self.core.flight.mission
             self.item = mission.plan.sequence[mission.step]
 
     def _decide(self, now_us: int) -> None:
         """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
         phase = self.core.flight.phase
-        self._hear(self.core.decide(now_us, self.tick_us).texts, phase)
+        self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
-        self.asked = _NO_ROWS
+        self.requested_path = _NO_ROWS
         if flight.phase != Phase.MISSION or not flight.legs or flight.legs[0].control_mode != LOAD_POSITION:
             return
         leg = flight.legs[0]
         stretch = unpack(Stretch, self.core.rows.stretch, 0)
-        since_us = now_us - flight.leg_start_us
+        leg_elapsed_us = now_us - flight.leg_start_us
         ticks = np.arange(len(self.core.rows.targets))
-        times = np.asarray((since_us + stretch.period_us * ticks) * 1e-6, np.float64)
-        self.asked = jets(leg, times, asked=True)
+        times = np.asarray((leg_elapsed_us + stretch.period_us * ticks) * 1e-6, np.float64)
+        self.requested_path = jets(leg, times, asked=True)
 
     # ---- what the ground station does
 
@@ -237,18 +242,18 @@ class SweptFlight:
         """Arm and start at their instants; as long as the vehicle is not ready to be armed, postpone both."""
         phase = self.core.flight.phase
         if now_us == self.arm_us and phase == Phase.DISARMED:
-            complaints = arming_complaints(self.core.flight, self.core.view(now_us), self.core.settings)
-            if complaints and now_us < READY_LIMIT_US:
+            problems = arming_problems(self.core.flight, self.core.view(now_us), self.core.settings)
+            if problems and now_us < READY_LIMIT_US:
                 self.arm_us += GROUND_WINDOW_US
                 self.start_us += GROUND_WINDOW_US
                 return
-            self._ask(Arm(arm=True, force=False), now_us)
+            self._request(Arm(arm=True, force=False), now_us)
         elif now_us == self.start_us and phase == Phase.ARMED:
-            self._ask(StartMission(0), now_us)
+            self._request(StartMission(0), now_us)
             self.airborne_us = now_us
 
-    def _ask(self, request: Arm | StartMission, now_us: int) -> None:
-        verdict = self.core.ask(request, now_us)
+    def _request(self, request: Arm | StartMission, now_us: int) -> None:
+        verdict = self.core.handle_request(request, now_us)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             self._end("refused", verdict.text or "")
 
@@ -256,62 +261,64 @@ class SweptFlight:
 
     def _end(self, outcome: str, reason: str, lost_phase: str = "") -> None:
         """End the flight; the reason is stated with the item numbers of the mission file."""
-        flown = self.flown
-        flown.outcome, flown.reason = outcome, of_mission(reason, self.cell.mission)
-        flown.lost_phase = lost_phase
+        result = self.result
+        result.outcome, result.reason = outcome, in_mission_terms(reason, self.cell.mission)
+        result.lost_phase = lost_phase
 
-    def _hear(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
+    def _on_texts(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
         if phase == Phase.MISSION:
-            self._warned.clear()
+            self._warnings.clear()
         for severity, text in texts:
-            self.flown.texts.append(text)
+            self.result.texts.append(text)
             if severity <= mavlink.MAV_SEVERITY_WARNING:
-                self._warned.append(text)
+                self._warnings.append(text)
             if severity <= mavlink.MAV_SEVERITY_CRITICAL and self.airborne_us >= 0:
                 self._end("diverged", text, phase.name.lower())
 
-    def _judge(self, now_us: int) -> None:
+    def _check_end(self, now_us: int) -> None:
         flight = self.core.flight
-        if self.flown.outcome:
+        if self.result.outcome:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
-            self._landed()
+            self._end_landed()
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.cell.limit_us:
             where: str = flight.phase.name.lower()
             limit_s = self.cell.limit_us * 1e-6
             self._end("timeout", f"not landed after {limit_s:.0f} s of flight: still in phase {where}", where)
 
-    def _landed(self) -> None:
+    def _end_landed(self) -> None:
         """End the flight of a vehicle that was disarmed, with outcome and reason as in `gcs fly`."""
         if self.core.flight.mission.done:
             self._end("completed", "")
             return
-        where = f"item {self.item} of {self.cell.items - 1}"
+        where = f"item {self.item} of {self.cell.item_count - 1}"
         ended = f"the vehicle was disarmed before the end of the mission, at {where}"
-        self._end("interrupted", "; ".join([*dict.fromkeys(self._warned), ended]))
+        self._end("interrupted", "; ".join([*dict.fromkeys(self._warnings), ended]))
 
-    def conclude(self) -> Flown:
+    def conclude(self) -> FlightResult:
         """Compute the figures of the flight and return its result."""
-        flown, f = self.flown, unpack(Figures, self.figures, 0)
+        result, f = self.result, unpack(Figures, self.figures, 0)
         if self.airborne_us >= 0:
-            flown.flight_s = (self.now_us - self.airborne_us) * 1e-6
-        flown.mission_s = self.mission_us * 1e-6
+            result.flight_s = (self.now_us - self.airborne_us) * 1e-6
+        result.mission_s = self.mission_us * 1e-6
         if f.samples > 0.0:
-            flown.load_error_max_m = f.error_max
-            flown.tracking_error_max_m = f.tracking_max
-            flown.load_error_rms_m = sqrt(f.error_square / f.samples)
-            flown.estimator_error_max_m = f.estimator_error_max
-            flown.saturated_fraction = f.saturated / f.ticks
-            flown.psi_R_max, flown.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
-            flown.tension_min_n, flown.tension_max_n = f.tension_min, f.tension_max
-            flown.rotor_force_min_n, flown.rotor_force_max_n = f.rotor_min, f.rotor_max
-        return flown
+            result.load_error_max_m = f.error_max
+            result.tracking_error_max_m = f.tracking_max
+            result.load_error_rms_m = sqrt(f.error_square / f.samples)
+            result.estimator_error_max_m = f.estimator_error_max
+            result.saturated_fraction = f.saturated / f.ticks
+            result.psi_R_max, result.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
+            result.tension_min_n, result.tension_max_n = f.tension_min, f.tension_max
+            result.rotor_force_min_n, result.rotor_force_max_n = f.rotor_min, f.rotor_max
+        return result
 
 
-def fly(mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None = None) -> Flown:
+def fly(
+    mission: Mission, conditions: Conditions, start_times: StartTimes, trace: Floats | None = None
+) -> FlightResult:
     """Fly a mission from take-off to landing under these conditions.
 
     `trace` (ticks, TRACE_COLUMNS) receives the true state at each tick, for tests: x_load, x_quad, quat_wxyz,
     rotor_force.
     """
-    return SweptFlight(cell_of(mission, conditions), conditions.seed, boarding, trace).run()
+    return SweepFlight(cell_of(mission, conditions), conditions.seed, start_times, trace).run()

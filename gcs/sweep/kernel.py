@@ -12,7 +12,16 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
-from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, Seen, fly_tick, row_at, vector_at
+from autopilot.core.tick import (
+    FLOWN,
+    TO_DECIDE,
+    ControlMemory,
+    CoreRows,
+    EstimateSummary,
+    fly_tick,
+    row_at,
+    vector_at,
+)
 from autopilot.geometry.addresses import ask_kernel_at, call_kernel_at
 from autopilot.geometry.compiler import INSIDE
 from autopilot.geometry.entry import native_address_of
@@ -20,9 +29,9 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.supervisor.quiescence import Stretch
-from gcs.sweep.wire import Wire, deliver, put_forces
+from gcs.sweep.wire import Wire, deliver_readings, put_forces
 from sitl.plant.chain.records import ChainRows
-from sitl.plant.rotors import ASKED, FORCE
+from sitl.plant.rotors import FORCE, REQUESTED
 from sitl.world import Floats, World, WorldModel, WorldRows, world_tick
 
 
@@ -50,33 +59,35 @@ NO_FIGURES = Figures(
 
 
 @kernel
-def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: Vec3) -> None:
-    """Add this tick to the figures; `asked` is the load's position on the requested path, `target` that on
-    the shaped path, which the autopilot flies."""
+def add_to_figures(
+    figures: Row, world: WorldRows, core: CoreRows, target: Vec3, requested_position: Vec3
+) -> None:
+    """Add this tick to the figures; `requested_position` is the load's position on the requested path,
+    `target` that on the shaped path, which the autopilot flies."""
     f = unpack(Figures, figures, 0)
-    plant, pilot = unpack(World, world.world, 0).plant, unpack(Pilot, core.pilot, 0)
-    believed = unpack(Seen, core.seen, 0).state
-    error = norm(sub(plant.x_load, asked))
-    least, greatest = f.rotor_min, f.rotor_max
+    plant, control = unpack(World, world.world, 0).plant, unpack(ControlMemory, core.control, 0)
+    believed = unpack(EstimateSummary, core.summary, 0).state
+    error = norm(sub(plant.x_load, requested_position))
+    min_force, max_force = f.rotor_min, f.rotor_max
     for i in range(world.rotor_table.shape[0]):
         force = world.rotors[FORCE, i]
-        least, greatest = min(least, force), max(greatest, force)
-    after = Figures(
+        min_force, max_force = min(min_force, force), max(max_force, force)
+    updated = Figures(
         max(f.error_max, error),
         f.error_square + error * error,
         f.samples + 1.0,
         max(f.tracking_max, norm(sub(plant.x_load, target))),
-        max(f.psi_R_max, pilot.command.psi_R),
-        max(f.psi_q_max, pilot.command.psi_q),
-        f.saturated + (1.0 if pilot.mixed.saturated != 0 else 0.0),
+        max(f.psi_R_max, control.command.psi_R),
+        max(f.psi_q_max, control.command.psi_q),
+        f.saturated + (1.0 if control.mixed.saturated != 0 else 0.0),
         f.ticks + 1.0,
         min(f.tension_min, plant.tension),
         max(f.tension_max, plant.tension),
         max(f.estimator_error_max, norm(sub(plant.x_load, believed.x_load))),
-        least,
-        greatest,
+        min_force,
+        max_force,
     )
-    pack(after, figures, 0)
+    pack(updated, figures, 0)
 
 
 class Code(NamedTuple):
@@ -90,7 +101,7 @@ def code_of_world(world: WorldRows, chain: ChainRows | None = None) -> int:
     """The address of the world's tick for such rows, which is compiled or loaded if necessary."""
     if not hasattr(world_tick, "overloads"):
         return 0
-    return native_address_of(world_tick, world, world.rotors[ASKED], False, 0.0, chain)
+    return native_address_of(world_tick, world, world.rotors[REQUESTED], False, 0.0, chain)
 
 
 def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
@@ -100,22 +111,22 @@ def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
     return native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False)
 
 
-def move_world(
+def call_world_tick(
     code: Code, world: WorldRows, gripper_open: bool, reel_rate: float, chain: ChainRows | None
 ) -> None:
     """Call `world_tick` by its address."""
-    world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
+    world_tick(world, world.rotors[REQUESTED], gripper_open, reel_rate, chain)
 
 
-@overload(move_world, jit_options=INSIDE)
-def _world_moved(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> Any:
+@overload(call_world_tick, jit_options=INSIDE)
+def _overload_world_tick(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> Any:
     def called(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> None:
-        call_kernel_at(code.world, (world, world.rotors[ASKED], gripper_open, reel_rate, chain))
+        call_kernel_at(code.world, (world, world.rotors[REQUESTED], gripper_open, reel_rate, chain))
 
     return called
 
 
-def fly_autopilot(
+def call_fly_tick(
     code: Code,
     core: CoreRows,
     law_rows: Any,
@@ -129,8 +140,8 @@ def fly_autopilot(
     return fly_tick(core, law_rows, readings, now_us, tick, dt, decided)
 
 
-@overload(fly_autopilot, jit_options=INSIDE)
-def _stepped(
+@overload(call_fly_tick, jit_options=INSIDE)
+def _overload_fly_tick(
     code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
 ) -> Any:
     def called(
@@ -162,9 +173,9 @@ def fly_stretch(
     law_rows: Any,
     wire: Row,
     figures: Row,
-    asked: Floats,
+    requested_path: Floats,
     trace: Floats,
-    begun: bool,
+    started: bool,
     decided: bool,
     gripper_open: bool,
     reel_rate: float,
@@ -173,28 +184,30 @@ def fly_stretch(
 ) -> bool:
     """Fly until the supervisor must decide (True) or the tick `stop_tick` has been flown (False).
 
-    `begun`: the present tick has been flown; `decided`: except for the law's part, which had to wait for the
-    supervisor's decision. `asked` (ticks, 21) is the load's requested path, from the first tick of the core's
-    stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the true state, up to its
-    length. `chain` is the memory of a cable of links, None for other cables.
+    `started`: the present tick has been flown; `decided`: except for the law's part, which had to wait for
+    the supervisor's decision. `requested_path` (ticks, 21) is the load's requested path, from the first tick
+    of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the true state,
+    up to its length. `chain` is the memory of a cable of links, None for other cables.
     """
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us
     while True:
-        if begun and not decided:
+        if started and not decided:
             put_forces(core.rotors, core.table, world)
-            move_world(code, world, gripper_open, reel_rate, chain)
-        begun = True
+            call_world_tick(code, world, gripper_open, reel_rate, chain)
+        started = True
         now = unpack(World, world.world, 0)
         _trace(trace, now, world.rotors, world.rotor_table.shape[0])
-        readings = 0 if decided else deliver(world, now.now_us, link, core.inbox)
+        readings = 0 if decided else deliver_readings(world, now.now_us, link, core.inbox)
         dt = 0.0 if now.tick == 0 else tick_us * 1e-6
-        came = fly_autopilot(code, core, law_rows, readings, now.now_us, now.tick, dt, decided)
+        outcome = call_fly_tick(code, core, law_rows, readings, now.now_us, now.tick, dt, decided)
         decided = False
-        if came == TO_DECIDE:
+        if outcome == TO_DECIDE:
             return True
-        if came == FLOWN and asked.shape[0] > 0:
-            at = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
-            count(figures, world, core, vector_at(core.targets, at, 0), vector_at(asked, at, 0))
+        if outcome == FLOWN and requested_path.shape[0] > 0:
+            row = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
+            add_to_figures(
+                figures, world, core, vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
+            )
         if now.tick >= stop_tick:
             return False

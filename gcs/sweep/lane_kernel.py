@@ -11,9 +11,9 @@ from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.lanes import in_lanes, parted
 from autopilot.geometry.packed import Row, unpack, with_field
 from autopilot.supervisor.quiescence import Stretch
-from gcs.sweep.kernel import count
-from gcs.sweep.wire import Wire, deliver, put_forces
-from sitl.plant.rotors import ASKED
+from gcs.sweep.kernel import add_to_figures
+from gcs.sweep.wire import Wire, deliver_readings, put_forces
+from sitl.plant.rotors import REQUESTED
 from sitl.world import World, WorldModel, WorldRows, world_tick
 
 
@@ -25,7 +25,7 @@ def world_in_lanes(rows: WorldRows) -> WorldRows:
         rows.model,
         in_lanes(rows.seed),
         rows.clock,
-        rows.fate,
+        rows.delivery,
         in_lanes(rows.errors),
         in_lanes(rows.queue),
         in_lanes(rows.commands),
@@ -51,8 +51,8 @@ def core_in_lanes(rows: CoreRows) -> CoreRows:
     )
     return CoreRows(
         in_lanes(rows.estimator),
-        in_lanes(rows.pilot),
-        in_lanes(rows.seen),
+        in_lanes(rows.control),
+        in_lanes(rows.summary),
         in_lanes(rows.commands),
         history,
         in_lanes(rows.inbox),
@@ -73,7 +73,7 @@ def fly_lanes(
     own_law_rows: Any,
     wire: Row,
     figure_rows: Row,
-    asked: Any,
+    requested_path: Any,
     ticks: int,
 ) -> tuple[int, int]:
     """Fly `ticks` ticks; return how many of them all lanes flew alike, and one bit for each lane that took
@@ -90,16 +90,18 @@ def fly_lanes(
     parted()
     for done in range(ticks):
         put_forces(core.rotors, core.table, world)
-        world_tick(world, world.rotors[ASKED], False, 0.0)
+        world_tick(world, world.rotors[REQUESTED], False, 0.0)
         now = unpack(World, world.world, 0)
-        readings = deliver(world, now.now_us, link, core.inbox)
-        came = fly_tick(core, law_rows, readings, now.now_us, now.tick, tick_us * 1e-6, False)
-        if came == FLOWN and asked[0].shape[0] > 0:
-            at = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
-            count(figures, world, core, vector_at(core.targets, at, 0), vector_at(asked, at, 0))
-        gone = parted()
-        if came == TO_DECIDE:
+        readings = deliver_readings(world, now.now_us, link, core.inbox)
+        outcome = fly_tick(core, law_rows, readings, now.now_us, now.tick, tick_us * 1e-6, False)
+        if outcome == FLOWN and requested_path[0].shape[0] > 0:
+            row = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
+            add_to_figures(
+                figures, world, core, vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
+            )
+        diverged = parted()
+        if outcome == TO_DECIDE:
             return done, (1 << LANES) - 1
-        if gone != 0:
-            return done, gone
+        if diverged != 0:
+            return done, diverged
     return ticks, 0

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from autopilot.control.actuators.disturbance_observer import aloft
-from autopilot.control.actuators.rotor_model import Actuation, advance, rows_of, steady
+from autopilot.control.actuators.disturbance_observer import nominal_in_flight
+from autopilot.control.actuators.rotor_model import Actuation, advance, queue_rows, steady_actuation
 from autopilot.control.laws.interface import kernels_of
 from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
 from autopilot.control.records import Cable, Reference, State, Vehicle
@@ -26,16 +26,18 @@ from autopilot.onboard.onboard import build_setup
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
-from gcs.sweep.plan import SweepPlan, simulated
+from gcs.sweep.plan import SweepPlan, simulator_settings
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
 STEP = 1e-5  # central differences: truncation and rounding both below 1e-9
-LOST = 1.0 + 1e-7  # spectral radius; numbers that the law stores but does not use have eigenvalue 1
-STRIDES = 12  # steps of the search from the default value to the end of the range
-HALVINGS = 6
+STABILITY_LIMIT = (
+    1.0 + 1e-7
+)  # spectral radius; numbers that the law stores but does not use have eigenvalue 1
+SEARCH_STEPS = 12  # steps of the search from the default value to the end of the range
+BISECTIONS = 6
 SETTLE_TICKS = 500  # in which the memory of a law settles while hovering
 
 
@@ -51,22 +53,22 @@ def sampled_plant(
     if tau > 0.0:
         A = np.block([[A, B], [np.zeros((4, n)), -np.eye(4) / tau]])
         B = np.vstack([np.zeros((n, 4)), np.eye(4) / tau])
-    whole = math.floor(delay / period + 1e-9)
-    late = max(0.0, delay - whole * period)
+    full_periods = math.floor(delay / period + 1e-9)
+    remainder = max(0.0, delay - full_periods * period)
 
     def hold(duration: float) -> tuple[Floats, Floats]:
         E = expm(np.block([[A, B], [np.zeros((4, len(A) + 4))]]) * duration)
         return E[: len(A), : len(A)], E[: len(A), len(A) :]
 
     Phi, _ = hold(period)
-    Phi_new, Gamma_new = hold(period - late)
-    Gamma_old = Phi_new @ hold(late)[1]
-    m, queue = len(A), whole + 1
+    Phi_new, Gamma_new = hold(period - remainder)
+    Gamma_old = Phi_new @ hold(remainder)[1]
+    m, queue = len(A), full_periods + 1
     size = m + 4 * queue
     A_d, B_d = np.zeros((size, size)), np.zeros((size, 4))
     A_d[:m, :m] = Phi
     A_d[:m, m : m + 4] = Gamma_old
-    if whole == 0:
+    if full_periods == 0:
         B_d[:m] = Gamma_new
     else:
         A_d[:m, m + 4 : m + 8] = Gamma_new
@@ -77,7 +79,7 @@ def sampled_plant(
     return A_d, B_d, C_d
 
 
-def state_at(motion: Floats, vehicle: Vehicle) -> State:
+def state_near_hover(motion: Floats, vehicle: Vehicle) -> State:
     """The state near hover with these LOAD_STATES, on the manifolds of q and R to second order."""
     q_x, q_y = float(motion[6]), float(motion[7])
     q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
@@ -113,12 +115,12 @@ def _numbers(record: Any) -> Iterator[float]:
         yield float(record)
 
 
-def _like(record: Any, numbers: Iterator[float]) -> Any:
+def _same_form(record: Any, numbers: Iterator[float]) -> Any:
     """A record of the same form with other numbers."""
     if isinstance(record, np.ndarray):
         return np.array([next(numbers) for _ in range(record.size)]).reshape(record.shape)
     if isinstance(record, tuple):
-        parts = [_like(part, numbers) for part in record]
+        parts = [_same_form(part, numbers) for part in record]
         return type(record)(*parts) if hasattr(record, "_fields") else tuple(parts)
     return next(numbers)
 
@@ -127,39 +129,39 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
     """(A, B, C, D) of the law at hover: states are its memory, inputs the motion, outputs (f, M)."""
     vehicle, law = setup.vehicle, setup.law
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
-    observed = aloft(vehicle)
+    observed = nominal_in_flight(vehicle)
     kernels, cable = kernels_of(law), Cable(vehicle.cable_length)
     motion = np.zeros(LOAD_STATES)
-    hover = state_at(motion, vehicle)
+    hover = state_near_hover(motion, vehicle)
 
     def tick(memory: Any, actuation: Actuation, state: State) -> tuple[Any, Actuation, Floats]:
         memory, command = kernels.load_position(law, memory, state, reference, actuation, observed, cable)
         after = advance(actuation, command.thrust, command.moment, setup.actuation)
         return memory, after, np.array([command.thrust, *command.moment])
 
-    actuation = steady(hover_thrust(vehicle), rows_of(setup.actuation))
+    actuation = steady_actuation(hover_thrust(vehicle), queue_rows(setup.actuation))
     memory = kernels.start(law, hover, ZERO, ZERO)
     for _ in range(SETTLE_TICKS):
         memory, actuation, _ = tick(memory, actuation, hover)
     form = (memory, actuation)
-    rest = np.array(list(_numbers(form)))
-    n = len(rest)
+    equilibrium = np.array(list(_numbers(form)))
+    n = len(equilibrium)
 
-    def step(at: Floats) -> Floats:
-        memory, actuation = _like(form, iter(at[:n].tolist()))
-        after, moved, command = tick(memory, actuation, state_at(at[n:], vehicle))
-        return np.array([*_numbers((after, moved)), *command])
+    def step(point: Floats) -> Floats:
+        memory, actuation = _same_form(form, iter(point[:n].tolist()))
+        after, next_actuation, command = tick(memory, actuation, state_near_hover(point[n:], vehicle))
+        return np.array([*_numbers((after, next_actuation)), *command])
 
-    at = np.concatenate([rest, motion])
+    point = np.concatenate([equilibrium, motion])
     jacobian = np.empty((n + 4, n + LOAD_STATES))
     for j in range(n + LOAD_STATES):
-        shift = np.zeros(n + LOAD_STATES)
-        shift[j] = STEP
-        jacobian[:, j] = (step(at + shift) - step(at - shift)) / (2.0 * STEP)
+        offset = np.zeros(n + LOAD_STATES)
+        offset[j] = STEP
+        jacobian[:, j] = (step(point + offset) - step(point - offset)) / (2.0 * STEP)
     return jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
 
 
-def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
+def eigenvalue_moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     """Moduli of the eigenvalues of hovering, sorted, under settings by name."""
     import control
 
@@ -167,11 +169,11 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     apply_settings(table, settings.items())
     truth = load_truth(vehicle)
     sim_table = sim_parameters(truth)
-    for name, value in simulated(settings).items():
+    for name, value in simulator_settings(settings).items():
         sim_table.set(name, value)
     true, period = apply_parameters(truth, sim_table), 1.0 / table["CTL_RATE_HZ"]
     setup = build_setup(table, 1)
-    really = setup.vehicle._replace(
+    true_vehicle = setup.vehicle._replace(
         quad_mass=true.quad_mass,
         load_mass=true.load_mass,
         cable_length=true.cable_length,
@@ -179,7 +181,7 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
         gravity=true.gravity,
     )
     delay = settings_of(sim_table).actuator_delay_us * 1e-6
-    A, B, C = sampled_plant(*load_state_space(really), true.rotor_tau, delay, period)
+    A, B, C = sampled_plant(*load_state_space(true_vehicle), true.rotor_tau, delay, period)
     world = control.ss(A, B, C, np.zeros((LOAD_STATES, 4)), period)
     law = control.ss(*linearised_law(setup), period)
     # feedback is already negative in the law itself
@@ -193,37 +195,39 @@ def linear_range(
     is not part of the loop, or the law is a custom one. All other parameters have their defaults, or the
     values set for all flights."""
     # parameters of a custom estimator or planner
-    brought = {parameter.name for one in plan.own(law).loaded() for parameter in one.parameters}
-    if law not in LAWS or name in brought:
+    own_parameters = {parameter.name for one in plan.own(law).load_classes() for parameter in one.parameters}
+    if law not in LAWS or name in own_parameters:
         return ""
-    fixed = {known: value for known, value in plan.settings if known not in brought}
+    fixed = {known: value for known, value in plan.settings if known not in own_parameters}
     fixed["CTL_LAW"] = float(LAWS.index(law))
 
-    def holds(value: float) -> bool:
-        return moduli(plan.vehicle, {**fixed, name: value})[-1] < LOST
+    def is_stable(value: float) -> bool:
+        return eigenvalue_moduli(plan.vehicle, {**fixed, name: value})[-1] < STABILITY_LIMIT
 
-    here, low, high = (moduli(plan.vehicle, {**fixed, name: value}) for value in (nominal_value, *limits))
-    if here == low == high:
+    nominal, low, high = (
+        eigenvalue_moduli(plan.vehicle, {**fixed, name: value}) for value in (nominal_value, *limits)
+    )
+    if nominal == low == high:
         return ""
-    if here[-1] >= LOST:
+    if nominal[-1] >= STABILITY_LIMIT:
         return "nowhere"
-    least, below = _boundary(holds, nominal_value, limits[0])
-    most, above = _boundary(holds, nominal_value, limits[1])
-    return f"{'< ' if below else ''}{least:.4g} … {'> ' if above else ''}{most:.4g}"
+    lowest, below = _boundary(is_stable, nominal_value, limits[0])
+    highest, above = _boundary(is_stable, nominal_value, limits[1])
+    return f"{'< ' if below else ''}{lowest:.4g} … {'> ' if above else ''}{highest:.4g}"
 
 
-def _boundary(holds: Callable[[float], bool], inside: float, outside: float) -> tuple[float, bool]:
+def _boundary(is_stable: Callable[[float], bool], inside: float, outside: float) -> tuple[float, bool]:
     """The last value on the way from `inside` to `outside` before it ceases to hold, and whether it held all
     the way (False if `outside` is zero, which is a natural end)."""
     if outside == inside:
         return inside, False
     low = inside
-    for value in np.linspace(inside, outside, STRIDES + 1)[1:].tolist():
-        if not holds(value):
+    for value in np.linspace(inside, outside, SEARCH_STEPS + 1)[1:].tolist():
+        if not is_stable(value):
             high = value
-            for _ in range(HALVINGS):
+            for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                low, high = (middle, high) if holds(middle) else (low, middle)
+                low, high = (middle, high) if is_stable(middle) else (low, middle)
             return low, False
         low = value
     return outside, outside != 0.0

@@ -13,15 +13,15 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any
 
-from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
-from autopilot.own.law import law_number, name_of, own_law
+from autopilot.own.law import law_name, law_number, own_law_reference
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.own.trial import try_all
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
-from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
@@ -32,12 +32,12 @@ from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
-MOST_FLIGHTS = 10_000_000
-_MOST_VALUES = 10_000
+MAX_FLIGHTS = 10_000_000
+_MAX_VALUES = 10_000
 _DRAW_SEED = 1  # for drawing the settings of `--sample`: another one would change the meaning of a plan
 
 
-def simulated(settings: Mapping[str, float]) -> dict[str, float]:
+def simulator_settings(settings: Mapping[str, float]) -> dict[str, float]:
     """Those of the settings, by name, that the simulator takes."""
     return {n: v for n, v in settings.items() if n.startswith("SIM_") and n != "SIM_LOSS_PCT"}
 
@@ -49,7 +49,7 @@ class PlanError(GcsError):
 
 
 @dataclass(frozen=True)
-class Varied:
+class VariedParameter:
     """A parameter and its values: on a grid, each of `values`; if drawn and `continuous`, any number between
     the least and the greatest of them."""
 
@@ -77,15 +77,15 @@ class SweepPlan:
     sensors: str
     laws: tuple[str, ...]
     seeds: tuple[int, ...]
-    varied: tuple[Varied, ...]
+    varied: tuple[VariedParameter, ...]
     settings: tuple[tuple[str, float], ...]  # the same for all flights
     sample: int = 0
     estimator: str = ""  # custom estimator of all flights; empty: the built-in one
     planner: str = ""
 
-    def own(self, law: str) -> Own:
+    def own(self, law: str) -> OwnCode:
         """The custom parts (law, estimator, planner) of a flight with this law."""
-        return Own(own_law(law), self.estimator, self.planner)
+        return OwnCode(own_law_reference(law), self.estimator, self.planner)
 
     @property
     def points(self) -> int:
@@ -109,10 +109,10 @@ class SweepPlan:
             return list(product(*(v.values for v in self.varied)))
         from scipy.stats.qmc import LatinHypercube
 
-        shares = LatinHypercube(len(self.varied), rng=_DRAW_SEED).random(self.sample)
+        fractions = LatinHypercube(len(self.varied), rng=_DRAW_SEED).random(self.sample)
         return [
-            tuple(_drawn(v, float(share)) for v, share in zip(self.varied, row, strict=True))
-            for row in shares
+            tuple(_drawn_value(v, float(fraction)) for v, fraction in zip(self.varied, row, strict=True))
+            for row in fractions
         ]
 
     def conditions(self, case: Case) -> Conditions:
@@ -135,7 +135,9 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
         sensors=values["sensors"],
         laws=tuple(values["laws"]),
         seeds=tuple(values["seeds"]),
-        varied=tuple(Varied(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]),
+        varied=tuple(
+            VariedParameter(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]
+        ),
         settings=tuple((name, float(value)) for name, value in values["settings"]),
         sample=int(values["sample"]),
         estimator=values["estimator"],
@@ -143,14 +145,14 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
     )
 
 
-def _drawn(varied: Varied, share: float) -> float:
+def _drawn_value(varied: VariedParameter, fraction: float) -> float:
     if varied.continuous:
         low, high = min(varied.values), max(varied.values)
-        return low + share * (high - low)
-    return varied.values[min(int(share * len(varied.values)), len(varied.values) - 1)]
+        return low + fraction * (high - low)
+    return varied.values[min(int(fraction * len(varied.values)), len(varied.values) - 1)]
 
 
-def read_varied(text: str, sampled: bool) -> Varied:
+def parse_varied(text: str, sampled: bool) -> VariedParameter:
     """NAME=A,B,C, or NAME=LOW:HIGH:COUNT, or, if values are `sampled`, NAME=LOW:HIGH."""
     name, equals, values = text.partition("=")
     name = name.strip().upper()
@@ -159,33 +161,37 @@ def read_varied(text: str, sampled: bool) -> Varied:
             f"--vary {text}: must be NAME=LOW:HIGH:COUNT or NAME=A,B,C, e.g. SIM_ACT_DELAY_MS=0:60:7"
         )
     if ":" not in values:
-        listed = tuple(_number(text, one) for one in values.split(","))
-        twice = next((one for i, one in enumerate(listed) if one in listed[:i]), None)
-        if twice is not None:
-            raise PlanError(f"--vary {text}: {twice:g} is there twice; --seeds flies it more than once")
-        return Varied(name, listed, False)
+        listed = tuple(_parse_number(text, one) for one in values.split(","))
+        duplicate = next((one for i, one in enumerate(listed) if one in listed[:i]), None)
+        if duplicate is not None:
+            raise PlanError(f"--vary {text}: {duplicate:g} is there twice; --seeds flies it more than once")
+        return VariedParameter(name, listed, False)
     parts = values.split(":")
     if len(parts) not in (2, 3):
         raise PlanError(f"--vary {text}: must be NAME=LOW:HIGH:COUNT, or NAME=LOW:HIGH with --sample")
-    low, high = _number(text, parts[0]), _number(text, parts[1])
+    low, high = _parse_number(text, parts[0]), _parse_number(text, parts[1])
     if not low < high:
         raise PlanError(f"--vary {text}: the first end must be below the second")
     if len(parts) == 2:
         if not sampled:
             raise PlanError(f"--vary {text}: a range without a count is for --sample; append a count, as :7")
-        return Varied(name, (low, high), True)
+        return VariedParameter(name, (low, high), True)
     if sampled:
-        drawn = f"{name}={parts[0].strip()}:{parts[1].strip()}"
-        raise PlanError(f"--vary {text}: --sample draws from the whole range, without a count; give {drawn}")
-    count = _number(text, parts[2])
-    if count != int(count) or not 2 <= count <= _MOST_VALUES:
-        raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MOST_VALUES}")
+        without_count = f"{name}={parts[0].strip()}:{parts[1].strip()}"
+        raise PlanError(
+            f"--vary {text}: --sample draws from the whole range, without a count; give {without_count}"
+        )
+    count = _parse_number(text, parts[2])
+    if count != int(count) or not 2 <= count <= _MAX_VALUES:
+        raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MAX_VALUES}")
     n = int(count)
     # rounded to twelve digits: 0.1 and not 0.30000000000000004
-    return Varied(name, tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n)), True)
+    return VariedParameter(
+        name, tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n)), True
+    )
 
 
-def _number(text: str, number: str) -> float:
+def _parse_number(text: str, number: str) -> float:
     try:
         value = float(number)
     except ValueError:
@@ -201,10 +207,10 @@ def make_plan(
     sensors: str,
     laws: Sequence[str],
     seeds: Sequence[int],
-    varied: Sequence[Varied],
+    varied: Sequence[VariedParameter],
     settings: Mapping[str, float],
     sample: int,
-    own: Own = NOTHING_OWN,
+    own: OwnCode = NO_OWN_CODE,
 ) -> SweepPlan:
     """The plan; PlanError states what is wrong with it. The estimator and planner of `own` are those of all
     flights."""
@@ -219,15 +225,15 @@ def make_plan(
     values = [*((v.name, value) for v in varied for value in v.values), *settings.items()]
     _check_laws(laws)
     for law in laws:
-        brought = own._replace(law=own_law(law))
-        _check_values(vehicle, brought, values, settings)
-        if any(brought):
-            _try(vehicle, brought, settings)
+        own_of_law = own._replace(law=own_law_reference(law))
+        _check_values(vehicle, own_of_law, values, settings)
+        if any(own_of_law):
+            _try_own_code(vehicle, own_of_law, settings)
     try:
         load_mission(mission)
         load_profile(sensors)
     except ValueError as error:
-        raise PlanError(*_lines(error)) from None
+        raise PlanError(*_error_lines(error)) from None
     plan = SweepPlan(
         mission,
         vehicle,
@@ -240,15 +246,15 @@ def make_plan(
         own.estimator,
         own.planner,
     )
-    if plan.flights > MOST_FLIGHTS:
-        raise PlanError(f"{plan.flights} flights are too many, {MOST_FLIGHTS} at most; --sample takes a few")
+    if plan.flights > MAX_FLIGHTS:
+        raise PlanError(f"{plan.flights} flights are too many, {MAX_FLIGHTS} at most; --sample takes a few")
     return plan
 
 
 def _check_laws(laws: Sequence[str]) -> None:
     """PlanError if two laws have the same name and could not be distinguished in a table."""
     try:
-        names = {law: name_of(law) for law in laws}
+        names = {law: law_name(law) for law in laws}
     except OwnError as error:
         raise PlanError(f"--law {error}") from None
     for law, name in names.items():
@@ -256,7 +262,7 @@ def _check_laws(laws: Sequence[str]) -> None:
             raise PlanError(f"--law {law}: another law has the name {name}, too; give it `name = ...`")
 
 
-def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
+def _try_own_code(vehicle: str, own: OwnCode, settings: Mapping[str, float]) -> None:
     """PlanError if custom code fails in the trial before the flights."""
     table = parameters_for(load_belief(vehicle), own)
     apply_settings(table, settings.items())
@@ -267,20 +273,20 @@ def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
         raise PlanError(str(error)) from None
 
 
-def _lines(error: ValueError) -> tuple[str, ...]:
+def _error_lines(error: ValueError) -> tuple[str, ...]:
     """The lines of an error: one for each mistake in a file."""
     return error.problems if isinstance(error, FileError) else (str(error),)
 
 
 def _check_values(
-    vehicle: str, own: Own, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
+    vehicle: str, own: OwnCode, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
 ) -> None:
     """PlanError unless all these values can be set; those of `settings` do not vary."""
     try:
         world = sim_parameters(load_truth(vehicle))
         table = parameters_for(load_belief(vehicle), own)
     except ValueError as error:
-        raise PlanError(*_lines(error)) from None
+        raise PlanError(*_error_lines(error)) from None
     for name, value in values:
         if name == "SIM_LOSS_PCT":
             raise PlanError(
@@ -289,11 +295,11 @@ def _check_values(
         if name == "CTL_LAW":
             raise PlanError("CTL_LAW is what --law says; give --law instead")
         option = "--set" if name in settings else "--vary"
-        holder = world if name.startswith("SIM_") and name not in table else table
-        if name not in holder:
-            raise PlanError(f"{option} {unknown_parameter(name, [*table.names, *world.names])}")
+        owner = world if name.startswith("SIM_") and name not in table else table
+        if name not in owner:
+            raise PlanError(f"{option} {unknown_parameter_text(name, [*table.names, *world.names])}")
         try:
-            holder.set(name, value)
+            owner.set(name, value)
             if name == "SIM_RATE_HZ":
                 settings_of(world)
         except ParameterError as error:
@@ -303,9 +309,11 @@ def _check_values(
 
 def _check_rates(world: ParameterTable, table: ParameterTable, values: Sequence[tuple[str, float]]) -> None:
     """PlanError if the law cannot run at one of its rates with one of the simulator's tick rates."""
-    ticks, jobs = ([value for name, value in values if name == one] for one in ("SIM_RATE_HZ", "CTL_RATE_HZ"))
-    for tick_hz, job_hz in product(ticks or [world["SIM_RATE_HZ"]], jobs or [table["CTL_RATE_HZ"]]):
-        table.set("CTL_RATE_HZ", job_hz)
+    tick_rates, law_rates = (
+        [value for name, value in values if name == one] for one in ("SIM_RATE_HZ", "CTL_RATE_HZ")
+    )
+    for tick_hz, law_hz in product(tick_rates or [world["SIM_RATE_HZ"]], law_rates or [table["CTL_RATE_HZ"]]):
+        table.set("CTL_RATE_HZ", law_hz)
         try:
             control_divider(tick_hz, table)
         except RateError as error:

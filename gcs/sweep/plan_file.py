@@ -11,7 +11,7 @@ from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
-_NAMED = {"mission": "mission", "laws": "--law", "varied": "--vary", "settings": "--set"}
+_OPTIONS = {"mission": "mission", "laws": "--law", "varied": "--vary", "settings": "--set"}
 ENTRIES = ("gcs.sweep.work",)  # modules whose imports are all the code that flies a sweep
 
 
@@ -19,7 +19,7 @@ def sweep_origin(plan: SweepPlan) -> Origin:
     """The origin of the flights of a plan if they are flown now: settings, files, version and code."""
     files = file_digests((plan.mission, plan.vehicle, plan.sensors))
     for law in plan.laws:
-        files |= {one.reference: one.digest for one in plan.own(law).loaded()}
+        files |= {one.reference: one.digest for one in plan.own(law).load_classes()}
     return origin_of({"plan": plan.to_json(), "files": files}, ENTRIES)
 
 
@@ -32,11 +32,11 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
         found = _read(directory)
         differing = origin.differences(found.get("origin"))
         if differing:
-            held = "this sweep as flown by another version or other code of Plumbline"
+            content = "this sweep as flown by another version or other code of Plumbline"
             if "settings" in differing:
-                held = f"another sweep, with other {', '.join(_differing(origin, found))}"
+                content = f"another sweep, with other {', '.join(_differing_options(origin, found))}"
             raise PlanError(
-                f"{directory}: holds {held}; name another folder by --out, or add --fresh to discard its "
+                f"{directory}: holds {content}; name another folder by --out, or add --fresh to discard its "
                 "flights"
             )
         return
@@ -59,7 +59,7 @@ def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
     ordinal = 1
     while True:
         directory = first if ordinal == 1 else first.with_name(f"{first.name}-{ordinal}")
-        if _is_free(directory) or _is_of(directory, origin, fresh):
+        if _is_free(directory) or _is_of_origin(directory, origin, fresh):
             return directory
         ordinal += 1
 
@@ -73,7 +73,7 @@ def _is_free(directory: Path) -> bool:
         return False
 
 
-def _is_of(directory: Path, origin: Origin, fresh: bool) -> bool:
+def _is_of_origin(directory: Path, origin: Origin, fresh: bool) -> bool:
     try:
         differing = origin.differences(_read(directory).get("origin"))
     except PlanError:
@@ -81,19 +81,23 @@ def _is_of(directory: Path, origin: Origin, fresh: bool) -> bool:
     return "settings" not in differing if fresh else not differing
 
 
-def _differing(origin: Origin, found: Mapping[str, Any]) -> list[str]:
+def _differing_options(origin: Origin, found: Mapping[str, Any]) -> list[str]:
     """The settings that differ, by their names on the command line, with the stored value if it is short."""
     try:
-        stored, asked = found["origin"]["settings"], origin.to_json()["settings"]
-        pairs = [(name, stored["plan"].get(name), value) for name, value in asked["plan"].items()]
-        other_files = stored["files"] != asked["files"]
+        stored, requested = found["origin"]["settings"], origin.to_json()["settings"]
+        pairs = [(name, stored["plan"].get(name), value) for name, value in requested["plan"].items()]
+        other_files = stored["files"] != requested["files"]
     except (KeyError, TypeError, AttributeError):
         return ["settings"]
-    named = [_NAMED.get(name, f"--{name}") + _was(theirs) for name, theirs, mine in pairs if theirs != mine]
-    return named or (["files of your own"] if other_files else [])
+    differing = [
+        _OPTIONS.get(name, f"--{name}") + _stored_value(stored_value)
+        for name, stored_value, requested_value in pairs
+        if stored_value != requested_value
+    ]
+    return differing or (["files of your own"] if other_files else [])
 
 
-def _was(value: object) -> str:
+def _stored_value(value: object) -> str:
     return f" ({value})" if isinstance(value, str | int | float) else ""
 
 

@@ -26,7 +26,7 @@ from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Cells, Flights, cells
 
 LAW_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
-_MOST_NUMBERS = 144  # cells of a map; with more, the values are not written into the cells
+_MAX_NUMBERED_CELLS = 144  # cells of a map; with more, the values are not written into the cells
 _ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colour scale
 
 
@@ -69,10 +69,10 @@ def draw_map(
 
 def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) -> None:
     x, y = found.axes
-    shown = np.ma.masked_invalid(values.T)
+    masked = np.ma.masked_invalid(values.T)
     ax.grid(False)
     ax.set_facecolor(PALE)
-    image = ax.imshow(shown, origin="lower", aspect="auto", norm=norm, cmap=colours, interpolation="nearest")
+    image = ax.imshow(masked, origin="lower", aspect="auto", norm=norm, cmap=colours, interpolation="nearest")
     for ticks, labels, centres in (
         (ax.set_xticks, ax.set_xticklabels, x),
         (ax.set_yticks, ax.set_yticklabels, y),
@@ -80,7 +80,7 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
         stride = max(1, -(-len(centres) // 12))
         ticks(range(0, len(centres), stride))
         labels([f"{value:.4g}" for value in centres[::stride]])
-    if values.size > _MOST_NUMBERS:
+    if values.size > _MAX_NUMBERED_CELLS:
         ax.figure.colorbar(image, ax=ax)
         return
     for (i, j), value in np.ndenumerate(values):

@@ -9,7 +9,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from autopilot.own.chosen import parameters_for
+from autopilot.own.own_code import parameters_for
 from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
@@ -18,22 +18,22 @@ from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
-from gcs.sweep.results import Flights, cells, flights_of, reach
-from gcs.sweep.standouts import FOLDER, Standout, base_command, command_of, stored_standouts
+from gcs.sweep.results import Flights, cells, completion_range, flights_by_law
+from gcs.sweep.standouts import REPEATS_FOLDER, Standout, base_command, repeat_command, stored_standouts
 from gcs.sweep.store import Store
 from gcs.web.page import render
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
 _TEMPLATE = "sweep.html"
-_MOST_PAIRS = 10
+_MAX_PAIRS = 10
 _SCRIPTS = ("sweep.js",)
 _STYLES = ("page.css", "sweep.css")
 
 
 def write_report(directory: Path, plan: SweepPlan) -> Path:
     """Write pictures and page from the stored flights; return the page's path."""
-    laws = [flights for flights in flights_of(Store(directory, plan).read(), plan) if flights.outcome]
+    laws = [flights for flights in flights_by_law(Store(directory, plan).read(), plan) if flights.outcome]
     tables = _tables(plan)
     units = {v.name: _parameter(tables, v.name).unit for v in plan.varied}
     names = [v.name for v in plan.varied if len(set(v.values)) > 1]
@@ -42,7 +42,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         picture = directory / f"curve-{name.lower()}.png"
         draw_curve(picture, laws, plan, name, units)
         curves.append(_picture(picture, f"{name}: over all other settings and seeds"))
-    for pair in list(combinations(names, 2))[:_MOST_PAIRS]:
+    for pair in list(combinations(names, 2))[:_MAX_PAIRS]:
         for flights in laws:
             picture = directory / f"map-{flights.law}-{pair[0].lower()}-{pair[1].lower()}.png"
             draw_map(picture, flights, plan, pair, units)
@@ -63,7 +63,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         version=version,
         flown=sum(len(flights.outcome) for flights in laws),
         laws=[_law(flights) for flights in laws],
-        standouts=[_shown(plan, one, directory) for one in stored_standouts(directory, plan)],
+        standouts=[_standout_row(plan, one, directory) for one in stored_standouts(directory, plan)],
         reaches=margins(plan, laws, tables),
         curves=curves,
         maps=maps,
@@ -72,12 +72,12 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
     return page
 
 
-def _shown(plan: SweepPlan, flight: Standout, directory: Path) -> dict[str, Any]:
+def _standout_row(plan: SweepPlan, flight: Standout, directory: Path) -> dict[str, Any]:
     """A row of the page; `page` is the path of the report, None unless the flight was flown again."""
-    page = f"{FOLDER}/{flight.name}/report.html"
+    page = f"{REPEATS_FOLDER}/{flight.name}/report.html"
     return {
         "flight": flight,
-        "command": command_of(plan, flight, directory),
+        "command": repeat_command(plan, flight, directory),
         "page": page if (directory / page).is_file() else None,
     }
 
@@ -93,15 +93,15 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
         "units": [units[name] for name in names],
         "axes": [axis.tolist() for axis in found.axes],
         "flown": found.flown.ravel().tolist(),
-        "completed": _plain(100.0 * found.success.ravel()),
-        "median": _plain(1e3 * found.error_median_m.ravel()),
-        "worst": _plain(1e3 * found.error_worst_m.ravel()),
+        "completed": _json_numbers(100.0 * found.success.ravel()),
+        "median": _json_numbers(1e3 * found.error_median_m.ravel()),
+        "worst": _json_numbers(1e3 * found.error_worst_m.ravel()),
         "varied": list(flights.values),
-        "shown": [_one(flights, row) if row >= 0 else None for row in rows],
+        "shown": [_flight_record(flights, row) if row >= 0 else None for row in rows],
     }
 
 
-def _one(flights: Flights, row: int) -> dict[str, Any]:
+def _flight_record(flights: Flights, row: int) -> dict[str, Any]:
     return {
         "index": int(flights.index[row]),
         "seed": int(flights.seed[row]),
@@ -110,7 +110,7 @@ def _one(flights: Flights, row: int) -> dict[str, Any]:
     }
 
 
-def _plain(values: Floats) -> list[float | None]:
+def _json_numbers(values: Floats) -> list[float | None]:
     return [float(f"{value:.5g}") if math.isfinite(value) else None for value in values]
 
 
@@ -119,22 +119,22 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
     rows = []
     for flights in laws:
         planned = plan.flights // len(plan.laws)
-        none = "nowhere" if len(flights.outcome) == planned else "not known yet"
+        if_none = "nowhere" if len(flights.outcome) == planned else "not known yet"
         for varied in plan.varied:
             parameter = _parameter(tables, varied.name)
             nominal, unit = parameter.default, parameter.unit
             values = flights.values[varied.name]
-            found = reach(flights, plan, varied.name, nominal)
-            least, most = min(*varied.values, nominal), max(*varied.values, nominal)
-            limits = (max(parameter.low, least), min(parameter.high, most))
+            found = completion_range(flights, plan, varied.name, nominal)
+            low, high = min(*varied.values, nominal), max(*varied.values, nominal)
+            limits = (max(parameter.low, low), min(parameter.high, high))
             rows.append(
                 {
                     "law": flights.law,
                     "name": varied.name,
                     "unit": unit,
                     "nominal": f"{nominal:.4g}",
-                    "every": _range(found.all_from, found.all_to, none),
-                    "some": _range(found.some_from, found.some_to, none),
+                    "every": _range(found.all_from, found.all_to, if_none),
+                    "some": _range(found.some_from, found.some_to, if_none),
                     "flown": _range(float(values.min()), float(values.max())),
                     "linear": linear_range(plan, flights.reference, varied.name, nominal, limits),
                 }
@@ -142,21 +142,21 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
     return rows
 
 
-def _range(low: float, high: float, none: str = "") -> str:
+def _range(low: float, high: float, if_none: str = "") -> str:
     if math.isnan(low):
-        return none
+        return if_none
     return f"{low:.4g}" if low == high else f"{low:.4g} … {high:.4g}"
 
 
 def _law(flights: Flights) -> dict[str, Any]:
-    ends = Counter(flights.outcome)
+    outcomes = Counter(flights.outcome)
     phases = Counter(phase for phase in flights.lost_phase if phase)
     worst = max((e for e in flights.error_m[flights.completed] if math.isfinite(e)), default=math.nan)
     return {
         "name": flights.law,
         "flights": len(flights.outcome),
-        "share": f"{100.0 * ends['completed'] / len(flights.outcome):.1f}",
-        "ends": ", ".join(f"{name} {n}" for name, n in ends.most_common()),
+        "share": f"{100.0 * outcomes['completed'] / len(flights.outcome):.1f}",
+        "ends": ", ".join(f"{name} {n}" for name, n in outcomes.most_common()),
         "phases": ", ".join(f"{name} {n}" for name, n in phases.most_common()) or "–",
         "worst": f"{1e3 * worst:.1f}" if math.isfinite(worst) else "–",
     }

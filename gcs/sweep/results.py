@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.own.law import name_of
+from autopilot.own.law import law_name
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan
 
@@ -50,7 +50,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Reach:
+class CompletionRange:
     """The ranges of a parameter, around its default value, in which flights complete.
 
     `all_from`, `all_to`: every flight completes, whatever else is varied. `some_from`, `some_to`: there is a
@@ -65,7 +65,7 @@ class Reach:
     some_to: float
 
 
-def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
+def flights_by_law(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     """The flights of the table by law, in the order of the plan."""
 
     def values(column: str, kind: type) -> NDArray[Any]:
@@ -78,12 +78,12 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     varied = {v.name: values(v.name, float) for v in plan.varied}
     found = []
     for reference in plan.laws:
-        name = name_of(reference)
+        name = law_name(reference)
         rows = law == name
         found.append(
             Flights(
                 name,
-                {of: column[rows] for of, column in varied.items()},
+                {parameter: column[rows] for parameter, column in varied.items()},
                 outcome[rows] == COMPLETED,
                 error[rows],
                 tuple(outcome[rows].tolist()),
@@ -114,16 +114,16 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
     """The figures over the named parameters, taken over all other settings and seeds."""
     axes = tuple(levels(plan, name) for name in names)
     shape = tuple(len(axis) for axis in axes)
-    at = np.ravel_multi_index(
+    cell_of_flight = np.ravel_multi_index(
         [_nearest(flights.values[name], axis) for name, axis in zip(names, axes, strict=True)], shape
     )
     count = int(np.prod(shape))
-    flown = np.bincount(at, minlength=count).astype(float)
-    done = np.bincount(at, weights=flights.completed.astype(float), minlength=count)
+    flown = np.bincount(cell_of_flight, minlength=count).astype(float)
+    completed_flights = np.bincount(cell_of_flight, weights=flights.completed.astype(float), minlength=count)
     median, worst = np.full(count, np.nan), np.full(count, np.nan)
     shown = np.full(count, -1, dtype=np.intp)
-    for cell in np.unique(at):
-        rows = np.flatnonzero(at == cell)
+    for cell in np.unique(cell_of_flight):
+        rows = np.flatnonzero(cell_of_flight == cell)
         rated = rows[flights.completed[rows] & np.isfinite(flights.error_m[rows])]
         errors = flights.error_m[rated]
         lost = rows[~flights.completed[rows]]
@@ -131,7 +131,7 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
             median[cell], worst[cell] = np.median(errors), errors.max()
         shown[cell] = lost[0] if len(lost) else rated[np.argmax(errors)] if len(rated) else rows[0]
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
-        success = np.where(flown > 0.0, done / flown, np.nan)
+        success = np.where(flown > 0.0, completed_flights / flown, np.nan)
     return Cells(
         axes,
         flown.reshape(shape),
@@ -142,7 +142,7 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
     )
 
 
-def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach:
+def completion_range(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> CompletionRange:
     """The ranges of a parameter around `nominal` (or the nearest flown value) in which flights complete.
 
     A flight that has not been flown yet counts as not completed: a value counts when all its flights have
@@ -152,29 +152,40 @@ def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach
     names = [varied.name for varied in plan.varied]
     planned = np.array([case.varied for case in plan.cases() if case.law == flights.reference])
     flown = np.stack([flights.values[other] for other in names], axis=1)[flights.completed]
-    asked, good = (_settings(rows, names.index(name), centres) for rows in (planned, flown))
-    every = np.array([bool(a) and a == g for a, g in zip(asked, good, strict=True)])
-    some = np.array([any(g[rest] == n for rest, n in a.items()) for a, g in zip(asked, good, strict=True)])
+    planned_counts, completed_counts = (
+        _count_settings(rows, names.index(name), centres) for rows in (planned, flown)
+    )
+    all_complete = np.array(
+        [bool(a) and a == g for a, g in zip(planned_counts, completed_counts, strict=True)]
+    )
+    some_complete = np.array(
+        [
+            any(g[others] == n for others, n in a.items())
+            for a, g in zip(planned_counts, completed_counts, strict=True)
+        ]
+    )
     start = int(np.argmin(np.abs(centres - nominal)))
-    return Reach(name, nominal, *_span(centres, every, start), *_span(centres, some, start))
+    return CompletionRange(
+        name, nominal, *_span(centres, all_complete, start), *_span(centres, some_complete, start)
+    )
 
 
-def _settings(values: Floats, column: int, centres: Floats) -> list[Counter[tuple[float, ...]]]:
+def _count_settings(values: Floats, column: int, centres: Floats) -> list[Counter[tuple[float, ...]]]:
     """For each value in `centres` of the parameter in `column`: the settings of all other parameters in those
     rows of `values` that are nearest to it, and how often each occurs."""
     found: list[Counter[tuple[float, ...]]] = [Counter() for _ in centres]
-    rest = np.delete(values, column, axis=1)
-    for level, setting in zip(_nearest(values[:, column], centres), rest.tolist(), strict=True):
+    others = np.delete(values, column, axis=1)
+    for level, setting in zip(_nearest(values[:, column], centres), others.tolist(), strict=True):
         found[level][tuple(setting)] += 1
     return found
 
 
-def _span(centres: Floats, holds: NDArray[np.bool_], start: int) -> tuple[float, float]:
-    if not holds[start]:
+def _span(centres: Floats, is_complete: NDArray[np.bool_], start: int) -> tuple[float, float]:
+    if not is_complete[start]:
         return np.nan, np.nan
     low = high = start
-    while low > 0 and holds[low - 1]:
+    while low > 0 and is_complete[low - 1]:
         low -= 1
-    while high + 1 < len(centres) and holds[high + 1]:
+    while high + 1 < len(centres) and is_complete[high + 1]:
         high += 1
     return float(centres[low]), float(centres[high])

@@ -10,21 +10,21 @@ from functools import partial
 from pathlib import Path
 
 from autopilot.shell.compiling import Part
-from gcs.batch.pool import PoolCrew
+from gcs.batch.pool import PoolBackend
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
-from gcs.folders import PAGE_FILE, PLAN_FILE, keep_others, make_folder, reserved
+from gcs.folders import PAGE_FILE, PLAN_FILE, check_no_other_results, make_folder, reserved
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
 
-_KEEP_S = 5.0  # longest time between the end of a flight and its storage on disk
+_STORE_INTERVAL_S = 5.0  # longest time between the end of a flight and its storage on disk
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResult:
     """What `gcs sweep` did."""
 
     flights: int  # in the table
@@ -32,7 +32,7 @@ class Swept:
     completed: int
     load_error_max_m: float | None  # of the completed flights; None: there is none
     wall_s: float
-    whole: bool  # False: stopped before the end
+    is_complete: bool  # False: stopped before the end
 
     @property
     def flights_per_s(self) -> float:
@@ -49,14 +49,14 @@ def sweep(
     quiet: bool,
     fresh: bool,
     warm: Callable[[Iterable[Part]], None] = lambda _: None,
-) -> Swept:
+) -> SweepResult:
     """Fly the flights of the plan that are missing, and store them.
 
     `stopped` returns whether a stop was requested; `warm` compiles parts of the flight software beforehand,
     which are otherwise compiled when they are first needed.
     """
     store = Store(directory, plan)
-    keep_others(directory, PLAN_FILE, (PAGE_FILE,))
+    check_no_other_results(directory, PLAN_FILE, (PAGE_FILE,))
     make_folder(directory)
     with reserved(directory, "gcs sweep"):
         if fresh:
@@ -73,23 +73,29 @@ def _fly_missing(
     stopped: Callable[[], bool],
     quiet: bool,
     warm: Callable[[Iterable[Part]], None],
-) -> Swept:
-    stored = store.done()
+) -> SweepResult:
+    stored = store.stored_indices()
     missing = [case for case in plan.cases() if case.index not in stored]
-    whole, flown, wall_s = True, 0, 0.0
+    is_complete, flown, wall_s = True, 0, 0.0
     if missing:
         work = prepare(plan, warm, quiet)
         with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
-            def told(rows: Sequence[Row], running: Running) -> None:
+            def report(rows: Sequence[Row], running: Running) -> None:
                 display.add(len(rows), sum(row["outcome"] == COMPLETED for row in rows), running)
 
-            crew = PoolCrew(executor, count, partial(fly_cases, work))
-            whole = fly_all(batches(plan, missing, count), crew, store.add, told, stopped, _KEEP_S)
+            backend = PoolBackend(executor, count, partial(fly_cases, work))
+            is_complete = fly_all(
+                batches(plan, missing, count), backend, store.add, report, stopped, _STORE_INTERVAL_S
+            )
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()
     outcomes = table.column("outcome").to_pylist()
     errors = table.column("load_error_max_m").to_pylist()
     completed = [error for error, outcome in zip(errors, outcomes, strict=True) if outcome == COMPLETED]
-    whole = whole or len(outcomes) == plan.flights  # a stop may be requested while the last flights fly
-    return Swept(len(outcomes), flown, len(completed), max(completed, default=None), wall_s, whole)
+    is_complete = (
+        is_complete or len(outcomes) == plan.flights
+    )  # a stop may be requested while the last flights fly
+    return SweepResult(
+        len(outcomes), flown, len(completed), max(completed, default=None), wall_s, is_complete
+    )

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from gcs.sweep.plan import SweepPlan
-from gcs.sweep.results import Flights, flights_of
+from gcs.sweep.results import Flights, flights_by_law
 from gcs.sweep.store import Store
-from gcs.workflows.flight_options import own_words
+from gcs.workflows.flight_options import own_part_options
 
-FOLDER = "flights"  # in a sweep's directory: flights that were flown again, each with a report
+REPEATS_FOLDER = "flights"  # in a sweep's directory: flights that were flown again, each with a report
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Standout:
         return f"{self.law}-{self.kind}"
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """What happened in it, in a few words."""
         if self.kind == "lost":
             return f"{self.outcome}: {self.reason}" if self.reason else self.outcome
@@ -62,7 +62,7 @@ def standouts(flights: Flights) -> list[Standout]:
 
 def stored_standouts(directory: Path, plan: SweepPlan) -> list[Standout]:
     """The flights of all laws that stand out, from those stored in the directory of a sweep."""
-    laws = flights_of(Store(directory, plan).read(), plan)
+    laws = flights_by_law(Store(directory, plan).read(), plan)
     return [one for flights in laws for one in standouts(flights)]
 
 
@@ -91,16 +91,16 @@ def base_command(plan: SweepPlan) -> str:
     A sweep does not check whether the vehicle can fly the mission, hence --force.
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
-    words += own_words(plan.estimator, plan.planner)
+    words += own_part_options(plan.estimator, plan.planner)
     for setting in flight_settings(plan, {}):
         words += ["--set", setting]
     return shlex.join(words)
 
 
-def command_of(plan: SweepPlan, flight: Standout, directory: Path) -> str:
+def repeat_command(plan: SweepPlan, flight: Standout, directory: Path) -> str:
     """The command that flies it again into the directory of the sweep, and overwrites an earlier repeat."""
     words = ["--law", flight.reference, "--seed", str(flight.seed)]
     for name, value in flight.varied.items():
         words += ["--set", f"{name}={value!r}"]
-    out = shlex.join(["--out", str(directory / FOLDER / flight.name), "--overwrite"])
+    out = shlex.join(["--out", str(directory / REPEATS_FOLDER / flight.name), "--overwrite"])
     return f"{base_command(plan)} {shlex.join(words)} {out}"

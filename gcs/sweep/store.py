@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from autopilot.own.law import name_of
+from autopilot.own.law import law_name
 from gcs.formats.arrow import array_of, text_array
-from gcs.sweep.flight import Flown
+from gcs.sweep.flight import FlightResult
 from gcs.sweep.plan import Case, SweepPlan
 
 if TYPE_CHECKING:
@@ -28,13 +28,13 @@ PARTS = "parts"
 METADATA_KEY = b"plumbline"
 Row = dict[str, Any]
 
-_TEXTS = ("law", "outcome", "reason", "lost_phase")
-_WHOLE = ("index", "seed", "slack_events")
+_TEXT_COLUMNS = ("law", "outcome", "reason", "lost_phase")
+_INTEGER_COLUMNS = ("index", "seed", "slack_events")
 
 
 def columns(plan: SweepPlan) -> tuple[str, ...]:
     """The columns of the table: number, law and seed of the flight, varied values, results."""
-    figures = tuple(f.name for f in fields(Flown) if f.name != "texts")
+    figures = tuple(f.name for f in fields(FlightResult) if f.name != "texts")
     return ("index", "law", "seed", *(v.name for v in plan.varied), *figures, "wall_s")
 
 
@@ -43,21 +43,21 @@ def schema(plan: SweepPlan) -> pyarrow.Schema:
     import pyarrow as pa
 
     def kind(name: str) -> pa.DataType:
-        if name in _TEXTS:
+        if name in _TEXT_COLUMNS:
             return pa.string()
-        return pa.int64() if name in _WHOLE else pa.float64()
+        return pa.int64() if name in _INTEGER_COLUMNS else pa.float64()
 
     metadata = {METADATA_KEY: json.dumps(plan.to_json()).encode()}
     return pa.schema([(name, kind(name)) for name in columns(plan)], metadata=metadata)
 
 
-def row_of(plan: SweepPlan, case: Case, flown: Flown, wall_s: float) -> Row:
+def row_of(plan: SweepPlan, case: Case, result: FlightResult, wall_s: float) -> Row:
     """The row of a flight."""
-    figures = {f.name: getattr(flown, f.name) for f in fields(Flown) if f.name != "texts"}
+    figures = {f.name: getattr(result, f.name) for f in fields(FlightResult) if f.name != "texts"}
     varied = {v.name: value for v, value in zip(plan.varied, case.varied, strict=True)}
     return {
         "index": case.index,
-        "law": name_of(case.law),
+        "law": law_name(case.law),
         "seed": case.seed,
         **varied,
         **figures,
@@ -65,7 +65,7 @@ def row_of(plan: SweepPlan, case: Case, flown: Flown, wall_s: float) -> Row:
     }
 
 
-def table_of(rows: Sequence[Row], kinds: pyarrow.Schema) -> pyarrow.Table:
+def table_of(rows: Sequence[Row], column_schema: pyarrow.Schema) -> pyarrow.Table:
     """Rows as a table of these columns."""
     import pyarrow as pa
 
@@ -77,7 +77,7 @@ def table_of(rows: Sequence[Row], kinds: pyarrow.Schema) -> pyarrow.Table:
         known = np.array([0 if value is None else value for value in values], dtype=kind)
         return array_of(known, np.array([value is None for value in values]))
 
-    return pa.Table.from_arrays([column(field) for field in kinds], schema=kinds)
+    return pa.Table.from_arrays([column(field) for field in column_schema], schema=column_schema)
 
 
 class Store:
@@ -97,7 +97,7 @@ class Store:
         """The complete parts."""
         return sorted((self._directory / PARTS).glob("*.parquet"))
 
-    def done(self) -> set[int]:
+    def stored_indices(self) -> set[int]:
         """Numbers of the flights that are stored."""
         import pyarrow.parquet as pq
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 from autopilot.geometry.machine_code import ROOT
 from autopilot.shell.compiling import (
-    OWN,
+    ANY_OWN_LAW,
     SIMULATOR,
     Part,
     autopilot_parts,
     compiled_for,
-    name_what_is_compiled,
+    print_compiled_kernels,
 )
 
 _MODULE = "gcs.sweep.warmup"
@@ -33,23 +33,25 @@ def lanes_part(law: str) -> Part:
 
 def main(part: str, law: str) -> None:
     """Compile the part unless it is compiled already; prints the names of the kernels that it compiles."""
-    name_what_is_compiled()
+    print_compiled_kernels()
     # imported only now, because the import itself compiles the first kernels
-    from autopilot.own.chosen import Own
-    from autopilot.own.law import law_number, own_law
-    from autopilot.own.rehearsal import REFERENCE
+    from autopilot.own.law import law_number, own_law_reference
+    from autopilot.own.own_code import OwnCode
+    from autopilot.own.warmup_law import WARMUP_LAW
     from gcs.closed_loop import Conditions
     from gcs.sweep.cell import cell_of
-    from gcs.sweep.flight import Boarding, SweptFlight
-    from gcs.sweep.group import FEWEST, Group
+    from gcs.sweep.flight import StartTimes, SweepFlight
+    from gcs.sweep.group import MIN_FLIGHTS, LaneGroup
     from missions.fileformat import load_mission
 
-    named = REFERENCE if law == OWN else law
-    conditions = Conditions(settings={"CTL_LAW": float(law_number(named))}, own=Own(own_law(named)))
+    law_name = WARMUP_LAW if law == ANY_OWN_LAW else law
+    conditions = Conditions(
+        settings={"CTL_LAW": float(law_number(law_name))}, own=OwnCode(own_law_reference(law_name))
+    )
     cell = cell_of(load_mission("hover"), conditions)
-    flights = [SweptFlight(cell, seed, Boarding(0, 0)) for seed in range(FEWEST)]
+    flights = [SweepFlight(cell, seed, StartTimes(0, 0)) for seed in range(MIN_FLIGHTS)]
     if part == "lanes":
-        Group(flights).compile()
+        LaneGroup(flights).compile()
     else:
         flights[0].compile()
 

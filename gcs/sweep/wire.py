@@ -31,11 +31,11 @@ from autopilot.geometry.packed import Row, pack
 from autopilot.wire.convert.geodesy import EARTH_RADIUS_M, Home
 from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX
-from sitl.messages import SPEEDS_US, rotor_speed
-from sitl.plant.rotors import ASKED
+from sitl.messages import ESC_PERIOD_US, rotor_speed
+from sitl.plant.rotors import REQUESTED
 from sitl.sensors.gnss import FIXED, LOST
-from sitl.sensors.profile import Profile, stated_of
-from sitl.world import BARO, CABLE, GNSS, IMU, LOAD, MAG, MOCAP, READING, SHOWS, WorldRows, arrived
+from sitl.sensors.profile import Profile, reported_std
+from sitl.world import BARO, CABLE, GNSS, IMU, LOAD, MAG, MOCAP, READING, STAMP_US, WorldRows, pop_arrived
 
 
 class Wire(NamedTuple):
@@ -66,12 +66,12 @@ def _single3(row: Row, first: int) -> Vec3:
 def put_forces(rotors: Array, table: Array, world: WorldRows) -> None:
     """Pass the commanded rotor forces (N) to the world, rounded as in HIL_ACTUATOR_CONTROLS; `rotors` and
     `table` are the mixer's."""
-    asked = world.rotors
+    rotors_of_world = world.rotors
     for i in range(min(table.shape[0] - 1, world.rotor_table.shape[0])):
-        asked[ASKED, i] = single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
+        rotors_of_world[REQUESTED, i] = single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
 
 
-def wire_rate(rate: float) -> float:
+def rounded_reel_rate(rate: float) -> float:
     """The winch's rate (m/s), rounded as in HIL_ACTUATOR_CONTROLS."""
     return float(single(rate / REEL_MAX) * REEL_MAX)
 
@@ -128,15 +128,15 @@ def _fix(row: Row, wire: Wire) -> GnssReading:
 def _newest(sensor: int, now_us: int, rows: WorldRows) -> int:
     """Row of the sensor's newest reading that arrives at this tick, or -1; removes the older ones."""
     newest = -1
-    at = arrived(sensor, now_us, rows)
-    while at >= 0:
-        newest = at
-        at = arrived(sensor, now_us, rows)
+    index = pop_arrived(sensor, now_us, rows)
+    while index >= 0:
+        newest = index
+        index = pop_arrived(sensor, now_us, rows)
     return newest
 
 
 @kernel
-def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
+def deliver_readings(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
     """Put the readings that arrive at this tick into the autopilot's inbox; return their number.
 
     Row 0 is the inertial unit's: HIL_SENSOR contains its newest sample, or repeats the last one.
@@ -150,30 +150,30 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
             inbox[0, box.READING + i] = single(row[READING + 3 + i])
             inbox[0, box.READING + 3 + i] = single(row[READING + i])
     count = 1
-    at = arrived(MOCAP, now_us, rows)
-    while at >= 0:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.POSE, rows.queue[MOCAP, at, SHOWS]
-        pack(_pose(rows.queue[MOCAP, at], wire), inbox[count], box.READING)
+    index = pop_arrived(MOCAP, now_us, rows)
+    while index >= 0:
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.POSE, rows.queue[MOCAP, index, STAMP_US]
+        pack(_pose(rows.queue[MOCAP, index], wire), inbox[count], box.READING)
         count += 1
-        at = arrived(MOCAP, now_us, rows)
-    at = arrived(LOAD, now_us, rows)
-    while at >= 0:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.LOAD, rows.queue[LOAD, at, SHOWS]
-        pack(_load(rows.queue[LOAD, at], wire), inbox[count], box.READING)
+        index = pop_arrived(MOCAP, now_us, rows)
+    index = pop_arrived(LOAD, now_us, rows)
+    while index >= 0:
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.LOAD, rows.queue[LOAD, index, STAMP_US]
+        pack(_load(rows.queue[LOAD, index], wire), inbox[count], box.READING)
         count += 1
-        at = arrived(LOAD, now_us, rows)
-    at = arrived(CABLE, now_us, rows)
-    while at >= 0:
-        row = rows.queue[CABLE, at]
+        index = pop_arrived(LOAD, now_us, rows)
+    index = pop_arrived(CABLE, now_us, rows)
+    while index >= 0:
+        row = rows.queue[CABLE, index]
         if row[READING + 3] > 0.0:  # the cable is seen
-            sight = DirectionReading(0.0, _single3(row, READING), wire.direction_std)
-            inbox[count, box.KIND], inbox[count, box.SHOWS] = box.DIRECTION, row[SHOWS]
-            pack(sight, inbox[count], box.READING)
+            direction = DirectionReading(0.0, _single3(row, READING), wire.direction_std)
+            inbox[count, box.KIND], inbox[count, box.SHOWS] = box.DIRECTION, row[STAMP_US]
+            pack(direction, inbox[count], box.READING)
             count += 1
-        at = arrived(CABLE, now_us, rows)
+        index = pop_arrived(CABLE, now_us, rows)
     newest = _newest(GNSS, now_us, rows)
     if newest >= 0 and rows.queue[GNSS, newest, READING + 6] < LOST:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.FIX, rows.queue[GNSS, newest, SHOWS]
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.FIX, rows.queue[GNSS, newest, STAMP_US]
         pack(_fix(rows.queue[GNSS, newest], wire), inbox[count], box.READING)
         count += 1
     newest = _newest(BARO, now_us, rows)
@@ -188,7 +188,7 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
         for i in range(3):
             inbox[count, box.READING + i] = single(rows.queue[MAG, newest, READING + i])
         count += 1
-    if now_us % SPEEDS_US == 0:
+    if now_us % ESC_PERIOD_US == 0:
         for first in range(0, rows.rotor_table.shape[0], 4):
             inbox[count, box.KIND] = box.SPEEDS
             inbox[count, box.READING] = first
@@ -198,17 +198,17 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
     return count
 
 
-def most_readings(rows: WorldRows) -> int:
+def max_readings(rows: WorldRows) -> int:
     """The greatest number of readings that can arrive at one tick."""
     return int(rows.queue.shape[0] * rows.queue.shape[1]) + len(rows.rotor_table)
 
 
 def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
     """What the trackers of a profile state, rounded as in their messages."""
-    stated = stated_of(profile, noise_scale)
+    stated = reported_std(profile, noise_scale)
     mocap, load = profile.mocap, profile.load_tracker
 
-    def root(std: float) -> float:
+    def received_std(std: float) -> float:
         """The deviation as the receiver computes it from a variance that was sent."""
         variance = float(np.float32(std * std))
         return sqrt(variance) if variance >= 0.0 else nan
@@ -217,9 +217,9 @@ def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
     measured = mocap is not None and mocap.velocity_noise_m_s is not None
     load_measured = load is not None and load.velocity_noise_m_s is not None
     return Wire(
-        root(stated.mocap_position),
-        root(stated.mocap_attitude),
-        root(stated.mocap_velocity) if measured else box.NOT_MEASURED,
+        received_std(stated.mocap_position),
+        received_std(stated.mocap_attitude),
+        received_std(stated.mocap_velocity) if measured else box.NOT_MEASURED,
         float(np.float32(stated.load_position)),
         float(np.float32(stated.load_velocity)) if load_measured else box.NOT_MEASURED,
         float(np.float32(stated.direction)),

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from autopilot.geometry.lane_numbers import LANES
-from autopilot.own.law import name_of
+from autopilot.own.law import law_name
 from autopilot.shell.compiling import Part
 from autopilot.shell.watched_calls import watched_calls
-from gcs.shell.display import told_if_slow
+from gcs.shell.display import notify_if_slow
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import Boarding, Flown, SweptFlight, boarding, fly
-from gcs.sweep.group import FEWEST, Group, suits
+from gcs.sweep.flight import FlightResult, StartTimes, SweepFlight, fly, start_times
+from gcs.sweep.group import MIN_FLIGHTS, LaneGroup, fits_in_lanes
 from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
 from gcs.sweep.warmup import lanes_part, sweep_parts
@@ -22,10 +22,10 @@ from missions.fileformat import load_mission
 from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
-LANES_PAY = 1000  # least number of flights with a law for which its lanes are compiled
-_MOST_AT_A_TIME = 2 * LANES  # flights that one worker is given at a time
+MIN_FLIGHTS_FOR_LANES = 1000  # least number of flights with a law for which its lanes are compiled
+_MAX_BATCH = 2 * LANES  # flights that one worker is given at a time
 
-_NOT_FLOWN = (ValueError, ArithmeticError)
+_FLIGHT_ERRORS = (ValueError, ArithmeticError)
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Work:
 
     plan: SweepPlan
     mission: Mission
-    boardings: dict[str, Boarding]  # by law
-    in_lanes: frozenset[str] = frozenset()  # laws with which eight flights are flown at once
+    start_times_by_law: dict[str, StartTimes]  # by law
+    lane_laws: frozenset[str] = frozenset()  # laws with which eight flights are flown at once
 
 
 def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool = True) -> Work:
@@ -48,28 +48,28 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool
     warm(sweep_parts(plan.laws))
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
-    bare = replace(plan, varied=(), sample=0)
-    boardings, in_lanes = {}, set()
+    without_variation = replace(plan, varied=(), sample=0)
+    start_times_by_law, lane_laws = {}, set()
     for law, case in cases.items():
-        conditions = bare.conditions(case)
+        conditions = without_variation.conditions(case)
         try:
-            with watched_calls(), told_if_slow(f"preparing the flights with law {name_of(law)}", quiet):
-                boardings[law] = boarding(mission, conditions)
+            with watched_calls(), notify_if_slow(f"preparing the flights with law {law_name(law)}", quiet):
+                start_times_by_law[law] = start_times(mission, conditions)
         except ValueError as error:
-            raise PlanError(f"law {name_of(law)}: {error}") from None
-        one = SweptFlight(cell_of(mission, conditions), case.seed, boardings[law])
-        if _lanes_pay(plan, law) and suits(one):
+            raise PlanError(f"law {law_name(law)}: {error}") from None
+        one = SweepFlight(cell_of(mission, conditions), case.seed, start_times_by_law[law])
+        if _lanes_are_worthwhile(plan, law) and fits_in_lanes(one):
             warm([lanes_part(law)])
-            in_lanes.add(law)
-    return Work(plan, mission, boardings, frozenset(in_lanes))
+            lane_laws.add(law)
+    return Work(plan, mission, start_times_by_law, frozenset(lane_laws))
 
 
-def _lanes_pay(plan: SweepPlan, law: str) -> bool:
+def _lanes_are_worthwhile(plan: SweepPlan, law: str) -> bool:
     """Whether there are flights that differ only in their seeds, and the lanes are compiled already or the
     flights are enough to compile them."""
     compiled = hasattr(lane_kernel.fly_lanes, "overloads") and not any(plan.own(law))
-    enough = plan.points * len(plan.seeds) >= LANES_PAY
-    return compiled and len(plan.seeds) >= FEWEST and (enough or lanes_part(law).ready)
+    enough = plan.points * len(plan.seeds) >= MIN_FLIGHTS_FOR_LANES
+    return compiled and len(plan.seeds) >= MIN_FLIGHTS and (enough or lanes_part(law).ready)
 
 
 def fly_cases(
@@ -87,39 +87,39 @@ def fly_cases(
         for first in range(0, len(members), LANES):
             if stopped():
                 break
-            some = members[first : first + LANES]
-            at_once = law in work.in_lanes and len(some) >= FEWEST
-            found = _fly_at_once(work, some, clock) if at_once else None
-            if found is None:
-                found = [fly_one(work, case, clock) for case in some if not stopped()]
-            rows += found
+            batch = members[first : first + LANES]
+            in_lanes = law in work.lane_laws and len(batch) >= MIN_FLIGHTS
+            batch_rows = _fly_in_lanes(work, batch, clock) if in_lanes else None
+            if batch_rows is None:
+                batch_rows = [fly_one(work, case, clock) for case in batch if not stopped()]
+            rows += batch_rows
     return rows
 
 
 def fly_one(work: Work, case: Case, clock: Clock) -> Row:
     """Fly one flight. If it cannot be flown at all, its outcome is `refused`."""
-    began_s = clock()
+    start_s = clock()
     try:
-        flown = fly(work.mission, work.plan.conditions(case), work.boardings[case.law])
-    except _NOT_FLOWN as error:
-        flown = Flown(outcome="refused", reason=str(error))
-    return row_of(work.plan, case, flown, clock() - began_s)
+        result = fly(work.mission, work.plan.conditions(case), work.start_times_by_law[case.law])
+    except _FLIGHT_ERRORS as error:
+        result = FlightResult(outcome="refused", reason=str(error))
+    return row_of(work.plan, case, result, clock() - start_s)
 
 
-def _fly_at_once(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] | None:
+def _fly_in_lanes(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] | None:
     """Fly flights of one cell in lanes; None: they must be flown one by one."""
-    began_s = clock()
+    start_s = clock()
     try:
         cell = cell_of(work.mission, work.plan.conditions(cases[0]))
-        flights = [SweptFlight(cell, case.seed, work.boardings[case.law]) for case in cases]
-        if not suits(flights[0]):
+        flights = [SweepFlight(cell, case.seed, work.start_times_by_law[case.law]) for case in cases]
+        if not fits_in_lanes(flights[0]):
             return None
-        Group(flights).run()
-    except _NOT_FLOWN:
+        LaneGroup(flights).run()
+    except _FLIGHT_ERRORS:
         return None
-    each_s = (clock() - began_s) / len(cases)
+    flight_s = (clock() - start_s) / len(cases)
     return [
-        row_of(work.plan, case, flight.flown, each_s) for case, flight in zip(cases, flights, strict=True)
+        row_of(work.plan, case, flight.result, flight_s) for case, flight in zip(cases, flights, strict=True)
     ]
 
 
@@ -129,9 +129,9 @@ def batches(plan: SweepPlan, cases: Sequence[Case], workers: int) -> list[tuple[
     size = batch_size(len(cases), workers)
     groups: list[tuple[Case, ...]] = []
     for law, members in groupby(cases, key=lambda case: case.law):
-        most = 1 if any(plan.own(law)) else size  # in Python a flight takes seconds
+        max_size = 1 if any(plan.own(law)) else size  # in Python a flight takes seconds
         of_law = list(members)
-        groups += [tuple(of_law[first : first + most]) for first in range(0, len(of_law), most)]
+        groups += [tuple(of_law[first : first + max_size]) for first in range(0, len(of_law), max_size)]
     return groups
 
 
@@ -141,4 +141,4 @@ def batch_size(flights: int, workers: int) -> int:
     share = max(1, -(-flights // workers))
     if share <= LANES:
         return share
-    return _MOST_AT_A_TIME if share >= 4 * _MOST_AT_A_TIME else LANES
+    return _MAX_BATCH if share >= 4 * _MAX_BATCH else LANES

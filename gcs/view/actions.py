@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -112,7 +112,7 @@ def _gust(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
 
 def _set_rotor_failure(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
     """Stop `rotor` (counted from 1), or let it run again."""
-    rotor = _number(arguments, "rotor", 1, MOST)
+    rotor = _number(arguments, "rotor", 1, MAX_ROTORS)
     failure = _OFF if arguments.get("failed") is True else _OK
     parameters = (_MOTOR, failure, float(round(rotor)))
     name = f"rotor {round(rotor)} {'off' if failure == _OFF else 'on'}"

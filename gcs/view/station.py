@@ -270,7 +270,7 @@ class Station:
         if task.texts_before is None:
             task.texts_before = len(vehicle.view.texts)
         if task.refused_us is not None and now_us - task.refused_us >= _REASON_US:
-            reasons = vehicle.view.complaints_since(task.texts_before)
+            reasons = vehicle.view.problems_since(task.texts_before)
             self._close(vehicle, task, False, "; ".join([*task.replies, *reasons]))
             return None
         return task

@@ -12,7 +12,7 @@ from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_encoding import from_the_wire
+from autopilot.wire.parameter_encoding import decode_parameter_value
 from autopilot.wire.parameter_table import decimal_from_float32
 from gcs.clients.connection import Connection
 from gcs.clients.operation import Target
@@ -67,7 +67,7 @@ class WatchedVehicle:
             self._estimated_positions.append((load.time_usec, (load.x, load.y, load.z)))
         if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             message = one.message
-            value = from_the_wire(message.param_value, message.param_type)
+            value = decode_parameter_value(message.param_value, message.param_type)
             self.set_parameter(message.param_id, decimal_from_float32(value))
         time_us = self.time_us
         if time_us is not None:

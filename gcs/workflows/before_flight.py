@@ -3,46 +3,46 @@
 from __future__ import annotations
 
 from autopilot.vehicle.shipped import VEHICLES
-from gcs.shell.display import told_if_slow
-from gcs.workflows.checked import known_flyable
-from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.shell.display import notify_if_slow
+from gcs.workflows.flight_options import FlightOptions, parse_setting
+from gcs.workflows.flyable_marks import is_known_flyable
 from missions.model import Mission, Waypoint
 from sitl.sensors.shipped import PROFILES
 
-CHECKING = "checking whether the vehicle can fly it; paths that are hard to shape take a while"
+CHECKING_TEXT = "checking whether the vehicle can fly it; paths that are hard to shape take a while"
 
 
 def check_options(options: FlightOptions) -> list[str]:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, or if
     custom code cannot fly; else a line for each option that may be unintended."""
-    if _as_shipped(options):
+    if _only_shipped_inputs(options):
         return []
-    from gcs.workflows.flight_inputs import check_flight_inputs, doubts
+    from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings
 
-    settings = list(map(setting_of, options.settings))
+    settings = list(map(parse_setting, options.settings))
     check_flight_inputs(options.vehicle, options.sensors, settings, options.own)
-    told = [f"--set {line}" for line in doubts(options.vehicle, settings)]
+    warnings = [f"--set {line}" for line in setting_warnings(options.vehicle, settings)]
     if any(options.own):
-        from autopilot.own.doubts import own_doubts
+        from autopilot.own.misspellings import misspelling_warnings
 
-        told += own_doubts(options.own)
-    return told
+        warnings += misspelling_warnings(options.own)
+    return warnings
 
 
-def planner_doubts(planner: str, mission: Mission) -> list[str]:
+def planner_warnings(planner: str, mission: Mission) -> list[str]:
     """A line if the mission contains nothing for a custom planner to plan."""
-    unused = without_planning(mission) if planner else ""
+    unused = unused_planner_text(mission) if planner else ""
     return [f"--planner {planner}: {unused}"] if unused else []
 
 
-def without_planning(mission: Mission) -> str:
+def unused_planner_text(mission: Mission) -> str:
     """The text for a planner that has nothing to plan in this mission; else empty."""
     if any(isinstance(step, Waypoint) for step in mission.steps):
         return ""
     return f"is not used: mission {mission.name} has no waypoints"
 
 
-def _as_shipped(options: FlightOptions) -> bool:
+def _only_shipped_inputs(options: FlightOptions) -> bool:
     """Whether there is no option that could be refused; to check others, most of the simulator is loaded."""
     return (
         not any(options.own)
@@ -54,11 +54,11 @@ def _as_shipped(options: FlightOptions) -> bool:
 
 def check_mission(mission: Mission, options: FlightOptions) -> None:
     """GcsError unless the vehicle can fly the mission, or the options waive this check."""
-    if options.force or options.tries_anyway:
+    if options.force or options.allows_infeasible:
         return
     shaped = options.law == "plumbline"
-    if not known_flyable(mission, options.vehicle, shaped):
-        from gcs.workflows.check_mission import refuse_unflyable
+    if not is_known_flyable(mission, options.vehicle, shaped):
+        from gcs.workflows.check_mission import require_flyable
 
-        with told_if_slow(CHECKING, options.quiet):
-            refuse_unflyable(mission, options.vehicle, shaped)
+        with notify_if_slow(CHECKING_TEXT, options.quiet):
+            require_flyable(mission, options.vehicle, shaped)

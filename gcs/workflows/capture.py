@@ -10,9 +10,9 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.operation import Target
 from gcs.clients.parameter_transfer import ParameterList
-from gcs.errors import InputError, NoVehicleError, RefusedError, not_written
+from gcs.errors import InputError, NoVehicleError, RefusedError, write_error
 from gcs.folders import TLOG_FILE, fresh_folder
-from gcs.shell.display import is_live, say
+from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
@@ -33,23 +33,26 @@ def capture_to(
     InputError if `out` is an earlier log, unless `overwrite` permits to replace it.
     """
     if out is not None and not overwrite:
-        _keep_earlier(out)
+        _check_no_log(out)
     with (
         TruthLink(truth_at) as world,
         Session(address) as session,
         StopRequest("stopping") as stop,
     ):
         target = session.find_with_truth(world)
-        if session.deaf:
-            say(f"only what the vehicle sends by itself is captured, without truth: {session.deaf}")
+        if session.unanswered_reason:
+            notify(
+                "only what the vehicle sends by itself is captured, without truth: "
+                f"{session.unanswered_reason}"
+            )
         elif world.missing:
-            say(f"the log will not contain the simulator's truth: {world.missing}")
+            notify(f"the log will not contain the simulator's truth: {world.missing}")
         path = out or fresh_folder("capture") / TLOG_FILE
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("wb")
         except OSError as error:
-            raise not_written(error, path, "file") from None
+            raise write_error(error, path, "file") from None
         with file:
             capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
 
@@ -66,30 +69,30 @@ def capture_to(
             session.on_truth = truth
             session.on_received = received
             session.on_sent = sent
-            if not session.deaf:
-                _ask_for_all(session, target)
-            if not is_live():  # on a terminal a bar shows it
+            if not session.unanswered_reason:
+                _request_all(session, target)
+            if not stderr_is_terminal():  # on a terminal a bar shows it
                 until = "until Ctrl-C" if duration_s is None else f"for {duration_s:g} s"
-                say(f"capturing to {path} {until}")
+                notify(f"capturing to {path} {until}")
             session.watch(lambda: bool(stop), duration_s, "capturing")
             capture.flush(monotonic_us())
         return path, capture.records
 
 
-def _ask_for_all(session: Session, target: Target) -> None:
+def _request_all(session: Session, target: Target) -> None:
     """Request all parameters, and the fast messages that a report needs."""
     try:
         session.run(ParameterList(target), "parameters")
     except NoVehicleError as error:
-        say(str(error))
+        notify(str(error))
     for message_id in REPORT_MESSAGES:
         try:
             session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))
         except RefusedError as error:
-            say(str(error))
+            notify(str(error))
 
 
-def _keep_earlier(out: Path) -> None:
+def _check_no_log(out: Path) -> None:
     """InputError if `out` is a file with contents; a pipe or a device has none to lose."""
     if out.is_file() and out.stat().st_size:
         raise InputError(f"--out {out}: holds a log already; name another, or add --overwrite")

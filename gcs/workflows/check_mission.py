@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_trouble, timeline
+from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of, load_belief
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
@@ -16,8 +16,8 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
 from gcs.mission_items import items_of
-from gcs.workflows.before_flight import without_planning
-from gcs.workflows.checked import note_flyable
+from gcs.workflows.before_flight import unused_planner_text
+from gcs.workflows.flyable_marks import mark_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import AttitudeRun, Mission, Release, Signals, Winch
@@ -26,8 +26,8 @@ from missions.model import AttitudeRun, Mission, Release, Signals, Winch
 # one: slower rotors, a sagging battery and a cable off the centre take a part of it, wind another.
 # `heavy-real` loses Case C with 15 % and completes it with 35 %; with 40 % also in wind of 5 m/s with gusts
 # of 1 m/s (docs/realism.md).
-ROOM_FOR_TRUTH = 0.25
-MORE_ROOM = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
+MIN_CONTROL_SHARE = 0.25
+MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
 def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
@@ -38,24 +38,26 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
     items_of(mission, Home())
     found = check(mission, load_limits(vehicle), shaped)
     if not found:
-        note_flyable(mission, vehicle, shaped)
+        mark_flyable(mission, vehicle, shaped)
     return found
 
 
-def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
+def winch_violations(mission: Mission, vehicle: str) -> Iterator[Violation]:
     """Winch items that request a cable length beyond the default limits of the vehicle's winch; the vehicle
     would refuse the mission at its start."""
     table = autopilot_parameters(load_belief(vehicle))
-    least_m, most_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
-    for entry, _, length_m in _reelings(mission, table):
-        beyond = cable_trouble(length_m, least_m, most_m)
-        if beyond:
-            text = f"items[{entry.item}] (winch): {beyond}: change length_m, or these of the vehicle"
-            limit_m = least_m if length_m < least_m else most_m
+    min_m, max_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
+    for entry, _, length_m in _winch_items(mission, table):
+        problem = cable_length_problem(length_m, min_m, max_m)
+        if problem:
+            text = f"items[{entry.item}] (winch): {problem}: change length_m, or these of the vehicle"
+            limit_m = min_m if length_m < min_m else max_m
             yield Violation(entry.item, "cable length", length_m, limit_m, entry.transfer_s, text)
 
 
-def _reelings(mission: Mission, table: AutopilotParameters) -> Iterator[tuple[TimelineEntry, Winch, float]]:
+def _winch_items(
+    mission: Mission, table: AutopilotParameters
+) -> Iterator[tuple[TimelineEntry, Winch, float]]:
     """Each winch item, and the length of the cable after it."""
     for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
         if isinstance(entry.step, Winch) and entry.after.cable_m is not None:
@@ -73,28 +75,28 @@ def path_reports(
         raise GcsError(f"{mission.name}: {error}") from None
 
 
-def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
+def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
     """A line for each path that leaves little for control, if the true vehicle is not the assumed one."""
     believed = belief_of(vehicle)
     if believed == vehicle:
         return
     belief = load_belief(vehicle)
-    whole = belief.rotor_max_n - belief.rotor_min_n
+    rotor_range = belief.rotor_max_n - belief.rotor_min_n
     for report in reports:
-        left = min(report.rotor_low_n - belief.rotor_min_n, belief.rotor_max_n - report.rotor_high_n)
-        if belief.limited and left < ROOM_FOR_TRUTH * whole:
-            share, least = round(100.0 * left / whole), round(100.0 * ROOM_FOR_TRUTH)
+        margin = min(report.rotor_low_n - belief.rotor_min_n, belief.rotor_max_n - report.rotor_high_n)
+        if belief.limited and margin < MIN_CONTROL_SHARE * rotor_range:
+            share, min_share = round(100.0 * margin / rotor_range), round(100.0 * MIN_CONTROL_SHARE)
             yield (
                 f"warning: items[{report.item}] ({report.kind}): {share} % of the rotors' range is left for "
                 f"control, and {vehicle} differs from what the autopilot assumes ({believed}): below "
-                f"{least} % such a flight may be lost; {MORE_ROOM} plans it slower"
+                f"{min_share} % such a flight may be lost; {MORE_MARGIN} plans it slower"
             )
 
 
-def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
+def winch_notes(mission: Mission, vehicle: str) -> Iterator[str]:
     """A line about each winch item while the load is carried, which path reports do not include."""
     table = autopilot_parameters(load_belief(vehicle))
-    for entry, step, length_m in _reelings(mission, table):
+    for entry, step, length_m in _winch_items(mission, table):
         if not entry.before.released:
             speed_m_s = step.speed_m_s or table["WNC_SPEED"]
             duration_s = transfer_duration(abs(step.length_m), speed_m_s, table["WNC_ACCEL"])
@@ -104,17 +106,17 @@ def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
             )
 
 
-def flown_alone(mission: Mission) -> Iterator[str]:
+def notes_after_release(mission: Mission) -> Iterator[str]:
     """A line about the items after a release, which path reports do not include."""
     released = [i for i, step in enumerate(mission.steps) if isinstance(step, Release)]
     if released and released[0] + 1 < len(mission.steps):
         rest = [f"items[{i}]" for i in (released[0] + 1, len(mission.steps) - 1)]
-        which = " to ".join(dict.fromkeys(rest))
-        yield f"note: {which}: flown without the load, slower where the rotors ask for it; no path to report"
+        items = " to ".join(dict.fromkeys(rest))
+        yield f"note: {items}: flown without the load, slower where the rotors ask for it; no path to report"
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckResult:
     """What `gcs check` found: what the vehicle cannot fly, or else how it flies each path, with warnings."""
 
     mission: str
@@ -130,24 +132,26 @@ class Check:
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
 
 
-def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None) -> Check:
+def check_mission(
+    name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None
+) -> CheckResult:
     """Check a mission against a vehicle; `as_asked`: without shaping.
 
     GcsError if a custom `planner` fails to plan it.
     """
     mission = load(name_or_path)
-    found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
+    found = [*violations(mission, vehicle, not as_asked), *winch_violations(mission, vehicle)]
     reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
-    warnings = tuple(remarks_on(reports, vehicle))
+    warnings = tuple(margin_warnings(reports, vehicle))
     if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
         warnings += (
             "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
             f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
         )
-    warnings += (*reeled(mission, vehicle), *flown_alone(mission))
-    if planner is not None and (unused := without_planning(mission)):
+    warnings += (*winch_notes(mission, vehicle), *notes_after_release(mission))
+    if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
-    return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)
+    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings)
 
 
 def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
@@ -155,19 +159,19 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     mission = load(name_or_path)
     if force:
         return mission
-    refuse_unflyable(mission, vehicle)
+    require_flyable(mission, vehicle)
     return mission
 
 
 def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
     """GcsError unless the vehicle can fly the mission of these items."""
     steps = decode_items(items, home)
-    refuse_unflyable(Mission(name, name, "", (), steps), vehicle, True)
+    require_flyable(Mission(name, name, "", (), steps), vehicle, True)
 
 
-def refuse_unflyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
+def require_flyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
     """GcsError unless the vehicle can fly the mission."""
     found = violations(mission, vehicle, shaped)
     if found:
-        head = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
-        raise GcsError(*([f"{head} {found[0]}"] if len(found) == 1 else [head, *map(str, found)]))
+        summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
+        raise GcsError(*([f"{summary} {found[0]}"] if len(found) == 1 else [summary, *map(str, found)]))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gcs.errors import EXIT_USAGE, GcsError, not_written
+from gcs.errors import EXIT_USAGE, GcsError, write_error
 from gcs.folders import TLOG_FILE
 from gcs.workflows.report import find_log
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta
     from gcs.report.compare import Run
 
-LONGEST_NAME = 100  # of a page, in characters
-MOST_RUNS = 12  # so that lines remain distinguishable, on a page of some megabytes
-FOLDER = Path("comparisons")
+MAX_NAME_LENGTH = 100  # of a page, in characters
+MAX_RUNS = 12  # so that lines remain distinguishable, on a page of some megabytes
+COMPARISONS_FOLDER = Path("comparisons")
 
 
 class CompareError(GcsError):
@@ -28,9 +28,9 @@ class CompareError(GcsError):
 
 def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]:
     """Compare the given flights and write the page; return the flights and the page's path."""
-    if not 2 <= len(sources) <= MOST_RUNS:
-        named = "one flight was named" if len(sources) == 1 else f"{len(sources)} flights were named"
-        raise CompareError(f"{named}; name 2 to {MOST_RUNS} that are to be compared")
+    if not 2 <= len(sources) <= MAX_RUNS:
+        text = "one flight was named" if len(sources) == 1 else f"{len(sources)} flights were named"
+        raise CompareError(f"{text}; name 2 to {MAX_RUNS} that are to be compared")
     logs = [find_log(source) for source in sources]
     for i, log in enumerate(logs):
         if log.resolve() in [other.resolve() for other in logs[:i]]:
@@ -43,23 +43,23 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
     for source, run in zip(sources, runs, strict=True):
         if run.record["outcome"] == "no telemetry":
             raise CompareError(f"{source}: holds no telemetry of a Plumbline vehicle")
-    page = out or FOLDER / f"{_page_name(names, logs)}.html"
+    page = out or COMPARISONS_FOLDER / f"{_page_name(names, logs)}.html"
     try:
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(comparison_page(runs), encoding="utf-8")
     except OSError as error:
-        raise not_written(error, page, "file") from None
+        raise write_error(error, page, "file") from None
     return runs, page
 
 
 def _page_name(names: Sequence[str], logs: Sequence[Path]) -> str:
     """RUN-RUN... if that is short enough for the name of a file; else the first, the number of the others,
     and a hash of the logs' paths."""
-    whole = "-".join(names).replace("/", "_")
-    if len(whole) <= LONGEST_NAME:
-        return whole
-    mark = hashlib.sha256("\n".join(str(log.resolve()) for log in logs).encode()).hexdigest()[:8]
-    return f"{names[0].replace('/', '_')[-LONGEST_NAME:]}-and-{len(names) - 1}-more-{mark}"
+    joined = "-".join(names).replace("/", "_")
+    if len(joined) <= MAX_NAME_LENGTH:
+        return joined
+    digest = hashlib.sha256("\n".join(str(log.resolve()) for log in logs).encode()).hexdigest()[:8]
+    return f"{names[0].replace('/', '_')[-MAX_NAME_LENGTH:]}-and-{len(names) - 1}-more-{digest}"
 
 
 def _meta(log: Path) -> FlightMeta:

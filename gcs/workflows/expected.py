@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 
-_OVERDUE = 0.25  # an overdue part is expected to take this share of its running time in addition
+_OVERDUE_SHARE = 0.25  # an overdue part is expected to take this share of its running time in addition
 
 
 def expected_s(costs: Sequence[float], cores: int) -> float:
@@ -35,11 +35,11 @@ def remaining_s(
     # a running part contributes to the pace as soon as it has taken longer than expected
     shared = (busy + len(running)) / cores
     slowness = max(1.0, *(paces or [shared]), *(so_far_s / idle_s for idle_s, so_far_s in running))
-    left = [max(idle_s * slowness - so_far_s, _OVERDUE * so_far_s) for idle_s, so_far_s in running]
+    left = [max(idle_s * slowness - so_far_s, _OVERDUE_SHARE * so_far_s) for idle_s, so_far_s in running]
     return expected_s([*left, *(idle_s * slowness for idle_s in waiting)], cores)
 
 
-def in_words(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """A rough time in words: in whole minutes only if a minute is a small part of it."""
     if seconds < 90.0:
         return f"about {max(seconds, 1.0):.0f} s"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gcs.analysis.record import Record
-from gcs.batch.programs import ProgramCrew, cores
+from gcs.batch.programs import ProgramBackend, cores
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running
 from gcs.errors import StoppedError
@@ -43,23 +43,29 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
         waiting = missing(plan, flights, fresh)
         with BatchDisplay(len(plan) - len(waiting), len(plan), quiet) as display:
 
-            def begin(experiment: Experiment, core: int) -> Child:
+            def start_flight(experiment: Experiment, core: int) -> Child:
                 return start(experiment, flights / experiment.name, core)
 
-            def tell(ended: Sequence[EndedFlight], running: Running) -> None:
+            def report_progress(ended: Sequence[EndedFlight], running: Running) -> None:
                 display.add(len(ended), sum(met for _, met in ended), running)
 
-            if not fly_missing(waiting, flights, ProgramCrew(cores(jobs), begin), tell, lambda: bool(stop)):
+            if not fly_missing(
+                waiting,
+                flights,
+                ProgramBackend(cores(jobs), start_flight),
+                report_progress,
+                lambda: bool(stop),
+            ):
                 stored = len(plan) - len(missing(plan, flights, False))
                 raise StoppedError(f"stopped: {stored} of {len(plan)} flights are stored")
         with StepDisplay("figures", quiet, long=True) as figures:
 
-            def drawn(done: int, total: int, name: str) -> None:
+            def on_figure(done: int, total: int, name: str) -> None:
                 if stop:
                     raise StoppedError(f"stopped: {done} of {total} figures are drawn")
                 figures.update(done, total, f"figures  {name}")
 
-            report = write_report(out, experiment_origin(plan[0]).code, drawn)
+            report = write_report(out, experiment_origin(plan[0]).code, on_figure)
     if docs is not None:
         write_docs(docs, out, report.records)
     return report

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.file import load_belief, load_vehicle
@@ -17,7 +17,7 @@ from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
-from gcs.workflows.flight_options import WORLD
+from gcs.workflows.flight_options import SIMULATOR_PREFIX
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
@@ -26,7 +26,7 @@ from sitl.vehicles.truth import truth_of
 
 
 def check_flight_inputs(
-    vehicle: str, sensors: str, settings: Iterable[tuple[str, float]], given_own: Own = NOTHING_OWN
+    vehicle: str, sensors: str, settings: Iterable[tuple[str, float]], own_parts: OwnCode = NO_OWN_CODE
 ) -> None:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, if a rate
     does not divide the rate that it must divide, or if custom code cannot fly."""
@@ -36,26 +36,26 @@ def check_flight_inputs(
     except FileError as error:
         raise input_error(error) from None
     given = list(settings)
-    own, world = _table(believed, given_own), sim_parameters(truth_of(found))
+    autopilot, simulator = _table(believed, own_parts), sim_parameters(truth_of(found))
     for name, value in given:
-        table = world if name.startswith(WORLD) and name not in own else own
+        table = simulator if name.startswith(SIMULATOR_PREFIX) and name not in autopilot else autopilot
         if name not in table:
-            raise InputError(f"--set {unknown_setting(name, [*own.names, *world.names])}")
+            raise InputError(f"--set {unknown_setting(name, [*autopilot.names, *simulator.names])}")
         _check(table, name, value)
         table.set(name, value)
     try:
-        control_divider(1e6 / settings_of(world).tick_us, own)
+        control_divider(1e6 / settings_of(simulator).tick_us, autopilot)
     except (ParameterError, RateError) as error:
         raise InputError(f"--set {error}") from None
-    if any(given_own):
-        _try(given_own, own, given)
+    if any(own_parts):
+        _try_own_code(own_parts, autopilot, given)
 
 
-def doubts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
+def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
     """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
     in milliseconds, which was probably meant in seconds."""
     found = load_vehicle(vehicle)
-    tables = sim_parameters(truth_of(found)), parameters_for(load_belief(vehicle), NOTHING_OWN)
+    tables = sim_parameters(truth_of(found)), parameters_for(load_belief(vehicle), NO_OWN_CODE)
     units = {name: table.describe(name).unit for table in tables for name in table.names}
     return [
         f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant"
@@ -74,22 +74,22 @@ def split_settings(
         load_profile(sensors)
     except FileError as error:
         raise input_error(error) from None
-    world = sim_parameters(truth_of(found))
+    simulator = sim_parameters(truth_of(found))
     given = list(settings)
-    ours = [(name, value) for name, value in given if name in world]
-    for name, value in ours:
-        _check(world, name, value)
-    return ours, [(name, value) for name, value in given if name not in world]
+    simulator_part = [(name, value) for name, value in given if name in simulator]
+    for name, value in simulator_part:
+        _check(simulator, name, value)
+    return simulator_part, [(name, value) for name, value in given if name not in simulator]
 
 
-def _table(vehicle: Vehicle, own: Own) -> ParameterTable:
+def _table(vehicle: Vehicle, own: OwnCode) -> ParameterTable:
     try:
         return parameters_for(vehicle, own)
     except OwnError as error:
         raise InputError(str(error)) from None
 
 
-def _try(own: Own, table: ParameterTable, settings: list[tuple[str, float]]) -> None:
+def _try_own_code(own: OwnCode, table: ParameterTable, settings: list[tuple[str, float]]) -> None:
     from autopilot.own.trial import try_all  # imports all flight software
     from autopilot.shell.watched_calls import watched_calls
 

@@ -6,9 +6,9 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from autopilot.own.estimator import load_estimator
-from autopilot.own.law import name_of
+from autopilot.own.law import law_name
 from autopilot.own.planner import load_planner
-from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.flight_options import FlightOptions, parse_setting
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from missions.model import Mission
 
 
-def _law(options: FlightOptions) -> str:
-    return name_of(options.law) if options.firmware is None else options.firmware.kind
+def _law_name(options: FlightOptions) -> str:
+    return law_name(options.law) if options.firmware is None else options.firmware.kind
 
 
 def meta_of(
@@ -30,7 +30,7 @@ def meta_of(
     return FlightMeta(
         mission=options.mission,
         title=mission.title,
-        law=_law(options) if own else None,
+        law=_law_name(options) if own else None,
         estimator=load_estimator(options.estimator).name if options.estimator else None,
         planner=load_planner(options.planner).name if options.planner else None,
         sensors=options.sensors if own else None,
@@ -42,5 +42,5 @@ def meta_of(
         wall_s=wall_s,
         command=options.command_line(),
         version=version("plumbline"),
-        settings=dict(map(setting_of, options.settings)),
+        settings=dict(map(parse_setting, options.settings)),
     )

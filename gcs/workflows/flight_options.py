@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from autopilot.own.chosen import Own
-from autopilot.own.law import own_law
+from autopilot.own.law import own_law_reference
+from autopilot.own.own_code import OwnCode
 from gcs.shell.link import Address
 
-WORLD = "SIM_"  # beginning of the names of the simulator's parameters
-_REFUSED = 2.0  # MIS_INFEASIBLE
+SIMULATOR_PREFIX = "SIM_"  # beginning of the names of the simulator's parameters
+_REFUSE_INFEASIBLE = 2.0  # MIS_INFEASIBLE
 
 
 class FirmwareProgram(NamedTuple):
@@ -46,9 +46,9 @@ class FlightOptions:
     pictures: bool = False  # all pictures of the report, not only that of its page
 
     @property
-    def own(self) -> Own:
+    def own(self) -> OwnCode:
         """The custom parts (law, estimator, planner) of the flight."""
-        return Own(own_law(self.law), self.estimator, self.planner)
+        return OwnCode(own_law_reference(self.law), self.estimator, self.planner)
 
     def command_line(self) -> str:
         """The command that flies it again."""
@@ -57,7 +57,7 @@ class FlightOptions:
             words += ["--connect", str(self.connect)]
             return " ".join([*words, "--truth", str(self.truth_at)] if self.truth_at else words)
         if self.firmware is None:
-            words += ["--law", self.law, *own_words(self.estimator, self.planner)]
+            words += ["--law", self.law, *own_part_options(self.estimator, self.planner)]
         else:
             words += ["--autopilot", f"{self.firmware.kind}={self.firmware.path}"]
         words += ["--sensors", self.sensors, "--vehicle", self.vehicle]
@@ -70,20 +70,20 @@ class FlightOptions:
         return " ".join(words)
 
     @property
-    def tries_anyway(self) -> bool:
+    def allows_infeasible(self) -> bool:
         """Whether the settings let the autopilot fly, or slow down, what it cannot fly as requested."""
         name = "MIS_INFEASIBLE="
         given = [float(s.removeprefix(name)) for s in self.settings if s.startswith(name)]
-        return any(value < _REFUSED for value in given)
+        return any(value < _REFUSE_INFEASIBLE for value in given)
 
 
-def own_words(estimator: str, planner: str) -> list[str]:
+def own_part_options(estimator: str, planner: str) -> list[str]:
     """The words of a command line for a custom estimator and planner, if there are any."""
     words = ["--estimator", estimator] if estimator else []
     return [*words, "--planner", planner] if planner else words
 
 
-def setting_of(text: str) -> tuple[str, float]:
+def parse_setting(text: str) -> tuple[str, float]:
     """Name and value of NAME=VALUE, which the command line has already checked."""
     name, _, value = text.partition("=")
     return name, float(value)

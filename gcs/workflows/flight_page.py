@@ -14,23 +14,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autopilot.own.law import name_of
+from autopilot.own.law import law_name
 from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError
 from gcs.mission_items import items_of
-from gcs.shell.display import say
-from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, pipe
+from gcs.shell.display import notify
+from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, feed_pipe
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
 from gcs.view.places import waypoints_record
-from gcs.workflows.flight_options import FlightOptions, setting_of
-from gcs.workflows.view import open_browser, tell_if_open
+from gcs.workflows.flight_options import FlightOptions, parse_setting
+from gcs.workflows.view import open_browser, warn_if_reachable
 from missions.model import Mission
 
-_BEGIN_S = 20.0  # until the page's process must have sent its address
+_START_LIMIT_S = 20.0  # until the page's process must have sent its address
 _READER_S = 15.0  # until the opened browser must show the page
 _RELOAD_S = 3.0  # within which a closed page may be opened again, as by a reload
 _WAIT_S = 0.1
@@ -54,7 +54,7 @@ class FlightPage:
         self._readers = 0
         self._had_readers = False
         self._stage = ""
-        self._asked: list[bytes] = []
+        self._requested_frames: list[bytes] = []
 
     # ---- in flight
 
@@ -65,70 +65,70 @@ class FlightPage:
         truth: list[bytes],
         vehicle: list[bytes],
         now_us: int,
-        may_speak: bool,
+        may_send: bool,
     ) -> list[bytes]:
         """Pass what was received to the page; return the datagrams for the vehicle that the page requested.
 
-        These wait for a turn at which the ground station may send (`may_speak`).
+        These wait for a turn at which the ground station may send (`may_send`).
         """
-        self._feed.tell(TRUTH, now_us, truth)
-        self._feed.tell(VEHICLE, now_us, vehicle)
+        self._feed.send_datagrams(TRUTH, now_us, truth)
+        self._feed.send_datagrams(VEHICLE, now_us, vehicle)
         if client.stage.value != self._stage:
             self._stage = client.stage.value
-            self.tell(stage=self._stage)
-        self._hear()
-        if not may_speak or not self._asked or client.outcome is not None:
+            self.send_event(stage=self._stage)
+        self._receive()
+        if not may_send or not self._requested_frames or client.outcome is not None:
             return []
-        asked, self._asked = self._asked, []
-        sent = [client.connection.frame(one.message) for frame in asked for one in messages(frame)[0]]
-        client.fly_on()
+        frames, self._requested_frames = self._requested_frames, []
+        sent = [client.connection.frame(one.message) for frame in frames for one in messages(frame)[0]]
+        client.start_manual_control()
         for datagram in sent:
             capture.on_sent(datagram)
         return sent
 
-    def tell(self, **record: Any) -> None:
+    def send_event(self, **record: Any) -> None:
         """Send the page news about the flight as a whole."""
-        self._feed.tell_event(record)
+        self._feed.send_event(record)
 
     # ---- before and after it
 
     def await_address(self) -> None:
         """Wait until the page is served; GcsError if it cannot be."""
-        self._wait(_BEGIN_S, lambda: bool(self.address))
+        self._wait(_START_LIMIT_S, lambda: bool(self.address))
         if not self.address:
             raise GcsError("the process of the live page does not start")
 
     def await_reader(self, stop: StopRequest) -> None:
         """Open a browser and wait until it shows the page; without a screen, do not wait."""
-        say(f"live page: {self.address}")
-        tell_if_open(self._host)
+        notify(f"live page: {self.address}")
+        warn_if_reachable(self._host)
         if open_browser(self.address):
             self._wait(_READER_S, lambda: bool(self._readers or stop))
 
-    def stay(self, stop: StopRequest) -> None:
+    def keep_open(self, stop: StopRequest) -> None:
         """Keep the page until the last browser closes it, or until Ctrl-C."""
         if stop:
             return
-        say("the page stays until it is closed or Ctrl-C ends it")
-        gone_s = 0.0
-        while not stop and gone_s < _RELOAD_S and not self._feed.closed:
+        notify("the page stays until it is closed or Ctrl-C ends it")
+        closed_s = 0.0
+        while not stop and closed_s < _RELOAD_S and not self._feed.closed:
             select.select([self._feed], [], [], _WAIT_S)
-            self._hear()
-            gone_s = gone_s + _WAIT_S if self._had_readers and not self._readers else 0.0
+            self._receive()
+            closed_s = closed_s + _WAIT_S if self._had_readers and not self._readers else 0.0
 
     def _wait(self, limit_s: float, done: Any) -> None:
         waited_s = 0.0
         while not done() and waited_s < limit_s and not self._feed.closed:
             if not select.select([self._feed], [], [], _WAIT_S)[0]:
                 waited_s += _WAIT_S
-            self._hear()
+            self._receive()
 
-    def _hear(self) -> None:
-        for piece in self._feed.read():
-            if piece.kind == COMMAND:
-                self._asked.append(piece.body)
-            elif piece.kind == EVENT:
-                event = piece.event
+    def _receive(self) -> None:
+        for message in self._feed.read():
+            if message.kind == COMMAND:
+                self._requested_frames.append(message.body)
+            elif message.kind == EVENT:
+                event = message.event
                 if "trouble" in event:
                     raise GcsError(event["trouble"])
                 self.address = event.get("address", self.address)
@@ -139,25 +139,25 @@ class FlightPage:
 @contextmanager
 def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> Iterator[FlightPage]:
     """Start the page of a flight, and end it afterwards."""
-    ours, theirs = pipe()
-    with closing(ours), Processes() as processes:
-        with closing(theirs):
-            arguments = ["view", "--feed", str(theirs.fileno()), "--bind", page.host]
+    flight_end, page_end = feed_pipe()
+    with closing(flight_end), Processes() as processes:
+        with closing(page_end):
+            arguments = ["view", "--feed", str(page_end.fileno()), "--bind", page.host]
             if page.port is not None:
                 arguments += ["--port", str(page.port)]
-            processes.start("gcs", arguments, Path(os.devnull), (theirs.fileno(),))
-        shown = FlightPage(ours, page.host)
-        shown.await_address()
-        shown.tell(**_about(mission, options))
-        yield shown
+            processes.start("gcs", arguments, Path(os.devnull), (page_end.fileno(),))
+        served_page = FlightPage(flight_end, page.host)
+        served_page.await_address()
+        served_page.send_event(**_session_record(mission, options))
+        yield served_page
 
 
-def _about(mission: Mission, options: FlightOptions) -> dict[str, Any]:
+def _session_record(mission: Mission, options: FlightOptions) -> dict[str, Any]:
     own = options.connect is None
     record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
     record["waypoints"] = waypoints_record(items_of(mission, Home()), Home())
     if own:
-        record |= {"law": name_of(options.law), "sensors": options.sensors, "vehicle_name": options.vehicle}
+        record |= {"law": law_name(options.law), "sensors": options.sensors, "vehicle_name": options.vehicle}
         record |= {"seed": options.seed, "speed": options.speed}
-        record["settings"] = dict(setting_of(setting) for setting in options.settings)
+        record["settings"] = dict(parse_setting(setting) for setting in options.settings)
     return record

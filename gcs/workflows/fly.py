@@ -18,20 +18,20 @@ from gcs.errors import (
     GcsError,
     InputError,
     StoppedError,
-    disk_trouble,
+    disk_problem,
 )
-from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others, make_folder
-from gcs.shell.display import is_live, say
+from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, check_no_other_results, fresh_folder, make_folder
+from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.before_flight import check_mission, check_options, planner_doubts
+from gcs.workflows.before_flight import check_mission, check_options, planner_warnings
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
 from gcs.workflows.mission_file import load
-from gcs.workflows.own_vehicle import LOGS, own_vehicle
 from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
-from gcs.workflows.too_slow import too_slow
+from gcs.workflows.too_slow import slowness_reason
+from gcs.workflows.vehicle_processes import LOGS, start_vehicle
 from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
 
@@ -52,7 +52,7 @@ _EXIT = {
 
 UNFLOWN_FILE = "unflown.tlog"  # telemetry of a vehicle that did not fly
 
-Told = Callable[["Record", "Outcome"], None]
+OnRecord = Callable[["Record", "Outcome"], None]
 
 
 @dataclass(frozen=True)
@@ -70,25 +70,28 @@ class Flight:
 
 
 def fly(
-    options: FlightOptions, told: Told, view: PageOptions | None = None, processes: Processes | None = None
+    options: FlightOptions,
+    on_record: OnRecord,
+    view: PageOptions | None = None,
+    processes: Processes | None = None,
 ) -> Flight:
-    """The whole flight; GcsError if there was none. `told` is called when the flight has ended, before the
-    pictures of the report are drawn. With `view`, a page shows the flight and stays afterwards. Simulator and
-    autopilot may already be loaded in `processes`."""
-    doubts = []
+    """The whole flight; GcsError if there was none. `on_record` is called when the flight has ended, before
+    the pictures of the report are drawn. With `view`, a page shows the flight and stays afterwards. Simulator
+    and autopilot may already be loaded in `processes`."""
+    warnings = []
     if options.connect is None and options.firmware is None:
-        doubts = check_options(options)
+        warnings = check_options(options)
     mission = load(options.mission)
     if not options.quiet:
-        for doubt in (*doubts, *planner_doubts(options.planner, mission)):
-            say(doubt)
+        for warning in (*warnings, *planner_warnings(options.planner, mission)):
+            notify(warning)
     out = options.out or fresh_folder(mission.name)
     with FlightFolder(out, options.overwrite) as folder:
         if options.connect is None:
             laws = (options.law,) if options.firmware is None else ()
             warm_up(flight_parts(laws), options.quiet)
             if not options.quiet:
-                say("starting the simulator and the autopilot")
+                notify("starting the simulator and the autopilot")
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
             _page(mission, options, view, stop) as page,
@@ -100,25 +103,25 @@ def fly(
                 if options.firmware is not None:
                     client = _fly_firmware(mission, options, options.firmware, log, out, stop, watch, page)
                 elif options.connect is None:
-                    client = _fly_own(mission, options, log, out, stop, watch, page, processes)
+                    client = _fly_started(mission, options, log, out, stop, watch, page, processes)
                 else:
                     client, truth_missing = _fly_running(
                         mission, options, options.connect, log, stop, watch, page
                     )
 
-            def tell(record: Record, outcome: Outcome) -> None:
-                told(record, outcome)
-                if not options.quiet and not is_live():  # on a terminal a bar shows it
-                    say("drawing the report")
+            def on_end(record: Record, outcome: Outcome) -> None:
+                on_record(record, outcome)
+                if not options.quiet and not stderr_is_terminal():  # on a terminal a bar shows it
+                    notify("drawing the report")
                 if page is not None:
-                    page.tell(outcome=outcome.name, reason=outcome.reason)
+                    page.send_event(outcome=outcome.name, reason=outcome.reason)
 
             stop.hint = "the flight is over, and its report is made; Ctrl-C again abandons the report"
-            flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
+            flight = _finish(mission, options, client, truth_missing, watch.stop(), out, folder, stop, on_end)
             if page is not None:
-                page.tell(report=str(out.resolve()))
+                page.send_event(report=str(out.resolve()))
                 stop.hint = "the page is closed"  # the report is complete and can no longer be abandoned
-                page.stay(stop)
+                page.keep_open(stop)
             return flight
 
 
@@ -137,7 +140,7 @@ def _page(
         yield page
 
 
-def _fly_own(
+def _fly_started(
     mission: Mission,
     options: FlightOptions,
     log: TlogWriter,
@@ -147,15 +150,15 @@ def _fly_own(
     page: FlightPage | None,
     processes: Processes | None,
 ) -> FlightClient:
-    with own_vehicle(options, out, processes) as own:
-        from gcs.workflows.own_flight import fly_own  # imported while the programs load
+    with start_vehicle(options, out, processes) as started:
+        from gcs.workflows.started_flight import fly_started_vehicle  # imported while the programs load
 
         check_mission(mission, options)
         if options.speed is None:
             from gcs.report.warm import load_libraries as load_report
 
-            load_report(lambda: own.vehicle.waiting)  # a core is idle until the vehicle sends
-        return fly_own(mission, options, log, own, stop, watch, page)
+            load_report(lambda: started.vehicle.has_datagram)  # a core is idle until the vehicle sends
+        return fly_started_vehicle(mission, options, log, started, stop, watch, page)
 
 
 def _fly_firmware(
@@ -168,10 +171,10 @@ def _fly_firmware(
     watch: Stopwatch,
     page: FlightPage | None,
 ) -> FlightClient:
-    from gcs.workflows.own_firmware import fly_firmware, own_firmware
+    from gcs.workflows.firmware_processes import fly_firmware, start_firmware
 
-    with own_firmware(program, options, out) as own:
-        return fly_firmware(mission, options, program, log, own, stop, watch, page)
+    with start_firmware(program, options, out) as started:
+        return fly_firmware(mission, options, program, log, started, stop, watch, page)
 
 
 def _fly_running(
@@ -189,7 +192,7 @@ def _fly_running(
     return fly_running(mission, options, address, log, stop, watch, page)
 
 
-def _end(
+def _finish(
     mission: Mission,
     options: FlightOptions,
     client: FlightClient,
@@ -198,46 +201,46 @@ def _end(
     out: Path,
     folder: FlightFolder,
     stop: StopRequest,
-    told: Told,
+    on_record: OnRecord,
 ) -> Flight:
     from gcs.clients.flight import Outcome
 
     outcome = client.outcome or Outcome("interrupted")
     if options.firmware is None:  # a firmware counts items in its own way
-        outcome = outcome.of_mission(mission)
+        outcome = outcome.in_mission_terms(mission)
     tlog = out / TLOG_FILE
     if tlog.stat().st_size == 0:
         if stop:
             raise StoppedError("stopped before the vehicle said anything")
         raise GcsError(outcome.reason or "the vehicle said nothing")
-    if stop and not client.begun:
+    if stop and not client.started:
         raise StoppedError(f"stopped before the vehicle was armed; what it said is in {folder.set_aside()}")
-    if options.connect is not None and not client.begun:
-        told_by = f"what the vehicle said is in {folder.set_aside()}"
-        raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {told_by}")
+    if options.connect is not None and not client.started:
+        where = f"what the vehicle said is in {folder.set_aside()}"
+        raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {where}")
     folder.keep()
     if options.real_time and outcome.name != "completed":
-        outcome = outcome.because(too_slow(tlog))
+        outcome = outcome.with_reason(slowness_reason(tlog))
     try:
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
         record = make_report(
-            tlog, out, meta, options.quiet, lambda record: told(record, outcome), options.pictures
+            tlog, out, meta, options.quiet, lambda record: on_record(record, outcome), options.pictures
         )
     except KeyboardInterrupt:
-        _tell_abandoned(tlog)
+        _report_abandoned(tlog)
         raise
     return Flight(outcome, record, out, bool(stop) and outcome.name == "interrupted")
 
 
-def _tell_abandoned(tlog: Path) -> None:
-    say(f"report abandoned; the telemetry is in {tlog}")
+def _report_abandoned(tlog: Path) -> None:
+    notify(f"report abandoned; the telemetry is in {tlog}")
 
 
 class FlightFolder:
     """The output directory, from which a flight that is overwritten is deleted; if the new flight fails, our
     files are deleted again."""
 
-    _OURS = (TLOG_FILE, *LOGS)
+    _FILES = (TLOG_FILE, *LOGS)
 
     def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path
@@ -254,7 +257,7 @@ class FlightFolder:
 
     def __enter__(self) -> FlightFolder:
         make_folder(self._path)
-        keep_others(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
+        check_no_other_results(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
         try:
             (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
         except FileExistsError:
@@ -269,26 +272,26 @@ class FlightFolder:
         return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:
-        trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
-        if trouble:
+        problem, tlog = disk_problem(error), self._path / TLOG_FILE
+        if problem:
             size = tlog.stat().st_size if tlog.exists() else 0
             if not size:
                 with suppress(OSError):  # the faulty disk may prevent this too
                     self._clear()
-                raise GcsError(f"{self._path}: {trouble}; no telemetry could be kept") from None
+                raise GcsError(f"{self._path}: {problem}; no telemetry could be kept") from None
             raise GcsError(
-                f"{self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}; "
+                f"{self._path}: {problem}; {size} bytes of telemetry are kept in {tlog}; "
                 f"gcs report {shlex.quote(str(self._path))} reads them"
             ) from None
         if self._kept:
             return
         if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:
-            _tell_abandoned(tlog)
+            _report_abandoned(tlog)
             return
         self._clear()
 
     def _clear(self) -> None:
-        for name in self._OURS:
+        for name in self._FILES:
             (self._path / name).unlink(missing_ok=True)
         if not any(self._path.iterdir()):
             self._path.rmdir()

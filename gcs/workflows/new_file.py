@@ -17,7 +17,7 @@ from pathlib import Path
 from sysconfig import get_path
 
 from autopilot.geometry.machine_code import ROOT
-from gcs.errors import InputError, not_written
+from gcs.errors import InputError, write_error
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 _FLY_IT = re.compile(r"^\W*Fly it:\s+(\S.*)$", re.MULTILINE)
@@ -67,14 +67,14 @@ def new_file(kind: str, name: str) -> NewFile:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise not_written(error, path, "file", by="") from None
+        raise write_error(error, path, "file", option="") from None
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         raise InputError(f"{path} exists already and is left as it is; choose another name") from None
     except OSError as error:
-        raise not_written(error, path, "file", by="") from None
+        raise write_error(error, path, "file", option="") from None
     return NewFile(path, _command(text, kind))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from autopilot.own.chosen import Own, parameters_for
+from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.own.planner import load_planner
-from autopilot.own.planning import planner_of
+from autopilot.own.planning import plan_function
 from autopilot.own.source import OwnError
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.trajectory.route import Planner
@@ -21,8 +21,8 @@ def own_planner(reference: str, vehicle: str) -> Iterator[Planner]:
     """The planner with its default parameters for a vehicle, and with its calls watched. GcsError if there is
     no such vehicle, or if the planner cannot be loaded."""
     try:
-        values = parameters_for(load_belief(vehicle), Own(planner=reference)).values()
-        planner = planner_of(load_planner(reference), values)
+        values = parameters_for(load_belief(vehicle), OwnCode(planner=reference)).values()
+        planner = plan_function(load_planner(reference), values)
     except OwnError as error:
         raise InputError(str(error)) from None
     except VehicleFileError as error:

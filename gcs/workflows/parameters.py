@@ -12,18 +12,18 @@ from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 from gcs.errors import GcsError, InputError, NoVehicleError, RefusedError
 from gcs.formats.params import QGC_ENDING, parameter_lines, qgc_parameters
-from gcs.shell.display import StepDisplay, say
+from gcs.shell.display import StepDisplay, notify
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from missions.text_files import TextFileError, text_of
 
-_ANY = "bebop"  # parameters have the same units with all vehicles
+_ANY_VEHICLE = "bebop"  # parameters have the same units with all vehicles
 
 
 def list_parameters(pattern: str, address: Address) -> dict[str, float]:
     """Values by name of the parameters that match a shell pattern; GcsError if none does."""
     with Session(address) as session:
-        values = _listed(session, session.find())
+        values = _read_all(session, session.find())
     found = {n: v for n, v in values.items() if fnmatch.fnmatchcase(n, pattern.upper())}
     if not found:
         raise GcsError(f"none of the vehicle's {len(values)} parameters matches {pattern!r}")
@@ -49,10 +49,10 @@ def set_parameter(name: str, value: float, address: Address) -> str:
         operation = ParameterSet(session.find(), name.upper(), value)
         done = exchange(session, operation, name).text
     if 0.0 < abs(value) < 1.0:
-        from gcs.workflows.flight_inputs import doubts
+        from gcs.workflows.flight_inputs import setting_warnings
 
-        for doubt in doubts(_ANY, [(name.upper(), value)]):
-            say(doubt)
+        for warning in setting_warnings(_ANY_VEHICLE, [(name.upper(), value)]):
+            notify(warning)
     return done
 
 
@@ -71,17 +71,17 @@ def exchange(
     except RefusedError:
         if not operation.unknown:
             raise
-    known = [] if names is None else names
-    if not known:
-        known += _listed(session, session.target)
-    raise RefusedError(unknown_setting(operation.name, known))
+    known_names = [] if names is None else names
+    if not known_names:
+        known_names += _read_all(session, session.target)
+    raise RefusedError(unknown_setting(operation.name, known_names))
 
 
 def save_parameters(file: Path, address: Address) -> int:
     """Write all parameters to a file, in the format of its ending; return their number."""
     with Session(address) as session:
         target = session.find()
-        values = _listed(session, target)
+        values = _read_all(session, target)
     is_qgc = file.suffix.lower() == QGC_ENDING
     text = qgc_parameters(values, target) if is_qgc else parameter_lines(values)
     partial = file.with_name(file.name + ".part")
@@ -110,7 +110,7 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
                 exchange(session, ParameterSet(target, name, value), names=names)
             except RefusedError as error:
                 refused += 1
-                say(str(error))
+                notify(str(error))
             except NoVehicleError as error:
                 raise NoVehicleError(
                     f"{error}; {done - refused} of {len(values)} parameters were set"
@@ -118,7 +118,7 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
     return len(values) - refused, len(values)
 
 
-def _listed(session: Session, target: Target) -> dict[str, float]:
+def _read_all(session: Session, target: Target) -> dict[str, float]:
     operation = ParameterList(target)
     session.run(operation, "parameters")
     return operation.values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gcs.clients import command
 from gcs.errors import NoVehicleError, RefusedError
-from gcs.shell.display import say
+from gcs.shell.display import notify
 from gcs.shell.session import Session
 
 HEALTH_S = 2.0  # in which a vehicle reports its health
@@ -22,9 +22,9 @@ def wait_until_ready(session: Session) -> bool:
     try:
         session.run(command.run_prearm_checks(session.target))
         # the reasons arrive with the answer, or a moment later
-        session.watch(lambda: bool(view.complaints_since(before)), READY_S)
+        session.watch(lambda: bool(view.problems_since(before)), READY_S)
     except (RefusedError, NoVehicleError):
         pass  # its reasons will arrive with the refusal to arm
-    reasons = "; ".join(view.complaints_since(before))
-    say("waiting for the vehicle to be ready" + (f": {reasons}" if reasons else ""))
+    reasons = "; ".join(view.problems_since(before))
+    notify("waiting for the vehicle to be ready" + (f": {reasons}" if reasons else ""))
     return session.watch(lambda: view.ready_to_arm is True, READY_S, "waiting for the vehicle to be ready")

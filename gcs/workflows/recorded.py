@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gcs.errors import InputError, input_error, not_written
+from gcs.errors import InputError, input_error, write_error
 from gcs.folders import TLOG_FILE
-from gcs.shell.display import StepDisplay, told_if_slow
+from gcs.shell.display import StepDisplay, notify_if_slow
 
 if TYPE_CHECKING:
     from gcs.recorded.column_map import ColumnMap
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from gcs.recorded.load_model import LoadModel
     from gcs.recorded.motion import Motion
 
-FOLDER = Path("replays")
-_FARTHEST_M = 200.0  # of a load from its vehicle: cables are shorter
-OWN_MAP = "telemetry"  # column map of Plumbline's own logs
+REPLAYS_FOLDER = Path("replays")
+_MAX_DISTANCE_M = 200.0  # of a load from its vehicle: cables are shorter
+PLUMBLINE_MAP = "telemetry"  # column map of Plumbline's own logs
 
 
 def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, Any]:
@@ -39,25 +39,25 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     path = find_recording(path)
     with StepDisplay("reading the recording", quiet, long=True) as display:
         display.update(0, 0)
-        asked, motion, model = _read(path, columns)
-        _needs_load(path, motion)
+        column_map, motion, model = _read(path, columns)
+        _require_load(path, motion)
         duration_s = float(motion.time_s[-1] - motion.time_s[0])
         if duration_s < MIN_DURATION_S:
             raise InputError(
                 f"{path}: {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are needed to identify anything"
             )
 
-        def tell(done: int, total: int) -> None:
+        def report_progress(done: int, total: int) -> None:
             display.update(done, total, "fitting predictions of the load")
 
         try:
             identify_vehicle(motion, model)  # too little motion is reported before the load is fitted
-            load = identify_load(motion, model, asked.identify.parameters, tell)
+            load = identify_load(motion, model, column_map.identify.parameters, report_progress)
             known = {one.name: one.value for one in load if one.is_determined}
             vehicle = identify_vehicle(motion, model._replace(**known))
         except (NoLoadError, TooLittleMotionError) as error:
             raise InputError(f"{path}: {error}") from None
-        found: list[Identified] = [tracked_length(motion, asked.attachment.below_m), *load, *vehicle]
+        found: list[Identified] = [tracked_length(motion, column_map.attachment.below_m), *load, *vehicle]
     return {
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
@@ -81,15 +81,15 @@ def replay(
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
     path = find_recording(path)
-    with told_if_slow("estimating the load", quiet):
+    with notify_if_slow("estimating the load", quiet):
         _, motion, model = _read(path, columns)
         rows = filter_rows(motion, model)
-        seen = bool(np.isfinite(motion.load).all())
+        load_is_measured = bool(np.isfinite(motion.load).all())
         record: dict[str, Any] = {**_rows_record(path, motion), "doubt": ""}
-        if seen and record["duration_s"] >= MIN_DURATION_S:
+        if load_is_measured and record["duration_s"] >= MIN_DURATION_S:
             with suppress(TooLittleMotionError):
                 record["doubt"] = map_warning(identify_vehicle(motion, model))
-        if seen:
+        if load_is_measured:
             squares = filtered_estimates(rows, model, load=True, tilt=True).squares
             record["innovations"] = {
                 name: {
@@ -100,22 +100,22 @@ def replay(
             }
             for horizon, score in zip(HORIZONS_S, score_ahead(motion, rows, model), strict=True):
                 record[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
-            alone = score_pose_alone(motion, rows, model)
+            pose_alone = score_pose_alone(motion, rows, model)
             record["pose_alone"] = {
-                "median_m": alone.median_m,
-                "nees_per_axis": float(np.mean(alone.square) / 2.0),
-                "inside_95": alone.inside,
+                "median_m": pose_alone.median_m,
+                "nees_per_axis": float(np.mean(pose_alone.square) / 2.0),
+                "inside_95": pose_alone.inside,
             }
         found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
         load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
         sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
-    folder = out or FOLDER / name_of(path)
+    folder = out or REPLAYS_FOLDER / name_of(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_table(folder / "load.csv", motion, load, sd)
         write_picture(folder / "load.png", motion, load, sd)
     except OSError as error:
-        raise not_written(error, folder) from None
+        raise write_error(error, folder) from None
     return record, folder
 
 
@@ -147,30 +147,30 @@ def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel
             raise InputError(f"{path}: no recording of a flight; {ACCEPTED_FILES}")
         raise InputError(f"{path}: say what its columns are by --columns: {MAPS.choice()}")
     try:
-        asked = load_map(columns or OWN_MAP)
-        if is_log(path) and asked.vehicle is not None:
+        column_map = load_map(columns or PLUMBLINE_MAP)
+        if is_log(path) and column_map.vehicle is not None:
             raise InputError(
                 f"--columns {columns}: describes rows of numbers by another system of tracking; {path} names "
                 "its columns itself: leave --columns out, or name a map without [vehicle]"
             )
-        motion = motion_of(read_recording(path, asked), asked)
+        motion = motion_of(read_recording(path, column_map), column_map)
     except MapError as error:
         raise input_error(error) from None
     except RecordingError as error:
         raise InputError(str(error)) from None
-    far = distances(motion)
-    length_m = float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0
-    if length_m > _FARTHEST_M:
+    load_distances_m = distances(motion)
+    length_m = float(np.nanmedian(load_distances_m)) if np.isfinite(load_distances_m).any() else 0.0
+    if length_m > _MAX_DISTANCE_M:
         raise InputError(
-            f"{path}: the load would be {length_m:.0f} m from the vehicle; {_FARTHEST_M:g} m at most: are "
-            "positions in m, and in the columns that the map names?"
+            f"{path}: the load would be {length_m:.0f} m from the vehicle; {_MAX_DISTANCE_M:g} m at most: "
+            "are positions in m, and in the columns that the map names?"
         )
-    if asked.model.length_m is None and not length_m:
+    if column_map.model.length_m is None and not length_m:
         raise InputError(f"{path}: without measured loads the column map must say model.length_m")
-    return asked, motion, asked.load_model(length_m)
+    return column_map, motion, column_map.load_model(length_m)
 
 
-def _needs_load(path: Path, motion: Motion) -> None:
+def _require_load(path: Path, motion: Motion) -> None:
     if not np.isfinite(motion.load).all():
         raise InputError(f"{path}: the load was not measured in every row; nothing can be identified from it")
 

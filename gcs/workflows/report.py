@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
-from gcs.errors import GcsError, InputError, disk_trouble, not_written
-from gcs.folders import SUMMARY_FILE, TLOG_FILE, keep_others
+from gcs.errors import GcsError, InputError, disk_problem, write_error
+from gcs.folders import SUMMARY_FILE, TLOG_FILE, check_no_other_results
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
@@ -22,38 +22,40 @@ def make_report(
     out: Path,
     meta: FlightMeta | None,
     quiet: bool,
-    figures: Callable[[Record], None] | None = None,
+    on_record: Callable[[Record], None] | None = None,
     all_pictures: bool = False,
 ) -> Record:
-    """Make the report in `out`; without `meta`, meta.json beside the log is used. `figures` is called with
+    """Make the report in `out`; without `meta`, meta.json beside the log is used. `on_record` is called with
     the record before anything is drawn. `all_pictures`: also those that the page does not contain."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update, figures, all_pictures)
+            return build_report(tlog, out, meta, display.update, on_record, all_pictures)
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
-            raise _not_made(error, tlog, out) from None
+            raise _report_error(error, tlog, out) from None
 
 
-def _not_made(error: OSError, tlog: Path, out: Path) -> GcsError:
+def _report_error(error: OSError, tlog: Path, out: Path) -> GcsError:
     """The error that the report cannot be written; if the disk is full, also what is kept, and how to make
     the report later."""
-    if not disk_trouble(error):
-        return not_written(error, error.filename or out)
+    if not disk_problem(error):
+        return write_error(error, error.filename or out)
     kept = [str(tlog)] if tlog.is_file() else []
-    if _is_whole(out / SUMMARY_FILE):
+    if _is_complete(out / SUMMARY_FILE):
         kept.append(str(out / SUMMARY_FILE))
-    again = shlex.quote(str(out)) if tlog == out / TLOG_FILE else shlex.join([str(tlog), "--out", str(out)])
+    arguments = (
+        shlex.quote(str(out)) if tlog == out / TLOG_FILE else shlex.join([str(tlog), "--out", str(out)])
+    )
     return GcsError(
-        f"{out}: the report cannot be written: {disk_trouble(error)}; kept are {' and '.join(kept)}; "
-        f"make it when there is space: gcs report {again}"
+        f"{out}: the report cannot be written: {disk_problem(error)}; kept are {' and '.join(kept)}; "
+        f"make it when there is space: gcs report {arguments}"
     )
 
 
-def _is_whole(summary: Path) -> bool:
+def _is_complete(summary: Path) -> bool:
     try:
         return bool(json.loads(summary.read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -81,15 +83,15 @@ def meta_beside(tlog: Path) -> FlightMeta:
         raise InputError(str(error)) from None
 
 
-def report_again(
+def remake_report(
     source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
 ) -> tuple[Record, Path]:
     """Make the report of a log, or of the directory that contains it, again; return the record and the
     report's directory."""
     tlog = find_log(source)
-    beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
-    folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
-    keep_others(folder, TLOG_FILE)
+    default_folder = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
+    folder = out or (tlog.parent if tlog.name == TLOG_FILE else default_folder)
+    check_no_other_results(folder, TLOG_FILE)
     if (folder / TLOG_FILE).exists() and not (folder / TLOG_FILE).samefile(tlog):
         raise InputError(f"{folder}: holds another flight; name another folder by --out")
     return make_report(tlog, folder, None, quiet, all_pictures=all_pictures), folder
@@ -104,7 +106,7 @@ def make_mcap(source: Path, folder: Path) -> Path:
     except ReportError as error:
         raise InputError(str(error)) from None
     except OSError as error:
-        raise not_written(error, error.filename or folder) from None
+        raise write_error(error, error.filename or folder) from None
 
 
 def make_common(source: Path, folder: Path) -> Path:
@@ -115,7 +117,7 @@ def make_common(source: Path, folder: Path) -> Path:
     try:
         write_common(find_log(source), path)
     except OSError as error:
-        raise not_written(error, error.filename or path) from None
+        raise write_error(error, error.filename or path) from None
     return path
 
 

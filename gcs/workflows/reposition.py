@@ -33,14 +33,14 @@ def reposition(
     message = session.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     origin = Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
     load = _load(session)
-    begin = load if from_load else _home(session, origin)
-    if begin is None:
+    origin_position = load if from_load else _home(session, origin)
+    if origin_position is None:
         raise GcsError("the vehicle does not report the position of its load")
-    east, north, up = add(begin, (offset[0], offset[1], offset[2] or 0.0))
-    far = math.hypot(east, north)
-    if far > FARTHEST_M:
+    east, north, up = add(origin_position, (offset[0], offset[1], offset[2] or 0.0))
+    horizontal_m = math.hypot(east, north)
+    if horizontal_m > FARTHEST_M:
         raise GcsError(
-            f"the place is {far / 1e3:.4g} km from the vehicle's origin; "
+            f"the place is {horizontal_m / 1e3:.4g} km from the vehicle's origin; "
             f"must be at most {FARTHEST_M / 1e3:g} km"
         )
     latitude, longitude, _ = geodetic_from_enu((east, north, up), origin)
@@ -48,8 +48,12 @@ def reposition(
     operation = command.reposition(session.target, latitude, longitude, height_m, speed_m_s)
     if load is None:
         return Move(operation, math.nan)
-    there = (east, north, load[2] if offset[2] is None else up)  # without a height, the load keeps its own
-    return Move(operation, norm(sub(there, load)))
+    destination = (
+        east,
+        north,
+        load[2] if offset[2] is None else up,
+    )  # without a height, the load keeps its own
+    return Move(operation, norm(sub(destination, load)))
 
 
 def _home(session: Session, origin: Home) -> Vec3:

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from gcs.errors import GcsError, InputError
-from gcs.shell.display import say
+from gcs.shell.display import notify
 from missions.nearest import nearest_few
 
 COMPLETED = "completed"
-WHOLE = "all flights flown"  # the test case of a sweep, in which some flights may be lost
+ALL_FLOWN = "all flights flown"  # the test case of a sweep, in which some flights may be lost
 _COUNTS = ("completed", "completed_fraction", "failed")  # figures of a sweep that depend on lost flights
 _NO_FIGURE = "this run has no such figure, for example because nothing happened that it measures"
 Value = float | str
@@ -48,7 +48,7 @@ class Verdict:
 
     requirement: Requirement
     found: Any  # None: not known
-    met: bool
+    is_met: bool
 
     @property
     def line(self) -> str:
@@ -58,20 +58,24 @@ class Verdict:
         return f"required {self.requirement.text}; found {found}{why}"
 
 
-def read_requirements(texts: Iterable[str], keys: Sequence[str], listed: str) -> list[Requirement]:
+def parse_requirements(texts: Iterable[str], keys: Sequence[str], listed: str) -> list[Requirement]:
     """Parse requirements on the figures `keys`; `listed` names the place that lists these. InputError states
     what is wrong with one."""
-    return [_read(text, keys, listed) for text in texts]
+    return [_parse(text, keys, listed) for text in texts]
 
 
-def _read(text: str, keys: Sequence[str], listed: str) -> Requirement:
+def _parse(text: str, keys: Sequence[str], listed: str) -> Requirement:
     form = _FORM.fullmatch(text)
     if form is None:
         raise InputError(f'--require {text!r}: must be KEY SIGN VALUE, e.g. "load_error_max_m < 0.01"')
     key, sign, word = form.groups()
     if key not in keys:
-        near = " or ".join(nearest_few(key, keys))
-        known = f"did you mean {near}? all are listed by {listed}" if near else f"there are {', '.join(keys)}"
+        similar = " or ".join(nearest_few(key, keys))
+        known = (
+            f"did you mean {similar}? all are listed by {listed}"
+            if similar
+            else f"there are {', '.join(keys)}"
+        )
         raise InputError(f"--require {text!r}: no figure {key}; {known}")
     value = _value(word)
     if isinstance(value, str) and sign not in ("==", "!="):
@@ -88,19 +92,19 @@ def _value(word: str) -> Value:
         return word.strip("\"'")
 
 
-def judge(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> list[Verdict]:
+def check_requirements(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> list[Verdict]:
     """The verdict on each requirement; an unknown figure meets none."""
     found = []
     for requirement in requirements:
         value = record.get(requirement.key)
         number = isinstance(value, int | float)
-        same = number == isinstance(requirement.value, float)
-        met = value is not None and same and _SIGNS[requirement.sign](value, requirement.value)
-        found.append(Verdict(requirement, value, met))
+        same_type = number == isinstance(requirement.value, float)
+        is_met = value is not None and same_type and _SIGNS[requirement.sign](value, requirement.value)
+        found.append(Verdict(requirement, value, is_met))
     return found
 
 
-def unjudged(requirements: Sequence[Requirement], flights: int, completed: int) -> str:
+def uncovered_failures(requirements: Sequence[Requirement], flights: int, completed: int) -> str:
     """A line that no requirement on the sweep considers its failed flights, and what to add; empty if all
     flights completed, if one does, or if nothing is required."""
     if not requirements or completed == flights or any(one.key in _COUNTS for one in requirements):
@@ -112,7 +116,7 @@ def unjudged(requirements: Sequence[Requirement], flights: int, completed: int) 
 
 
 @contextmanager
-def reporting(run: str, junit: Path | None, case: str = COMPLETED) -> Iterator[None]:
+def junit_on_error(run: str, junit: Path | None, case: str = COMPLETED) -> Iterator[None]:
     """If the run raises GcsError, write the test report with this error in the test case `case`, and raise
     it again."""
     try:
@@ -125,7 +129,7 @@ def reporting(run: str, junit: Path | None, case: str = COMPLETED) -> Iterator[N
         raise
 
 
-def conclude(
+def report_verdicts(
     run: str,
     junit: Path | None,
     outcome: str,
@@ -137,19 +141,19 @@ def conclude(
     """Print each requirement that was not met to stderr, and write the test report: the test case `case`,
     which fails with the `reason` if the run was not completed, and one for each requirement. True if all
     requirements were met."""
-    missed = [verdict for verdict in verdicts if not verdict.met]
-    for verdict in missed:
-        say(verdict.line)
+    unmet = [verdict for verdict in verdicts if not verdict.is_met]
+    for verdict in unmet:
+        notify(verdict.line)
     if junit is not None:
         cases = [(case, outcome == COMPLETED, ": ".join(filter(None, (f"outcome {outcome}", reason))))]
-        cases += [(verdict.requirement.text, verdict.met, verdict.line) for verdict in verdicts]
-        suite = _suite(run, len(cases), sum(not met for _, met, _ in cases), wall_s=wall_s)
-        for name, met, said in cases:
+        cases += [(verdict.requirement.text, verdict.is_met, verdict.line) for verdict in verdicts]
+        suite = _suite(run, len(cases), sum(not is_met for _, is_met, _ in cases), wall_s=wall_s)
+        for name, is_met, line in cases:
             element = _case(suite, run, name)
-            if not met:
-                ET.SubElement(element, "failure", message=said)
+            if not is_met:
+                ET.SubElement(element, "failure", message=line)
         _write(junit, suite)
-    return not missed
+    return not unmet
 
 
 def _suite(run: str, tests: int = 1, failures: int = 0, errors: int = 0, wall_s: float = 0.0) -> ET.Element:

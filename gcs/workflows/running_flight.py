@@ -11,7 +11,7 @@ from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError, RefusedError
-from gcs.shell.display import FlightDisplay, say
+from gcs.shell.display import FlightDisplay, notify
 from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
@@ -19,7 +19,7 @@ from gcs.shell.truth import TruthLink
 from gcs.shell.vehicle_socket import VehicleSocket
 from gcs.workflows.flight_loops import run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
-from gcs.workflows.own_flight import flight_client
+from gcs.workflows.started_flight import flight_client
 from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
 
@@ -46,7 +46,7 @@ def fly_running(
             session.find_with_truth(truth)
             client = flight_client(mission, options, vehicle_home(session))
         if truth.missing:
-            say(f"the report will not contain the simulator's truth: {truth.missing}")
+            notify(f"the report will not contain the simulator's truth: {truth.missing}")
         _fly(client, mission, options, address, truth, log, stop, watch, page)
         return client, truth.missing
 
@@ -73,10 +73,10 @@ def _fly(
     finally:
         vehicle.close()
     if client.outcome is not None and client.outcome.name in ("interrupted", "timeout") and client.view.armed:
-        say(_left_in_the_air(address))
+        notify(_hold_or_land(address))
 
 
-def _left_in_the_air(address: Address) -> str:
+def _hold_or_land(address: Address) -> str:
     """Command a vehicle that is still flying to hold, or to land if it cannot hold yet; return a line on it.
 
     A failure raises no error here: the report of what was captured must still be made.

@@ -9,7 +9,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients import command
 from gcs.clients.vehicle_view import Text, VehicleView
 from gcs.errors import NoVehicleError, RefusedError
-from gcs.shell.display import say, told_if_slow
+from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address, monotonic_us
 from gcs.shell.session import Session
 from gcs.shell.truth import TruthLink
@@ -18,7 +18,7 @@ LISTEN_S = 2.5  # by then every stream has arrived; the slowest are sent once a 
 RECALL_S = 1.0  # stored texts arrive within a fifth of that; a vehicle without any sends nothing
 SHOWN_TEXTS = 10  # texts that are warnings or worse
 # messages that `status_record` reads: when all of them have arrived, listening ends
-_READ = {
+_STATUS_MESSAGES = {
     "SYS_STATUS",
     "EXTENDED_SYS_STATE",
     "MISSION_CURRENT",
@@ -42,22 +42,29 @@ def vehicle_status(address: Address, truth_at: Address | None = None, quiet: boo
     with (
         TruthLink(truth_at) as truth,
         Session(address) as session,
-        told_if_slow("listening to the vehicle", quiet),
+        notify_if_slow("listening to the vehicle", quiet),
     ):
         session.find_with_truth(truth)
-        told = {"SIM_STATUS"} if truth.heard else set()
+        truth_messages = {"SIM_STATUS"} if truth.received else set()
         view = session.view
-        asked = _ask_for_texts(session)
+        request = _request_texts(session)
         session.watch(
-            lambda: view.latest.keys() >= _READ and view.truth.keys() >= told and asked.answered,
+            lambda: (
+                view.latest.keys() >= _STATUS_MESSAGES
+                and view.truth.keys() >= truth_messages
+                and request.is_complete
+            ),
             LISTEN_S,
             "listening",
         )
-        if session.deaf:
-            say(f"texts, and rate, lateness and missed ticks of the simulator are missing: {session.deaf}")
+        if session.unanswered_reason:
+            notify(
+                "texts, and rate, lateness and missed ticks of the simulator are missing: "
+                f"{session.unanswered_reason}"
+            )
         elif truth.missing:
-            say(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
-        texts = [text for text in asked.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING]
+            notify(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
+        texts = [text for text in request.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING]
         return {**status_record(session.view), "texts": text_records(texts[-SHOWN_TEXTS:])}
 
 
@@ -66,43 +73,43 @@ def vehicle_texts(address: Address) -> list[dict[str, Any]]:
     meanwhile. NoVehicleError if it does not answer because its key is missing."""
     with Session(address) as session:
         session.find()
-        asked = _ask_for_texts(session)
-        if session.deaf:
-            raise NoVehicleError(f"its texts could not be requested: {session.deaf}")
-        session.watch(lambda: asked.answered, RECALL_S)
-        return text_records(asked.texts)
+        request = _request_texts(session)
+        if session.unanswered_reason:
+            raise NoVehicleError(f"its texts could not be requested: {session.unanswered_reason}")
+        session.watch(lambda: request.is_complete, RECALL_S)
+        return text_records(request.texts)
 
 
-class _Asked:
-    """A request for the texts that a vehicle has stored; `keeps`: it has accepted the request."""
+class _TextRequest:
+    """A request for the texts that a vehicle has stored; `is_accepted`: it has accepted the request."""
 
-    def __init__(self, view: VehicleView, keeps: bool) -> None:
+    def __init__(self, view: VehicleView, is_accepted: bool) -> None:
         self._view = view
-        self._keeps = keeps
-        self._heard = len(view.texts) if keeps else 0
+        self._is_accepted = is_accepted
+        self._texts_before = len(view.texts) if is_accepted else 0
         self._until_us = monotonic_us() + round(RECALL_S * 1e6)
 
     @property
-    def answered(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all texts have arrived that will arrive."""
-        return not self._keeps or self._view.recalled_all or monotonic_us() >= self._until_us
+        return not self._is_accepted or self._view.recalled_all or monotonic_us() >= self._until_us
 
     @property
     def texts(self) -> list[Text]:
         """The stored texts, and those sent since then."""
-        kept = {(text.severity, text.text) for text in self._view.recalled}
-        new = (text for text in self._view.texts[self._heard :] if text[1:] not in kept)
+        stored = {(text.severity, text.text) for text in self._view.recalled}
+        new = (text for text in self._view.texts[self._texts_before :] if text[1:] not in stored)
         return [*self._view.recalled, *new]
 
 
-def _ask_for_texts(session: Session) -> _Asked:
-    keeps = not session.deaf
-    if keeps:
+def _request_texts(session: Session) -> _TextRequest:
+    is_accepted = not session.unanswered_reason
+    if is_accepted:
         try:
             session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
         except (RefusedError, NoVehicleError):
-            keeps = False
-    return _Asked(session.view, keeps)
+            is_accepted = False
+    return _TextRequest(session.view, is_accepted)
 
 
 def text_records(texts: list[Text]) -> list[dict[str, Any]]:
@@ -110,11 +117,11 @@ def text_records(texts: list[Text]) -> list[dict[str, Any]]:
     now_us = monotonic_us()
     return [
         {
-            "age_s": max(0.0, (now_us - said_us) * 1e-6),
+            "age_s": max(0.0, (now_us - received_us) * 1e-6),
             "severity": _SEVERITIES.get(severity, str(severity)),
             "text": text,
         }
-        for said_us, severity, text in texts
+        for received_us, severity, text in texts
     ]
 
 

@@ -9,23 +9,23 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from autopilot.own.chosen import NOTHING_OWN, Own
-from autopilot.own.doubts import own_doubts
-from gcs.batch.pool import dask_cluster, own_processes
+from autopilot.own.misspellings import misspelling_warnings
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode
+from gcs.batch.pool import dask_cluster, local_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
 from gcs.folders import PAGE_FILE
-from gcs.shell.display import say
+from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import MOST_FLIGHTS, SweepPlan, make_plan, read_varied
+from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
-from gcs.sweep.run import Swept, sweep
-from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.sweep.run import SweepResult, sweep
+from gcs.sweep.standouts import REPEATS_FOLDER, Standout, flight_settings, repeat_command, stored_standouts
 from gcs.sweep.store import TABLE_FILE
-from gcs.workflows.before_flight import planner_doubts
-from gcs.workflows.flight_inputs import doubts
-from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.before_flight import planner_warnings
+from gcs.workflows.flight_inputs import setting_warnings
+from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
 
@@ -63,7 +63,7 @@ class SweepOptions:
     fresh: bool
     quiet: bool
     command: str  # as it was typed
-    own: Own = NOTHING_OWN  # custom estimator and planner of all flights
+    own: OwnCode = NO_OWN_CODE  # custom estimator and planner of all flights
     reports: bool = False  # also of the flights that stand out
     table_only: bool = False  # no page
 
@@ -73,7 +73,7 @@ class Sweep:
     """The result of a sweep; `name` is the mission's."""
 
     name: str
-    done: Swept
+    counts: SweepResult
     planned: int
     directory: Path
     result: Path  # the page, else the table
@@ -81,21 +81,21 @@ class Sweep:
 
     @property
     def exit_code(self) -> int:
-        return EXIT_DONE if self.done.whole else EXIT_INTERRUPTED
+        return EXIT_DONE if self.counts.is_complete else EXIT_INTERRUPTED
 
     @property
     def record(self) -> dict[str, object]:
         """As `gcs sweep --json` prints it."""
         return {
-            "flights": self.done.flights,
-            "completed": self.done.completed,
-            "failed": self.done.flights - self.done.completed,
-            "completed_fraction": self.done.completed / max(self.done.flights, 1),
-            "load_error_max_m": self.done.load_error_max_m,
+            "flights": self.counts.flights,
+            "completed": self.counts.completed,
+            "failed": self.counts.flights - self.counts.completed,
+            "completed_fraction": self.counts.completed / max(self.counts.flights, 1),
+            "load_error_max_m": self.counts.load_error_max_m,
             "planned": self.planned,
-            "flown": self.done.flown,
-            "wall_s": round(self.done.wall_s, 3),
-            "flights_per_s": round(self.done.flights_per_s, 2),
+            "flown": self.counts.flown,
+            "wall_s": round(self.counts.wall_s, 3),
+            "flights_per_s": round(self.counts.flights_per_s, 2),
             "out": str(self.directory),
             "standouts": list(self.flights),
         }
@@ -103,33 +103,33 @@ class Sweep:
 
 def run_sweep(options: SweepOptions) -> Sweep:
     """Plan the sweep, fly its missing flights, and write its report; PlanError if it cannot be flown."""
-    if options.seeds > MOST_FLIGHTS:
-        raise InputError(f"--seeds {options.seeds}: too many, {MOST_FLIGHTS} flights at most")
+    if options.seeds > MAX_FLIGHTS:
+        raise InputError(f"--seeds {options.seeds}: too many, {MAX_FLIGHTS} flights at most")
     plan = make_plan(
         options.mission,
         options.vehicle,
         options.sensors,
         options.laws,
         tuple(range(1, options.seeds + 1)),
-        [read_varied(text, options.sample is not None) for text in options.varied],
-        dict(setting_of(text) for text in options.settings),
+        [parse_varied(text, options.sample is not None) for text in options.varied],
+        dict(parse_setting(text) for text in options.settings),
         options.sample or 0,
         options.own,
     )
     if not options.quiet:
-        _tell_doubts(plan)
+        _print_warnings(plan)
     directory = options.out
     if directory is None:
         directory = default_directory(plan, sweep_origin(plan), options.fresh)
         first = default_folder(plan)
         if directory != first and not options.quiet:
-            goes = "is in" if directory.exists() else "goes to"
-            say(f"{first} holds another sweep: this one {goes} {directory}")
+            location = "is in" if directory.exists() else "goes to"
+            notify(f"{first} holds another sweep: this one {location} {directory}")
     with (
         StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop,
         _workers(options) as workers,
     ):
-        done = sweep(
+        counts = sweep(
             plan,
             directory,
             options.command,
@@ -146,10 +146,10 @@ def run_sweep(options: SweepOptions) -> Sweep:
             result = directory / TABLE_FILE
         else:
             if not options.quiet:
-                say("drawing the report")
+                notify("drawing the report")
             result = write_report(directory, plan)
-    flights = tuple(_told(plan, one, directory) for one in found)
-    return Sweep(Path(plan.mission).stem, done, plan.flights, directory, result, flights)
+    flights = tuple(_standout_record(plan, one, directory) for one in found)
+    return Sweep(Path(plan.mission).stem, counts, plan.flights, directory, result, flights)
 
 
 @contextmanager
@@ -159,21 +159,21 @@ def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Exe
         with dask_cluster(options.scheduler) as cluster:
             yield nullcontext(cluster)
     else:
-        yield own_processes(len(cores(options.jobs)))
+        yield local_processes(len(cores(options.jobs)))
 
 
-def _tell_doubts(plan: SweepPlan) -> None:
+def _print_warnings(plan: SweepPlan) -> None:
     """Print what can be flown but may be unintended; of several values of a parameter only the first."""
-    own = [line for law in plan.laws for line in own_doubts(plan.own(law))]
-    for line in dict.fromkeys([*own, *planner_doubts(plan.planner, load(plan.mission))]):
-        say(line)
+    own = [line for law in plan.laws for line in misspelling_warnings(plan.own(law))]
+    for line in dict.fromkeys([*own, *planner_warnings(plan.planner, load(plan.mission))]):
+        notify(line)
     for option, values in (
         ("--set", list(plan.settings)),
         ("--vary", [(one.name, value) for one in plan.varied for value in one.values]),
     ):
-        told = doubts(plan.vehicle, values)
-        for line in {line.split(maxsplit=1)[0]: line for line in reversed(told)}.values():
-            say(f"{option} {line}")
+        lines = setting_warnings(plan.vehicle, values)
+        for line in {line.split(maxsplit=1)[0]: line for line in reversed(lines)}.values():
+            notify(f"{option} {line}")
 
 
 def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quiet: bool) -> None:
@@ -182,7 +182,7 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
 
     for one in found:
         if not quiet:
-            say(f"{one.law}, {one.kind}: flying flight {one.index} again")
+            notify(f"{one.law}, {one.kind}: flying flight {one.index} again")
         fly(
             FlightOptions(
                 mission=plan.mission,
@@ -192,7 +192,7 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
                 seed=one.seed,
                 speed=None,
                 real_time=False,
-                out=directory / FOLDER / one.name,
+                out=directory / REPEATS_FOLDER / one.name,
                 settings=flight_settings(plan, one.varied),
                 connect=None,
                 quiet=True,
@@ -206,15 +206,15 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
         )
 
 
-def _told(plan: SweepPlan, one: Standout, directory: Path) -> dict[str, object]:
+def _standout_record(plan: SweepPlan, one: Standout, directory: Path) -> dict[str, object]:
     """As `gcs sweep --json` prints it."""
-    page = directory / FOLDER / one.name / PAGE_FILE
+    page = directory / REPEATS_FOLDER / one.name / PAGE_FILE
     return {
         "law": one.law,
         "kind": one.kind,
         "index": one.index,
         "seed": one.seed,
-        "told": one.told,
-        "command": command_of(plan, one, directory),
+        "told": one.summary,
+        "command": repeat_command(plan, one, directory),
         "report": str(page) if page.is_file() else None,
     }

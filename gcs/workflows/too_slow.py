@@ -6,11 +6,11 @@ from pathlib import Path
 
 from autopilot.wire.tlog import read_tlog
 
-MOST_MISSED = 1e-3  # share of the commands that may come too late without being reported
+MAX_MISSED_SHARE = 1e-3  # share of the commands that may come too late without being reported
 _MICRO = 1e-6
 
 
-def too_slow(tlog: Path) -> str:
+def slowness_reason(tlog: Path) -> str:
     """A line on the commands that came too late, if more than one of a thousand did; else empty."""
     from autopilot.wire.dialect import plumbline as mavlink
 
@@ -22,7 +22,7 @@ def too_slow(tlog: Path) -> str:
             if status.speed_factor > 0.0:
                 rate_hz = max(rate_hz, status.rate_hz / status.speed_factor)
     sent = round(flown_s * rate_hz)
-    if not sent or missed <= MOST_MISSED * sent:
+    if not sent or missed <= MAX_MISSED_SHARE * sent:
         return ""
     return (
         f"the machine was too slow: {missed} of some {sent} commands came too late; try without --real-time"

@@ -12,10 +12,10 @@ from gcs.errors import GcsError
 from gcs.formats.missions import PLAN_ENDING, CheckedPlan, check_plan, is_foreign, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_items import items_of
-from gcs.shell.display import say, told_if_slow
+from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
-from gcs.workflows.before_flight import CHECKING
+from gcs.workflows.before_flight import CHECKING_TEXT
 from gcs.workflows.check_mission import check_items, load_checked
 from gcs.workflows.running_flight import vehicle_home
 
@@ -24,19 +24,21 @@ _FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 
 
-Tell = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
-def upload(mission: str, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
-    """Check a mission by name or path for `vehicle` and upload it; `tell` gets a line for each list."""
-    send = checked_upload(mission, vehicle, force, skip, tell)
+def upload(
+    mission: str, vehicle: str, force: bool, skip: bool, address: Address, print_line: PrintLine
+) -> None:
+    """Check a mission by name or path for `vehicle` and upload it; `print_line` gets a line for each list."""
+    send = checked_upload(mission, vehicle, force, skip, print_line)
     with Session(address) as session:
         session.find()
         send(session)
 
 
 def checked_upload(
-    mission: str, vehicle: str, force: bool, skip: bool, tell: Tell
+    mission: str, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> Callable[[Session], None]:
     """Read a mission by name or path, and check it for `vehicle`; return a function that uploads it in a
     session. A file of another ground station is checked only in that function, since its positions must be
@@ -44,53 +46,53 @@ def checked_upload(
     path = Path(mission)
     if is_foreign(path):
         plan = read_foreign(path)
-        return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, tell)
-    with told_if_slow(CHECKING):
+        return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, print_line)
+    with notify_if_slow(CHECKING_TEXT):
         loaded = load_checked(mission, vehicle, force)
 
     def send(session: Session) -> None:
         items = items_of(loaded, vehicle_home(session))
-        tell(session.run(MissionUpload(session.target, items), "upload").text)
+        print_line(session.run(MissionUpload(session.target, items), "upload").text)
 
     return send
 
 
 def _upload_foreign(
-    session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, tell: Tell
+    session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> None:
-    items = _flown(path, check_plan(plan, home := vehicle_home(session)), skip)
+    items = _flyable_items(path, check_plan(plan, home := vehicle_home(session)), skip)
     if not force:
-        with told_if_slow(CHECKING):
+        with notify_if_slow(CHECKING_TEXT):
             check_items(path.name, items, home, vehicle)
     # the fence first: the vehicle checks the mission against it
-    for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
-        if area is not None:
-            text = session.run(MissionUpload(session.target, area, kind)).text
-            if area:
-                tell(text)
-    tell(session.run(MissionUpload(session.target, items), "upload").text)
+    for kind, points in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
+        if points is not None:
+            text = session.run(MissionUpload(session.target, points, kind)).text
+            if points:
+                print_line(text)
+    print_line(session.run(MissionUpload(session.target, items), "upload").text)
 
 
-def _flown(path: Path, judged: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:
+def _flyable_items(path: Path, checked: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:
     """The items to upload. Prints what cannot be flown as in the file; GcsError if something must be left out
     without `skip`, or if nothing remains."""
-    for line in (*judged.kept, *judged.left_out):
-        say(f"{path}: {line}")
-    if judged.left_out and not skip:
-        count = len(judged.left_out)
+    for line in (*checked.kept, *checked.left_out):
+        notify(f"{path}: {line}")
+    if checked.left_out and not skip:
+        count = len(checked.left_out)
         raise GcsError(
             f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip uploads the rest"
         )
-    if not judged.items:
+    if not checked.items:
         raise GcsError(f"{path}: nothing that can be flown; gcs clear deletes the mission on the vehicle")
-    return judged.items
+    return checked.items
 
 
 def download(address: Address) -> list[WireItem]:
     """The items of the vehicle's mission."""
     with Session(address) as session:
         session.find()
-        return _fetched(session, _MISSION)
+        return _download_items(session, _MISSION)
 
 
 def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
@@ -98,10 +100,10 @@ def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
     return its items, and what was written in words."""
     with Session(address) as session:
         session.find()
-        items = _fetched(session, _MISSION)
+        items = _download_items(session, _MISSION)
         has_areas = file.suffix.lower() == PLAN_ENDING
-        fence = _fetched(session, _FENCE) if has_areas else []
-        rally = _fetched(session, _RALLY) if has_areas else []
+        fence = _download_items(session, _FENCE) if has_areas else []
+        rally = _download_items(session, _RALLY) if has_areas else []
         home = vehicle_home(session)
     write_foreign(file, items, home, fence, rally)
     lists = (items, "item"), (fence, "fence item"), (rally, "rally point")
@@ -109,7 +111,7 @@ def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
     return items, ", ".join(f"{count} {what}" for count, what in counts)
 
 
-def _fetched(session: Session, kind: int) -> list[WireItem]:
+def _download_items(session: Session, kind: int) -> list[WireItem]:
     operation = MissionDownload(session.target, kind)
     session.run(operation, "download")
     return operation.items

@@ -23,8 +23,8 @@ def load_limits(name_or_path: str) -> VehicleLimits:
         tilt_max_rad=radians(table["MIS_TILT_DEG"]),
         speed_m_s=table["MIS_SPEED"],
         accel_m_s2=table["MIS_ACCEL"],
-        least_tension=0.01 * table["MIS_TENSION"],
-        shaping_m=table["MIS_SHAPE_ERR"],
+        min_tension_share=0.01 * table["MIS_TENSION"],
+        max_shaping_m=table["MIS_SHAPE_ERR"],
         rotor_margin=0.01 * table["MIS_ROTOR_MARG"],
         when_infeasible=int(table["MIS_INFEASIBLE"]),
     )

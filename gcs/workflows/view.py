@@ -15,10 +15,10 @@ from autopilot.shell.options import stop_signals
 from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients.connection import Connection
-from gcs.clients.truth import Worlds
+from gcs.clients.truth import TruthSources
 from gcs.errors import GcsError
-from gcs.shell.display import say
-from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited
+from gcs.shell.display import notify
+from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited_feed
 from gcs.shell.link import (
     LOOPBACK,
     SITL_TRUTH,
@@ -28,7 +28,7 @@ from gcs.shell.link import (
     open_address,
     unix_us,
 )
-from gcs.shell.page_server import Pages, PageServer, Site
+from gcs.shell.page_server import PageCallbacks, PageServer, Site
 from gcs.view.controls import SLIDERS
 from gcs.view.station import Station
 from gcs.web import LIVE_FILES, LIVE_PAGE, asset
@@ -44,7 +44,7 @@ class ViewOptions:
     connect: tuple[Address, ...]
     host: str = LOOPBACK
     port: int | None = None  # None: PAGE_PORT, or any free port
-    opens: bool = True  # opens a browser, if there is one
+    opens_browser: bool = True  # opens a browser, if there is one
     truth: Address | None = SITL_TRUTH  # where the simulator sends the truth; None: it is not received
 
 
@@ -63,15 +63,15 @@ class UdpLinks:
 
     def __init__(self, addresses: tuple[Address, ...], truth: Address | None) -> None:
         self._sockets: list[UdpSocket] = []
-        self._ways: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # socket and peer by system id
-        self._spoken: list[UdpSocket] = []  # of `udpout:` addresses: the vehicle waits until we send first
+        self._routes: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # socket and peer by system id
+        self._outgoing: list[UdpSocket] = []  # of `udpout:` addresses: the vehicle waits until we send first
         self._truth: UdpSocket | None = None
-        self._worlds = Worlds()
+        self._worlds = TruthSources()
         try:
             for address in addresses:
                 self._sockets.append(open_address(address))
                 if not address.listen:
-                    self._spoken.append(self._sockets[-1])
+                    self._outgoing.append(self._sockets[-1])
             if truth:
                 self._truth = _truth_socket(truth)
         except GcsError:
@@ -83,17 +83,17 @@ class UdpLinks:
         for link in self._sockets:
             for datagram, sender in link.drain_with_senders():
                 for system in station.receive(datagram, now_us):
-                    self._ways[system] = (link, sender)
+                    self._routes[system] = (link, sender)
         for datagram, sender in self._truth.drain_with_senders() if self._truth else ():
             run = self._worlds.run(datagram, sender)
             station.receive_truth(datagram, run, alone=len(self._worlds) == 1)
-        for out in station.poll(now_us):
-            way = self._ways.get(out.system)
-            if way is not None:
-                way[0].send_to(out.datagram, way[1])
-        if not self._ways:
-            for datagram in self._hello.poll(now_us) if self._spoken else ():
-                for link in self._spoken:
+        for outgoing in station.poll(now_us):
+            route = self._routes.get(outgoing.system)
+            if route is not None:
+                route[0].send_to(outgoing.datagram, route[1])
+        if not self._routes:
+            for datagram in self._hello.poll(now_us) if self._outgoing else ():
+                for link in self._outgoing:
                     link.send(datagram)
 
     def close(self) -> None:
@@ -106,30 +106,30 @@ def _truth_socket(address: Address) -> UdpSocket | None:
     try:
         return UdpSocket(address.host, address.port)
     except GcsError:
-        say(
+        notify(
             f"UDP {address} is in use: the page shows what the autopilot believes; --truth names another port"
         )
         return None
 
 
-class FedLinks:
+class FeedLinks:
     """The vehicle of `gcs fly`, which passes on what it receives, and sends what the page requests."""
 
-    def __init__(self, feed: FeedEnd, told: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, feed: FeedEnd, on_event: Callable[[dict[str, Any]], None]) -> None:
         self._feed = feed
-        self._told = told
+        self._on_event = on_event
 
     def poll(self, station: Station, now_us: int) -> None:
-        for piece in self._feed.read():
-            if piece.kind == EVENT:
-                self._told(piece.event)
-            elif piece.kind == TRUTH:
-                station.receive_truth(piece.body)
+        for message in self._feed.read():
+            if message.kind == EVENT:
+                self._on_event(message.event)
+            elif message.kind == TRUTH:
+                station.receive_truth(message.body)
             else:
-                station.receive(piece.body, now_us)
+                station.receive(message.body, now_us)
                 station.sample(now_us)  # at each datagram, since a lockstep flight is faster than the clock
-        for out in station.poll(now_us):
-            self._feed.tell(COMMAND, 0, [out.datagram])
+        for outgoing in station.poll(now_us):
+            self._feed.send_datagrams(COMMAND, 0, [outgoing.datagram])
 
     @property
     def ended(self) -> bool:
@@ -161,34 +161,36 @@ def view(options: ViewOptions) -> None:
 
 def serve_feed(descriptor: int, options: ViewOptions) -> None:
     """Serve the page of a flight that the parent process flies, until that ends this process."""
-    feed = inherited(descriptor)
+    feed = inherited_feed(descriptor)
     station = Station(active=False)
     session, site = _Session(), Site(_texts())
     servers: list[PageServer] = []
 
-    def told(event: dict[str, Any]) -> None:
+    def on_event(event: dict[str, Any]) -> None:
         if "report" in event:
             site.report = Path(event.pop("report"))
             event["report"] = "report/report.html"
         if "kind" in event:
             station.known_waypoints = event.pop("waypoints", [])
-            station.known_parameters.update(_known(event.get("vehicle_name"), event.pop("settings", {})))
+            station.known_parameters.update(
+                _known_parameters(event.get("vehicle_name"), event.pop("settings", {}))
+            )
         session.record = {**session.record, **event}
         for server in servers:
-            server.tell_all(session.record)
+            server.send_to_all(session.record)
 
-    links = FedLinks(feed, told)
+    links = FeedLinks(feed, on_event)
     try:
         asyncio.run(_serve(station, links, options, session, site, feed, servers))
     except GcsError as error:
-        feed.tell_event({"trouble": str(error)})
+        feed.send_event({"trouble": str(error)})
     finally:
         links.close()
 
 
 async def _serve(
     station: Station,
-    links: UdpLinks | FedLinks,
+    links: UdpLinks | FeedLinks,
     options: ViewOptions,
     session: _Session,
     site: Site,
@@ -200,22 +202,22 @@ async def _serve(
     for number in stop_signals():
         loop.add_signal_handler(number, stopped.set)
 
-    def opened() -> list[dict[str, Any]]:
+    def on_open() -> list[dict[str, Any]]:
         controls = [slider.record() for slider in SLIDERS]
         hello = {"type": "hello", "controls": controls}
         return [hello, *station.initial_records(), session.record]
 
-    def count_changed(count: int) -> None:
+    def on_count_changed(count: int) -> None:
         if feed is not None:
-            feed.tell_event({"readers": count})
+            feed.send_event({"readers": count})
 
     async with PageServer(
-        site, Pages(opened, station.handle_request, count_changed), options.host, options.port
+        site, PageCallbacks(on_open, station.handle_request, on_count_changed), options.host, options.port
     ) as server:
         if servers is not None:
             servers.append(server)
         if feed is not None:
-            feed.tell_event({"address": server.address})
+            feed.send_event({"address": server.address})
         else:
             _announce(server.address, options)
         next_state_s = loop.time()
@@ -225,17 +227,17 @@ async def _serve(
             for record in station.news():
                 page = record.pop("page", None)
                 if page is None:
-                    server.tell_all(record)
+                    server.send_to_all(record)
                 else:
-                    server.tell(page, record)
+                    server.send_to(page, record)
             if loop.time() >= next_state_s:
                 next_state_s = max(next_state_s + STATE_S, loop.time())
                 if station.vehicles and server.readers:
-                    server.tell_all(station.state(now_us))
+                    server.send_to_all(station.state(now_us))
                 else:
                     station.sample(now_us)
                     station.discard_samples()
-            if isinstance(links, FedLinks) and links.ended:
+            if isinstance(links, FeedLinks) and links.ended:
                 return
             try:
                 await asyncio.wait_for(stopped.wait(), _TICK_S)
@@ -243,27 +245,27 @@ async def _serve(
                 continue
 
 
-def _known(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
+def _known_parameters(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
     """Parameters of the vehicle that was started for the flight, before they are changed on the page."""
     if vehicle is None:
         return {}
-    sizes = load_vehicle(vehicle)
+    vehicle_file = load_vehicle(vehicle)
     known = {slider.name: slider.default for slider in SLIDERS if slider.default is not None}
-    known |= {"VEH_ARM_LEN": sizes.arm_m, "VEH_CABLE_LEN": sizes.cable_length_m}
-    return {**known, "SIM_LOAD_MASS": sizes.load_mass_kg, **settings}
+    known |= {"VEH_ARM_LEN": vehicle_file.arm_m, "VEH_CABLE_LEN": vehicle_file.cable_length_m}
+    return {**known, "SIM_LOAD_MASS": vehicle_file.load_mass_kg, **settings}
 
 
 def _announce(address: str, options: ViewOptions) -> None:
     print(f"live page: {address}", flush=True)
-    tell_if_open(options.host)
-    if options.opens:
+    warn_if_reachable(options.host)
+    if options.opens_browser:
         open_browser(address)
 
 
-def tell_if_open(host: str) -> None:
+def warn_if_reachable(host: str) -> None:
     """Print a line if other machines than this one can reach the page."""
     if host not in (LOOPBACK, "localhost", "::1"):
-        say("other machines can reach the page: anyone who knows its full address can command the vehicle")
+        notify("other machines can reach the page: anyone who knows its full address can command the vehicle")
 
 
 def open_browser(address: str) -> bool:

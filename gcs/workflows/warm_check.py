@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from autopilot.shell.compiling import name_what_is_compiled
+from autopilot.shell.compiling import print_compiled_kernels
 
 
 def main() -> None:
     """Check every shipped mission; prints the names of the kernels that this compiles."""
-    name_what_is_compiled()
+    print_compiled_kernels()
     # imported only now, because the import itself compiles the first kernels
     from gcs.workflows.check_mission import check_mission
     from missions.fileformat import shipped

@@ -12,11 +12,11 @@ from autopilot.geometry.machine_code import ROOT, drop_unused, why_not_kept
 from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from gcs.errors import GcsError
-from gcs.shell.display import CompileDisplay, say
+from gcs.shell.display import CompileDisplay, notify
 from gcs.shell.processes import Child, Processes
-from gcs.workflows.expected import expected_s, in_words, remaining_s
+from gcs.workflows.expected import duration_text, expected_s, remaining_s
 
-_LOOK_S = 0.05
+_POLL_S = 0.05
 _CHECK = Part(
     "the mission check",
     "gcs.workflows.warm_check",
@@ -25,9 +25,9 @@ _CHECK = Part(
     "check",
     4.0,
 )
-_HERE = Part(
+_IN_PROCESS = Part(
     "flights in one process",
-    "gcs.workflows.warm_here",
+    "gcs.workflows.warm_in_process",
     (),
     ROOT / "gcs" / "closed_ticks.py",
     "here",
@@ -42,9 +42,9 @@ def flight_parts(laws: Sequence[str]) -> list[Part]:
     return [*own, SIMULATOR, _CHECK, _REPORT]
 
 
-def parts_here(laws: Sequence[str]) -> list[Part]:
+def in_process_parts(laws: Sequence[str]) -> list[Part]:
     """What `plumbline.fly` needs for flights with these laws."""
-    return [*flight_parts(laws), _HERE]
+    return [*flight_parts(laws), _IN_PROCESS]
 
 
 def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
@@ -65,16 +65,16 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     if not quiet:
-        expected = in_words(expected_s([part.cost_s for part in waiting], cores))
+        expected = duration_text(expected_s([part.cost_s for part in waiting], cores))
         count = f"{total} parts" if total > 1 else waiting[0].title
-        unkept = why_not_kept()
-        if unkept:
-            say(
-                f"what is compiled cannot be kept ({unkept}), so that every command begins with it; "
+        not_kept_reason = why_not_kept()
+        if not_kept_reason:
+            notify(
+                f"what is compiled cannot be kept ({not_kept_reason}), so that every command begins with it; "
                 "XDG_CACHE_HOME=FOLDER names a folder that can be written"
             )
-        once = "" if unkept else ", once"
-        say(f"compiling the flight software{once}: {count}, {expected} on an idle machine")
+        once = "" if not_kept_reason else ", once"
+        notify(f"compiling the flight software{once}: {count}, {expected} on an idle machine")
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as logs,
         Processes() as processes,
@@ -82,17 +82,21 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
     ):
         running: dict[str, tuple[Part, Child, float]] = {}
         done: list[tuple[float, float]] = []  # s on an idle machine, s that it took
-        all_begun_s = time.monotonic()
+        start_s = time.monotonic()
 
-        def left(now_s: float) -> str:
+        def remaining_text(now_s: float) -> str:
             remain = len(waiting) + len(running)
             if not remain:
                 return "that was the last part"
-            begun = [(part.cost_s, now_s - begun_s) for part, _, begun_s in running.values()]
-            more = in_words(remaining_s(done, begun, [part.cost_s for part in waiting], cores, busy))
+            running_parts = [
+                (part.cost_s, now_s - part_start_s) for part, _, part_start_s in running.values()
+            ]
+            more = duration_text(
+                remaining_s(done, running_parts, [part.cost_s for part in waiting], cores, busy)
+            )
             if total == 1:
-                return f"after {now_s - all_begun_s:.0f} s, {more} more"
-            return f"{remain} of {total} parts remain after {now_s - all_begun_s:.0f} s, {more} more"
+                return f"after {now_s - start_s:.0f} s, {more} more"
+            return f"{remain} of {total} parts remain after {now_s - start_s:.0f} s, {more} more"
 
         while waiting or running:
             while waiting and len(running) < cores:
@@ -104,17 +108,17 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 {title: child.last_line() for title, (_, child, _) in running.items()},
                 len(waiting) + len(running),
                 total,
-                left(time.monotonic()),
+                remaining_text(time.monotonic()),
             )
-            time.sleep(_LOOK_S)
-            for title, (part, child, begun_s) in list(running.items()):
+            time.sleep(_POLL_S)
+            for title, (part, child, part_start_s) in list(running.items()):
                 if child.running:
                     continue
                 if child.exit_code != 0:
-                    raise GcsError(f"{title} cannot be compiled: {child.obituary()}")
-                part.done()
+                    raise GcsError(f"{title} cannot be compiled: {child.exit_report()}")
+                part.mark_done()
                 del running[title]
                 now_s = time.monotonic()
-                done.append((part.cost_s, now_s - begun_s))
-                display.done(title, now_s - begun_s, left(now_s))
+                done.append((part.cost_s, now_s - part_start_s))
+                display.done(title, now_s - part_start_s, remaining_text(now_s))
     drop_unused(time.time())

@@ -33,7 +33,7 @@ class Mixing(NamedTuple):
 
     table: Floats  # (rotors + 1, 8) of the mixer
     rotors: Floats  # memory of the mixer; forces (N) are in the row FORCE
-    hover: Floats  # (MOST,) N: force of each rotor that holds vehicle and load
+    hover: Floats  # (MAX_ROTORS,) N: force of each rotor that holds vehicle and load
 
 
 def action_size(kind: int, rotors: int) -> int:
@@ -112,9 +112,9 @@ def write_equivalent_action(
             out[i] = unscaled(mixing.rotors[FORCE, i], low, mixing.hover[i], high)
         return
     J, Omega = model.vehicle.inertia, state.omega_body
-    turning = sub(mixed.moment_done, cross(Omega, times(J, Omega)))
+    turning = sub(mixed.achieved_moment, cross(Omega, times(J, Omega)))
     low, high = model.strength * model.min_force, model.strength * model.max_force
-    out[0] = unscaled(mixed.thrust_done, low, model.weight, high)
+    out[0] = unscaled(mixed.achieved_thrust, low, model.weight, high)
     for i in range(3):
         commanded = Omega[i] + turning[i] / (J[i] * model.rate_gain[i])
         out[1 + i] = clipped(commanded / model.rates[i])

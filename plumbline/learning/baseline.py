@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.control.actuators.disturbance_observer import aloft, observe
+from autopilot.control.actuators.disturbance_observer import nominal_in_flight, observe
 from autopilot.control.actuators.mixer import mix
-from autopilot.control.actuators.rotor_model import Actuation, rows_of, steady
+from autopilot.control.actuators.rotor_model import Actuation, queue_rows, steady_actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
 from autopilot.control.laws.interface import law_of
 from autopilot.control.records import Cable, Reference
@@ -64,8 +64,8 @@ class _LawPilot:
         self._setup, self.mixing = setup, mixing
         vehicle = setup.vehicle
         weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
-        self._actuation: Actuation = steady(weight, rows_of(setup.actuation))
-        self._observed = aloft(vehicle)
+        self._actuation: Actuation = steady_actuation(weight, queue_rows(setup.actuation))
+        self._observed = nominal_in_flight(vehicle)
         self._memory: Any = None
 
     def step(self, state: Any, episodes: Any, i: int, ticks: int) -> Any:
@@ -94,6 +94,6 @@ class _LawPilot:
                 setup.drag,
                 vehicle,
             )
-            actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, setup.actuation)
+            actuation = actuate(actuation, mixed.achieved_thrust, mixed.achieved_moment, setup.actuation)
         self._actuation = actuation
         return mixed

@@ -14,15 +14,15 @@ from autopilot.control.actuators.mixer import new_rotors
 from autopilot.control.records import State
 from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import CoreConstants, Seen, any_law
+from autopilot.core.tick import CoreConstants, EstimateSummary, placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import History, new_history
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.guidance.layout import COLUMNS
 from autopilot.trajectory.signals import Jet
-from autopilot.vehicle.layout import MOST
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.layout import MAX_ROTORS
+from autopilot.vehicle.rotors import mixer_table
 from gcs.sweep.kernel import Code, code_of_autopilot, code_of_world
 from plumbline.learning.actions import Mixing
 from plumbline.learning.initial_world import (
@@ -146,9 +146,9 @@ class Episodes:
         batch.world[chosen_rows, X_QUAD.stop - 1] += initial.cable_length
         batch.world[chosen_rows, V_LOAD] = velocities
         batch.world[chosen_rows, V_QUAD] = velocities
-        batch.model[chosen_rows], batch.fate[chosen_rows], batch.errors[chosen_rows] = (
+        batch.model[chosen_rows], batch.delivery[chosen_rows], batch.errors[chosen_rows] = (
             rows.model,
-            rows.fate,
+            rows.delivery,
             rows.errors,
         )
         batch.clock[chosen_rows] = initial.clock
@@ -166,7 +166,7 @@ class Episodes:
 
     def _reset_estimator(self, i: int) -> None:
         estimators = self._batch.estimators
-        for name in ("estimator", "pilot", "seen", "commands"):
+        for name in ("estimator", "control", "summary", "commands"):
             getattr(estimators, name)[i] = getattr(self._initial_rows, name)
         for row, blank in zip(estimators.history, new_history(), strict=True):
             row[i] = blank
@@ -187,7 +187,7 @@ class Episodes:
             model=np.zeros((n, len(rows.model))),
             seed=np.zeros((n, 1), np.int64),
             clock=np.zeros((n, *rows.clock.shape), np.int64),
-            fate=np.zeros((n, *rows.fate.shape)),
+            delivery=np.zeros((n, *rows.delivery.shape)),
             errors=np.zeros((n, *rows.errors.shape)),
             queue=np.zeros((n, rows.queue.shape[0], capacity, rows.queue.shape[2])),
             commands=np.zeros((n, command_capacity, rows.commands.shape[1])),
@@ -195,12 +195,12 @@ class Episodes:
             rotors=np.zeros((n, *rows.rotors.shape)),
             rotor_table=np.zeros((n, *rows.rotor_table.shape)),
             mixed=np.repeat(new_rotors()[None], n, axis=0),
-            mixer=allocate(scenario.cell.setup.layout),
+            mixer=mixer_table(scenario.cell.setup.layout),
             hover=hover_forces(scenario, scenario.task.action.weight),
             episode=np.zeros((n, width(Episode))),
-            action=np.zeros((n, MOST)),
+            action=np.zeros((n, MAX_ROTORS)),
             law=np.zeros((n, width(ThesisMemory))),
-            past=np.zeros((n, scenario.options.history, FEATURES + MOST)),
+            past=np.zeros((n, scenario.options.history, FEATURES + MAX_ROTORS)),
             task=scenario.row,
             reference=scenario.reference,
             estimators=estimators,
@@ -211,10 +211,14 @@ class Episodes:
         """The memory of the estimators before the first reading, for an autopilot whose law runs every second
         tick."""
         n = self.count
-        pilot = core.pilot
+        control = core.control
         weight = self.scenario.task.action.weight
         core.rows.commands[:, 0] = weight
-        pack(pilot._replace(thrust=weight, observed=pilot.observed._replace(support=0.0)), core.rows.pilot, 0)
+        pack(
+            control._replace(thrust=weight, observed=control.observed._replace(ground_force=0.0)),
+            core.rows.control,
+            0,
+        )
         constants = unpack(CoreConstants, core.rows.constants, 0)
         pack(constants._replace(control_every=LAW_EVERY), core.rows.constants, 0)
         self._initial_rows = core.rows
@@ -225,8 +229,8 @@ class Episodes:
 
         return EstimatorRows(
             estimator=repeated(core.rows.estimator),
-            pilot=repeated(core.rows.pilot),
-            seen=repeated(core.rows.seen),
+            control=repeated(core.rows.control),
+            summary=repeated(core.rows.summary),
             commands=repeated(core.rows.commands),
             history=History._make(repeated(part) for part in new_history()),
             inbox=repeated(inbox),
@@ -234,7 +238,7 @@ class Episodes:
             winch=core.rows.winch,
             stretch=core.rows.stretch,
             none=np.zeros((1, COLUMNS)),
-            law=any_law(core.law_rows),
+            law=placeholder_law(core.law_rows),
             wire=self.scenario.cell.wire,
         )
 
@@ -252,7 +256,7 @@ class Episodes:
     def state(self, i: int) -> State:
         """The observed state of an episode: the true or the estimated one."""
         if self.scenario.estimated:
-            return unpack(Seen, self._batch.estimators.seen[i], 0).state
+            return unpack(EstimateSummary, self._batch.estimators.summary[i], 0).state
         return true_state(self.plant(i))
 
     def is_at_start(self, i: int) -> bool:

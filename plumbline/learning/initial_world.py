@@ -11,10 +11,10 @@ from autopilot.control.actuators.mixer import mix, new_rotors
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, packed, place_of, unpack
 from autopilot.geometry.so3 import IDENTITY_QUAT
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.rotors import mixer_table
 from plumbline.learning.scenario import Draw, Scenario
 from sitl.plant.records import PlantState, Truth
-from sitl.plant.rotors import ASKED, COMMAND, FORCE, TARGET
+from sitl.plant.rotors import COMMAND, FORCE, REQUESTED, TARGET
 from sitl.world import DUE, LENGTH, Floats, Ints, World, WorldRows
 
 _NEVER = 2**62
@@ -33,7 +33,7 @@ class InitialWorld:
     """A world except for its position and velocity: the load rests at the origin."""
 
     world: Row
-    rows: WorldRows  # model, rotors, fate and errors of the sensors
+    rows: WorldRows  # model, rotors, delivery and errors of the sensors
     clock: Ints
     commands: Floats  # (waiting, 1 + rotors) given before, and still in transit
     cable_length: float  # m
@@ -43,7 +43,7 @@ def initial_world(scenario: Scenario, draw: Draw) -> InitialWorld:
     """The world of an episode. The rotors carry the weight, and have been commanded to for a long time."""
     rows, truth, settings = scenario.world(draw)
     hover = hover_forces(scenario, (truth.quad_mass + truth.load_mass) * truth.gravity)
-    for row in (ASKED, COMMAND, TARGET, FORCE):
+    for row in (REQUESTED, COMMAND, TARGET, FORCE):
         rows.rotors[row] = hover
     world = unpack(World, rows.world, 0)._replace(plant=_suspended(truth))
     clock = rows.clock.copy()
@@ -64,9 +64,9 @@ def worlds_differ(scenario: Scenario) -> bool:
 
 
 def hover_forces(scenario: Scenario, weight: float) -> Floats:
-    """(MOST,) N: force of each rotor that carries a weight (N) with the vehicle level."""
+    """(MAX_ROTORS,) N: force of each rotor that carries a weight (N) with the vehicle level."""
     setup, rotors = scenario.cell.setup, new_rotors()
-    mix(weight, ZERO, setup.vehicle, 0.0, allocate(setup.layout), rotors)
+    mix(weight, ZERO, setup.vehicle, 0.0, mixer_table(setup.layout), rotors)
     forces: Floats = rotors[MIXED]
     return forces
 

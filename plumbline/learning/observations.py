@@ -24,7 +24,7 @@ from autopilot.control.records import State
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, sub
 from autopilot.trajectory.signals import Jet
-from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.layout import MAX_ROTORS
 from plumbline.learning.records import FEATURES, ObservationModel
 
 PREVIEW_SIZE = 6  # numbers of an instant of the preview
@@ -71,7 +71,7 @@ def write_observation(
     state: State, jet: Jet, action: Any, past: Any, model: ObservationModel, out: Any
 ) -> None:
     """Write the observation after a step with `action` into `out`, and insert it into `past` (steps,
-    FEATURES + MOST), which has the newest of the earlier steps first."""
+    FEATURES + MAX_ROTORS), which has the newest of the earlier steps first."""
     _write_features(state, jet, out)
     for i in range(model.actions):
         out[FEATURES + i] = action[i]
@@ -82,7 +82,7 @@ def write_observation(
         at += FEATURES + model.actions
     _write_preview(jet, model.ahead, model.ahead_s, out, at)
     for k in range(model.past - 1, -1, -1):
-        for i in range(FEATURES + MOST):
+        for i in range(FEATURES + MAX_ROTORS):
             past[k, i] = past[k - 1, i] if k > 0 else 0.0
     if model.past > 0:
         for i in range(FEATURES + model.actions):

@@ -19,8 +19,8 @@ from autopilot.control.records import State
 from autopilot.control.thesis_cascade import ThesisMemory, start
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
 from autopilot.trajectory.signals import Jet
-from autopilot.vehicle.layout import MOST
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.layout import MAX_ROTORS
+from autopilot.vehicle.rotors import mixer_table
 from gcs.errors import GcsError
 from plumbline.learning.actions import Mixing, apply_action, clipped
 from plumbline.learning.initial_world import hover_forces
@@ -122,12 +122,12 @@ class PolicyPilot:
             task.observation_model.actions,
         ):
             raise GcsError(f"the policy does not fit its options: they show {size} numbers")
-        self._past = np.zeros((task.observation_model.past, FEATURES + MOST))
+        self._past = np.zeros((task.observation_model.past, FEATURES + MAX_ROTORS))
         self.observation: Floats = np.zeros(size, np.float32)
-        self._action, self._tick = np.zeros(MOST), 0
+        self._action, self._tick = np.zeros(MAX_ROTORS), 0
         self._memory: ThesisMemory | None = None
         hover = hover_forces(scenario, task.action.weight)
-        self._mixing = Mixing(allocate(scenario.cell.setup.layout), new_rotors(), hover)
+        self._mixing = Mixing(mixer_table(scenario.cell.setup.layout), new_rotors(), hover)
         # compile now, not in flight
         self.tick(_AT_REST, (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO))
         self.start()
@@ -151,4 +151,4 @@ class PolicyPilot:
         if self._memory is None:
             self._memory = start(state, state.x_load, state.v_load)
         self._memory, mixed = apply_action(self._action, state, self._memory, self._model, self._mixing)
-        return mixed.thrust_done, mixed.moment_done
+        return mixed.achieved_thrust, mixed.achieved_moment

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from autopilot.geometry.machine_code import ROOT
-from autopilot.shell.compiling import Part, name_what_is_compiled
+from autopilot.shell.compiling import Part, print_compiled_kernels
 from gcs.workflows.warmup import warm_up
 from plumbline.learning.options import EnvOptions
 from plumbline.learning.scenario import Scenario
@@ -29,7 +29,7 @@ def compile_step(scenario: Scenario) -> None:
 
 def main(observation: str) -> None:
     """Compile it, unless it is compiled already; prints the names of the kernels that it compiles."""
-    name_what_is_compiled()
+    print_compiled_kernels()
     from plumbline.learning.batch import Episodes
 
     Episodes(Scenario(EnvOptions(observation=observation)), 1, threads=1).close()

@@ -85,8 +85,8 @@ class EstimatorRows(NamedTuple):
     """The memory of each environment's estimator, as in `autopilot.core.tick.CoreRows`."""
 
     estimator: Floats
-    pilot: Floats
-    seen: Floats
+    control: Floats
+    summary: Floats
     commands: Floats
     history: History
     inbox: Floats
@@ -94,7 +94,7 @@ class EstimatorRows(NamedTuple):
     winch: Row
     stretch: Row
     none: Floats  # no setpoints: (1, 21)
-    law: Any  # of no law in particular, as `autopilot.core.tick.any_law` makes it
+    law: Any  # of no law in particular, as `autopilot.core.tick.placeholder_law` makes it
     wire: Row
 
 
@@ -106,7 +106,7 @@ class Batch(NamedTuple):
     model: Floats
     seed: Ints
     clock: Ints
-    fate: Floats
+    delivery: Floats
     errors: Floats
     queue: Floats
     commands: Floats
@@ -115,11 +115,11 @@ class Batch(NamedTuple):
     rotor_table: Floats
     mixed: Floats  # as `CoreRows.rotors`: forces
     mixer: Floats  # (rotors + 1, 8) as `CoreRows.table`
-    hover: Floats  # (MOST,) N: force of each rotor that holds vehicle and load
+    hover: Floats  # (MAX_ROTORS,) N: force of each rotor that holds vehicle and load
     episode: Floats  # Episode
-    action: Floats  # (n, MOST) of the last step
+    action: Floats  # (n, MAX_ROTORS) of the last step
     law: Floats  # ThesisMemory
-    past: Floats  # (n, past, FEATURES + MOST), newest first
+    past: Floats  # (n, past, FEATURES + MAX_ROTORS), newest first
     task: Row  # TaskModel
     reference: Floats  # (ticks, 21) desired position of the load and its derivatives
     estimators: Any  # EstimatorRows; None: the truth is observed

@@ -15,14 +15,14 @@ from autopilot.guidance.layout import COLUMNS
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import divider
-from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError, input_error
 from gcs.sweep.cell import Cell, cell_of
-from gcs.sweep.plan import simulated
+from gcs.sweep.plan import simulator_settings
 from gcs.workflows.flight_inputs import check_flight_inputs
-from gcs.workflows.flight_options import WORLD
+from gcs.workflows.flight_options import SIMULATOR_PREFIX
 from gcs.workflows.mission_file import load
 from missions.model import Mission
 from missions.nearest import did_you_mean
@@ -38,7 +38,7 @@ from sitl.settings import Settings, settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
-from sitl.world import Floats, WorldRows, command_room, new_world
+from sitl.world import Floats, WorldRows, command_capacity, new_world
 
 HOVER_AT: Vec3 = (0.0, 0.0, 3.0)  # m, of the load
 SETTLE_S = 2.0  # for which the simulator flies before an episode, if the estimate is observed
@@ -102,7 +102,7 @@ class Scenario:
         for share in (0.0, 1.0):
             values = tuple(a + share * b for a, b in zip(self._lows, self._spans, strict=True))
             rows, _, settings = self.world(Draw(1, HOVER_AT, 0, values))
-            commands.append(command_room(settings))
+            commands.append(command_capacity(settings))
             readings.append(rows.queue.shape[1])
         return max(commands), max(readings)
 
@@ -112,8 +112,8 @@ class Scenario:
             return self.cell.truth, self.cell.settings
         table = self._simulator
         for name, value in zip(self._names, values, strict=True):
-            if name not in table and name.startswith(WORLD):
-                raise GcsError(f"randomise {unknown_parameter(name, table.names)}")
+            if name not in table and name.startswith(SIMULATOR_PREFIX):
+                raise GcsError(f"randomise {unknown_parameter_text(name, table.names)}")
             if name not in table or name in _FIXED:
                 hint = "" if name in table else did_you_mean(name, table.names)
                 reason = f"{hint}must be a parameter of the simulator that may change"
@@ -131,7 +131,7 @@ class Scenario:
     @cached_property
     def _simulator(self) -> ParameterTable:
         table = sim_parameters(self._vehicle)
-        for name, value in simulated(dict(self.options.settings)).items():
+        for name, value in simulator_settings(dict(self.options.settings)).items():
             table.set(name, value)
         return table
 

@@ -14,17 +14,17 @@ from autopilot.control.actuators.disturbance_observer import observe
 from autopilot.control.actuators.mixer import MixerResult, mix
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control.records import Reference, State, with_length
+from autopilot.control.records import Reference, State, with_cable_length
 from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
-from autopilot.core.tick import CoreConstants, CoreRows, Pilot, Seen, Winch
+from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary, Winch
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel, threaded
 from autopilot.geometry.linear import E1, ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.packed import pack, unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.signals import Jet
-from gcs.sweep.kernel import Code, fly_autopilot, move_world
-from gcs.sweep.wire import Wire, deliver, put_forces
+from gcs.sweep.kernel import Code, call_fly_tick, call_world_tick
+from gcs.sweep.wire import Wire, deliver_readings, put_forces
 from plumbline.learning.actions import Mixing, apply_action, clipped
 from plumbline.learning.observations import write_observation
 from plumbline.learning.records import Actions, Batch, Episode, EstimatorRows, Observations, Reward, TaskModel
@@ -43,7 +43,7 @@ def _world(batch: Batch, i: int) -> WorldRows:
         batch.model[i],
         batch.seed[i],
         batch.clock[i],
-        batch.fate[i],
+        batch.delivery[i],
         batch.errors[i],
         batch.queue[i],
         batch.commands[i],
@@ -68,8 +68,8 @@ def _core(estimators: EstimatorRows, i: int, mixing: Mixing) -> CoreRows:
     )
     return CoreRows(
         estimators.estimator[i],
-        estimators.pilot[i],
-        estimators.seen[i],
+        estimators.control[i],
+        estimators.summary[i],
         estimators.commands[i],
         history,
         estimators.inbox[i],
@@ -109,7 +109,7 @@ def _observed_state(estimators: Any, plant: PlantState, i: int) -> State:
     """The observed state: the true or the estimated one."""
     if estimators is None:
         return true_state(plant)
-    return unpack(Seen, estimators.seen[i], 0).state
+    return unpack(EstimateSummary, estimators.summary[i], 0).state
 
 
 @kernel
@@ -136,23 +136,26 @@ def jet_at(reference: Any, row: int) -> Jet:
 def _update_actuation(estimators: EstimatorRows, i: int, mixed: MixerResult) -> None:
     """Update what the autopilot assumes of rotors and disturbances after a command."""
     constants = unpack(CoreConstants, estimators.constants, 0)
-    pilot, seen = unpack(Pilot, estimators.pilot[i], 0), unpack(Seen, estimators.seen[i], 0)
+    control, summary = (
+        unpack(ControlMemory, estimators.control[i], 0),
+        unpack(EstimateSummary, estimators.summary[i], 0),
+    )
     cable = unpack(Winch, estimators.winch, 0).cable
     observed = observe(
-        pilot.observed,
-        seen.state,
-        1.0 if seen.taut else 0.0,
-        pilot.thrust,
-        pilot.moment,
+        control.observed,
+        summary.state,
+        1.0 if summary.taut else 0.0,
+        control.thrust,
+        control.moment,
         constants.observer,
         constants.drag,
-        with_length(constants.vehicle, cable.length),
+        with_cable_length(constants.vehicle, cable.length),
     )
-    actuation = Actuation(estimators.commands[i], pilot.thrust, pilot.moment)
-    actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
-    pilot = with_field(with_field(pilot, "mixed", mixed), "observed", observed)
-    pilot = with_field(with_field(pilot, "thrust", actuation.thrust), "moment", actuation.moment)
-    pack(pilot, estimators.pilot[i], 0)
+    actuation = Actuation(estimators.commands[i], control.thrust, control.moment)
+    actuation = actuate(actuation, mixed.achieved_thrust, mixed.achieved_moment, constants.actuation)
+    control = with_field(with_field(control, "mixed", mixed), "observed", observed)
+    control = with_field(with_field(control, "thrust", actuation.thrust), "moment", actuation.moment)
+    pack(control, estimators.control[i], 0)
 
 
 @kernel
@@ -163,12 +166,12 @@ def _tick(
     put_forces(mixing.rotors, mixing.table, rows)
     if estimators is not None:
         _update_actuation(estimators, i, mixed)
-    move_world(code, rows, False, 0.0, None)
+    call_world_tick(code, rows, False, 0.0, None)
     if estimators is not None:
         now = unpack(World, rows.world, 0)
-        readings = deliver(rows, now.now_us, unpack(Wire, estimators.wire, 0), estimators.inbox[i])
+        readings = deliver_readings(rows, now.now_us, unpack(Wire, estimators.wire, 0), estimators.inbox[i])
         dt = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
-        fly_autopilot(
+        call_fly_tick(
             code, _core(estimators, i, mixing), estimators.law, readings, now.now_us, _ODD, dt, False
         )
     return unpack(World, rows.world, 0).plant

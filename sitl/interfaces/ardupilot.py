@@ -18,8 +18,8 @@ from sitl.hil import HilSimulator
 MOTORS = 4
 PWM_OFF, PWM_FULL = 1000, 2000  # us, MOT_PWM_MIN and MOT_PWM_MAX
 RATE_HZ = 800  # frame rate: with a lower one the firmware's scheduler, at 400 Hz, refuses to arm
-_KINDS = ((18458, Struct("<HHI16H")), (29569, Struct("<HHI32H")))
-_PACKETS = {layout.size: (magic, layout) for magic, layout in _KINDS}
+_PACKET_KINDS = ((18458, Struct("<HHI16H")), (29569, Struct("<HHI32H")))
+_PACKETS = {layout.size: (magic, layout) for magic, layout in _PACKET_KINDS}
 _LOST_S = 0.5  # time after an answer from which a repeated packet means that the answer was lost
 # The firmware truncates the difference of two times to whole microseconds. With this factor the rounding of
 # their binary numbers, which is smaller for the first hours, never loses one; the factor adds 1 us in 100 s.
@@ -43,8 +43,8 @@ class Reply(NamedTuple):
     """The effect of a datagram."""
 
     answer: bytes = b""  # to be sent; empty: nothing
-    moved: bool = False  # the world was advanced by a tick
-    news: str = ""  # for the terminal
+    advanced: bool = False  # the world was advanced by a tick
+    notice: str = ""  # for the terminal
 
 
 def read_servo_packet(datagram: bytes) -> ServoPacket | None:
@@ -87,7 +87,7 @@ class Exchange:
         """ValueError if the firmware cannot fly the vehicle."""
         self._simulator = simulator
         self._frame = simulator.frame
-        self._newest = -1  # number of the newest frame
+        self._frame_number = -1  # number of the newest frame
         self._answer = b""  # to the newest frame
         self._answered_s = 0.0
 
@@ -96,32 +96,32 @@ class Exchange:
 
         A smaller number than before means that the firmware was restarted: the world restarts too.
         """
-        if packet.number == self._newest:
+        if packet.number == self._frame_number:
             if now_s - self._answered_s < _LOST_S:
                 return Reply()
             self._answered_s = now_s
             return Reply(self._answer)
-        news = ""
-        if packet.number < self._newest:
+        notice = ""
+        if packet.number < self._frame_number:
             at_s = self._simulator.now_us / 1e6
-            news = f"the firmware restarted at t = {at_s:.3f} s, and the world restarts"
-            self._simulator.begin_anew()
-        elif self._newest < 0 < packet.number:
-            news = f"the firmware has already flown for {packet.number} frames; the world restarts"
-        self._newest, self._answered_s = packet.number, now_s
+            notice = f"the firmware restarted at t = {at_s:.3f} s, and the world restarts"
+            self._simulator.restart()
+        elif self._frame_number < 0 < packet.number:
+            notice = f"the firmware has already flown for {packet.number} frames; the world restarts"
+        self._frame_number, self._answered_s = packet.number, now_s
         self._answer = self._tick(packet.pwm)
-        return Reply(self._answer, True, news)
+        return Reply(self._answer, True, notice)
 
     def _tick(self, pwm: tuple[int, ...]) -> bytes:
         simulator, frame = self._simulator, self._frame
         motors = throttles(pwm)
-        simulator.obey(frame.forces(motors), any(motors))
+        simulator.apply_command(frame.forces(motors), any(motors))
         simulator.advance()
-        felt, state = simulator.inertial, simulator.core.state
+        imu, state = simulator.imu_reading, simulator.core.state
         return line(
             simulator.now_us,
-            frame.felt(felt.gyro_body),
-            frame.felt(felt.accel_body),
+            frame.to_controller_axes(imu.gyro_body),
+            frame.to_controller_axes(imu.accel_body),
             state.x_quad,
             state.v_quad,
             frame.attitude(state.quat_wxyz),

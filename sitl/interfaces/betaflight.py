@@ -61,10 +61,10 @@ class Exchange:
     def state(self) -> bytes:
         """The packet that is sent at this tick."""
         simulator, frame = self._simulator, self._frame
-        felt, state = simulator.inertial, simulator.core.state
+        imu, state = simulator.imu_reading, simulator.core.state
         return state_packet(
-            frame.felt(felt.gyro_body),
-            frame.felt(felt.accel_body),
+            frame.to_controller_axes(imu.gyro_body),
+            frame.to_controller_axes(imu.accel_body),
             frame.attitude(state.quat_wxyz),
             state.v_quad,
             state.x_quad,
@@ -73,4 +73,4 @@ class Exchange:
 
     def receive(self, motors: tuple[float, ...]) -> None:
         """Take throttles as the answer to the present tick; the firmware is armed while any motor turns."""
-        self._simulator.obey(self._frame.forces(motors), any(motors))
+        self._simulator.apply_command(self._frame.forces(motors), any(motors))

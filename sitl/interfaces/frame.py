@@ -18,9 +18,9 @@ from autopilot.vehicle.layout import Layout
 
 # angle from forward to the left, and the sign of the moment about the upward axis, of motors 1 to 4
 _MOTORS = ((-0.25 * pi, -1.0), (0.75 * pi, -1.0), (0.25 * pi, 1.0), (-0.75 * pi, 1.0))
-_TURNS = (0.0, 0.25 * pi)  # of the flight controller to the left
-_WITHIN = 0.15 * pi  # from the direction of a motor, within which a rotor is taken as its rotor
-_ALIKE = 0.1  # share of the arm by which the distances of the rotors may differ
+_MOUNTING_YAWS = (0.0, 0.25 * pi)  # of the flight controller to the left
+_ANGLE_TOLERANCE = 0.15 * pi  # from the direction of a motor, within which a rotor is taken as its rotor
+_ARM_TOLERANCE = 0.1  # share of the arm by which the distances of the rotors may differ
 # share of the thrust that grows with the square of the throttle, for propellers with common speed controllers
 THRUST_EXPO = 0.65
 
@@ -29,62 +29,62 @@ class Frame(NamedTuple):
     """How a firmware's motors and flight controller are placed on a vehicle."""
 
     rotor_of: tuple[int, ...]  # index of the rotor that each motor drives, in the order of the motors
-    greatest_n: tuple[float, ...]  # force of that rotor at full throttle
-    least_n: float  # force of a rotor at no throttle
-    turn: float  # rad, of the flight controller to the left of the vehicle's nose
+    max_force_n: tuple[float, ...]  # force of that rotor at full throttle
+    min_force_n: float  # force of a rotor at no throttle
+    mounting_yaw: float  # rad, of the flight controller to the left of the vehicle's forward axis
 
     def forces(self, throttles: Sequence[float]) -> tuple[float, ...]:
         """Forces (N) of the rotors, in the vehicle's order, at these throttles of the motors, 0 ... 1."""
         found = [0.0] * len(self.rotor_of)
-        for rotor, greatest, throttle in zip(self.rotor_of, self.greatest_n, throttles, strict=True):
+        for rotor, max_force, throttle in zip(self.rotor_of, self.max_force_n, throttles, strict=True):
             u = min(max(throttle, 0.0), 1.0)
             share = (1.0 - THRUST_EXPO) * u + THRUST_EXPO * u * u
-            found[rotor] = self.least_n + (greatest - self.least_n) * share
+            found[rotor] = self.min_force_n + (max_force - self.min_force_n) * share
         return tuple(found)
 
-    def felt(self, v: Vec3) -> Vec3:
+    def to_controller_axes(self, v: Vec3) -> Vec3:
         """A vector of the vehicle's axes in those of the flight controller, both FLU."""
-        if self.turn == 0.0:
+        if self.mounting_yaw == 0.0:
             return v
-        c, s = cos(self.turn), sin(self.turn)
+        c, s = cos(self.mounting_yaw), sin(self.mounting_yaw)
         return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
 
     def attitude(self, quat_wxyz: Quat) -> Quat:
         """The flight controller's attitude, given the vehicle's."""
-        if self.turn == 0.0:
+        if self.mounting_yaw == 0.0:
             return quat_wxyz
-        half: Quat = (cos(0.5 * self.turn), 0.0, 0.0, sin(0.5 * self.turn))
+        half: Quat = (cos(0.5 * self.mounting_yaw), 0.0, 0.0, sin(0.5 * self.mounting_yaw))
         return quat_multiply(quat_wxyz, half)
 
 
-def frame_of(layout: Layout, least_n: float, greatest_n: float) -> Frame:
-    """The frame of a vehicle whose rotors give `least_n` to `greatest_n`; ValueError if it is not an X."""
-    if not 0.0 <= least_n < greatest_n < inf:
+def frame_of(layout: Layout, min_force_n: float, max_force_n: float) -> Frame:
+    """The frame of a vehicle whose rotors give these forces; ValueError if it is not an X."""
+    if not 0.0 <= min_force_n < max_force_n < inf:
         raise ValueError(
-            f"rotors of {least_n:g} to {greatest_n:g} N; a throttle needs rotors from 0 N or more to a "
+            f"rotors of {min_force_n:g} to {max_force_n:g} N; a throttle needs rotors from 0 N or more to a "
             "finite force (rotor_min_n, rotor_max_n)"
         )
-    for turn in _TURNS:
-        order = _order(layout, turn)
+    for mounting_yaw in _MOUNTING_YAWS:
+        order = _rotor_order(layout, mounting_yaw)
         if order:
-            strengths = tuple(greatest_n * layout[rotor].strength for rotor in order)
-            return Frame(order, strengths, least_n, turn)
+            strengths = tuple(max_force_n * layout[rotor].strength for rotor in order)
+            return Frame(order, strengths, min_force_n, mounting_yaw)
     raise ValueError(
         'rotors that make no quadrotor of the kind that firmwares fly: take frame = "x" or "plus" with four '
         "rotors, spins in turn"
     )
 
 
-def _order(layout: Layout, turn: float) -> tuple[int, ...]:
-    """The rotor of each motor if the flight controller is turned by `turn`; empty if they do not fit."""
+def _rotor_order(layout: Layout, mounting_yaw: float) -> tuple[int, ...]:
+    """The rotor of each motor with the flight controller turned by this yaw; empty if they do not fit."""
     reach = [hypot(rotor.x, rotor.y) for rotor in layout]
-    if len(layout) != len(_MOTORS) or max(reach) - min(reach) > _ALIKE * max(reach):
+    if len(layout) != len(_MOTORS) or max(reach) - min(reach) > _ARM_TOLERANCE * max(reach):
         return ()
     found = []
     for angle, yaw in _MOTORS:
         for i, rotor in enumerate(layout):
-            off = atan2(rotor.y, rotor.x) - angle - turn
-            if abs(atan2(sin(off), cos(off))) < _WITHIN and rotor.yaw * yaw > 0.0:
+            angle_error = atan2(rotor.y, rotor.x) - angle - mounting_yaw
+            if abs(atan2(sin(angle_error), cos(angle_error))) < _ANGLE_TOLERANCE and rotor.yaw * yaw > 0.0:
                 found.append(i)
                 break
     return tuple(found) if len(set(found)) == len(_MOTORS) else ()

@@ -22,7 +22,7 @@ MOTORS = 4
 _HEAD, _TAIL = 10, 2  # bytes of a MAVLink 2 frame around its payload
 _FRAME_START = 0xFD
 _TRUTH_US = 20_000
-_LARGEST = 65_536  # most bytes that are kept of a stream without a whole frame
+_MAX_BUFFERED = 65_536  # most bytes that are kept of a stream without a whole frame
 _SENSOR, _GPS, _STATE = (
     mavlink.MAVLINK_MSG_ID_HIL_SENSOR,
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
@@ -44,11 +44,11 @@ class Stream:
     """Extracts the frames of a stream of bytes that may be cut anywhere."""
 
     def __init__(self) -> None:
-        self._left = b""
+        self._unparsed = b""
 
-    def feed(self, piece: bytes) -> list[bytes]:
+    def feed(self, chunk: bytes) -> list[bytes]:
         """The frames that are complete now; bytes that belong to no frame are skipped."""
-        data = (self._left + piece)[-_LARGEST:]
+        data = (self._unparsed + chunk)[-_MAX_BUFFERED:]
         found = []
         while True:
             begin = data.find(_FRAME_START)
@@ -62,7 +62,7 @@ class Stream:
                 data = data[size:]
             else:
                 data = data[1:]
-        self._left = data
+        self._unparsed = data
         return found
 
 
@@ -71,7 +71,7 @@ class Exchange:
 
     def __init__(self, simulator: HilSimulator) -> None:
         """ValueError if the firmware cannot fly with the vehicle or its sensors."""
-        if not simulator.navigates:
+        if not simulator.has_navigation_sensors:
             raise ValueError(
                 "PX4 flies by GNSS, barometer and magnetometer; take a sensor profile that has them: "
                 "--sensors rtk or gps"
@@ -80,7 +80,7 @@ class Exchange:
         self._frame: Frame = simulator.frame
         self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._stream = Stream()
-        self.in_step = False  # whether the firmware has answered once
+        self.in_lockstep = False  # whether the firmware has answered once
 
     def sensors(self) -> bytes:
         """The frames that are sent at this tick."""
@@ -90,32 +90,34 @@ class Exchange:
         truth = simulator.truth_datagram()
         if truth is not None and simulator.now_us % _TRUTH_US == 0:
             sent += [frame for kind, frame in frames(truth) if kind == _STATE]
-        sent += [self._mounted(frame) for kind, frame in sensors if kind == _SENSOR]
+        sent += [self._in_controller_axes(frame) for kind, frame in sensors if kind == _SENSOR]
         return b"".join(sent)
 
-    def receive(self, piece: bytes) -> bool:
+    def receive(self, chunk: bytes) -> bool:
         """Process bytes of the firmware; True if they answer the present tick."""
-        for frame in self._stream.feed(piece):
+        for frame in self._stream.feed(chunk):
             message = decode(frame)[0][0].message
             if message.get_msgId() != _CONTROLS:
                 continue
-            if self.in_step and message.time_usec < self._simulator.now_us:
+            if self.in_lockstep and message.time_usec < self._simulator.now_us:
                 continue  # an answer from before it was in step
-            self.in_step = True
-            self._simulator.obey(self._frame.forces(tuple(message.controls[:MOTORS])), _armed(message.mode))
+            self.in_lockstep = True
+            self._simulator.apply_command(
+                self._frame.forces(tuple(message.controls[:MOTORS])), _armed(message.mode)
+            )
             return True
         return False
 
-    def _mounted(self, frame: bytes) -> bytes:
+    def _in_controller_axes(self, frame: bytes) -> bytes:
         """HIL_SENSOR in the axes of the flight controller."""
-        if self._frame.turn == 0.0:
+        if self._frame.mounting_yaw == 0.0:
             return frame
         m = decode(frame)[0][0].message
         for fields, names in ((ACCEL, "acc"), (GYRO, "gyro"), (MAG, "mag")):
             if m.fields_updated & fields:
                 x, y, z = (getattr(m, axis + names) for axis in "xyz")
                 # FRD here, FLU there
-                turned = self._frame.felt((x, -y, -z))
+                turned = self._frame.to_controller_axes((x, -y, -z))
                 for axis, value in zip("xyz", (turned[0], -turned[1], -turned[2]), strict=True):
                     setattr(m, axis + names, value)
         return self._writer.frame(m)

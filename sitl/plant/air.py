@@ -39,11 +39,11 @@ from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, apply_transposed, c
 from sitl.plant.records import Air, Truth
 from sitl.plant.rotors import PITCH, ROLL, RotorRows
 
-_LEAST_HEIGHT = 0.5  # rotor radii, above which the formula holds
+_MIN_HEIGHT = 0.5  # rotor radii, above which the formula holds
 _NO_WASH = 1e-9  # N, added to a denominator to avoid 0 / 0
 
 
-class Felt(NamedTuple):
+class AirWrench(NamedTuple):
     """Force (N) and moment (N m) of the air on the rotors, body frame."""
 
     force: Vec3
@@ -51,7 +51,7 @@ class Felt(NamedTuple):
 
 
 @kernel
-def blows(truth: Truth) -> bool:
+def has_rotor_air_effects(truth: Truth) -> bool:
     """Whether drag, flapping or ground effect act on the rotors."""
     air = truth.air
     return air.rotor_drag > 0.0 or air.rotor_flap > 0.0 or air.ground_effect > 0.0
@@ -69,19 +69,19 @@ def ground_gain(thrust: float, height: float, across: float, air: Air) -> float:
     """F' / F - 1 of a rotor with this thrust (N) and height (m); `across` is |u'|^2."""
     disc = pi * air.rotor_radius * air.rotor_radius
     lift = if_above(thrust, 0.0, thrust, 0.0)
-    least = _LEAST_HEIGHT * air.rotor_radius
-    near = air.rotor_radius / (4.0 * if_above(height, least, height, least))
+    min_height = _MIN_HEIGHT * air.rotor_radius
+    near = air.rotor_radius / (4.0 * if_above(height, min_height, height, min_height))
     b = near * near * lift / (lift + 2.0 * air.density * disc * across + _NO_WASH)
     return air.ground_effect * b / (1.0 - b)
 
 
 @kernel
-def felt_by_rotors(
+def rotor_air_wrench(
     rotors: RotorRows, stage: int, x_quad: Vec3, v_quad: Vec3, R: Mat3, omega: Vec3, wind: Vec3, truth: Truth
-) -> Felt:
+) -> AirWrench:
     """Force and moment in addition to the rotors' thrust and torque; the rotor forces are in row `stage`."""
     air = truth.air
-    through = apply_transposed(R, (v_quad[0] - wind[0], v_quad[1] - wind[1], v_quad[2] - wind[2]))
+    air_velocity = apply_transposed(R, (v_quad[0] - wind[0], v_quad[1] - wind[1], v_quad[2] - wind[2]))
     lag = air.rotor_drag / truth.gravity + air.rotor_flap
     stiff = air.blade_stiffness * air.rotor_flap
     # a rotor with a horizontal axis has no ground below it
@@ -90,14 +90,14 @@ def felt_by_rotors(
     for i in range(rotors.table.shape[0]):
         thrust = rotors.rows[stage, i]
         hub = hub_of(rotors, i, truth)
-        u = add(through, cross(omega, hub))
-        more = 0.0
+        u = add(air_velocity, cross(omega, hub))
+        extra_thrust = 0.0
         if air.ground_effect > 0.0:
             z = x_quad[2] + R[2][0] * hub[0] + R[2][1] * hub[1] + R[2][2] * hub[2]
             # its height along the axis is z / upright
-            far = if_above(upright, 1e-3, z / (upright + 1e-9), 1e9)
-            more = thrust * ground_gain(thrust, far, u[0] * u[0] + u[1] * u[1], air)
-        pull = (-lag * thrust * u[0], -lag * thrust * u[1], more)
-        force = add(force, pull)
-        moment = add(moment, add(cross(hub, pull), (stiff * u[1], -stiff * u[0], 0.0)))
-    return Felt(force, moment)
+            axis_height = if_above(upright, 1e-3, z / (upright + 1e-9), 1e9)
+            extra_thrust = thrust * ground_gain(thrust, axis_height, u[0] * u[0] + u[1] * u[1], air)
+        hub_force = (-lag * thrust * u[0], -lag * thrust * u[1], extra_thrust)
+        force = add(force, hub_force)
+        moment = add(moment, add(cross(hub, hub_force), (stiff * u[1], -stiff * u[0], 0.0)))
+    return AirWrench(force, moment)

@@ -23,39 +23,39 @@ from sitl.plant.records import Motion, Truth
 
 
 @kernel
-def off_centre(truth: Truth) -> bool:
+def is_off_centre(truth: Truth) -> bool:
     """Whether the cable is attached away from the centre of mass."""
     rho = truth.attachment
     return rho[0] != 0.0 or rho[1] != 0.0 or rho[2] != 0.0
 
 
 @kernel
-def arm_to(R: Mat3, truth: Truth) -> Vec3:
+def attachment_offset(R: Mat3, truth: Truth) -> Vec3:
     """x_A - x_Q."""
     return apply(R, truth.attachment)
 
 
 @kernel
-def speed_beside(R: Mat3, omega: Vec3, truth: Truth) -> Vec3:
+def attachment_velocity(R: Mat3, omega: Vec3, truth: Truth) -> Vec3:
     """x_A' - x_Q'."""
     return apply(R, cross(omega, truth.attachment))
 
 
 @kernel
-def accel_beside(R: Mat3, omega: Vec3, omega_dot: Vec3, truth: Truth) -> Vec3:
+def attachment_accel(R: Mat3, omega: Vec3, omega_dot: Vec3, truth: Truth) -> Vec3:
     """x_A'' - x_Q''."""
     rho = truth.attachment
     return apply(R, add(cross(omega_dot, rho), cross(omega, cross(omega, rho))))
 
 
 @kernel
-def turning_arm(q_cable: Vec3, R: Mat3, truth: Truth) -> Vec3:
+def moment_arm(q_cable: Vec3, R: Mat3, truth: Truth) -> Vec3:
     """n: the torque on the vehicle per newton of pull."""
     return cross(truth.attachment, apply_transposed(R, q_cable))
 
 
 @kernel
-def by_inertia(torque: Vec3, truth: Truth) -> Vec3:
+def inverse_inertia_times(torque: Vec3, truth: Truth) -> Vec3:
     """J^-1 torque."""
     J = truth.inertia
     return (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
@@ -64,25 +64,25 @@ def by_inertia(torque: Vec3, truth: Truth) -> Vec3:
 @kernel
 def effective_mass(q_cable: Vec3, R: Mat3, truth: Truth) -> float:
     """mu, the effective mass of vehicle and load along q."""
-    if not off_centre(truth):
+    if not is_off_centre(truth):
         return truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
-    n = turning_arm(q_cable, R, truth)
-    return 1.0 / (1.0 / truth.load_mass + 1.0 / truth.quad_mass + dot(n, by_inertia(n, truth)))
+    n = moment_arm(q_cable, R, truth)
+    return 1.0 / (1.0 / truth.load_mass + 1.0 / truth.quad_mass + dot(n, inverse_inertia_times(n, truth)))
 
 
 @kernel
-def attached_at(x_quad: Vec3, R: Mat3, truth: Truth) -> Vec3:
+def attachment_position(x_quad: Vec3, R: Mat3, truth: Truth) -> Vec3:
     """x_A."""
-    return add(x_quad, arm_to(R, truth)) if off_centre(truth) else x_quad
+    return add(x_quad, attachment_offset(R, truth)) if is_off_centre(truth) else x_quad
 
 
 @kernel
-def cable_of(motion: Motion, truth: Truth) -> tuple[Vec3, Vec3]:
+def cable_and_rate(motion: Motion, truth: Truth) -> tuple[Vec3, Vec3]:
     """c = x_L - x_A and c'."""
-    if not off_centre(truth):
-        return motion.apart, motion.apart_dot
+    if not is_off_centre(truth):
+        return motion.separation, motion.separation_dot
     R = rotation_from_quat(motion.quat)
     return (
-        sub(motion.apart, arm_to(R, truth)),
-        sub(motion.apart_dot, speed_beside(R, motion.omega, truth)),
+        sub(motion.separation, attachment_offset(R, truth)),
+        sub(motion.separation_dot, attachment_velocity(R, motion.omega, truth)),
     )

@@ -12,12 +12,12 @@ from sitl.plant.records import PlantState, Truth
 from sitl.plant.rotors import COMMAND, FORCE, RotorRows, rotor_table, rotors_at_rest
 
 Forces = tuple[float, ...]
-Flown: TypeAlias = Any  # the fields of a PlantState, and `rotor_force` (N), one per rotor
+StateWithRotors: TypeAlias = Any  # the fields of a PlantState, and `rotor_force` (N), one per rotor
 _record: Any = namedtuple
 _FLOWN = _record("_FLOWN", [*PlantState._fields, "rotor_force"])
 
 
-def initial_state(truth: Truth, rotors: int = 4) -> Flown:
+def initial_state(truth: Truth, rotors: int = 4) -> StateWithRotors:
     """The state at rest on the ground."""
     return _FLOWN(*step.initial_state(truth), rotor_force=(0.0,) * rotors)
 

@@ -30,7 +30,7 @@ class Ends(NamedTuple):
     load: Vec3
 
 
-UNTOUCHED = Ends(ZERO, ZERO)
+NO_DRAG = Ends(ZERO, ZERO)
 
 
 @kernel
@@ -49,7 +49,7 @@ def drag_of_cable(
     length = norm(cable)
     q = scale(1.0 / length, cable)
     factor = 0.5 * truth.air.density * DRAG_COEFFICIENT * truth.air.cable_diameter * length
-    above, below = ZERO, ZERO
+    vehicle_force, load_force = ZERO, ZERO
     for k in range(3):
         share = _NODES[k]
         air = wind
@@ -58,5 +58,5 @@ def drag_of_cable(
         u = sub(axpy(share - 1.0, cable_dot, motion.v_load), air)
         across = axpy(-dot(u, q), q, u)
         force = scale(-_WEIGHTS[k] * factor * norm(across), across)
-        above, below = axpy(1.0 - share, force, above), axpy(share, force, below)
-    return Ends(above, below)
+        vehicle_force, load_force = axpy(1.0 - share, force, vehicle_force), axpy(share, force, load_force)
+    return Ends(vehicle_force, load_force)

@@ -34,9 +34,9 @@ from autopilot.vehicle.battery import (
     Battery,
     drawn_current,
     open_voltage,
+    rotor_power_coefficient,
+    rotor_power_term,
     terminal_voltage,
-    watts_per,
-    work_of,
 )
 from sitl.plant.records import Drive, Truth
 
@@ -65,9 +65,9 @@ def throttle_of(share: float, curve: float) -> float:
 
 
 @kernel
-def driven_force(force: float, greatest: float, drive: Drive, supply: float) -> float:
+def driven_force(force: float, max_force: float, drive: Drive, supply: float) -> float:
     """F' of a rotor; a force below 0 is returned unchanged."""
-    share = if_above(force, 0.0, force / greatest, 0.0)
+    share = if_above(force, 0.0, force / max_force, 0.0)
     throttle = throttle_of(share, drive.known_curve)
     if drive.esc_steps > 0.0:
         throttle = np.rint(throttle * drive.esc_steps) / drive.esc_steps
@@ -75,7 +75,7 @@ def driven_force(force: float, greatest: float, drive: Drive, supply: float) -> 
         throttle = if_above(throttle, supply, supply, throttle)
     else:
         throttle = throttle * supply
-    return if_above(force, 0.0, greatest * thrust_share(throttle, drive.thrust_curve), force)
+    return if_above(force, 0.0, max_force * thrust_share(throttle, drive.thrust_curve), force)
 
 
 class Supply(NamedTuple):
@@ -94,16 +94,16 @@ FULL = Supply(0.0, 0.0, 0.0, 1.0)  # also used without a battery
 def battery_of(truth: Truth, rotors: int) -> Battery:
     """The battery of a vehicle with this number of rotors."""
     drive = truth.drive
-    scaled = watts_per(drive.hover_w, truth.quad_mass * truth.gravity, rotors)
+    scaled = rotor_power_coefficient(drive.hover_w, truth.quad_mass * truth.gravity, rotors)
     return Battery(drive.capacity_as, drive.cells, drive.resistance, scaled)
 
 
 @kernel
-def drained(supply: Supply, forces: Row, rotors: int, truth: Truth, h: float) -> Supply:
+def discharged(supply: Supply, forces: Row, rotors: int, truth: Truth, h: float) -> Supply:
     """The battery h seconds later, when the rotors give these forces (N) at that instant."""
     battery = battery_of(truth, rotors)
     empty = truth.drive.capacity_as * (1.0 - truth.drive.charge)  # A s, used before the beginning
     used = supply.used_as + h * supply.current
-    current = drawn_current(work_of(forces, rotors), empty + used, battery)
+    current = drawn_current(rotor_power_term(forces, rotors), empty + used, battery)
     voltage = terminal_voltage(empty + used, current, battery)
     return Supply(used, current, voltage, voltage / (battery.cells * open_voltage(1.0)))

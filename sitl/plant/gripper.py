@@ -11,7 +11,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.so3 import rotation_from_quat
-from sitl.plant.attachment import attached_at
+from sitl.plant.attachment import attachment_position
 from sitl.plant.records import PlantState, Truth
 
 
@@ -22,7 +22,7 @@ def without_cable(truth: Truth) -> Truth:
 
 
 @kernel
-def dropped(state: PlantState) -> PlantState:
+def with_cable_released(state: PlantState) -> PlantState:
     """The state at the instant at which the cable is released: positions and velocities are unchanged.
 
     `accel_quad` keeps the value of the instant before, as at every instant at which the forces jump.
@@ -31,7 +31,7 @@ def dropped(state: PlantState) -> PlantState:
 
 
 @kernel
-def takes_hold(state: PlantState, truth: Truth) -> bool:
+def can_grip(state: PlantState, truth: Truth) -> bool:
     """Whether a closing gripper takes hold of the cable: the load lies on the ground within its length."""
-    held = attached_at(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
-    return state.load_on_ground > 0.0 and norm(sub(state.x_load, held)) <= truth.cable_length
+    attachment = attachment_position(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
+    return state.load_on_ground > 0.0 and norm(sub(state.x_load, attachment)) <= truth.cable_length

@@ -15,34 +15,40 @@ from __future__ import annotations
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import axpy, dot, norm, scale
 from autopilot.geometry.so3 import rotation_from_quat
-from sitl.plant.attachment import by_inertia, cable_of, effective_mass, off_centre, turning_arm
+from sitl.plant.attachment import (
+    cable_and_rate,
+    effective_mass,
+    inverse_inertia_times,
+    is_off_centre,
+    moment_arm,
+)
 from sitl.plant.records import Motion, Truth
 
 
 @kernel
-def stretched(motion: Motion, truth: Truth) -> Motion:
+def at_cable_length(motion: Motion, truth: Truth) -> Motion:
     """Vehicle and load at the distance of the cable length, separating along the cable at the winch's rate.
 
     Centre of mass and momenta are unchanged. After a taut step this removes the integrator's drift; at the
     instant at which a slack cable comes taut it is the perfectly inelastic impact.
     """
-    cable, cable_dot = cable_of(motion, truth)
+    cable, cable_dot = cable_and_rate(motion, truth)
     length = norm(cable)
     q_cable = scale(1.0 / length, cable)
     share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
     excess = length - motion.length
     speed = dot(q_cable, cable_dot) - motion.length_dot
-    if off_centre(truth):
+    if is_off_centre(truth):
         R = rotation_from_quat(motion.quat)
         impulse = effective_mass(q_cable, R, truth) * speed
-        apart = impulse * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
+        relative_impulse = impulse * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
         return Motion(
             axpy(-share * excess, q_cable, motion.x_load),
             axpy(-impulse / truth.load_mass, q_cable, motion.v_load),
-            axpy(-excess, q_cable, motion.apart),
-            axpy(-apart, q_cable, motion.apart_dot),
+            axpy(-excess, q_cable, motion.separation),
+            axpy(-relative_impulse, q_cable, motion.separation_dot),
             motion.quat,
-            axpy(impulse, by_inertia(turning_arm(q_cable, R, truth), truth), motion.omega),
+            axpy(impulse, inverse_inertia_times(moment_arm(q_cable, R, truth), truth), motion.omega),
             motion.length,
             motion.length_dot,
         )

@@ -45,17 +45,17 @@ from autopilot.geometry.linear import (
     times,
 )
 from autopilot.geometry.so3 import quat_derivative, quat_normalise, rotation_from_quat
-from sitl.plant.air import blows, felt_by_rotors
+from sitl.plant.air import has_rotor_air_effects, rotor_air_wrench
 from sitl.plant.attachment import (
-    accel_beside,
-    arm_to,
-    by_inertia,
+    attachment_accel,
+    attachment_offset,
+    attachment_velocity,
     effective_mass,
-    off_centre,
-    speed_beside,
-    turning_arm,
+    inverse_inertia_times,
+    is_off_centre,
+    moment_arm,
 )
-from sitl.plant.cable_drag import UNTOUCHED, drag_of_cable
+from sitl.plant.cable_drag import NO_DRAG, drag_of_cable
 from sitl.plant.contact import load_force, quad_wrench
 from sitl.plant.records import Motion, Rates, Truth
 from sitl.plant.rotors import RotorRows, Wrench
@@ -77,13 +77,13 @@ def rates(
     each rotor is in row `stage`."""
     R = rotation_from_quat(quat_normalise(motion.quat))
     Omega = motion.omega
-    v_quad = sub(motion.v_load, motion.apart_dot)
-    x_quad = sub(motion.x_load, motion.apart)
-    cable, cable_dot = motion.apart, motion.apart_dot
-    beside = off_centre(truth)
-    if beside:
-        cable = sub(cable, arm_to(R, truth))
-        cable_dot = sub(cable_dot, speed_beside(R, Omega, truth))
+    v_quad = sub(motion.v_load, motion.separation_dot)
+    x_quad = sub(motion.x_load, motion.separation)
+    cable, cable_dot = motion.separation, motion.separation_dot
+    off_centre = is_off_centre(truth)
+    if off_centre:
+        cable = sub(cable, attachment_offset(R, truth))
+        cable_dot = sub(cable_dot, attachment_velocity(R, Omega, truth))
     thrust, moment = wrench.thrust, wrench.moment
 
     ground_quad, ground_moment = quad_wrench(x_quad, v_quad, R, Omega, truth)
@@ -91,11 +91,11 @@ def rates(
         scale(thrust, column(R, 2)),
         add(drag_force(v_quad, wind, truth.quad_drag, truth.quad_drag_quadratic), ground_quad),
     )
-    if blows(truth):
-        felt = felt_by_rotors(rotors, stage, x_quad, v_quad, R, Omega, wind, truth)
-        a_quad = add(a_quad, apply(R, felt.force))
-        moment = add(moment, felt.moment)
-    air_at_load, on_cable = wind, UNTOUCHED
+    if has_rotor_air_effects(truth):
+        air_wrench = rotor_air_wrench(rotors, stage, x_quad, v_quad, R, Omega, wind, truth)
+        a_quad = add(a_quad, apply(R, air_wrench.force))
+        moment = add(moment, air_wrench.moment)
+    air_at_load, on_cable = wind, NO_DRAG
     if truth.air.downwash > 0.0 or truth.air.cable_diameter > 0.0:
         wake = wake_of(rotors, stage, x_quad, v_quad, R, wind, truth)
         if truth.air.downwash > 0.0:
@@ -116,37 +116,37 @@ def rates(
     J = truth.inertia
     moment = axpy(-truth.spin_drag * norm(Omega), Omega, add(moment, ground_moment))
     moment = sub(moment, cross(Omega, times(J, Omega)))
-    alpha = by_inertia(moment, truth)
+    alpha = inverse_inertia_times(moment, truth)
 
     tension = 0.0
-    a_apart = sub(a_load, a_quad)  # without gravity, which is the same for both
+    a_separation = sub(a_load, a_quad)  # without gravity, which is the same for both
     if taut > 0.0:
         length = norm(cable)
         q_cable = scale(1.0 / length, cable)
-        turning = dot(cable_dot, cable_dot) - motion.length_dot * motion.length_dot
-        pull = dot(q_cable, a_apart) + turning / length - truth.reel_accel
-        if beside:
-            pull -= dot(q_cable, accel_beside(R, Omega, alpha, truth))
-        tension = effective_mass(q_cable, R, truth) * pull
+        centripetal = dot(cable_dot, cable_dot) - motion.length_dot * motion.length_dot
+        closing_accel = dot(q_cable, a_separation) + centripetal / length - truth.reel_accel
+        if off_centre:
+            closing_accel -= dot(q_cable, attachment_accel(R, Omega, alpha, truth))
+        tension = effective_mass(q_cable, R, truth) * closing_accel
         a_load = axpy(-tension / truth.load_mass, q_cable, a_load)
-        if beside:
-            alpha = axpy(tension, by_inertia(turning_arm(q_cable, R, truth), truth), alpha)
-            pull = tension * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
-        a_apart = axpy(-pull, q_cable, a_apart)
+        if off_centre:
+            alpha = axpy(tension, inverse_inertia_times(moment_arm(q_cable, R, truth), truth), alpha)
+            closing_accel = tension * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
+        a_separation = axpy(-closing_accel, q_cable, a_separation)
 
     falling = (a_load[0], a_load[1], a_load[2] - truth.gravity)
     return Rates(
         Motion(
             motion.v_load,
             falling,
-            motion.apart_dot,
-            a_apart,
+            motion.separation_dot,
+            a_separation,
             quat_derivative(motion.quat, Omega),
             alpha,
             motion.length_dot,
             truth.reel_accel,
         ),
-        sub(falling, a_apart),
+        sub(falling, a_separation),
         tension,
         ground_quad[2],
         ground_load[2],

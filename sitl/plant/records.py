@@ -133,16 +133,16 @@ class Motion(NamedTuple):
     `length` and `length_dot`, which the winch determines, are known beforehand; they are integrated too, so
     that every stage of a step has them.
 
-    Vehicle and load are represented by the load and the vector from vehicle to load, `apart = x_load -
+    Vehicle and load are represented by the load and the vector from vehicle to load, `separation = x_load -
     x_quad`, in both modes. This is a linear change of the coordinates (x_L, q) of (2-30)-(2-35): it leaves a
-    Runge-Kutta step unchanged, and linear momentum is conserved to rounding. `apart` is the
-    cable's vector where the cable is attached at the centre of mass (`attachment.cable_of`).
+    Runge-Kutta step unchanged, and linear momentum is conserved to rounding. `separation` is the
+    cable's vector where the cable is attached at the centre of mass (`attachment.cable_and_rate`).
     """
 
     x_load: Vec3
     v_load: Vec3
-    apart: Vec3
-    apart_dot: Vec3
+    separation: Vec3
+    separation_dot: Vec3
     quat: Quat
     omega: Vec3
     length: float  # m, of the cable

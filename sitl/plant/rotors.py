@@ -21,23 +21,23 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
-from autopilot.vehicle.layout import MOST, Layout
+from autopilot.vehicle.layout import MAX_ROTORS, Layout
 from sitl.plant.drive import driven_force, is_driven
 from sitl.plant.records import Truth
 
 Array = NDArray[np.float64]
 
 # rows of `RotorRows.rows`, one column per rotor, with room for the greatest number
-ASKED, COMMAND, TARGET, FORCE, END, SHARE, BEFORE, BEGIN, MIDDLE = range(9)
+REQUESTED, COMMAND, TARGET, FORCE, END, SHARE, BEFORE, BEGIN, MIDDLE = range(9)
 # columns of `RotorRows.table`, one row per rotor
-ROLL, PITCH, YAW, STRENGTH, LAG, LEFT = range(6)
+ROLL, PITCH, YAW, STRENGTH, LAG, FAILED_SHARE = range(6)
 
 
 class RotorRows(NamedTuple):
     """The rotors of a vehicle, in arrays: the same machine code flies any number of them."""
 
     table: Array  # (n, 6) constants, which only parameters change
-    rows: Array  # (9, MOST) N: requested at this tick, in force, target, present, at the end of a step;
+    rows: Array  # (9, MAX_ROTORS) N: requested at this tick, in force, target, present, at the end of a step;
     # share of its command that it gives; before a step; at the beginning and in the middle of a step
 
 
@@ -48,19 +48,19 @@ class Wrench(NamedTuple):
     moment: Vec3
 
 
-def rotor_table(layout: Layout, left: tuple[float, ...] = ()) -> Array:
-    """The table of these rotors; `left` is the share of its command that each gives when it has failed."""
+def rotor_table(layout: Layout, failed_shares: tuple[float, ...] = ()) -> Array:
+    """The table of these rotors; `failed_shares`: of its command, what each gives when it has failed."""
     table = np.zeros((len(layout), 6))
     for row, rotor in zip(table, layout, strict=True):
         row[:] = (rotor.y, -rotor.x, rotor.yaw, rotor.strength, rotor.lag, 1.0)
-    if left:
-        table[:, LEFT] = left
+    if failed_shares:
+        table[:, FAILED_SHARE] = failed_shares
     return table
 
 
 def rotors_at_rest() -> Array:
     """The rows of intact rotors at rest."""
-    rows = np.zeros((9, MOST))
+    rows = np.zeros((9, MAX_ROTORS))
     rows[SHARE] = 1.0
     return rows
 
@@ -72,7 +72,7 @@ def _clamp(force: float, low: float, high: float) -> float:
 
 
 @kernel
-def limit(rotors: RotorRows, truth: Truth) -> None:
+def set_targets(rotors: RotorRows, truth: Truth) -> None:
     """Write the target of each rotor: its command within its limits, after drive and failure."""
     rows = rotors.rows
     driven = is_driven(truth)
@@ -86,7 +86,7 @@ def limit(rotors: RotorRows, truth: Truth) -> None:
 
 
 @kernel
-def keep(rotors: RotorRows, source: int, target: int) -> None:
+def copy_row(rotors: RotorRows, source: int, target: int) -> None:
     """Copy a row."""
     rows = rotors.rows
     for i in range(rotors.table.shape[0]):

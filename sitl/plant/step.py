@@ -17,12 +17,12 @@ from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, s
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT, rotation_from_quat
-from sitl.plant.attachment import arm_to, cable_of, off_centre, speed_beside
+from sitl.plant.attachment import attachment_offset, attachment_velocity, cable_and_rate, is_off_centre
 from sitl.plant.contact import quad_reach
-from sitl.plant.flow import Flow, flow
-from sitl.plant.impact import stretched
+from sitl.plant.impact import at_cable_length
 from sitl.plant.records import Motion, PlantState, Truth
-from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, keep, limit
+from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, copy_row, set_targets
+from sitl.plant.runge_kutta import StepEnd, runge_kutta_step
 
 # Longest steps, from benchmarks/plant_convergence.py: docs/plant.md has the table.
 MAX_STEP = 4e-3  # s, in the air
@@ -41,15 +41,15 @@ _MAX_SEARCH = 60  # trials of the search; bisection alone would need 35
 _MAX_RATE = 200.0  # rad/s
 _MAX_SPEED = 200.0  # m/s
 _MAX_DISTANCE = 1e5  # m
-_LEAST_DISTANCE = 1e-6  # m
-_LEAST_SPEED = 1e-60  # m/s, rad/s: anything slower counts as at rest
+_MIN_DISTANCE = 1e-6  # m
+_MIN_SPEED = 1e-60  # m/s, rad/s: anything slower counts as at rest
 
 
 @kernel
 def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
     """Longest step that resolves what may happen next; divides `remaining` evenly."""
-    v_quad_z = motion.v_load[2] - motion.apart_dot[2]
-    quad_clearance = motion.x_load[2] - motion.apart[2] - quad_reach(truth)
+    v_quad_z = motion.v_load[2] - motion.separation_dot[2]
+    quad_clearance = motion.x_load[2] - motion.separation[2] - quad_reach(truth)
     load_clearance = motion.x_load[2] - truth.load_radius
     longest = MAX_STEP
     if (
@@ -64,37 +64,37 @@ def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
 
 
 @kernel
-def _excess(motion: Motion, tension: float, taut: float, truth: Truth) -> float:
+def _mode_excess(motion: Motion, tension: float, taut: float, truth: Truth) -> float:
     """Positive when the mode must change: while taut, the force (N) with which the cable would push; while
     slack, the distance (m) by which its ends are further apart than its length."""
     if taut > 0.0:
         return -tension - _TENSION_TOLERANCE
-    return norm(cable_of(motion, truth)[0]) - motion.length - _LENGTH_TOLERANCE
+    return norm(cable_and_rate(motion, truth)[0]) - motion.length - _LENGTH_TOLERANCE
 
 
 @kernel
-def _closing(motion: Motion, truth: Truth) -> float:
+def _closing_speed(motion: Motion, truth: Truth) -> float:
     """Speed in m/s at which the ends separate, minus the rate at which the cable is let out."""
-    cable, cable_dot = cable_of(motion, truth)
+    cable, cable_dot = cable_and_rate(motion, truth)
     return dot(cable, cable_dot) / norm(cable) - motion.length_dot
 
 
 @kernel
-def sound(motion: Motion) -> bool:
+def is_valid(motion: Motion) -> bool:
     """Whether the motion is finite and within the domain of the model; a comparison with nan is false."""
-    v_quad = sub(motion.v_load, motion.apart_dot)
+    v_quad = sub(motion.v_load, motion.separation_dot)
     return (
         norm(motion.omega) < _MAX_RATE
         and norm(motion.v_load) < _MAX_SPEED
         and norm(v_quad) < _MAX_SPEED
         and norm(motion.x_load) < _MAX_DISTANCE
-        and norm(motion.apart) < _MAX_DISTANCE
+        and norm(motion.separation) < _MAX_DISTANCE
         and abs(motion.quat[0]) <= 1.0 + 1e-9
     )
 
 
 @kernel
-def held(state: PlantState) -> PlantState:
+def frozen_state(state: PlantState) -> PlantState:
     """`state`, marked as the last one before the motion left the domain of the model."""
     return PlantState(
         state.x_load,
@@ -117,32 +117,32 @@ def held(state: PlantState) -> PlantState:
 
 
 @kernel
-def _at_rest(speed: float) -> float:
+def _zero_if_tiny(speed: float) -> float:
     """A component of a velocity, or 0 once it has decayed.
 
     On the ground, speeds decay but never reach zero, and a processor takes a hundred times as long to add
     numbers below 1e-308 as others.
     """
-    return if_above(abs(speed), _LEAST_SPEED, speed, 0.0)
+    return if_above(abs(speed), _MIN_SPEED, speed, 0.0)
 
 
 @kernel
-def resting(v: Vec3) -> Vec3:
-    return (_at_rest(v[0]), _at_rest(v[1]), _at_rest(v[2]))
+def zero_tiny_components(v: Vec3) -> Vec3:
+    return (_zero_if_tiny(v[0]), _zero_if_tiny(v[1]), _zero_if_tiny(v[2]))
 
 
 @kernel
 def state_of(
-    end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_speed: float, truth: Truth
+    end: StepEnd, q_before: Vec3, taut: float, slack_events: float, snap_speed: float, truth: Truth
 ) -> PlantState:
     """The state at the end of a step."""
     motion = end.motion
-    v_load, apart_dot = resting(motion.v_load), resting(motion.apart_dot)
+    v_load, separation_dot = zero_tiny_components(motion.v_load), zero_tiny_components(motion.separation_dot)
     q_cable, q_cable_dot = q_before, ZERO
-    cable, cable_dot = cable_of(with_field(motion, "apart_dot", apart_dot), truth)
+    cable, cable_dot = cable_and_rate(with_field(motion, "separation_dot", separation_dot), truth)
     distance = norm(cable)
     # where the load passes through the vehicle the direction is undefined: keep the last one
-    if distance > _LEAST_DISTANCE:
+    if distance > _MIN_DISTANCE:
         q_cable = scale(1.0 / distance, cable)
         q_cable_dot = scale(1.0 / distance, tangent(q_cable, cable_dot))
     return PlantState(
@@ -150,10 +150,10 @@ def state_of(
         v_load,
         q_cable,
         q_cable_dot,
-        sub(motion.x_load, motion.apart),
-        sub(v_load, apart_dot),
+        sub(motion.x_load, motion.separation),
+        sub(v_load, separation_dot),
         motion.quat,
-        resting(motion.omega),
+        zero_tiny_components(motion.omega),
         taut,
         slack_events,
         1.0 if end.quad_normal > 0.0 else 0.0,
@@ -178,27 +178,27 @@ def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: f
     """
     if state.diverged > 0.0:
         return state
-    limit(rotors, truth)
-    keep(rotors, FORCE, BEFORE)
+    set_targets(rotors, truth)
+    copy_row(rotors, FORCE, BEFORE)
     taut, slack_events = state.taut, state.slack_events
     if taut > 0.0:
         cable = scale(truth.cable_length, state.q_cable)
         cable_dot = scale(truth.cable_length, state.q_cable_dot)
         if truth.reel_rate != 0.0:
             cable_dot = axpy(truth.reel_rate, state.q_cable, cable_dot)
-        apart, apart_dot = cable, cable_dot
-        if off_centre(truth):
+        separation, separation_dot = cable, cable_dot
+        if is_off_centre(truth):
             R = rotation_from_quat(state.quat_wxyz)
-            apart = add(cable, arm_to(R, truth))
-            apart_dot = add(cable_dot, speed_beside(R, state.omega_body, truth))
+            separation = add(cable, attachment_offset(R, truth))
+            separation_dot = add(cable_dot, attachment_velocity(R, state.omega_body, truth))
     else:
-        apart = sub(state.x_load, state.x_quad)
-        apart_dot = sub(state.v_load, state.v_quad)
+        separation = sub(state.x_load, state.x_quad)
+        separation_dot = sub(state.v_load, state.v_quad)
     motion = Motion(
         state.x_load,
         state.v_load,
-        apart,
-        apart_dot,
+        separation,
+        separation_dot,
         state.quat_wxyz,
         state.omega_body,
         truth.cable_length,
@@ -211,15 +211,15 @@ def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: f
         low, high, low_excess, high_excess, side = 0.0, t, 0.0, 0.0, 0
         switched = False
         for trial in range(_MAX_SEARCH):
-            end = flow(motion, rotors, truth, wind, taut, t)
-            excess = _excess(end.motion, end.tension, taut, truth)
+            end = runge_kutta_step(motion, rotors, truth, wind, taut, t)
+            excess = _mode_excess(end.motion, end.tension, taut, truth)
             if trial == 0:
-                low_excess, high_excess = _excess(motion, end.tension_before, taut, truth), excess
+                low_excess, high_excess = _mode_excess(motion, end.tension_before, taut, truth), excess
                 if taut <= 0.0 and impacts >= _MAX_IMPACTS:
                     break
                 if low_excess > 0.0:
                     # the switch is overdue: the forces jumped, or the last step had used up its impacts
-                    switched = taut > 0.0 or _closing(motion, truth) > 0.0
+                    switched = taut > 0.0 or _closing_speed(motion, truth) > 0.0
                     break
                 if not excess > 0.0:
                     break
@@ -239,7 +239,7 @@ def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: f
             t = 0.0
         else:
             motion = end.motion
-            keep(rotors, END, FORCE)
+            copy_row(rotors, END, FORCE)
         remaining -= t
         if switched:
             if taut > 0.0:
@@ -248,13 +248,13 @@ def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: f
             else:
                 taut = 1.0
                 impacts += 1
-                snap_speed = max(snap_speed, _closing(motion, truth))
-                motion = stretched(motion, truth)
+                snap_speed = max(snap_speed, _closing_speed(motion, truth))
+                motion = at_cable_length(motion, truth)
         elif not remaining > 0.0:
             break
-    if not sound(end.motion):
-        keep(rotors, BEFORE, FORCE)
-        return held(state)
+    if not is_valid(end.motion):
+        copy_row(rotors, BEFORE, FORCE)
+        return frozen_state(state)
     return state_of(end, state.q_cable, taut, slack_events, snap_speed, truth)
 
 

@@ -72,17 +72,17 @@ def wake_of(
 def wake_at(point: Vec3, wake: Wake, rotors: RotorRows, stage: int, truth: Truth) -> Vec3:
     """Velocity (world, m/s) that the wake adds to the wind at a point."""
     air = truth.air
-    square = 0.0
+    speed_squared = 0.0
     for i in range(rotors.table.shape[0]):
         hub = add(wake.x_quad, apply(wake.R, hub_of(rotors, i, truth)))
-        away = sub(point, hub)
-        s = dot(away, wake.along)
-        beside = dot(away, away) - s * s
+        offset = sub(point, hub)
+        s = dot(offset, wake.along)
+        radial_squared = dot(offset, offset) - s * s
         width = 1.5 * air.rotor_radius * air.rotor_radius + _SPREAD * _SPREAD * s * s
-        fall = 1.0 + beside / width
-        fall *= fall
+        profile = 1.0 + radial_squared / width
+        profile *= profile
         thrust = rotors.rows[stage, i]
-        flow = 3.0 * thrust / (pi * air.density * width * fall * fall)
+        flow = 3.0 * thrust / (pi * air.density * width * profile * profile)
         # no wake above a rotor, and none of a rotor with reversed thrust
-        square += if_above(s, 0.0, if_above(flow, 0.0, flow, 0.0), 0.0)
-    return scale(air.downwash * sqrt(square), wake.along)
+        speed_squared += if_above(s, 0.0, if_above(flow, 0.0, flow, 0.0), 0.0)
+    return scale(air.downwash * sqrt(speed_squared), wake.along)

@@ -12,33 +12,33 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import with_field
 from sitl.plant.records import Truth
 
-GREATEST_RATE = 2.0  # m/s
-GREATEST_ACCEL = 5.0  # m/s^2
-SHORTEST = 0.05  # m, at which the drum stops
-_STANDS = 1e-9  # m/s, a smaller rate is only rounding
+MAX_RATE = 2.0  # m/s
+MAX_ACCEL = 5.0  # m/s^2
+MIN_LENGTH = 0.05  # m, at which the drum stops
+_STOPPED_RATE = 1e-9  # m/s, a smaller rate is only rounding
 
 
 @kernel
-def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
-    """The truth of a tick in which the drum approaches `wanted_rate` (m/s, positive: out; NaN: it stops)."""
-    if isnan(wanted_rate):
-        wanted_rate = 0.0
+def with_commanded_rate(truth: Truth, commanded_rate: float, tick_s: float) -> Truth:
+    """The truth of a tick in which the drum approaches this rate (m/s, positive: out; NaN: it stops)."""
+    if isnan(commanded_rate):
+        commanded_rate = 0.0
     # inwards no faster than the drum can stop before the cable is shortest
-    left = max(truth.cable_length - SHORTEST, 0.0)
-    fastest_in = min(GREATEST_RATE, sqrt(GREATEST_ACCEL * left))
-    wanted_rate = min(GREATEST_RATE, max(-fastest_in, wanted_rate))
+    remaining = max(truth.cable_length - MIN_LENGTH, 0.0)
+    max_rate_in = min(MAX_RATE, sqrt(MAX_ACCEL * remaining))
+    commanded_rate = min(MAX_RATE, max(-max_rate_in, commanded_rate))
     rate = truth.reel_rate
-    if wanted_rate == 0.0 and abs(rate) < _STANDS:
+    if commanded_rate == 0.0 and abs(rate) < _STOPPED_RATE:
         return with_field(with_field(truth, "reel_rate", 0.0), "reel_accel", 0.0)
-    accel = min(GREATEST_ACCEL, max(-GREATEST_ACCEL, (wanted_rate - rate) / tick_s))
+    accel = min(MAX_ACCEL, max(-MAX_ACCEL, (commanded_rate - rate) / tick_s))
     return with_field(truth, "reel_accel", accel)
 
 
 @kernel
-def later(truth: Truth, h: float) -> Truth:
+def truth_after(truth: Truth, h: float) -> Truth:
     """The truth h seconds later, within the tick."""
     rate, accel = truth.reel_rate, truth.reel_accel
     if rate == 0.0 and accel == 0.0:
         return truth
-    longer = with_field(truth, "cable_length", truth.cable_length + h * (rate + 0.5 * h * accel))
-    return with_field(longer, "reel_rate", rate + h * accel)
+    lengthened = with_field(truth, "cable_length", truth.cable_length + h * (rate + 0.5 * h * accel))
+    return with_field(lengthened, "reel_rate", rate + h * accel)

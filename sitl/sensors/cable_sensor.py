@@ -32,10 +32,10 @@ class CableState(NamedTuple):
 
 
 class CableReading(NamedTuple):
-    """Unit vector from vehicle to load, body FLU; `seen` is 0.0 if there is no reading."""
+    """Unit vector from vehicle to load, body FLU; `detected` is 0.0 if there is no reading."""
 
     direction_body: Vec3
-    seen: float
+    detected: float
 
 
 @kernel
@@ -53,14 +53,14 @@ def sample(
     line = apply_transposed(R, sub(truth_state.x_load, truth_state.x_quad))
     distance = norm(line)
     direction = _DOWN
-    seen = 0.0
+    detected = 0.0
     if distance > 0.0:
         direction = scale(1.0 / distance, line)
         if -direction[2] >= config.cone_cosine and (truth_state.taut > 0.5 or config.taut_only < 0.5):
-            seen = 1.0
+            detected = 1.0
     turn = add(sensor_state.mounting, white(config.direction_noise, noise, 0))
     measured = apply(exp(turn), direction)
     return (
-        CableReading(measured, seen),
+        CableReading(measured, detected),
         CableState(drift_step(sensor_state.mounting, config.mounting_drift, noise, 1)),
     )

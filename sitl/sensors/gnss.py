@@ -49,8 +49,8 @@ class GnssState(NamedTuple):
     error: Vec3
     multipath: Vec3
     floating: Vec3
-    lost_left: float
-    float_left: float
+    lost_remaining_s: float
+    float_remaining_s: float
 
 
 class GnssReading(NamedTuple):
@@ -74,16 +74,16 @@ def start(config: GnssConfig, noise: Noise) -> GnssState:
 
 
 @kernel
-def _left(config: GnssConfig, state: GnssState, noise: Noise) -> tuple[float, float]:
+def _remaining(config: GnssConfig, state: GnssState, noise: Noise) -> tuple[float, float]:
     """Remaining times (s) without a fix, and until the fix no longer floats, from this sample on."""
-    lost, floating = state.lost_left - config.period_s, state.float_left - config.period_s
-    loses, floats = uniform(noise, 8)
-    how_long = uniform(noise, 9)
-    settling = -logarithm(how_long[1]) * config.float_s if config.float_error > 0.0 else 0.0
-    if lost <= 0.0 and loses <= config.lost_chance:
-        lost = -logarithm(how_long[0]) * config.lost_s
+    lost, floating = state.lost_remaining_s - config.period_s, state.float_remaining_s - config.period_s
+    lost_draw, float_draw = uniform(noise, 8)
+    draws = uniform(noise, 9)
+    settling = -logarithm(draws[1]) * config.float_s if config.float_error > 0.0 else 0.0
+    if lost <= 0.0 and lost_draw <= config.lost_chance:
+        lost = -logarithm(draws[0]) * config.lost_s
         floating = max(floating, lost + settling)
-    if floating <= 0.0 and floats <= config.float_chance:
+    if floating <= 0.0 and float_draw <= config.float_chance:
         floating = settling
     return max(lost, 0.0), max(floating, 0.0)
 
@@ -97,15 +97,19 @@ def sample(
     position = add3(truth_state.x_quad, slow, times(config.position_noise, gaussian(noise, 0)))
     velocity = add(truth_state.v_quad, times(config.velocity_noise, gaussian(noise, 1)))
     multipath, floating = sensor_state.multipath, sensor_state.floating
-    lost_left, float_left, quality = sensor_state.lost_left, sensor_state.float_left, FIXED
+    lost_remaining_s, float_remaining_s, quality = (
+        sensor_state.lost_remaining_s,
+        sensor_state.float_remaining_s,
+        FIXED,
+    )
     if config.multipath.drive > 0.0:
         position = add(position, times(config.multipath_error, multipath))
         multipath = drift_step(multipath, config.multipath, noise, 4)
     if config.float_chance > 0.0 or config.lost_chance > 0.0:
-        lost_left, float_left = _left(config, sensor_state, noise)
-        if lost_left > 0.0:
+        lost_remaining_s, float_remaining_s = _remaining(config, sensor_state, noise)
+        if lost_remaining_s > 0.0:
             quality = LOST
-        elif float_left > 0.0:
+        elif float_remaining_s > 0.0:
             quality = FLOATING
             position = add(position, scale(config.float_error, floating))
         floating = drift_step(floating, config.correlation, noise, 6)
@@ -115,7 +119,7 @@ def sample(
             drift_step(sensor_state.error, config.correlation, noise, 2),
             multipath,
             floating,
-            lost_left,
-            float_left,
+            lost_remaining_s,
+            float_remaining_s,
         ),
     )

@@ -73,7 +73,7 @@ def sample(
 
 
 @kernel
-def cut(reading: ImuReading, config: ImuConfig) -> ImuReading:
+def clip_reading(reading: ImuReading, config: ImuConfig) -> ImuReading:
     """The reading cut at full scale."""
     return ImuReading(
         clip(reading.accel_body, config.accel_range), clip(reading.gyro_body, config.gyro_range)

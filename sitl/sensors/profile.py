@@ -24,13 +24,13 @@ from sitl.sensors.pose_tracker import PoseConfig
 from sitl.sensors.room import Room
 from sitl.sensors.vibration import VibrationConfig
 
-_HIGHEST_RATE_HZ = 20_000.0
-_LONGEST_JITTER = 5.0  # times its mean: without the limit, one reading in 150 would be later
+_MAX_RATE_HZ = 20_000.0
+_MAX_JITTER_FACTOR = 5.0  # times its mean: without the limit, one reading in 150 would be later
 
 # a sensor states at least these deviations, so that no receiver divides by the zero of a perfect one
-_LEAST_POSITION_STD = 1e-4  # m
-_LEAST_VELOCITY_STD = 1e-3  # m/s
-_LEAST_ANGLE_STD = 1e-4  # rad
+_MIN_POSITION_STD = 1e-4  # m
+_MIN_VELOCITY_STD = 1e-3  # m/s
+_MIN_ANGLE_STD = 1e-4  # rad
 
 
 def _rate(value: object) -> float:
@@ -39,8 +39,8 @@ def _rate(value: object) -> float:
         return 0.0
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise PydanticCustomError("rate", 'must be a number > 0, or "tick" (a reading at every tick)')
-    if not 0.0 < value <= _HIGHEST_RATE_HZ:
-        raise PydanticCustomError("rate", f"must be > 0 and at most {_HIGHEST_RATE_HZ:g}")
+    if not 0.0 < value <= _MAX_RATE_HZ:
+        raise PydanticCustomError("rate", f"must be > 0 and at most {_MAX_RATE_HZ:g}")
     return float(value)
 
 
@@ -85,11 +85,11 @@ class Stamped(Sampled):
     time_offset_ms: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
 
     @property
-    def latest_ms(self) -> float:
+    def max_extra_delay_ms(self) -> float:
         """The longest delay of a reading beyond the latency."""
         if self.jitter_ms == 0.0:
             return 0.0
-        return _LONGEST_JITTER * self.jitter_ms if self.jitter_max_ms is None else self.jitter_max_ms
+        return _MAX_JITTER_FACTOR * self.jitter_ms if self.jitter_max_ms is None else self.jitter_max_ms
 
 
 def _walk(bias: float, walk: float, period_s: float) -> Drift:
@@ -246,7 +246,7 @@ class Gnss(Stamped):
     lost_s: Positive = 2.0
 
     @model_validator(mode="after")
-    def _floats(self) -> Gnss:
+    def _only_rtk_floats(self) -> Gnss:
         if self.fix != "rtk" and self.float_per_min > 0.0:
             raise ValueError('has float_per_min without fix = "rtk": only a fix with carrier phase floats')
         return self
@@ -330,13 +330,13 @@ class Profile(_Table):
     magnetometer: Magnetometer | None = None
 
     @model_validator(mode="after")
-    def _tells_where_the_vehicle_is(self) -> Profile:
+    def _has_position_source(self) -> Profile:
         if self.mocap is None and self.gnss is None:
             raise ValueError("has neither mocap nor gnss; one of them must tell where the vehicle is")
         return self
 
 
-class Stated(NamedTuple):
+class ReportedStd(NamedTuple):
     """The deviations that readings state, per axis; nan where a sensor is not fitted."""
 
     mocap_position: float
@@ -350,27 +350,27 @@ class Stated(NamedTuple):
     gnss_float: float  # of a floating fix, horizontal and vertical
 
 
-def stated_of(profile: Profile, scale: float) -> Stated:
+def reported_std(profile: Profile, scale: float) -> ReportedStd:
     """The deviations that the sensors of a profile state when all noise is multiplied by `scale`."""
     mocap, load, cable, gnss = profile.mocap, profile.load_tracker, profile.cable_sensor, profile.gnss
 
-    def std(least: float, *parts: float | None) -> float:
-        return max(least, scale * hypot(*(part or 0.0 for part in parts)))
+    def std(min_std: float, *parts: float | None) -> float:
+        return max(min_std, scale * hypot(*(part or 0.0 for part in parts)))
 
-    return Stated(
-        mocap_position=std(_LEAST_POSITION_STD, mocap.position_noise_m, mocap.position_bias_m)
+    return ReportedStd(
+        mocap_position=std(_MIN_POSITION_STD, mocap.position_noise_m, mocap.position_bias_m)
         if mocap
         else nan,
-        mocap_attitude=std(_LEAST_ANGLE_STD, mocap.attitude_noise_rad) if mocap else nan,
-        mocap_velocity=std(_LEAST_VELOCITY_STD, mocap.velocity_noise_m_s) if mocap else nan,
-        load_position=std(_LEAST_POSITION_STD, load.position_noise_m, load.position_bias_m) if load else nan,
-        load_velocity=std(_LEAST_VELOCITY_STD, load.velocity_noise_m_s) if load else nan,
-        direction=std(_LEAST_ANGLE_STD, cable.direction_noise_rad, cable.mounting_bias_rad) if cable else nan,
-        gnss_horizontal=std(_LEAST_POSITION_STD, gnss.horizontal_noise_m, gnss.horizontal_correlated_m)
+        mocap_attitude=std(_MIN_ANGLE_STD, mocap.attitude_noise_rad) if mocap else nan,
+        mocap_velocity=std(_MIN_VELOCITY_STD, mocap.velocity_noise_m_s) if mocap else nan,
+        load_position=std(_MIN_POSITION_STD, load.position_noise_m, load.position_bias_m) if load else nan,
+        load_velocity=std(_MIN_VELOCITY_STD, load.velocity_noise_m_s) if load else nan,
+        direction=std(_MIN_ANGLE_STD, cable.direction_noise_rad, cable.mounting_bias_rad) if cable else nan,
+        gnss_horizontal=std(_MIN_POSITION_STD, gnss.horizontal_noise_m, gnss.horizontal_correlated_m)
         if gnss
         else nan,
-        gnss_vertical=std(_LEAST_POSITION_STD, gnss.vertical_noise_m, gnss.vertical_correlated_m)
+        gnss_vertical=std(_MIN_POSITION_STD, gnss.vertical_noise_m, gnss.vertical_correlated_m)
         if gnss
         else nan,
-        gnss_float=std(_LEAST_POSITION_STD, gnss.float_error_m) if gnss else nan,
+        gnss_float=std(_MIN_POSITION_STD, gnss.float_error_m) if gnss else nan,
     )

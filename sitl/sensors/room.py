@@ -43,11 +43,11 @@ def _wave(axis: int, angle: int, place: Vec3, length: float, noise: Noise) -> fl
 @kernel
 def distortion(place: Vec3, room: Room, noise: Noise) -> Vec3:
     """The error at a place (ENU, m); of `noise` only seed and scale are used."""
-    own = Noise(noise.seed, _STREAM, 0, 1.0)
-    angle = words(own, _ANGLES)
+    room_noise = Noise(noise.seed, _STREAM, 0, 1.0)
+    angle = words(room_noise, _ANGLES)
     size = sqrt(2.0) * room.error * noise.scale
     return (
-        size * _wave(0, angle[0], place, room.length, own),
-        size * _wave(1, angle[1], place, room.length, own),
-        size * _wave(2, angle[2], place, room.length, own),
+        size * _wave(0, angle[0], place, room.length, room_noise),
+        size * _wave(1, angle[1], place, room.length, room_noise),
+        size * _wave(2, angle[2], place, room.length, room_noise),
     )

@@ -35,7 +35,7 @@ from typing import NamedTuple
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import each
 from autopilot.geometry.linear import Vec3, scale
-from autopilot.wire.convert.simulator import speed_rpm
+from autopilot.wire.convert.simulator import rotor_speed_rpm
 from sitl.plant.records import Truth
 from sitl.plant.rotors import FORCE, PITCH, ROLL, STRENGTH, YAW, Array, RotorRows
 from sitl.sensors.elementary import cosine_sine
@@ -78,7 +78,7 @@ def _gain(hz: float, cutoff_hz: float) -> float:
 
 
 @kernel
-def shaking(
+def rotor_vibration(
     rotors: RotorRows, truth: Truth, phases: Array, config: VibrationConfig, noise: Noise
 ) -> tuple[Vec3, Vec3]:
     """What the rotors add to specific force (m/s^2) and body rate (rad/s), body FLU.
@@ -91,7 +91,7 @@ def shaking(
     mean = ax = ay = az = wx = wy = wz = 0.0
     for i in range(count):
         force = rotors.rows[FORCE, i]
-        hz = speed_rpm(force, table[i, STRENGTH] * truth.rotor_max) / 60.0
+        hz = rotor_speed_rpm(force, table[i, STRENGTH] * truth.rotor_max) / 60.0
         word = each(phases[i] + hz * config.period_s * _WORDS) & _MASK
         phases[i] = word * 1.0
         cosine, sine = cosine_sine(word)

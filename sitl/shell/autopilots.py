@@ -20,10 +20,10 @@ Run = Callable[[Link, HilSimulator, StopRequest, Callable[[str], None], Pacing |
 PLUMBLINE = "plumbline"
 
 
-class Kind(NamedTuple):
+class AutopilotKind(NamedTuple):
     """The defaults for one autopilot, unless the user sets others."""
 
-    awaited: str  # name of what the simulator reports to wait for
+    awaited_name: str  # name of what the simulator reports to wait for
     listen: Address
     truth_every: int  # ticks
     settings: Mapping[str, float]  # SIM_* parameters
@@ -37,10 +37,12 @@ def parameter_file(name: str) -> Path:
 
 
 AUTOPILOTS = {
-    PLUMBLINE: Kind("an autopilot", ("127.0.0.1", 4560), 2, {}),
-    "ardupilot": Kind("ArduPilot", ("127.0.0.1", 9002), 8, {"SIM_RATE_HZ": ardupilot.RATE_HZ}, run_ardupilot),
-    "px4": Kind("PX4", ("127.0.0.1", 4560), 5, {"SIM_RATE_HZ": px4.RATE_HZ}, run_px4),
-    "betaflight": Kind(
+    PLUMBLINE: AutopilotKind("an autopilot", ("127.0.0.1", 4560), 2, {}),
+    "ardupilot": AutopilotKind(
+        "ArduPilot", ("127.0.0.1", 9002), 8, {"SIM_RATE_HZ": ardupilot.RATE_HZ}, run_ardupilot
+    ),
+    "px4": AutopilotKind("PX4", ("127.0.0.1", 4560), 5, {"SIM_RATE_HZ": px4.RATE_HZ}, run_px4),
+    "betaflight": AutopilotKind(
         "Betaflight", ("127.0.0.1", 9002), 10, {"SIM_RATE_HZ": betaflight.RATE_HZ}, run_betaflight, True
     ),
 }

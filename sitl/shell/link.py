@@ -8,16 +8,24 @@ import socket
 import time
 from collections.abc import Callable
 
-from autopilot.shell.options import Address, datagram_socket, reason, receive, send, set_timeout, shown
+from autopilot.shell.options import (
+    Address,
+    address_text,
+    datagram_socket,
+    os_error_text,
+    receive,
+    send,
+    set_timeout,
+)
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
 from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
 
-_TAKE_OVER_S = 0.5  # silence of the autopilot that is served, after which another may take its place
-_MOST_NAMED = 8  # of the refused autopilots
-_TELL_AGAIN_S = 1.0  # between two messages to refused autopilots
+_TAKEOVER_SILENCE_S = 0.5  # silence of the autopilot that is served, after which another may take its place
+_MAX_REPORTED = 8  # of the refused autopilots
+_REFUSAL_PERIOD_S = 1.0  # between two messages to refused autopilots
 _TEXT_LENGTH = 50  # of STATUSTEXT
 TRUTH_WINDOW_US = 20_000  # in lockstep: time whose truth is sent in one datagram
 
@@ -25,43 +33,46 @@ TRUTH_WINDOW_US = 20_000  # in lockstep: time whose truth is sent in one datagra
 class Link:
     """The socket for the autopilots, the autopilot that is served, and the address for the truth."""
 
-    def __init__(self, listen: Address, truth: Address, say: Callable[[str], None]) -> None:
+    def __init__(self, listen: Address, truth: Address, notify: Callable[[str], None]) -> None:
         try:
             self._socket = datagram_socket(listen)
             self._socket.bind(listen)
         except OSError as error:
             busy = "is another sitl running? " if error.errno == errno.EADDRINUSE else ""
             raise ValueError(
-                f"cannot listen on {shown(listen)}: {reason(error)}; {busy}choose another with --listen"
+                f"cannot listen on {address_text(listen)}: {os_error_text(error)}; "
+                f"{busy}choose another with --listen"
             ) from None
         try:
             self._truth_socket = datagram_socket(truth)
         except OSError as error:
             raise ValueError(
-                f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
+                f"cannot send truth to {address_text(truth)}: {os_error_text(error)}; "
+                "choose another with --truth"
             ) from None
         self.truth = truth  # address to which it is sent
         self.address = listen
         self._gathered: list[bytes] = []  # truth of this window
         self.window_ends_us = 0
         self._timeout_s = 0.0
-        self._say = say
-        self._heard = 0.0  # when the peer last answered, monotonic clock
-        self._turned_away: set[Address] = set()
-        self._met_s: float | None = None  # when the first peer was met, monotonic clock
+        self._notify = notify
+        self._last_answer_s = 0.0  # when the peer last answered, monotonic clock
+        self._refused: set[Address] = set()
+        self._connected_s: float | None = None  # when the first peer was met, monotonic clock
         self.peer: Address | None = None
-        self._told_away_s = -_TELL_AGAIN_S  # when a refused autopilot was last notified, monotonic clock
+        # when a refused autopilot was last notified, monotonic clock
+        self._last_refusal_s = -_REFUSAL_PERIOD_S
         # a separate sequence counter: the frames to the autopilot that is served are numbered without a gap
         self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
 
     @property
     def served_s(self) -> float:
         """Wall clock time since the first autopilot was met."""
-        return 0.0 if self._met_s is None else time.monotonic() - self._met_s
+        return 0.0 if self._connected_s is None else time.monotonic() - self._connected_s
 
     def close(self) -> None:
         self._socket.close()
-        self._tell_gathered()
+        self._send_gathered()
         self._truth_socket.close()
 
     def timeout(self, seconds: float) -> None:
@@ -97,7 +108,7 @@ class Link:
             self._gathered.append(truth)
         if not self.window_ends_us - TRUTH_WINDOW_US < now_us < self.window_ends_us:
             self.window_ends_us = next_multiple(now_us, TRUTH_WINDOW_US)
-            self._tell_gathered()
+            self._send_gathered()
 
     def take_gathered(self) -> bytes:
         """Hand over the truth of this window so far to a caller that continues to gather it."""
@@ -116,60 +127,63 @@ class Link:
         """The socket for the autopilots, and the socket from which the truth is sent."""
         return self._socket, self._truth_socket
 
-    def _tell_gathered(self) -> None:
+    def _send_gathered(self) -> None:
         if self._gathered:
             send(self._truth_socket, b"".join(self._gathered), self.truth)
             self._gathered.clear()
 
-    def serves(self, sender: Address) -> bool:
+    def accepts(self, sender: Address) -> bool:
         """Whether the sender is the autopilot that is served: while one answers, no other takes its place."""
         if sender == self.peer:
             return True
-        if self.peer is not None and time.monotonic() - self._heard < _TAKE_OVER_S:
-            self._turn_away(sender, self.peer)
+        if self.peer is not None and time.monotonic() - self._last_answer_s < _TAKEOVER_SILENCE_S:
+            self._report_refusal(sender, self.peer)
             return False
-        self._say(f"serving the autopilot at {shown(sender)}")
+        self._notify(f"serving the autopilot at {address_text(sender)}")
         self.peer = sender
-        self.met()
+        self.note_connection()
         return True
 
-    def _turn_away(self, sender: Address, peer: Address) -> None:
+    def _report_refusal(self, sender: Address, peer: Address) -> None:
         """Report it on the terminal, once for each of the first: a flood can have any number of addresses."""
-        if sender in self._turned_away or len(self._turned_away) == _MOST_NAMED:
+        if sender in self._refused or len(self._refused) == _MAX_REPORTED:
             return
-        self._turned_away.add(sender)
-        others = "; others are not named" if len(self._turned_away) == _MOST_NAMED else ""
-        self._say(f"the autopilot at {shown(sender)} is not served: that at {shown(peer)} answers{others}")
+        self._refused.add(sender)
+        others = "; others are not named" if len(self._refused) == _MAX_REPORTED else ""
+        self._notify(
+            f"the autopilot at {address_text(sender)} is not served: "
+            f"that at {address_text(peer)} answers{others}"
+        )
 
-    def met(self) -> None:
+    def note_connection(self) -> None:
         """Note when the first autopilot is met."""
-        if self._met_s is None:
-            self._met_s = time.monotonic()
+        if self._connected_s is None:
+            self._connected_s = time.monotonic()
 
-    def heard(self) -> None:
+    def note_answer(self) -> None:
         """Note that the autopilot that is served has answered."""
-        self._heard = time.monotonic()
+        self._last_answer_s = time.monotonic()
 
-    def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
+    def process(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
         """Pass a datagram on. True if it is a heartbeat whose sender is served from now on."""
         if sender == self.peer and simulator.receive(datagram):
-            self.heard()
+            self.note_answer()
             return False
-        if not simulator.greets(datagram):
+        if not simulator.has_heartbeat(datagram):
             return False
-        if not self.serves(sender):
-            self._tell_turned_away(sender)
+        if not self.accepts(sender):
+            self._send_refusal(sender)
             return False
-        simulator.introduce()
+        simulator.announce_boot()
         return True
 
-    def _tell_turned_away(self, sender: Address) -> None:
+    def _send_refusal(self, sender: Address) -> None:
         """Notify an autopilot which one is served in its place, but not for every datagram of a flood."""
         now_s = time.monotonic()
-        if now_s - self._told_away_s < _TELL_AGAIN_S:
+        if now_s - self._last_refusal_s < _REFUSAL_PERIOD_S:
             return
-        self._told_away_s = now_s
-        text = f"Serving another autopilot: {shown(self.peer)}".encode()[:_TEXT_LENGTH]
+        self._last_refusal_s = now_s
+        text = f"Serving another autopilot: {address_text(self.peer)}".encode()[:_TEXT_LENGTH]
         severity = mavlink.MAV_SEVERITY_ERROR
         self.send(self._writer.frame(mavlink.MAVLink_statustext_message(severity, text)), sender)
 

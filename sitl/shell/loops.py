@@ -6,7 +6,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from autopilot.shell.options import Address, StopRequest, shown
+from autopilot.shell.options import Address, StopRequest, address_text
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
@@ -15,59 +15,61 @@ from sitl.shell.tick_loop import TickLoop
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
-LOOK_S = 0.2  # between two checks for a request to stop, while nothing arrives
+POLL_S = 0.2  # between two checks for a request to stop, while nothing arrives
 LOST_S = 3.0  # of silence, after which the autopilot is reported as silent
-WAITED_S = 1.0  # for one answer: longer than on a busy machine; such a wait is reported
+LONG_WAIT_S = 1.0  # for one answer: longer than on a busy machine; such a wait is reported
 SPIN_NS = 150_000  # before a due time: longer than a sleep overruns
 _SLOW_SHARE = 0.95  # of the requested speed of the clock: a slower one is reported
-_SLOW_AGAIN_NS = 10_000_000_000  # between two reports of it
+_SLOW_REPORT_PERIOD_NS = 10_000_000_000  # between two reports of it
 _STALL_NS = 200_000_000  # a greater lateness moves the schedule and is not caught up with
-_STOOD_NS = 2_000_000_000  # between two ticks, without waiting for an answer: longer than on a busy machine
+# between two ticks, without waiting for an answer: longer than on a busy machine
+_MIN_STANDSTILL_NS = 2_000_000_000
 
 
 class Watch:
     """Reports when the autopilot falls silent and when it answers again, once each."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
-        self._lost: Address | None = None
+    def __init__(self, notify: Callable[[str], None]) -> None:
+        self._notify = notify
+        self._lost_peer: Address | None = None
 
-    def heard(self, link: Link) -> None:
+    def note_answer(self, link: Link) -> None:
         """Note that an answer came."""
-        lost, self._lost = self._lost, None
-        if lost is not None and lost == link.peer:  # else another has taken its place, which was reported
-            self._say(f"autopilot at {shown(link.peer)} answers again")
+        lost_peer, self._lost_peer = self._lost_peer, None
+        # else another has taken its place, which was reported
+        if lost_peer is not None and lost_peer == link.peer:
+            self._notify(f"autopilot at {address_text(link.peer)} answers again")
 
-    def silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
+    def check_silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
         """Note that no answer has come since that time of the monotonic clock."""
-        if self._lost is None and time.monotonic() - since > LOST_S:
-            self._lost = link.peer
-            self._say(
-                f"no answer from the autopilot at {shown(link.peer)} for {LOST_S:g} s "
+        if self._lost_peer is None and time.monotonic() - since > LOST_S:
+            self._lost_peer = link.peer
+            self._notify(
+                f"no answer from the autopilot at {address_text(link.peer)} for {LOST_S:g} s "
                 f"(t = {simulator.now_us / 1e6:.3f} s); waiting for it"
             )
 
 
-def meet(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
+def wait_for_autopilot(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
     """Wait for the heartbeat of an autopilot."""
-    link.timeout(LOOK_S)
+    link.timeout(POLL_S)
     while link.peer is None:
         stop.check()
         arrived = link.receive()
         if arrived:
-            link.take(*arrived, simulator)
+            link.process(*arrived, simulator)
 
 
 def run_lockstep(
     link: Link,
     simulator: HilSimulator,
     stop: StopRequest,
-    say: Callable[[str], None],
+    notify: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
     """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` allows."""
-    watch = Watch(say)
-    clock = None if pacing is None else Clock(pacing, simulator, say)
+    watch = Watch(notify)
+    clock = None if pacing is None else Clock(pacing, simulator, notify)
     ticks = TickLoop(link, simulator) if pacing is None else None
     link.timeout(_RESEND_FIRST_S)
     while True:
@@ -77,18 +79,20 @@ def run_lockstep(
         link.gather_truth(simulator)
         link.send(simulator.sensor_datagram())
         if ticks is None:
-            asked_s = time.monotonic()  # waiting that is not counted would look like a busy machine
+            sent_s = time.monotonic()  # waiting that is not counted would look like a busy machine
             arrived = link.receive()
         else:
             moved, arrived = ticks.run()
             if moved:
                 continue
-            asked_s = time.monotonic()
-        greeted = arrived is not None and link.take(*arrived, simulator)
+            sent_s = time.monotonic()
+        greeting_came = arrived is not None and link.process(*arrived, simulator)
         if not simulator.answered:
-            waited_s = _insist(link, simulator, stop, watch, arrived is None or greeted, asked_s)
-            if waited_s >= WAITED_S:
-                say(f"waited {waited_s:.1f} s for the autopilot")
+            waited_s = _resend_until_answered(
+                link, simulator, stop, watch, arrived is None or greeting_came, sent_s
+            )
+            if waited_s >= LONG_WAIT_S:
+                notify(f"waited {waited_s:.1f} s for the autopilot")
                 if clock is not None:
                     clock.skip(waited_s)
         simulator.advance()
@@ -97,65 +101,67 @@ def run_lockstep(
 class Clock:
     """The wall clock that lockstep follows if the machine is fast enough; reports when it is not."""
 
-    def __init__(self, pacing: Pacing, simulator: HilSimulator, say: Callable[[str], None]) -> None:
-        self._pacing, self._simulator, self._say = pacing, simulator, say
+    def __init__(self, pacing: Pacing, simulator: HilSimulator, notify: Callable[[str], None]) -> None:
+        self._pacing, self._simulator, self._notify = pacing, simulator, notify
         self._period_ns = round(simulator.tick_us * 1000 / pacing.speed)
-        self._due = time.perf_counter_ns()
-        self._told_ns = 0
+        self._due_ns = time.perf_counter_ns()
+        self._reported_ns = 0
         self._began_ns = time.perf_counter_ns()  # the last tick, or the end of a wait for an answer
 
     def skip(self, seconds: float) -> None:
         """Leave out a time for which the clock stood because no answer came."""
-        self._due = self._began_ns = time.perf_counter_ns()
+        self._due_ns = self._began_ns = time.perf_counter_ns()
         self._pacing.pause(round(seconds * 1e9))
 
     def wait(self) -> None:
         """Wait until the next tick is due."""
         # a greater lateness than _STALL_NS is not caught up with
-        self._due = max(self._due, time.perf_counter_ns() - _STALL_NS) + self._period_ns
-        before, now = self._began_ns, _sleep_until(self._due)
+        self._due_ns = max(self._due_ns, time.perf_counter_ns() - _STALL_NS) + self._period_ns
+        before, now = self._began_ns, _sleep_until(self._due_ns)
         self._began_ns = now
-        if now - before >= _STOOD_NS + self._period_ns:
-            stood_s = (now - before) * 1e-9
-            self._say(f"stood still for {stood_s:.1f} s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)")
-            self.skip(stood_s)
+        if now - before >= _MIN_STANDSTILL_NS + self._period_ns:
+            standstill_s = (now - before) * 1e-9
+            self._notify(
+                f"stood still for {standstill_s:.1f} s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)"
+            )
+            self.skip(standstill_s)
             return
         pacing = self._pacing
-        pacing.record(self._due, now)
+        pacing.record(self._due_ns, now)
         figures = pacing.figures
         if figures is self._simulator.pacing:
             return
         self._simulator.pacing = figures
         speed = figures.rate_hz * self._simulator.tick_us * 1e-6
-        if 0.0 < speed < _SLOW_SHARE * pacing.speed and now - self._told_ns > _SLOW_AGAIN_NS:
-            self._told_ns = now
+        if 0.0 < speed < _SLOW_SHARE * pacing.speed and now - self._reported_ns > _SLOW_REPORT_PERIOD_NS:
+            self._reported_ns = now
             text = f"Machine busy: clock at {speed:.2f} x, not {pacing.speed:g} x"
-            self._say(text.lower())
-            self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
+            self._notify(text.lower())
+            self._simulator.parameters.send_text(text, mavlink.MAV_SEVERITY_NOTICE)
 
 
-def _insist(
-    link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool, began: float
+def _resend_until_answered(
+    link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, resend: bool, began_s: float
 ) -> float:
-    """Resend the present tick until it is answered; `again`: immediately, because nothing or a greeting came.
-    Returns how long the answer took, in s, since the tick was sent at `began` (monotonic)."""
+    """Resend the present tick until it is answered; `resend`: at once, because nothing or a greeting came.
+    Returns how long the answer took, in s, since the tick was sent at `began_s` (monotonic)."""
     sent = time.monotonic()
     silence_s = _RESEND_FIRST_S
     while not simulator.answered:
         stop.check()
         # not for every stray datagram: the second answer to a resent tick would double all ticks that follow
         now = time.monotonic()
-        if again or now - sent >= silence_s:
+        if resend or now - sent >= silence_s:
             link.send(simulator.sensor_datagram())
             sent = now
             silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
             link.timeout(silence_s)
-        watch.silence(began, link, simulator)
+        watch.check_silence(began_s, link, simulator)
         arrived = link.receive()
-        again = arrived is None or link.take(*arrived, simulator)
+        resend = arrived is None or link.process(*arrived, simulator)
     link.timeout(_RESEND_FIRST_S)
-    watch.heard(link)
-    return time.monotonic() - began
+    watch.note_answer(link)
+    return time.monotonic() - began_s
 
 
 def run_real_time(
@@ -163,61 +169,61 @@ def run_real_time(
     simulator: HilSimulator,
     pacing: Pacing,
     stop: StopRequest,
-    say: Callable[[str], None],
-    ask: Callable[[], None],
-    take: Callable[[bytes, Address], object],
+    notify: Callable[[str], None],
+    send_tick: Callable[[], None],
+    process: Callable[[bytes, Address], object],
 ) -> None:
     """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted.
 
-    `ask` sends the present tick to the autopilot, `take` processes each datagram that comes back.
+    `send_tick` sends the present tick to the autopilot, `process` processes each datagram that comes back.
     """
-    watch = Watch(say)
+    watch = Watch(notify)
     period_ns = simulator.tick_us * 1000 / pacing.speed
     simulator.pacing = pacing.figures
-    heard = time.monotonic()
+    last_answer_s = time.monotonic()
     start = time.perf_counter_ns()
     tick = 0
     while True:
         stop.check()
         due = start + round(tick * period_ns)
         now = _sleep_until(due)
-        ask()
+        send_tick()
         pacing.record(due, now)
         simulator.pacing = pacing.figures
         link.send_truth(simulator)
         if now - due > _STALL_NS:
             start += now - due
         tick += 1
-        if _await_answer(link, simulator, start + round(tick * period_ns), take):
-            heard = time.monotonic()
-            watch.heard(link)
+        if _await_answer(link, simulator, start + round(tick * period_ns), process):
+            last_answer_s = time.monotonic()
+            watch.note_answer(link)
         else:
-            watch.silence(heard, link, simulator)
+            watch.check_silence(last_answer_s, link, simulator)
         simulator.advance()
 
 
 def _await_answer(
-    link: Link, simulator: HilSimulator, due_ns: int, take: Callable[[bytes, Address], object]
+    link: Link, simulator: HilSimulator, due_ns: int, process: Callable[[bytes, Address], object]
 ) -> bool:
     """Wait until the present tick is answered (True) or the next one is due."""
     while True:
         arrived = link.receive(socket.MSG_DONTWAIT)
         if arrived:
-            take(*arrived)
+            process(*arrived)
             if simulator.answered:
                 return True
-        left = due_ns - time.perf_counter_ns()
-        if left <= 0:
+        remaining_ns = due_ns - time.perf_counter_ns()
+        if remaining_ns <= 0:
             return False
-        if not arrived and left > SPIN_NS:
-            link.wait((left - SPIN_NS) * 1e-9)
+        if not arrived and remaining_ns > SPIN_NS:
+            link.wait((remaining_ns - SPIN_NS) * 1e-9)
 
 
 def _sleep_until(due_ns: int) -> int:
     """Sleep, then spin for the last part; returns the present time."""
-    left = due_ns - time.perf_counter_ns()
-    if left > SPIN_NS:
-        time.sleep((left - SPIN_NS) * 1e-9)
+    remaining_ns = due_ns - time.perf_counter_ns()
+    if remaining_ns > SPIN_NS:
+        time.sleep((remaining_ns - SPIN_NS) * 1e-9)
     while True:
         now = time.perf_counter_ns()
         if now >= due_ns:

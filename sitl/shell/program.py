@@ -9,23 +9,23 @@ import sys
 
 import click
 
-from autopilot.shell.compiling import ONCE, SIMULATOR
+from autopilot.shell.compiling import COMPILING_TEXT, SIMULATOR
 from autopilot.shell.options import (
     EXIT_ERROR,
     EXIT_USAGE,
-    MOST_SEED,
-    MOST_SPEED,
+    MAX_SEED,
+    MAX_SPEED,
     Address,
     ProgramCommand,
     Stop,
     StopRequest,
     WholeNumber,
     address_option,
-    be_punctual,
-    complain,
+    address_text,
     home_option,
+    print_errors,
+    reduce_latency,
     setting_option,
-    shown,
 )
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.convert.geodesy import Home
@@ -35,8 +35,8 @@ from sitl.pacing import Pacing
 from sitl.sensors.shipped import PROFILES, ProfileError
 from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
 from sitl.shell.link import Link
-from sitl.shell.loops import SPIN_NS, meet, run_lockstep, run_real_time
-from sitl.shell.tick_loop import rehearse
+from sitl.shell.loops import SPIN_NS, run_lockstep, run_real_time, wait_for_autopilot
+from sitl.shell.tick_loop import warm_up
 
 
 def _run_on(cpu: int) -> None:
@@ -71,11 +71,11 @@ def _run_on(cpu: int) -> None:
     help=f"The simulated vehicle: {VEHICLES.choice()}.",
 )
 @click.option(
-    "--seed", default=1, show_default=True, type=WholeNumber(0, MOST_SEED), help="Seed of all noise."
+    "--seed", default=1, show_default=True, type=WholeNumber(0, MAX_SEED), help="Seed of all noise."
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(0.0, MOST_SPEED, min_open=True),
+    type=click.FloatRange(0.0, MAX_SPEED, min_open=True),
     metavar="NUMBER",
     help="Maximum speed, as a multiple of real time.  [default: 1; with --lockstep: no limit]",
 )
@@ -170,7 +170,7 @@ def main(
 
         check_names(settings)
 
-    def say(text: str) -> None:
+    def notify(text: str) -> None:
         if not quiet:
             print(f"sitl: {text}", flush=True)
 
@@ -182,7 +182,7 @@ def main(
     simulator: HilSimulator | None = None
     try:
         # first, so that no message of an autopilot is lost while kernels are compiled
-        link = Link(listen, truth, say)
+        link = Link(listen, truth, notify)
 
         def build() -> HilSimulator:
             return HilSimulator.build(
@@ -198,57 +198,57 @@ def main(
 
         compiled = SIMULATOR.ready
         if not compiled:
-            say(ONCE)
+            notify(COMPILING_TEXT)
         warm = build()  # compiles, or loads, every kernel
-        rehearse(warm)
+        warm_up(warm)
         warm.truth_datagram()
         warm.receive(b"")
         warm.advance()
         if not compiled:
-            SIMULATOR.done()
+            SIMULATOR.mark_done()
         simulator = build()
         if cpu is not None:
             _run_on(cpu)
         # not if it would spin for most of the time, which would keep other programs from running
-        be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
+        reduce_latency(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
         mode = "in lockstep" if unlimited else f"at {factor:g} x real time, slower on a busy machine"
         if real_time:
             mode = f"at {factor:g} x real time, without waiting for answers"
-        say(
+        notify(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
-            f"waiting for {kind.awaited} on {shown(listen)}"
+            f"waiting for {kind.awaited_name} on {address_text(listen)}"
         )
         with StopRequest() as stop:
             paced = None if unlimited else pacing
             if kind.run is not None:
-                kind.run(link, simulator, stop, say, paced)
+                kind.run(link, simulator, stop, notify, paced)
                 return
-            meet(link, simulator, stop)
+            wait_for_autopilot(link, simulator, stop)
             if real_time:
                 run_real_time(
                     link,
                     simulator,
                     pacing,
                     stop,
-                    say,
-                    ask=lambda: link.send(simulator.sensor_datagram()),
-                    take=lambda datagram, sender: link.take(datagram, sender, simulator),
+                    notify,
+                    send_tick=lambda: link.send(simulator.sensor_datagram()),
+                    process=lambda datagram, sender: link.process(datagram, sender, simulator),
                 )
             else:
-                run_lockstep(link, simulator, stop, say, paced)
+                run_lockstep(link, simulator, stop, notify, paced)
     except (VehicleFileError, ProfileError) as error:
-        sys.exit(complain("sitl", EXIT_USAGE, *error.problems))
+        sys.exit(print_errors("sitl", EXIT_USAGE, *error.problems))
     except ParameterError as error:
-        sys.exit(complain("sitl", EXIT_USAGE, str(error)))
+        sys.exit(print_errors("sitl", EXIT_USAGE, str(error)))
     except ValueError as error:
-        sys.exit(complain("sitl", EXIT_ERROR, str(error)))
+        sys.exit(print_errors("sitl", EXIT_ERROR, str(error)))
     except Stop:
         pass
     finally:
         if link is not None:
             link.close()
     if simulator is not None and link is not None:
-        say(_summary(simulator, real_time, pacing, link.served_s))
+        notify(_summary(simulator, real_time, pacing, link.served_s))
 
 
 def _summary(simulator: HilSimulator, real_time: bool, pacing: Pacing, wall_s: float) -> str:

@@ -8,92 +8,96 @@ import socket
 import time
 from collections.abc import Callable
 
-from autopilot.shell.options import Address, StopRequest, reason, shown
+from autopilot.shell.options import Address, StopRequest, address_text, os_error_text
 from sitl.hil import HilSimulator
 from sitl.interfaces.px4 import Exchange
 from sitl.pacing import Pacing
 from sitl.shell.link import Link
-from sitl.shell.loops import LOOK_S, LOST_S, WAITED_S, Clock
+from sitl.shell.loops import LONG_WAIT_S, LOST_S, POLL_S, Clock
 
-_FREE_S = 0.004  # between ticks before the first answer: about real time, as the firmware starts by its clock
-_PIECE = 65_536
-_UNREAD = 65_536  # bytes that may wait for a firmware that does not read: hundreds of ticks
+# between ticks before the first answer: about real time, as the firmware starts by its clock
+_FREE_RUN_TICK_S = 0.004
+_CHUNK_BYTES = 65_536
+_SEND_BUFFER_BYTES = 65_536  # bytes that may wait for a firmware that does not read: hundreds of ticks
 
 
 def run_px4(
     link: Link,
     simulator: HilSimulator,
     stop: StopRequest,
-    say: Callable[[str], None],
+    notify: Callable[[str], None],
     pacing: Pacing | None = None,
 ) -> None:
     """Serve firmwares for ever; the world restarts with each."""
     exchange = Exchange(simulator)
     with _server(link.address) as server:
-        door, served = Door(server, say), False
+        gate, served = FirmwareGate(server, notify), False
         while True:
             stop.check()
-            came = door.enter()
-            if came is None:
+            connection = gate.accept_next()
+            if connection is None:
                 continue
-            firmware, peer = came
-            say(f"serving PX4 at {shown(peer)}{', and the world restarts' if served else ''}")
-            link.met()
+            firmware, peer = connection
+            notify(f"serving PX4 at {address_text(peer)}{', and the world restarts' if served else ''}")
+            link.note_connection()
             if served:
-                simulator.begin_anew()
+                simulator.restart()
                 exchange = Exchange(simulator)
             served = True
             with firmware:
                 firmware.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                firmware.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD)
-                clock = None if pacing is None else Clock(pacing, simulator, say)
-                why = _serve(firmware, exchange, door, link, simulator, stop, say, clock)
-            say(f"PX4 is gone at t = {simulator.now_us / 1e6:.3f} s: {why}; waiting for another")
+                firmware.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+                clock = None if pacing is None else Clock(pacing, simulator, notify)
+                reason_gone = _serve(firmware, exchange, gate, link, simulator, stop, notify, clock)
+            notify(f"PX4 is gone at t = {simulator.now_us / 1e6:.3f} s: {reason_gone}; waiting for another")
 
 
-class Door:
+class FirmwareGate:
     """Lets one firmware in at a time."""
 
-    def __init__(self, server: socket.socket, say: Callable[[str], None]) -> None:
-        self._server, self._say = server, say
-        self._inside: Address | None = None
+    def __init__(self, server: socket.socket, notify: Callable[[str], None]) -> None:
+        self._server, self._notify = server, notify
+        self._served: Address | None = None
         self._next: tuple[socket.socket, Address] | None = None
-        self._looked_s = 0.0
+        self._last_poll_s = 0.0
 
-    def enter(self) -> tuple[socket.socket, Address] | None:
+    def accept_next(self) -> tuple[socket.socket, Address] | None:
         """The firmware that is served from now on; None if none has connected for LOOK_S."""
-        came, self._next = self._next or self._asking(LOOK_S), None
-        self._inside = None if came is None else came[1]
-        return came
+        connection, self._next = self._next or self._accept_within(POLL_S), None
+        self._served = None if connection is None else connection[1]
+        return connection
 
-    def turn_away(self) -> None:
+    def refuse_others(self) -> None:
         """Refuse a firmware that connects while another answers; checks at most once in LOOK_S."""
-        came = self._knocking()
-        if came is not None:
-            came[0].close()
-            self._say(f"PX4 at {shown(came[1])} is not served: that at {shown(self._inside)} answers")
+        connection = self._poll_for_next()
+        if connection is not None:
+            connection[0].close()
+            self._notify(
+                f"PX4 at {address_text(connection[1])} is not served: "
+                f"that at {address_text(self._served)} answers"
+            )
 
-    def give_place(self) -> None:
+    def yield_to_next(self) -> None:
         """If another firmware connects while the present one is silent, raise ConnectionError to serve it."""
-        self._next = self._knocking()
+        self._next = self._poll_for_next()
         if self._next is not None:
             raise ConnectionError("it is silent, and another asks")
 
-    def _knocking(self) -> tuple[socket.socket, Address] | None:
+    def _poll_for_next(self) -> tuple[socket.socket, Address] | None:
         now_s = time.monotonic()
-        if now_s - self._looked_s < LOOK_S:
+        if now_s - self._last_poll_s < POLL_S:
             return None
-        self._looked_s = now_s
-        return self._asking(0.0)
+        self._last_poll_s = now_s
+        return self._accept_within(0.0)
 
-    def _asking(self, seconds: float) -> tuple[socket.socket, Address] | None:
+    def _accept_within(self, seconds: float) -> tuple[socket.socket, Address] | None:
         if not select.select([self._server], [], [], seconds)[0]:
             return None
         try:
-            came, peer = self._server.accept()
+            connection, peer = self._server.accept()
         except ConnectionError:  # it has disconnected already
             return None
-        return came, peer[:2]
+        return connection, peer[:2]
 
 
 def _server(address: Address) -> socket.socket:
@@ -105,7 +109,8 @@ def _server(address: Address) -> socket.socket:
         server.close()
         busy = "is another sitl running? " if error.errno == errno.EADDRINUSE else ""
         raise ValueError(
-            f"cannot listen on TCP {shown(address)}: {reason(error)}; {busy}choose another with --listen"
+            f"cannot listen on TCP {address_text(address)}: {os_error_text(error)}; "
+            f"{busy}choose another with --listen"
         ) from None
     server.listen(1)
     return server
@@ -114,28 +119,28 @@ def _server(address: Address) -> socket.socket:
 def _serve(
     firmware: socket.socket,
     exchange: Exchange,
-    door: Door,
+    gate: FirmwareGate,
     link: Link,
     simulator: HilSimulator,
     stop: StopRequest,
-    say: Callable[[str], None],
+    notify: Callable[[str], None],
     clock: Clock | None,
 ) -> str:
     """Tick while the firmware is connected; returns why it no longer is."""
-    began = time.monotonic()
+    began_s = time.monotonic()
     try:
         while True:
             stop.check()
             if clock is not None:
                 clock.wait()
-            if exchange.in_step:
-                door.turn_away()
-            elif time.monotonic() - began > LOST_S:
-                door.give_place()
+            if exchange.in_lockstep:
+                gate.refuse_others()
+            elif time.monotonic() - began_s > LOST_S:
+                gate.yield_to_next()
             firmware.sendall(exchange.sensors())
             link.gather_truth(simulator)
-            waited_s = _await(firmware, exchange, door, simulator, stop, say)
-            if clock is not None and waited_s >= WAITED_S:
+            waited_s = _await(firmware, exchange, gate, simulator, stop, notify)
+            if clock is not None and waited_s >= LONG_WAIT_S:
                 clock.skip(waited_s)
             simulator.advance()
     except TimeoutError:
@@ -143,38 +148,40 @@ def _serve(
     except EOFError:
         return "the connection was closed"
     except ConnectionError as error:
-        return reason(error)
+        return os_error_text(error)
 
 
 def _await(
     firmware: socket.socket,
     exchange: Exchange,
-    door: Door,
+    gate: FirmwareGate,
     simulator: HilSimulator,
     stop: StopRequest,
-    say: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> float:
     """Wait until the tick is answered or, before the first answer, for _FREE_S; returns the time in s."""
-    began = time.monotonic()
-    told = False
+    began_s = time.monotonic()
+    silence_reported = False
     while True:
-        firmware.settimeout(LOOK_S if exchange.in_step else _FREE_S)
+        firmware.settimeout(POLL_S if exchange.in_lockstep else _FREE_RUN_TICK_S)
         try:
-            piece = firmware.recv(_PIECE)
+            chunk = firmware.recv(_CHUNK_BYTES)
         except TimeoutError:
-            piece = None
-        if piece == b"":
+            chunk = None
+        if chunk == b"":
             raise EOFError
-        if piece is not None and exchange.receive(piece):
-            if told:
-                say("PX4 answers again")
+        if chunk is not None and exchange.receive(chunk):
+            if silence_reported:
+                notify("PX4 answers again")
             break
-        if not exchange.in_step and time.monotonic() - began >= _FREE_S:
+        if not exchange.in_lockstep and time.monotonic() - began_s >= _FREE_RUN_TICK_S:
             break
         stop.check()
-        if told:
-            door.give_place()
-        elif time.monotonic() - began > LOST_S:
-            told = True
-            say(f"no answer from PX4 for {LOST_S:g} s (t = {simulator.now_us / 1e6:.3f} s); waiting for it")
-    return time.monotonic() - began
+        if silence_reported:
+            gate.yield_to_next()
+        elif time.monotonic() - began_s > LOST_S:
+            silence_reported = True
+            notify(
+                f"no answer from PX4 for {LOST_S:g} s (t = {simulator.now_us / 1e6:.3f} s); waiting for it"
+            )
+    return time.monotonic() - began_s

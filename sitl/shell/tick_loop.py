@@ -22,76 +22,80 @@ from autopilot.shell.machine_sockets import (
     system_address,
     usable,
 )
-from autopilot.shell.options import LARGEST_DATAGRAM, Address
+from autopilot.shell.options import MAX_DATAGRAM_BYTES, Address
 from autopilot.wire.compiled import Bytes
 from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
-from sitl.running import NOW_US, RAN, Ints, Running
 from sitl.shell.link import TRUTH_WINDOW_US, Link
-from sitl.ticks import TRUTH_OF_A_TICK, goes_on, move_on, put_sensors_next, put_truth_due
+from sitl.tick_batch import NOW_US, TICKS_RUN, Ints, TickBatch
+from sitl.ticks import MAX_TRUTH_BYTES, advance_with_answer, can_continue, put_next_sensors, put_truth_if_due
 
 # why `exchange` returns
-SILENCE, HEARD, MOVED = 0, 1, 2
-_TRUTH_ROOM = 65_507  # bytes of the longest datagram; a window has less
-# entries of `Wire.sizes`
-_ADDRESS, _HEARD, _GATHERED = range(3)
+TIMED_OUT, RECEIVED, ADVANCED = 0, 1, 2
+_TRUTH_CAPACITY = 65_507  # bytes of the longest datagram; a window has less
+# entries of `SocketBuffers.sizes`
+_ADDRESS, _RECEIVED, _GATHERED = range(3)
 
 
-class Wire(NamedTuple):
+class SocketBuffers(NamedTuple):
     """The sockets, and the data that pass through them."""
 
     fd: int
     truth_fd: int
     peer: Bytes  # the addresses of the autopilot that is served, of the last sender, and for the truth
     sender: Bytes
-    truth_to: Bytes
-    heard: Bytes  # the last datagram
+    truth_address: Bytes
+    received: Bytes  # the last datagram
     gathered: Bytes  # truth of this window
-    sizes: Ints  # bytes of the sender's address, of `heard`, of `gathered`
+    sizes: Ints  # bytes of the sender's address, of `received`, of `gathered`
     window_ends_us: Ints  # (1,)
 
 
 @kernel
-def _tell(wire: Wire, run: Running) -> None:
+def _send_tick(buffers: SocketBuffers, batch: TickBatch) -> None:
     """Send the sensors of this tick; gather its truth, and send the truth at the end of a window."""
-    now_us = run.numbers[NOW_US]
-    wire.sizes[_GATHERED] += put_truth_due(run, wire.gathered[wire.sizes[_GATHERED] :])
-    ends_us = wire.window_ends_us[0]
+    now_us = batch.numbers[NOW_US]
+    buffers.sizes[_GATHERED] += put_truth_if_due(batch, buffers.gathered[buffers.sizes[_GATHERED] :])
+    ends_us = buffers.window_ends_us[0]
     if not ends_us - TRUTH_WINDOW_US < now_us < ends_us:
-        wire.window_ends_us[0] = next_multiple(now_us, TRUTH_WINDOW_US)
-        if wire.sizes[_GATHERED] > 0:
+        buffers.window_ends_us[0] = next_multiple(now_us, TRUTH_WINDOW_US)
+        if buffers.sizes[_GATHERED] > 0:
             send_to_at(
-                wire.truth_fd,
-                wire.gathered.ctypes.data,
-                wire.sizes[_GATHERED],
-                wire.truth_to.ctypes.data,
+                buffers.truth_fd,
+                buffers.gathered.ctypes.data,
+                buffers.sizes[_GATHERED],
+                buffers.truth_address.ctypes.data,
                 SYSTEM_ADDRESS_BYTES,
             )
-            wire.sizes[_GATHERED] = 0
-    length = put_sensors_next(run)
-    send_to_at(wire.fd, run.buffer.ctypes.data, length, wire.peer.ctypes.data, SYSTEM_ADDRESS_BYTES)
+            buffers.sizes[_GATHERED] = 0
+    length = put_next_sensors(batch)
+    send_to_at(buffers.fd, batch.buffer.ctypes.data, length, buffers.peer.ctypes.data, SYSTEM_ADDRESS_BYTES)
 
 
 @threaded
-def exchange(wire: Wire, run: Running) -> int:
+def exchange(buffers: SocketBuffers, batch: TickBatch) -> int:
     """Run ticks of the world, each as soon as the one before is answered. Returns SILENCE or HEARD if the
     present tick is not answered, MOVED if the world is at a tick of which no frames are written yet."""
     while True:
-        wire.sizes[_ADDRESS] = SYSTEM_ADDRESS_BYTES
+        buffers.sizes[_ADDRESS] = SYSTEM_ADDRESS_BYTES
         size = receive_from_at(
-            wire.fd, wire.heard.ctypes.data, len(wire.heard), wire.sender.ctypes.data, wire.sizes.ctypes.data
+            buffers.fd,
+            buffers.received.ctypes.data,
+            len(buffers.received),
+            buffers.sender.ctypes.data,
+            buffers.sizes.ctypes.data,
         )
-        wire.sizes[_HEARD] = size
+        buffers.sizes[_RECEIVED] = size
         if size < 0:
-            return SILENCE
+            return TIMED_OUT
         for i in range(SYSTEM_ADDRESS_BYTES):
-            if wire.sender[i] != wire.peer[i]:
-                return HEARD
-        if not move_on(run, wire.heard.ctypes.data, size):
-            return HEARD
-        if not goes_on(run) or wire.sizes[_GATHERED] > _TRUTH_ROOM - TRUTH_OF_A_TICK:
-            return MOVED
-        _tell(wire, run)
+            if buffers.sender[i] != buffers.peer[i]:
+                return RECEIVED
+        if not advance_with_answer(batch, buffers.received.ctypes.data, size):
+            return RECEIVED
+        if not can_continue(batch) or buffers.sizes[_GATHERED] > _TRUTH_CAPACITY - MAX_TRUTH_BYTES:
+            return ADVANCED
+        _send_tick(buffers, batch)
 
 
 class TickLoop:
@@ -99,69 +103,69 @@ class TickLoop:
 
     def __init__(self, link: Link, simulator: HilSimulator) -> None:
         self._link, self._simulator = link, simulator
-        self._truth_to = system_address(link.truth)
-        self._usable = all(map(usable, link.sockets)) and self._truth_to is not None
+        self._truth_address = system_address(link.truth)
+        self._usable = all(map(usable, link.sockets)) and self._truth_address is not None
         self._peer: Address | None = None
-        self._wire: Wire | None = None
+        self._buffers: SocketBuffers | None = None
         self._exchange: Any = None  # machine code, after its first use
 
     def run(self) -> tuple[bool, tuple[bytes, Address] | None]:
         """Run after the sensors of a tick were sent. Returns whether the world has moved on to a tick that is
         still to be sent, and otherwise the datagram that came, if any, as `Link.receive` returns it."""
         link, simulator = self._link, self._simulator
-        run = simulator.running() if self._usable else None
-        wire = None if run is None else self._ready()
-        if run is None or wire is None:
+        batch = simulator.tick_batch() if self._usable else None
+        buffers = None if batch is None else self._ready()
+        if batch is None or buffers is None:
             return False, link.receive()
         gathered = link.take_gathered()
-        if len(gathered) > _TRUTH_ROOM - TRUTH_OF_A_TICK:
+        if len(gathered) > _TRUTH_CAPACITY - MAX_TRUTH_BYTES:
             link.gather(gathered, link.window_ends_us)
             return False, link.receive()
-        wire.gathered[: len(gathered)] = np.frombuffer(gathered, np.uint8)
-        wire.sizes[_GATHERED], wire.window_ends_us[0] = len(gathered), link.window_ends_us
+        buffers.gathered[: len(gathered)] = np.frombuffer(gathered, np.uint8)
+        buffers.sizes[_GATHERED], buffers.window_ends_us[0] = len(gathered), link.window_ends_us
         if self._exchange is None:
-            self._exchange = entry_of(exchange, wire, run)
-        why = self._exchange(wire, run)
-        link.gather(wire.gathered[: wire.sizes[_GATHERED]].tobytes(), int(wire.window_ends_us[0]))
-        if run.numbers[RAN]:
-            link.heard()
-        simulator.ran(framed=why != MOVED)
-        if why != HEARD:
-            return why == MOVED, None
-        sender = wire.sender.tobytes()
-        return False, (wire.heard[: wire.sizes[_HEARD]].tobytes(), address_of_system(sender))
+            self._exchange = entry_of(exchange, buffers, batch)
+        reason = self._exchange(buffers, batch)
+        link.gather(buffers.gathered[: buffers.sizes[_GATHERED]].tobytes(), int(buffers.window_ends_us[0]))
+        if batch.numbers[TICKS_RUN]:
+            link.note_answer()
+        simulator.finish_batch(sensors_sent=reason != ADVANCED)
+        if reason != RECEIVED:
+            return reason == ADVANCED, None
+        sender = buffers.sender.tobytes()
+        return False, (buffers.received[: buffers.sizes[_RECEIVED]].tobytes(), address_of_system(sender))
 
-    def _ready(self) -> Wire | None:
+    def _ready(self) -> SocketBuffers | None:
         """The wire to the autopilot that is served now; None: machine code cannot send to its address."""
         peer = self._link.peer
         if peer != self._peer:
             self._peer = peer
             address = None if peer is None else system_address(peer)
-            self._wire = None if address is None else self._wire_to(address)
-        return self._wire
+            self._buffers = None if address is None else self._buffers_to(address)
+        return self._buffers
 
-    def _wire_to(self, peer: bytes) -> Wire:
-        assert self._truth_to is not None
+    def _buffers_to(self, peer: bytes) -> SocketBuffers:
+        assert self._truth_address is not None
         sock, truth_sock = self._link.sockets
-        return _new_wire(sock.fileno(), truth_sock.fileno(), peer, self._truth_to)
+        return _new_buffers(sock.fileno(), truth_sock.fileno(), peer, self._truth_address)
 
 
-def _new_wire(fd: int, truth_fd: int, peer: bytes, truth_to: bytes) -> Wire:
-    return Wire(
+def _new_buffers(fd: int, truth_fd: int, peer: bytes, truth_address: bytes) -> SocketBuffers:
+    return SocketBuffers(
         fd,
         truth_fd,
         np.frombuffer(peer, np.uint8).copy(),
         np.zeros(SYSTEM_ADDRESS_BYTES, np.uint8),
-        np.frombuffer(truth_to, np.uint8).copy(),
-        np.zeros(LARGEST_DATAGRAM, np.uint8),
-        np.zeros(_TRUTH_ROOM, np.uint8),
+        np.frombuffer(truth_address, np.uint8).copy(),
+        np.zeros(MAX_DATAGRAM_BYTES, np.uint8),
+        np.zeros(_TRUTH_CAPACITY, np.uint8),
         np.zeros(3, np.int64),
         np.zeros(1, np.int64),
     )
 
 
-def rehearse(simulator: HilSimulator) -> None:
+def warm_up(simulator: HilSimulator) -> None:
     """Prepare the machine code of `exchange`, if this simulator can use it."""
-    run = simulator.running()
-    if SUPPORTED and run is not None:
-        entry_of(exchange, _new_wire(-1, -1, b"", b""), run)
+    batch = simulator.tick_batch()
+    if SUPPORTED and batch is not None:
+        entry_of(exchange, _new_buffers(-1, -1, b"", b""), batch)

@@ -9,7 +9,7 @@ from autopilot.vehicle.model import Vehicle
 from sitl.plant.records import Air, ChainModel, Drive, Truth
 
 # keys of the vehicle file that are not the name of the field followed by its unit
-_NAMED = {
+_IRREGULAR_KEYS = {
     "known_curve": "thrust_curve_known",
     "speed_controlled": "esc_speed_controlled",
     "cells": "battery_cells",
@@ -24,14 +24,16 @@ _SCALES = {"capacity_as": 3.6}  # A s per mAh
 
 
 def _keys(record: type[Truth] | type[Air] | type[Drive]) -> dict[str, str]:
-    """Key of the vehicle file for each field: from `_NAMED`, or the field's name followed by its unit."""
+    """Key of the vehicle file for each field: from `_IRREGULAR_KEYS`, or its name followed by its unit."""
     found = {}
     for field in record._fields:
         if field in _RECORDS:
             continue
         keys = [key for key in Vehicle.model_fields if key == field or key.startswith(f"{field}_")]
-        if field in _NAMED or keys:  # else the field is not in the vehicle file: the winch, the voltage
-            found[field] = _NAMED.get(field) or min(keys, key=len)
+        if (
+            field in _IRREGULAR_KEYS or keys
+        ):  # else the field is not in the vehicle file: the winch, the voltage
+            found[field] = _IRREGULAR_KEYS.get(field) or min(keys, key=len)
     return found
 
 

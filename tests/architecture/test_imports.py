@@ -35,9 +35,9 @@ VEHICLE = (  # the record of a vehicle, its file, and where its rotors are
 PLANT = ("sitl.plant.records", "sitl.plant.rotors")  # what the sensors may import of it
 RECORDS = "autopilot.control.records"  # the records of the laws: vehicle, state, reference, command
 OWN = (  # custom laws, estimators and planners, by name
-    "autopilot.own.brought",
-    "autopilot.own.chosen",
-    "autopilot.own.doubts",
+    "autopilot.own.loaded_class",
+    "autopilot.own.own_code",
+    "autopilot.own.misspellings",
     "autopilot.own.estimator",
     "autopilot.own.law",
     "autopilot.own.planner",
@@ -102,7 +102,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # its lines stand at the speed that the speed controllers report
     "sitl.sensors.vibration": ("autopilot.geometry", "autopilot.wire.convert", *PLANT, "sitl.sensors"),
     "sitl.vehicles": (*VEHICLE, "autopilot.wire", "sitl.plant.records"),
-    "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.chosen"),
+    "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.overrides"),
     "sitl.world": (
         "autopilot.geometry",
         "autopilot.vehicle.layout",
@@ -140,7 +140,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.vehicles",
     ),
     "gcs.workflows.own_planner": (*GCS, "gcs", "autopilot.own", "autopilot.shell.watched_calls"),
-    "gcs.workflows.flight_here": (*GCS, "gcs", "autopilot.shell.watched_calls"),
+    "gcs.workflows.in_process_flight": (*GCS, "gcs", "autopilot.shell.watched_calls"),
     "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.closed_ticks": ("autopilot", "sitl", "gcs"),
@@ -308,7 +308,7 @@ BAD = {
     "autopilot/services/commands.py": "def f():\n    from autopilot.control.laws import thesis",
     "autopilot/services/endpoint.py": "from autopilot.onboard import onboard",
     "autopilot/supervisor/advance.py": "from autopilot.core.flight_core import FlightCore",
-    "autopilot/supervisor/quiescence.py": "from autopilot.core.tick import Seen",
+    "autopilot/supervisor/quiescence.py": "from autopilot.core.tick import EstimateSummary",
     "autopilot/supervisor/settings.py": "from autopilot.control.laws import chosen_law",
     "autopilot/supervisor/watches/slack.py": "from autopilot.estimation.tautness import tautness",
     "autopilot/supervisor/requests/arming.py": "from autopilot.estimation.filter import estimate",

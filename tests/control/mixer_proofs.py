@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from autopilot.control.records import Vehicle
 from autopilot.vehicle.layout import Layout, Rotor
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.rotors import mixer_table
 from tests.control.closeness import EXACT, close
 from tests.doubles.mixing import mix
 
@@ -56,7 +56,7 @@ def forces_make_the_demand(laws: SimpleNamespace, model: SimpleNamespace, vehicl
     for limited, thrust, moment in ((1.0, 4.0, (0.01, -0.02, 0.003)), (0.0, 9.0, (-0.4, 0.3, 0.05))):
         result = mix(thrust, moment, vehicle, limited, room=laws)
         close(matrix @ np.array(result.forces), (thrust, *moment), EXACT)
-        close((result.thrust_done, *result.moment_done), (thrust, *moment), EXACT)
+        close((result.achieved_thrust, *result.achieved_moment), (thrust, *moment), EXACT)
         assert result.saturated == 0
 
 
@@ -98,7 +98,7 @@ def cuts_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Veh
             bits = sum(1 << i for i in range(4) if not limits[0] <= plain[i] <= limits[1])
             assert result.saturated == bits != 0
             assert all(limits[0] <= F <= limits[1] for F in result.forces)
-            close((result.thrust_done, *result.moment_done), best_forces(limited, demand), PROGRAMME)
+            close((result.achieved_thrust, *result.achieved_moment), best_forces(limited, demand), PROGRAMME)
 
 
 @cache
@@ -154,7 +154,7 @@ def any_rotors_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicl
         plain = inverse @ np.array(demand)
         assert result.saturated == sum(1 << i for i, u in enumerate(plain) if not 0.1 <= u <= 1.5)
         close(result.forces, strengths * best_efforts(limits, UNEVEN, demand), PROGRAMME)
-        close((result.thrust_done, *result.moment_done), does @ np.array(result.forces), EXACT)
+        close((result.achieved_thrust, *result.achieved_moment), does @ np.array(result.forces), EXACT)
 
 
 def what_is_no_number_is_zero(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -174,10 +174,10 @@ def the_same_of_each_that_is_left(laws: SimpleNamespace, model: SimpleNamespace,
     """Idling rotors all give the same force, except those that are lost; the thrust is their sum."""
     for layout, lost in ((UNEVEN, 0b100), (MOST_ROTORS, 0)):
         rotors = laws.new_rotors()
-        result = laws.spread(0.05, allocate(layout, lost), rotors)
+        result = laws.spread(0.05, mixer_table(layout, lost), rotors)
         expected = [0.0 if lost >> i & 1 else 0.05 for i in range(len(layout))]
         close(rotors[laws.FORCE, : len(layout)], expected, EXACT)
-        close((result.thrust_done, *result.moment_done), (sum(expected), 0.0, 0.0, 0.0), EXACT)
+        close((result.achieved_thrust, *result.achieved_moment), (sum(expected), 0.0, 0.0, 0.0), EXACT)
         assert result.saturated == 0
 
 

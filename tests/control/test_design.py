@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from autopilot.control.design import Timing, Wanted, design, feedback, gains_of, level_axis
+from autopilot.control.design import Requirements, Timing, ackermann_gain, design, gains_of, level_axis_model
 from autopilot.control.records import Vehicle
 
-WANTED = Wanted(0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0)
+WANTED = Requirements(0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0)
 # a vehicle five times as heavy, with a longer cable
 HEAVY = Vehicle(2.0, 0.5, 2.0, (0.02, 0.022, 0.04), 9.81, 0.25, 0.02, 0.0, 10.0)
 
@@ -48,7 +48,7 @@ def test_poles_are_those_of_the_three_loops(vehicle: str, bebop: Vehicle) -> Non
     omega_i, omega_x, omega_q, omega_R, zeta = 0.5, 2.5, 4.0, 15.0, 0.8
     gains = gains_of(omega_i, omega_x, omega_q, omega_R, zeta, v)
     m, reach, J = v.quad_mass + v.load_mass, v.quad_mass * v.cable_length, v.inertia[0]
-    A, b = level_axis(v, J, 0.01)
+    A, b = level_axis_model(v, J, 0.01)
     chain, b = A[:7, :7], np.append(np.zeros(6), 1.0 / J)
     # rows that give q_c, then F / (m g) = theta_c, from the chain's state; each rate is a row times the chain
     q_c = np.array([gains.k_i[0], gains.k_x[0], gains.k_v[0], 0.0, 0.0, 0.0, 0.0]) / (m * v.gravity)
@@ -63,7 +63,7 @@ def test_poles_are_those_of_the_three_loops(vehicle: str, bebop: Vehicle) -> Non
     for omega in (omega_x, omega_q, omega_R):
         expected = np.convolve(expected, [1.0, 2.0 * zeta * omega, omega * omega])
     np.testing.assert_allclose(closed, expected, rtol=1e-6)
-    np.testing.assert_allclose(feedback(A, J, expected)[:7], -u, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(ackermann_gain(A, J, expected)[:7], -u, rtol=1e-6, atol=1e-9)
 
 
 def test_another_vehicle_gets_gains_of_its_own() -> None:

@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 import autopilot
 import missions
 from autopilot.control.actuators import disturbance_observer as observer
-from autopilot.control.actuators.disturbance_observer import Observed
-from autopilot.control.actuators.rotor_model import Actuation, advance, rows_of, steady
+from autopilot.control.actuators.disturbance_observer import DisturbanceEstimate
+from autopilot.control.actuators.rotor_model import Actuation, advance, queue_rows, steady_actuation
 from autopilot.control.actuators.torque_observer import NO_TORQUE
 from autopilot.control.believed import believed_actuation, believed_vehicle
 from autopilot.control.drag import Drag
@@ -43,7 +43,7 @@ from tests.doubles.plain_python import in_plain_python
 ZERO, EAST, DOWN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
 LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 TICK = 0.004
-BEHIND = {"actuation": Actuation, "observed": Observed, "cable": Cable}
+BEHIND = {"actuation": Actuation, "observed": DisturbanceEstimate, "cable": Cable}
 FOLLOWED: dict[str, dict[str, Any]] = {
     "load_position": {"reference": Reference},
     "quad_position": {"reference": Reference},
@@ -124,7 +124,7 @@ def test_a_law_that_begins_on_a_steady_climb_goes_on_with_it(law: Law, climb: fl
     rising reference as this law keeps it; and the same for the vehicle alone."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0, VEH_ACT_DELAY=10.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
-    cable, observed = Cable(vehicle.cable_length), observer.aloft(vehicle)
+    cable, observed = Cable(vehicle.cable_length), observer.nominal_in_flight(vehicle)
     flown, v = law.kernels, (0.0, 0.0, climb)
     both = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     alone = vehicle.quad_mass * vehicle.gravity
@@ -132,7 +132,7 @@ def test_a_law_that_begins_on_a_steady_climb_goes_on_with_it(law: Law, climb: fl
         carries = mode is flown.load_position
         lag = law.ramp_lag_s(built) if carries else 0.0
         tolerance = EXACT + (SLIP.get(law.name, 0.0) * abs(climb) if carries else 0.0)
-        rotors = steady(weight, rows_of(constants))
+        rotors = steady_actuation(weight, queue_rows(constants))
         memory = None
         for k in range(100):
             z = climb * k * TICK
@@ -156,10 +156,10 @@ def test_a_law_turns_with_its_heading(law: Law, angle: float, rate: float) -> No
     """A vehicle over a load at rest turns as commanded: no moment is needed."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
-    cable, observed = Cable(vehicle.cable_length), observer.aloft(vehicle)
+    cable, observed = Cable(vehicle.cable_length), observer.nominal_in_flight(vehicle)
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     above = (0.0, 0.0, vehicle.cable_length)
-    rotors, memory = steady(weight, rows_of(constants)), None
+    rotors, memory = steady_actuation(weight, queue_rows(constants)), None
     for k in range(round(2.0 / TICK)):
         psi = angle + rate * k * TICK
         c, s = math.cos(psi), math.sin(psi)
@@ -180,17 +180,27 @@ def test_a_law_begins_to_turn_as_its_heading_does(law: Law) -> None:
     the same sense."""
     table = parameters(law, PLB_DRAG=0.0, PLB_DRAG_2=0.0)
     built, vehicle, constants = build_law(table), believed_vehicle(table), believed_actuation(table)
-    behind = steady((vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity, rows_of(constants))
+    behind = steady_actuation(
+        (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity, queue_rows(constants)
+    )
     at = State(ZERO, ZERO, DOWN, ZERO, (0.0, 0.0, vehicle.cable_length), ZERO, LEVEL, ZERO)
     memory = law.kernels.start(built, at, ZERO, ZERO)
-    for sense in (1.0, -1.0):
-        reference = Reference((ZERO,) * 7, EAST, (0.0, sense * 0.5, 0.0), (-0.25, sense * 2.0, 0.0))
+    for update_estimate in (1.0, -1.0):
+        reference = Reference(
+            (ZERO,) * 7, EAST, (0.0, update_estimate * 0.5, 0.0), (-0.25, update_estimate * 2.0, 0.0)
+        )
         _, command = law.kernels.load_position(
-            built, memory, at, reference, behind, observer.aloft(vehicle), Cable(vehicle.cable_length)
+            built,
+            memory,
+            at,
+            reference,
+            behind,
+            observer.nominal_in_flight(vehicle),
+            Cable(vehicle.cable_length),
         )
         assert command.moment[:2] == pytest.approx((0.0, 0.0), abs=EXACT)
         if law.name != "thesis":  # which takes it from its filter, which has seen nothing yet
-            assert sense * command.moment[2] > 0.5 * vehicle.inertia[2]
+            assert update_estimate * command.moment[2] > 0.5 * vehicle.inertia[2]
 
 
 @every_law
@@ -203,7 +213,10 @@ def test_attitude_modes_begin_at_the_present_rates(law: Law) -> None:
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     for _ in range(5):
         state = motion(rng, vehicle.cable_length)
-        rotors, observed = steady(weight, rows_of(constants)), observer.aloft(vehicle)
+        rotors, observed = (
+            steady_actuation(weight, queue_rows(constants)),
+            observer.nominal_in_flight(vehicle),
+        )
         behind = (rotors, observed, Cable(vehicle.cable_length))
         memory = law.kernels.start(built, state, state.x_load, state.v_load)
         q, q_dot, omega = (np.array(v) for v in (state.q_cable, state.q_cable_dot, state.omega_body))
@@ -261,13 +274,13 @@ def fingerprints() -> dict[str, str]:
         for mode in FOLLOWED:
             rng = np.random.default_rng(9)
             digest = hashlib.sha256()
-            rotors = steady(4.9, rows_of(constants))
+            rotors = steady_actuation(4.9, queue_rows(constants))
             memory = None
             for k in range(12):
                 length = 0.7 + 0.02 * k
                 state = motion(rng, length)
                 jet = tuple(triple(v) for v in rng.normal(size=(7, 3)))
-                observed = Observed(
+                observed = DisturbanceEstimate(
                     float(rng.uniform(0.05, 0.2)),
                     triple(0.2 * rng.normal(size=3)),
                     1.0,
@@ -282,7 +295,7 @@ def fingerprints() -> dict[str, str]:
                     0.0,
                     triple((*(0.1 * rng.normal(size=2)), 0.0)),
                     float(0.1 * rng.random()),
-                    NO_TORQUE._replace(now=triple(0.005 * rng.normal(size=3))),
+                    NO_TORQUE._replace(total=triple(0.005 * rng.normal(size=3))),
                 )
                 q_d, R_d = motion(rng, length).q_cable, motion(rng, length).R
                 followed: dict[str, tuple[Any, ...]] = {
@@ -330,7 +343,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control.actuators.disturbance_observer import Observed
+from autopilot.control.actuators.disturbance_observer import DisturbanceEstimate
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.laws.interface import Kernels, Law
 from autopilot.control.records import Cable, Command, Reference, State, Vehicle
@@ -388,7 +401,7 @@ def position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ProbeMemory, Command]:
     return asked(law, memory, state)
@@ -403,7 +416,7 @@ def load_attitude(
     b1_d: Vec3,
     pull: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ProbeMemory, Command]:
     return asked(law, memory, state)
@@ -417,7 +430,7 @@ def quad_attitude(
     R_d: Mat3,
     thrust: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ProbeMemory, Command]:
     return asked(law, memory, state)
@@ -440,7 +453,7 @@ import autopilot
 from dataclasses import replace
 from autopilot.control.records import State
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import Seen, control_tick
+from autopilot.core.tick import EstimateSummary, control_tick
 from autopilot.geometry.packed import pack, unpack
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import build_setup
@@ -458,17 +471,17 @@ at = (0.0, 0.0, 2.0)
 state = State(at, zero, (0.0, 0.0, -1.0), zero, (0.0, 0.0, 2.0 + length), zero, level, zero)
 weight = core.setup.vehicle.load_mass * core.setup.vehicle.gravity
 flight = core.flight
-core.change(
+core.replace_flight(
     replace(
         flight, phase=Phase.HOLD, legs=(Hold(at),), cable=replace(flight.cable, taut_length_m=length)
     )
 )
 asked = []
 for now_us in (4000, 8000, 12000):
-    pack(Seen(state, True, 0.0, weight, 0.0, 0, 0, 0.0, 0), core.rows.seen, 0)
+    pack(EstimateSummary(state, True, 0.0, weight, 0.0, 0, 0, 0.0, 0), core.rows.summary, 0)
     core.decide(now_us, 4000)
     control_tick(core.rows, core.law_rows, 0)
-    asked.append([core.pilot.command.thrust, sum(core.forces)])
+    asked.append([core.control.command.thrust, sum(core.forces)])
 print(json.dumps({"laws": LAWS, "asked": asked, "phase": core.flight.phase.name, "at": autopilot.__file__}))
 """
 

@@ -19,7 +19,7 @@ def test_linear_model_is_that_of_the_equations(model: SimpleNamespace) -> None:
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def rates(motion: np.ndarray, u: np.ndarray) -> np.ndarray:
-        s = cascade_margin.state_at(motion, vehicle)
+        s = cascade_margin.state_near_hover(motion, vehicle)
         w = np.cross(s.q_cable, s.q_cable_dot)
         d = model.rates(model.pack(s.x_load, s.v_load, s.q_cable, w, s.R, s.omega_body), u[0], u[1:], vehicle)
         q_ddot = np.cross(d[9:12], s.q_cable) + np.cross(w, s.q_cable_dot)

@@ -31,7 +31,7 @@ def test_forces_are_always_within_limits(thrust: float, moment: tuple[float, flo
     result = mix(thrust, moment, BEBOP, 1.0)
     assert all(BEBOP.rotor_min <= F <= BEBOP.rotor_max for F in result.forces)
     done = rotor_rows(BEBOP) @ np.array(result.forces)
-    np.testing.assert_allclose((result.thrust_done, *result.moment_done), done, atol=ROUNDING)
+    np.testing.assert_allclose((result.achieved_thrust, *result.achieved_moment), done, atol=ROUNDING)
 
 
 @given(st.tuples(*[st.floats(0.01, 1.95)] * 4))
@@ -52,9 +52,11 @@ def test_roll_and_pitch_are_kept_whenever_possible(thrust: float, moment: tuple[
     found = linprog(np.zeros(4), A_eq=rows, b_eq=moment[:2], bounds=[(BEBOP.rotor_min, BEBOP.rotor_max)] * 4)
     wanted = np.array(moment[:2])
     if found.status == 0:
-        np.testing.assert_allclose(result.moment_done[:2], wanted, atol=PROGRAMME)
+        np.testing.assert_allclose(result.achieved_moment[:2], wanted, atol=PROGRAMME)
     greatest = BEBOP.arm * (BEBOP.rotor_max - BEBOP.rotor_min)
-    np.testing.assert_allclose(result.moment_done[:2], np.clip(wanted, -greatest, greatest), atol=ROUNDING)
+    np.testing.assert_allclose(
+        result.achieved_moment[:2], np.clip(wanted, -greatest, greatest), atol=ROUNDING
+    )
 
 
 @settings(max_examples=60, deadline=None)
@@ -64,7 +66,7 @@ def test_thrust_comes_before_yaw(thrust: float, moment: tuple[float, float, floa
     thrust that is done, none come nearer to the yaw."""
     result = mix(thrust, moment, BEBOP, 1.0)
     rows, bounds = rotor_rows(BEBOP), [(BEBOP.rotor_min, BEBOP.rotor_max)] * 4
-    kept = np.array(result.moment_done[:2])
+    kept = np.array(result.achieved_moment[:2])
 
     def reach(row: np.ndarray, A_eq: np.ndarray, b_eq: np.ndarray) -> tuple[float, float]:
         ends = [linprog(sign * row, A_eq=A_eq, b_eq=b_eq, bounds=bounds) for sign in (1.0, -1.0)]
@@ -72,11 +74,11 @@ def test_thrust_comes_before_yaw(thrust: float, moment: tuple[float, float, floa
         return float(ends[0].fun), float(-ends[1].fun)
 
     low, high = reach(rows[0], rows[1:3], kept)
-    assert result.thrust_done == pytest.approx(min(high, max(low, thrust)), abs=PROGRAMME)
+    assert result.achieved_thrust == pytest.approx(min(high, max(low, thrust)), abs=PROGRAMME)
     # a rounding may make a programme without room infeasible: stay inside by that much
-    done = min(high, max(low, result.thrust_done))
+    done = min(high, max(low, result.achieved_thrust))
     low, high = reach(rows[3], rows[:3], np.array([done, *kept]))
-    assert result.moment_done[2] == pytest.approx(min(high, max(low, moment[2])), abs=PROGRAMME)
+    assert result.achieved_moment[2] == pytest.approx(min(high, max(low, moment[2])), abs=PROGRAMME)
 
 
 @given(thrusts, moments)
@@ -86,7 +88,7 @@ def test_unlimited_passes_through(thrust: float, moment: tuple[float, float, flo
         result = mix(thrust, moment, vehicle, limited)
         assert result.saturated == 0
         np.testing.assert_allclose(
-            (result.thrust_done, *result.moment_done), (thrust, *moment), atol=ROUNDING
+            (result.achieved_thrust, *result.achieved_moment), (thrust, *moment), atol=ROUNDING
         )
 
 
@@ -100,7 +102,7 @@ def test_no_demand_makes_nan(
     high: float, limited: float, thrust: float, moment: tuple[float, float, float]
 ) -> None:
     result = mix(thrust, moment, BEBOP._replace(rotor_max=high), limited)
-    numbers = (*result.forces, result.thrust_done, *result.moment_done)
+    numbers = (*result.forces, result.achieved_thrust, *result.achieved_moment)
     assert not np.isnan(numbers).any()
     if not np.isfinite([thrust, *moment]).all():
         assert result.saturated == 0b1111
@@ -141,10 +143,10 @@ def test_any_rotors_stay_within_limits_and_do_what_is_told(
         share = 0.0 if gone >> i & 1 else rotor.strength
         assert share * BEBOP.rotor_min - ROUNDING <= force <= share * BEBOP.rotor_max + ROUNDING
     done = rows_of(layout, BEBOP) @ np.array(result.forces)
-    np.testing.assert_allclose((result.thrust_done, *result.moment_done), done, atol=ROUNDING)
+    np.testing.assert_allclose((result.achieved_thrust, *result.achieved_moment), done, atol=ROUNDING)
     if result.saturated == 0:
         np.testing.assert_allclose(done[:3], (thrust, *moment[:2]), atol=1e3 * ROUNDING)
-    for asked, given_ in zip(moment[:2], result.moment_done[:2], strict=True):
+    for asked, given_ in zip(moment[:2], result.achieved_moment[:2], strict=True):
         assert abs(given_) <= abs(asked) + 1e3 * ROUNDING
         assert asked * given_ >= -1e3 * ROUNDING
 
@@ -160,4 +162,4 @@ def test_unlimited_it_is_the_least_squares_inverse(
     strengths = np.array([rotor.strength for rotor in layout])
     efforts = np.linalg.pinv(rows_of(layout, BEBOP) * strengths) @ np.array([thrust, *moment])
     np.testing.assert_allclose(result.forces, strengths * efforts, atol=1e5 * ROUNDING)
-    assert result.moment_done == pytest.approx(moment, abs=1e5 * ROUNDING)
+    assert result.achieved_moment == pytest.approx(moment, abs=1e5 * ROUNDING)

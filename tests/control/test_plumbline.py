@@ -25,7 +25,7 @@ from autopilot.control.actuators import torque_observer
 from autopilot.control.actuators.rotor_model import actuation_constants
 from autopilot.control.believed import believed_design, believed_vehicle
 from autopilot.control.design import gains_of
-from autopilot.control.drag import Drag, air_force
+from autopilot.control.drag import Drag, drag_force
 from autopilot.control.laws import build_law, chosen_law
 from autopilot.control.laws import plumbline as law_file
 from autopilot.control.laws.interface import kernels_of, law_of
@@ -71,39 +71,39 @@ FLOWN = {("case-b", 0): 0.010, ("case-b", 18): 0.025, ("case-c", 0): 0.025}
 def compiled() -> SimpleNamespace:
     return SimpleNamespace(
         load_motion=load_motion.load_motion,
-        air_force=air_force,
+        drag_force=drag_force,
         position_jet=direction_jet.position_jet,
         direction_jet=direction_jet.direction_jet,
         saturated=direction_jet.saturated,
-        held_up=direction_jet.held_up,
+        with_min_upward=direction_jet.with_min_upward,
         start=plumbline.start,
         shifted_jet=plumbline.shifted_jet,
         shifted_state=plumbline.shifted_state,
-        gently=plumbline.gently,
-        flat_across=plumbline.flat_across,
-        no_longer=plumbline.no_longer,
-        paced=plumbline.paced,
+        smooth_limit=plumbline.smooth_limit,
+        reference_force_across=plumbline.reference_force_across,
+        limit_length=plumbline.limit_length,
+        with_pace=plumbline.with_pace,
         commanded_attitude=plumbline.commanded_attitude,
-        wanted_force=plumbline.wanted_force,
+        commanded_force=plumbline.commanded_force,
         load_position=plumbline.load_position,
         lag_gain=rotor_lag.lag_gain,
-        hasten=rotor_lag.hasten,
+        compensate_lag=rotor_lag.compensate_lag,
         actuation_constants=actuation.actuation_constants,
-        rows_of=actuation.rows_of,
-        steady=actuation.steady,
+        queue_rows=actuation.queue_rows,
+        steady_actuation=actuation.steady_actuation,
         after_delay=actuation.after_delay,
         advance=actuation.advance,
         predict=prediction.predict,
-        stay=prediction.stay,
+        predict_on_ground=prediction.predict_on_ground,
         observer_constants=observer.observer_constants,
-        nominal=observer.nominal,
-        aloft=observer.aloft,
-        standing=observer.standing,
-        lying=observer.lying,
+        nominal_on_ground=observer.nominal_on_ground,
+        nominal_in_flight=observer.nominal_in_flight,
+        vehicle_on_ground=observer.vehicle_on_ground,
+        load_on_ground=observer.load_on_ground,
         observe=observer.observe,
-        rested=observer.rested,
-        blown=observer.blown,
-        pulled=observer.pulled,
+        slowed_by_noise=observer.slowed_by_noise,
+        with_wind_on_load=observer.with_wind_on_load,
+        cable_force=observer.cable_force,
     )
 
 
@@ -213,7 +213,7 @@ def direction_is_differentiated(law: SimpleNamespace, model: SimpleNamespace, ve
     for seed in range(3):
         rng = np.random.default_rng([22, seed])
         path = rng.normal(size=(7, 3))
-        path[2, 2] += 8.0  # upwards, so that `held_up` changes nothing
+        path[2, 2] += 8.0  # upwards, so that `with_min_upward` changes nothing
         asked = as_asked(law, path, (k_i, k_x, k_v), model, vehicle)
         at = random_path(rng, model, vehicle, asked)[0]
         states = {k * H: at(k * H) for k in range(-2, 3)}
@@ -275,7 +275,7 @@ def level_state(model: SimpleNamespace) -> State:
 def drag_is_flown_against(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Drag opposes the velocity, moves the load as a force does, and is compensated by thrust."""
     v = (1.0, -2.0, 2.0)
-    agree(law.air_force(v, Drag(0.1, 0.2)), -0.7 * np.array(v), ROUNDING)
+    agree(law.drag_force(v, Drag(0.1, 0.2)), -0.7 * np.array(v), ROUNDING)
     at, f, _ = random_path(np.random.default_rng(23), model, vehicle)
     state = at(0.0)
     b3, air = np.array(state.R)[:, 2], 0.3
@@ -356,12 +356,16 @@ def what_the_path_needs_across_is_not_bounded(
     whirl = differences(q_d)[1]
     expected = -m_Q * L * np.array([whirl[0], whirl[1], 0.0])
     # a force as small as this is shortened by a 10^-6 of itself
-    agree(law.flat_across(q, polynomial(path, 0.0), vehicle), expected, SECOND_DIFFERENCE)
+    agree(law.reference_force_across(q, polynomial(path, 0.0), vehicle), expected, SECOND_DIFFERENCE)
     wild = (ZERO, ZERO, ZERO, ZERO, (3e4, -4e4, 0.0), ZERO, ZERO)
-    agree(law.flat_across(q, wild, vehicle), weight * np.array([0.6, -0.8, 0.0]), 1e-4)
+    agree(law.reference_force_across(q, wild, vehicle), weight * np.array([0.6, -0.8, 0.0]), 1e-4)
     falling = (ZERO, ZERO, (0.0, 0.0, -2.0 * g), ZERO, (2.0, 0.0, 9.0), EAST, EAST)
     # for a cable that a quarter of the weight keeps upright
-    agree(law.flat_across(q, falling, vehicle), np.array([m_Q * L * 2.0 / (0.25 * g), 0.0, 0.0]), 1e-4)
+    agree(
+        law.reference_force_across(q, falling, vehicle),
+        np.array([m_Q * L * 2.0 / (0.25 * g), 0.0, 0.0]),
+        1e-4,
+    )
 
     path[4] = [80.0, 0.0, 0.0]
     jet = polynomial(path, 0.0)
@@ -377,15 +381,15 @@ def what_the_path_needs_across_is_not_bounded(
         there.omega_body,
     )
     motion = law.load_motion(state, there.thrust, 0.0, ZERO, vehicle)
-    found = law.wanted_force(state, motion, ZERO, jet, ZERO, GAINS, vehicle)
+    found = law.commanded_force(state, motion, ZERO, jet, ZERO, GAINS, vehicle)
     flat = there.thrust * np.array(there.R)[:, 2]
     # the rotors' thrust is assumed to be constant
     agree(found.F, flat, ALONG)
 
 
 def rotors_follow_as_wanted(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Rotors with a lag of 20 ms, commanded through `hasten`, follow a changing demand as rotors of 8 ms
-    would."""
+    """Rotors with a lag of 20 ms, commanded through `compensate_lag`, follow a changing demand as rotors of
+    8 ms would."""
     lag, wanted = 0.020, 0.008
     gain = law.lag_gain(lag, wanted, TICK)
     held, fast = math.exp(-TICK / lag), math.exp(-TICK / wanted)
@@ -393,7 +397,7 @@ def rotors_follow_as_wanted(law: SimpleNamespace, model: SimpleNamespace, vehicl
     rotors = np.array([4.9, 0.0, 0.0, 0.0])
     for _ in range(30):
         wish = np.array([4.9, 0.0, 0.0, 0.0]) + np.array([0.2, 0.005, 0.005, 0.005]) * rng.normal(size=4)
-        thrust, moment = law.hasten(
+        thrust, moment = law.compensate_lag(
             float(rotors[0]), model.vec(rotors[1:]), float(wish[0]), model.vec(wish[1:]), gain
         )
         expected = wish + fast * (rotors - wish)
@@ -438,18 +442,18 @@ def what_errors_ask_for_is_bounded(law: SimpleNamespace, model: SimpleNamespace,
         agree(at(0.0)[2], second, SECOND_DIFFERENCE)
     agree(law.saturated((1e-4, 0.0, 0.0), ZERO, ZERO, 2.0)[0], np.array([1e-4, 0.0, 0.0]), ROUNDING)
     v = (0.3, 0.0, -0.4)
-    agree(law.gently(v, 5.0), np.array(v) / 1.0001**0.25, ROUNDING)
-    assert np.linalg.norm(law.gently((300.0, 0.0, 400.0), 5.0)) == pytest.approx(5.0, rel=1e-6)
-    agree(law.no_longer(v, 0.5), np.array(v), ROUNDING)
-    agree(law.no_longer(v, 0.25), np.array([0.15, 0.0, -0.2]), ROUNDING)
+    agree(law.smooth_limit(v, 5.0), np.array(v) / 1.0001**0.25, ROUNDING)
+    assert np.linalg.norm(law.smooth_limit((300.0, 0.0, 400.0), 5.0)) == pytest.approx(5.0, rel=1e-6)
+    agree(law.limit_length(v, 0.5), np.array(v), ROUNDING)
+    agree(law.limit_length(v, 0.25), np.array([0.15, 0.0, -0.2]), ROUNDING)
 
 
 def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """`held_up` is the identity from 0.4 of the weight, points upwards with at least a quarter of it, and is
-    smooth in between."""
+    """`with_min_upward` is the identity from 0.4 of the weight, points upwards with at least a quarter of
+    it, and is smooth in between."""
     weight = 4.0
     for upward in (1.6, 2.0, -1.0):
-        A, A_dot, A_ddot = law.held_up((3.0, 4.0, upward), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), weight)
+        A, A_dot, A_ddot = law.with_min_upward((3.0, 4.0, upward), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), weight)
         up, rest = (upward, 1.0) if upward > 0.0 else (1.0, 0.0)
         agree(
             (A, A_dot, A_ddot),
@@ -458,13 +462,17 @@ def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Ve
         )
     for upward, expected in ((0.401, 1.0), (1.599, 1.599)):
         # near its ends the transition departs with the third power of the distance
-        agree(law.held_up((0.0, 0.0, upward), ZERO, ZERO, weight)[0], np.array([0.0, 0.0, expected]), 1e-8)
+        agree(
+            law.with_min_upward((0.0, 0.0, upward), ZERO, ZERO, weight)[0],
+            np.array([0.0, 0.0, expected]),
+            1e-8,
+        )
     for upward in (0.6, 1.0, 1.4):
         path = np.random.default_rng(39).normal(size=(7, 3))
         path[0, 2] = upward
 
         def at(t: float, path: Array = path) -> Any:
-            return law.held_up(*polynomial(path, t)[:3], weight)
+            return law.with_min_upward(*polynomial(path, t)[:3], weight)
 
         first, second = differences(lambda t, at=at: at(t)[0])  # type: ignore[misc]
         assert at(0.0)[0][2] >= 1.0
@@ -507,7 +515,7 @@ def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle
     """
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     push, v = np.array([0.4, -0.3, 0.0]), np.array([1.0, 2.0, 0.0])
-    F = np.array([0.0, 0.0, weight]) - push - np.array(law.air_force(model.vec(v), BEBOP_DRAG))
+    F = np.array([0.0, 0.0, weight]) - push - np.array(law.drag_force(model.vec(v), BEBOP_DRAG))
     b3 = model.unit(F)
     b1 = model.unit(np.array(EAST) - b3[0] * b3)
     R = np.column_stack([b1, np.cross(b3, b1), b3])
@@ -527,7 +535,7 @@ def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle
     agree(command.moment, np.zeros(3), 1e-7)
     assert memory.thrust_rate == pytest.approx(0.0, abs=1e-7)
     memory, _ = said(np.array([30.0, 0.0, -40.0]))
-    expected = plumbline.GREATEST_HELD * weight / GAINS.k_i[0] * np.array([0.6, 0.0, -0.8])
+    expected = plumbline.MAX_INTEGRAL_SHARE * weight / GAINS.k_i[0] * np.array([0.6, 0.0, -0.8])
     agree(memory.integral, expected, ROUNDING)
 
 
@@ -601,7 +609,7 @@ def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace
     for delay, lag in ((0.0, 0.02), (0.010, 0.02), (0.012, 0.0), (0.0719, 0.03), (0.2, 0.01)):
         constants = law.actuation_constants(delay, lag, TICK)
         rng = np.random.default_rng(35)
-        belief, commands, fine = law.steady(4.9, law.rows_of(constants)), [], 40
+        belief, commands, fine = law.steady_actuation(4.9, law.queue_rows(constants)), [], 40
         true, h = np.array([4.9, 0.0, 0.0, 0.0]), TICK / fine
         kept = math.exp(-h / lag) if lag > 0.0 else 0.0
 
@@ -633,7 +641,7 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
     constants = law.actuation_constants(delay, lag, TICK)
     for seed in range(2):
         rng = np.random.default_rng([36, seed])
-        belief = actuation.steady(5.0)
+        belief = actuation.steady_actuation(5.0)
         rows = []
         for _ in range(12):
             u = np.array([5.0, 0.0, 0.0, 0.0]) + rng.normal(size=4) * [0.8, 0.02, 0.02, 0.02]
@@ -691,7 +699,7 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
         ]
         # the velocity changes by a few per cent meanwhile
         agree(lost[0] - lost[1], 0.5 * delay * np.array(state.v_quad), 2e-3)
-        stays = law.stay(state, belief, constants)
+        stays = law.predict_on_ground(state, belief, constants)
         assert stays.state == state
         agree([stays.thrust, *stays.moment], r, ROUNDING)
 
@@ -705,14 +713,14 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 
     def learned(believed: Drag, true: Drag, way: Callable[[int], Any]) -> tuple[Any, Any]:
         constants = law.observer_constants(0.3, 0.02, 0.2, 0.0, 2.0, TICK, believed, vehicle)
-        observed = law.aloft(vehicle)
+        observed = law.nominal_in_flight(vehicle)
         for k in range(300):
             v = model.vec(way(k))
             pose = model.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
-            force = np.array(law.air_force(v, true)) + wind
+            force = np.array(law.drag_force(v, true)) + wind
             state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
             observed = law.observe(observed, state, 1.0, lift, ZERO, constants, believed, vehicle)
-        return observed, force - np.array(law.air_force(v, believed))
+        return observed, force - np.array(law.drag_force(v, believed))
 
     for believed, true in ((BEBOP_DRAG, thrice), (none, Drag(0.3, 0.0)), (BEBOP_DRAG, none)):
         observed, push = learned(
@@ -721,7 +729,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
         found = (believed.linear + observed.drag.linear, believed.quadratic + observed.drag.quadratic)
         agree(found, true, 0.03 * max(true) + 1e-3)
         agree(observed.push, push, 0.005)
-        agree(observed.steady, wind, 0.02)
+        agree(observed.steady_push, wind, 0.02)
     # drag along the rotors' axis is attributed to the cable, and gives no information
     climbing, _ = learned(
         BEBOP_DRAG, thrice, lambda k: [1.5 * math.sin(0.1 * k), math.cos(0.1 * k), 2.0 * math.sin(0.23 * k)]
@@ -734,26 +742,30 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The noisier the accelerometer, the more slowly the push is learned; less so in wind."""
     constants = law.observer_constants(0.3, 0.1, 0.2, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
-    still = law.aloft(vehicle)
+    still = law.nominal_in_flight(vehicle)
     breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     for push in (0.0, breeze, 0.9 * breeze, breeze + 0.5):
-        observed = still._replace(steady=(0.6 * push, -0.8 * push, 0.0))
+        observed = still._replace(steady_push=(0.6 * push, -0.8 * push, 0.0))
         quiet = 0.06 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
         for noise in (0.05, 0.12, 1.0):
             slower = max(1.0, noise / quiet)
-            rested = law.rested(constants, observed, noise * noise)
+            rested = law.slowed_by_noise(constants, observed, noise * noise)
             agree(rested.push, constants.push / slower, 1e-9 * constants.push)
             assert rested._replace(push=constants.push) == constants
     # the effect of the wind on the load is filtered with 0.15 s
-    blown = law.blown(still._replace(load_air=(0.3, -0.2, 0.1)), (0.1, 0.5, 0.4), 0.02, constants)
+    blown = law.with_wind_on_load(
+        still._replace(load_air_accel=(0.3, -0.2, 0.1)), (0.1, 0.5, 0.4), 0.02, constants
+    )
     share = TICK / 0.15
-    agree(blown.load_air, (0.3 - 0.2 * share, -0.2 + 0.7 * share, 0.1 + 0.3 * share), 1e-12)
+    agree(blown.load_air_accel, (0.3 - 0.2 * share, -0.2 + 0.7 * share, 0.1 + 0.3 * share), 1e-12)
     assert blown.load_drag == 0.02
     # the pull follows from its part along the rotors' axis; a cable that slants more counts as 60 deg
     lean = 0.4
     axis = (math.sin(lean), 0.0, math.cos(lean))
-    agree(law.pulled((-2.0 * axis[2], 1.0, 2.0 * axis[0] - 3.0), (0.0, 0.0, -1.0), axis), 3.0, 1e-12)
-    agree(law.pulled((0.0, 0.0, -3.0), (math.sin(1.3), 0.0, -math.cos(1.3)), (0.0, 0.0, 1.0)), 6.0, 1e-12)
+    agree(law.cable_force((-2.0 * axis[2], 1.0, 2.0 * axis[0] - 3.0), (0.0, 0.0, -1.0), axis), 3.0, 1e-12)
+    agree(
+        law.cable_force((0.0, 0.0, -3.0), (math.sin(1.3), 0.0, -math.cos(1.3)), (0.0, 0.0, 1.0)), 6.0, 1e-12
+    )
 
 
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -765,7 +777,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def learned(way: Callable[[int], Any]) -> tuple[Any, State, Array, Array]:
-        observed, omega, M = law.aloft(vehicle), 3.0 * rng.normal(size=3), np.zeros(3)
+        observed, omega, M = law.nominal_in_flight(vehicle), 3.0 * rng.normal(size=3), np.zeros(3)
         for k in range(1500):
             v = np.array(way(k))
             R = model.rodrigues([0.4 * math.sin(0.01 * k), 0.3, 0.5])
@@ -779,28 +791,28 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
         return observed, state, swept, beside + tilt * swept
 
     observed, state, _, torque = learned(lambda k: [1.5 * math.sin(0.02 * k), math.cos(0.03 * k), 0.3])
-    agree(observed.torque.now, torque, 1e-4)
+    agree(observed.torque.total, torque, 1e-4)
     # 4 % of the torque that follows the motion remains in this: 0.2 m/s of 1 m/s, squared
     agree(observed.torque.steady, beside, 0.04 * 1.5 * tilt)
-    assert observed.torque.together / observed.torque.alone == pytest.approx(tilt, rel=0.02)
+    assert observed.torque.correlation / observed.torque.square == pytest.approx(tilt, rel=0.02)
     slow, _, swept, _ = learned(lambda k: [0.2 * math.sqrt(2.0) * math.sin(0.02 * k), 0.0, 0.0])
-    agree(np.array(slow.torque.now) - slow.torque.steady, 0.5 * tilt * swept, 0.1 * tilt * 0.2)
+    agree(np.array(slow.torque.total) - slow.torque.steady, 0.5 * tilt * swept, 0.1 * tilt * 0.2)
     # no more than the rotors could compensate, and nothing while the cable is slack
     for k in range(500):
         spun = state._replace(omega_body=model.vec((-1.0) ** k * np.array([3.0, 3.0, 3.0])))
         observed = law.observe(observed, spun, 1.0, lift, (9.0, -9.0, 9.0), constants, BEBOP_DRAG, vehicle)
     force = vehicle.rotor_max - vehicle.rotor_min
     level, yaw = 0.3 * vehicle.arm * force, 0.6 * vehicle.torque_ratio * force
-    agree(observed.torque.now, (-level, level, -yaw), ROUNDING)
+    agree(observed.torque.total, (-level, level, -yaw), ROUNDING)
     slack = law.observe(observed, state, 0.0, 5.0, (0.1, 0.1, 0.1), constants, BEBOP_DRAG, vehicle)
-    assert slack.torque == observed.torque._replace(now=ZERO, omega_body=state.omega_body)
+    assert slack.torque == observed.torque._replace(total=ZERO, omega_body=state.omega_body)
     # an observer that is configured not to learn does not
     deaf = law.observer_constants(0.3, 0.1, 1.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     for _ in range(100):
         unmoved = law.observe(
-            law.aloft(vehicle), state, 1.0, lift, (0.1, 0.1, 0.1), deaf, BEBOP_DRAG, vehicle
+            law.nominal_in_flight(vehicle), state, 1.0, lift, (0.1, 0.1, 0.1), deaf, BEBOP_DRAG, vehicle
         )
-        assert unmoved.torque.now == ZERO
+        assert unmoved.torque.total == ZERO
 
 
 def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -809,9 +821,9 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     heavy = vehicle._replace(load_mass=1.5 * vehicle.load_mass)
     constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     rng = np.random.default_rng(37)
-    observed = law.aloft(vehicle)
-    assert law.standing(law.nominal(vehicle), vehicle)
-    assert not law.standing(observed, vehicle)
+    observed = law.nominal_in_flight(vehicle)
+    assert law.vehicle_on_ground(law.nominal_on_ground(vehicle), vehicle)
+    assert not law.vehicle_on_ground(observed, vehicle)
     wind = np.array([0.1, -0.2, 0.05])
     for _ in range(600):
         q = model.unit([0.3 * rng.normal(), 0.3 * rng.normal(), -1.0])
@@ -820,7 +832,7 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
         state = model.state_of(model.pack(ZERO, rng.normal(size=3), q, w, R, ZERO), vehicle)
         axis = np.array(R)[:, 2]
         push = wind - (wind @ axis) * axis
-        air = np.array(law.air_force(state.v_quad, BEBOP_DRAG))
+        air = np.array(law.drag_force(state.v_quad, BEBOP_DRAG))
         motion = law.load_motion(state, f, 0.0, model.vec(push + air), heavy)
         a = np.array(motion.a_load) - vehicle.cable_length * np.array(motion.q_ddot)
         state = state._replace(a_quad=model.vec(a))
@@ -829,21 +841,21 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     assert observed.load_mass == pytest.approx(heavy.load_mass, rel=1e-3)
     # the vehicle leans in every direction in turn: the wind along the rotors' axis is not observed
     agree(observed.push[:2], wind[:2], 0.06)
-    assert observed.support == 0.0
+    assert observed.ground_force == 0.0
     # nothing is learned from a load on the ground; of a standing vehicle the support is found; the push is
     # bounded
-    lying = observed._replace(load_ground=state.x_load[2])
-    assert law.lying(lying, state)
-    assert not law.lying(observed, state)
+    lying = observed._replace(load_ground_height=state.x_load[2])
+    assert law.load_on_ground(lying, state)
+    assert not law.load_on_ground(observed, state)
     light = law.observe(lying, state._replace(a_quad=ZERO), 1.0, f, ZERO, constants, BEBOP_DRAG, vehicle)
     assert light.load_mass == observed.load_mass
     rest = state._replace(R=model.mat(np.eye(3)), v_quad=ZERO, a_quad=ZERO)
     for _ in range(50):
         observed = law.observe(observed, rest, 0.0, 1.0, ZERO, constants, BEBOP_DRAG, vehicle)
-    assert observed.support == pytest.approx(vehicle.quad_mass * vehicle.gravity - 1.0, rel=1e-3)
-    assert law.standing(observed, vehicle)
-    assert observed.load_ground == state.x_load[2]
-    storm = law.nominal(vehicle)._replace(support=-9.0)
+    assert observed.ground_force == pytest.approx(vehicle.quad_mass * vehicle.gravity - 1.0, rel=1e-3)
+    assert law.vehicle_on_ground(observed, vehicle)
+    assert observed.load_ground_height == state.x_load[2]
+    storm = law.nominal_on_ground(vehicle)._replace(ground_force=-9.0)
     blown = rest._replace(a_quad=(30.0, 0.0, 0.0))
     for _ in range(50):
         storm = law.observe(storm, blown, 0.0, 3.924, ZERO, constants, BEBOP_DRAG, vehicle)
@@ -856,7 +868,7 @@ def a_pace_multiplies_the_bandwidths_of_load_and_cable(
     """The pace rises from nothing to the whole in 0.3 s."""
     loops, pace = (0.6, 3.0, 5.0), 0.8
     slow = gains_of(*(pace * omega for omega in loops), 20.0, 0.9, vehicle)
-    for found, wanted in zip(law.paced(gains_of(*loops, 20.0, 0.9, vehicle), pace), slow, strict=True):
+    for found, wanted in zip(law.with_pace(gains_of(*loops, 20.0, 0.9, vehicle), pace), slow, strict=True):
         assert found == pytest.approx(wanted, rel=1e-12)
     level = Reference((ZERO,) * 7, EAST)
     for pace, then in ((0.8, 0.8 + TICK / 0.3), (0.99, 1.0)):
@@ -872,7 +884,7 @@ def a_pace_multiplies_the_bandwidths_of_load_and_cable(
         law.load_position(
             law.start()._replace(pace=pace), at(0.0), reference, f, ZERO, gains, CALM_AIR, ZERO, TICK, vehicle
         )[1]
-        for pace, gains in ((0.7, GAINS), (1.0, law.paced(GAINS, 0.7)))
+        for pace, gains in ((0.7, GAINS), (1.0, law.with_pace(GAINS, 0.7)))
     ]
     assert said[0].moment == said[1].moment and said[0].thrust == said[1].thrust
 
@@ -942,7 +954,9 @@ def test_compiled_and_plain_agree_to_the_bit(
     plain, fast = plain_laws(own_sources), compiled()
     constants, observing = actuation_constants(0.010, 0.02, TICK), observing_all(bebop)
     rng = np.random.default_rng(27)
-    memories = [(law.start(), actuation.steady(4.9), law.nominal(bebop)) for law in (plain, fast)]
+    memories = [
+        (law.start(), actuation.steady_actuation(4.9), law.nominal_on_ground(bebop)) for law in (plain, fast)
+    ]
     for _ in range(10):
         at, f, _ = random_path(rng, model, bebop)
         state, reference = at(0.0), Reference(polynomial(rng.normal(size=(7, 3)), 0.0), EAST)
@@ -951,7 +965,7 @@ def test_compiled_and_plain_agree_to_the_bit(
             memory, rotors, observed = memories[n]
             observed = law.observe(observed, state, 1.0, f, rotors.moment, observing, BEBOP_DRAG, bebop)
             ahead = law.predict(
-                state, 1.0, rotors, constants, TICK, observed.push, observed.torque.now, BEBOP_DRAG, bebop
+                state, 1.0, rotors, constants, TICK, observed.push, observed.torque.total, BEBOP_DRAG, bebop
             )
             memory, command = law.load_position(
                 memory,
@@ -965,7 +979,7 @@ def test_compiled_and_plain_agree_to_the_bit(
                 TICK,
                 bebop,
             )
-            asked = law.hasten(ahead.thrust, ahead.moment, command.thrust, command.moment, 1.7)
+            asked = law.compensate_lag(ahead.thrust, ahead.moment, command.thrust, command.moment, 1.7)
             rotors = law.advance(rotors, *asked, constants)
             memories[n] = memory, rotors, observed
             told = [repr(part) for part in (memory, command, asked, ahead, observed)]
@@ -1031,8 +1045,8 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
     law, state = built(VEH_ACT_DELAY=10.0), level_state(model)
     flown, vehicle = kernels_of(law), law.constants.vehicle
     cable = Cable(vehicle.cable_length)
-    hovering = actuation.steady(4.905)
-    observed = observer.nominal(vehicle)._replace(support=0.0, load_ground=-1.0)
+    hovering = actuation.steady_actuation(4.905)
+    observed = observer.nominal_on_ground(vehicle)._replace(ground_force=0.0, load_ground_height=-1.0)
     memory = flown.start(law, state, ZERO, ZERO)
     still, above = Reference((ZERO,) * 7, EAST), Reference((state.x_quad, *(ZERO,) * 6), EAST)
     memory, one = flown.load_position(law, memory, state, still, hovering, observed, cable)
@@ -1040,7 +1054,9 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
         law, memory, state, state.q_cable, EAST, 4.905, hovering, observed, cable
     )
     memory, three = flown.quad_attitude(law, memory, state, state.R, 4.905, hovering, observed, cable)
-    memory, four = flown.quad_position(law, memory, state, above, actuation.steady(3.924), observed, cable)
+    memory, four = flown.quad_position(
+        law, memory, state, above, actuation.steady_actuation(3.924), observed, cable
+    )
     assert [c.thrust for c in (one, two, three, four)] == pytest.approx([4.905] * 3 + [3.924])
     for command in (one, two, three, four):
         agree(command.moment, np.zeros(3), ROUNDING)
@@ -1116,12 +1132,12 @@ def test_a_vehicle_that_the_ground_holds_is_not_turned(bebop: Vehicle) -> None:
     )
     memory = law_file.start(law, state, state.x_quad, ZERO)
     jet = (state.x_quad, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
-    belief = actuation.steady(4.0, actuation.rows_of(law.constants.actuation))
+    belief = actuation.steady_actuation(4.0, actuation.queue_rows(law.constants.actuation))
     asked = [
         law_file.quad_position(
             law, memory, state, Reference(jet, EAST), belief, observed, Cable(truth.cable_length)
         )[1].moment
-        for observed in (observer.nominal(bebop), observer.aloft(bebop))
+        for observed in (observer.nominal_on_ground(bebop), observer.nominal_in_flight(bebop))
     ]
     assert asked[0] == ZERO
     assert math.hypot(*asked[1]) > 0.01
@@ -1134,7 +1150,7 @@ def test_cases_are_flown_within_true_limits(mission: str, delay_ticks: int, bebo
     signals = next(s for s in load_mission(mission).steps if isinstance(s, Signals))
     rows = signal_table(signals.terms)
     state, constants, observing = aloft(truth), law.constants, observing_all(bebop)
-    belief, observed = actuation.steady(4.905), observer.aloft(bebop)
+    belief, observed = actuation.steady_actuation(4.905), observer.nominal_in_flight(bebop)
     on_their_way, cable = [state.rotor_force] * delay_ticks, Cable(truth.cable_length)
     memory = law_file.start(law, sensed(state), state.x_load, ZERO)
     worst = 0.0
@@ -1150,7 +1166,7 @@ def test_cases_are_flown_within_true_limits(mission: str, delay_ticks: int, bebo
             law, memory, sensed(state), reference, belief, observed, cable
         )
         mixed = mix(command.thrust, command.moment, bebop, 1.0)
-        belief = actuation.advance(belief, mixed.thrust_done, mixed.moment_done, constants.actuation)
+        belief = actuation.advance(belief, mixed.achieved_thrust, mixed.achieved_moment, constants.actuation)
         on_their_way.append(mixed.forces)
         state = advance(state, truth, on_their_way.pop(0), ZERO, TICK)
         assert state.taut == 1.0

@@ -7,13 +7,26 @@ import math
 import numpy as np
 import pytest
 
-from autopilot.control.actuators.mixer import FORCE, MISSED, TOLD, mix, new_rotors, thrust_and_moment
-from autopilot.control.actuators.thrust_factor import LEAST, UNTOLD, counted, learned_factor, mix_with
+from autopilot.control.actuators.mixer import (
+    FORCE,
+    MISSED_COUNT,
+    REPORTED_SPEED,
+    mix,
+    new_rotors,
+    thrust_and_moment,
+)
+from autopilot.control.actuators.thrust_factor import (
+    DEAD_BAND,
+    MIN_FACTOR,
+    applied_factor,
+    learned_factor,
+    mix_with_factor,
+)
 from autopilot.vehicle.layout import PLUS
-from autopilot.vehicle.rotors import allocate
-from autopilot.wire.convert.simulator import speed_rpm
+from autopilot.vehicle.rotors import mixer_table
+from autopilot.wire.convert.simulator import rotor_speed_rpm
 
-TABLE = allocate(PLUS)
+TABLE = mixer_table(PLUS)
 SHARE = 0.004  # 250 Hz, 1 s
 HOVER_N = 4.905
 
@@ -21,7 +34,7 @@ HOVER_N = 4.905
 def told(forces, vehicle):
     """The memory of rotors whose reported speeds correspond to these forces."""
     rotors = new_rotors()
-    rotors[TOLD, :4] = [speed_rpm(force, vehicle.rotor_max) for force in forces]
+    rotors[REPORTED_SPEED, :4] = [rotor_speed_rpm(force, vehicle.rotor_max) for force in forces]
     return rotors
 
 
@@ -47,7 +60,7 @@ def test_the_factor_is_found_in_the_time_constant(bebop):
 )
 def test_what_tells_nothing_is_not_learned_from(bebop, forces, thrust, missed):
     rotors = told(forces, bebop)
-    rotors[MISSED, 3] = missed
+    rotors[MISSED_COUNT, 3] = missed
     assert learned_factor(0.9, thrust, bebop, TABLE, rotors, SHARE) == 0.9
 
 
@@ -55,19 +68,19 @@ def test_it_stays_within_its_bounds(bebop):
     factor = 1.0
     for _ in range(3000):
         factor = learned_factor(factor, HOVER_N, bebop, TABLE, told([0.35] * 4, bebop), SHARE)
-    assert factor == LEAST
+    assert factor == MIN_FACTOR
 
 
 def test_as_little_as_the_speeds_cannot_tell_counts_for_nothing():
-    assert [counted(factor) for factor in (1.0 - UNTOLD, 1.0, 1.0 + UNTOLD)] == [1.0, 1.0, 1.0]
-    assert counted(0.8) == pytest.approx(0.8 + UNTOLD)
+    assert [applied_factor(factor) for factor in (1.0 - DEAD_BAND, 1.0, 1.0 + DEAD_BAND)] == [1.0, 1.0, 1.0]
+    assert applied_factor(0.8) == pytest.approx(0.8 + DEAD_BAND)
 
 
 def test_weak_rotors_are_asked_for_more_and_give_what_was_wanted(bebop):
     rotors, wanted = new_rotors(), (HOVER_N, (0.02, -0.01, 0.005))
-    mixed = mix_with(0.8, *wanted, bebop, 1.0, TABLE, rotors)
+    mixed = mix_with_factor(0.8, *wanted, bebop, 1.0, TABLE, rotors)
     assert mixed.saturated == 0
-    assert (mixed.thrust_done, *mixed.moment_done) == pytest.approx((wanted[0], *wanted[1]))
+    assert (mixed.achieved_thrust, *mixed.achieved_moment) == pytest.approx((wanted[0], *wanted[1]))
     rotors[FORCE] *= 0.8
     thrust, moment = thrust_and_moment(rotors, bebop, TABLE)
     assert (thrust, *moment) == pytest.approx((wanted[0], *wanted[1]))
@@ -75,14 +88,14 @@ def test_weak_rotors_are_asked_for_more_and_give_what_was_wanted(bebop):
 
 def test_they_are_asked_for_no_more_than_they_can_and_it_is_known_what_comes(bebop):
     rotors = new_rotors()
-    mixed = mix_with(0.8, 100.0, (0.0, 0.0, 0.0), bebop, 1.0, TABLE, rotors)
+    mixed = mix_with_factor(0.8, 100.0, (0.0, 0.0, 0.0), bebop, 1.0, TABLE, rotors)
     assert rotors[FORCE, :4] == pytest.approx([bebop.rotor_max] * 4)
-    assert mixed.thrust_done == pytest.approx(0.8 * 4.0 * bebop.rotor_max)
+    assert mixed.achieved_thrust == pytest.approx(0.8 * 4.0 * bebop.rotor_max)
     assert mixed.saturated == 0b1111
 
 
 def test_rotors_that_are_as_believed_are_asked_for_the_same_to_the_bit(bebop):
     one, other = new_rotors(), new_rotors()
     demand = (5.3, (0.05, -0.02, 0.01), bebop, 1.0, TABLE)
-    assert mix_with(1.0, *demand, one) == mix(*demand, other)
+    assert mix_with_factor(1.0, *demand, one) == mix(*demand, other)
     assert np.array_equal(one, other)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.control.believed import believed_vehicle
 from autopilot.control.records import State
-from autopilot.core.attachment import cable_moment, tell_attachment
+from autopilot.core.attachment import cable_moment, shift_to_attachment
 from autopilot.estimation.inbox import FIX, HEIGHT, POSE, READING, new_inbox, put_reading
 from autopilot.estimation.records import GnssReading, PoseReading, blank_state
 from autopilot.geometry.packed import unpack
@@ -67,7 +67,7 @@ def test_readings_are_told_of_where_the_cable_is_attached():
     put_reading(inbox, 0, POSE, 0, pose)
     put_reading(inbox, 1, FIX, 0, fix)
     inbox[2, 0], inbox[2, READING] = HEIGHT, 3.0
-    tell_attachment(inbox, 3, estimator, RHO)
+    shift_to_attachment(inbox, 3, estimator, RHO)
     arm, beside = TURNED.apply(RHO), TURNED.apply(np.cross(OMEGA, RHO))
     moved, placed = unpack(PoseReading, inbox[0], READING), unpack(GnssReading, inbox[1], READING)
     for place, speed in ((moved.x_quad, moved.v_quad), (placed.position, placed.velocity)):

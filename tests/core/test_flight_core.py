@@ -6,7 +6,7 @@ from math import nan
 
 import pytest
 
-from autopilot.core.flight_core import LAID_OUT_BRAKING
+from autopilot.core.flight_core import SETPOINTS_BRAKING
 from autopilot.geometry.linear import norm
 from autopilot.guidance.legs import Brake, Slow
 from autopilot.supervisor.state import Phase
@@ -32,7 +32,7 @@ def test_a_stop_is_laid_out_in_portions(command: str) -> None:
         before = craft.onboard.core.rows.targets
         craft.tick()
         if craft.flight.legs[0] is stop:
-            assert len(craft.onboard.core.rows.targets) <= LAID_OUT_BRAKING
+            assert len(craft.onboard.core.rows.targets) <= SETPOINTS_BRAKING
             portions += craft.onboard.core.rows.targets is not before
-    assert portions >= stop.duration_s / (LAID_OUT_BRAKING * 0.004) - 2.0
+    assert portions >= stop.duration_s / (SETPOINTS_BRAKING * 0.004) - 2.0
     assert norm(craft.truth.v_load) < 0.1

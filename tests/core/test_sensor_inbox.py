@@ -74,7 +74,7 @@ class Read(NamedTuple):
     imu: ImuReading | None
     gps: HilGps | None
     fields_updated: int
-    aside: tuple[Any, ...]
+    other_messages: tuple[Any, ...]
 
 
 def reading_in(row: np.ndarray) -> tuple[int, int, Any]:
@@ -95,8 +95,8 @@ def tick_of(*datagrams: bytes, rows: int = box.ROOM) -> Read:
     tick = inbox.read(b"".join(datagrams), -1)
     assert tick is not None
     readings = [reading_in(row) for row in inbox.rows[: tick.readings]]
-    gps = unpack(HilGps, inbox.fix, 0) if tick.fixed else None
-    return Read(tick.now_us, readings, sample_of(inbox), gps, tick.fields_updated, tick.aside)
+    gps = unpack(HilGps, inbox.fix, 0) if tick.has_fix else None
+    return Read(tick.now_us, readings, sample_of(inbox), gps, tick.fields_updated, tick.other_messages)
 
 
 def record(tick: Read, kind: int) -> tuple[int, object]:
@@ -129,7 +129,7 @@ def test_without_a_whole_sensor_message_there_is_no_tick(datagram: bytes) -> Non
 
 def test_the_sensor_message_is_the_clock_and_the_inertial_sample() -> None:
     tick = tick_of(sensor(0))
-    assert (tick.now_us, tick.fields_updated, tick.gps, tick.aside) == (NOW_US, 0, None, ())
+    assert (tick.now_us, tick.fields_updated, tick.gps, tick.other_messages) == (NOW_US, 0, None, ())
     assert [kind for kind, _, _ in tick.readings] == [box.IMU]
     assert tick.imu is not None
     assert tick.imu.accel == pytest.approx((0.0, 0.5, 9.81), abs=SINGLE)
@@ -212,7 +212,7 @@ def test_a_fix_is_read_from_three_dimensions_on_and_always_told_to_the_operator(
 
 def test_other_messages_are_put_aside() -> None:
     tick = tick_of(HEARTBEAT, sensor(0))
-    assert [message.get_type() for message in tick.aside] == ["HEARTBEAT"]
+    assert [message.get_type() for message in tick.other_messages] == ["HEARTBEAT"]
 
 
 def test_readings_are_absorbed_in_this_order() -> None:
@@ -276,7 +276,7 @@ WHOLE = (POSE, TRACKED_LOAD, SEEN_LOAD, gps(6), sensor(PRESSURE | MAG))
 def test_what_surrounds_the_frames_of_the_sensors_changes_no_reading(datagram: bytes) -> None:
     expected, found = tick_of(*WHOLE), tick_of(datagram)
     assert len(expected.readings) == 7
-    assert found._replace(aside=()) == expected._replace(aside=())
+    assert found._replace(other_messages=()) == expected._replace(other_messages=())
 
 
 @given(at=st.integers(0, len(b"".join(WHOLE)) - 1), to=st.integers(0, 255), cut=st.integers(0, 400))

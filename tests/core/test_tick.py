@@ -24,7 +24,7 @@ from autopilot.geometry.so3 import IDENTITY_QUAT
 from autopilot.guidance.layout import COLUMNS
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION
 from autopilot.onboard.onboard import build_setup
-from autopilot.supervisor.quiescence import FOREVER_US, RESTING, at_rest
+from autopilot.supervisor.quiescence import FOREVER_US, UNCONTROLLED, uncontrolled_stretch
 from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -37,7 +37,7 @@ from tests.doubles.plain_python import in_plain_python
 TICK_US = 4000
 BEGIN_US = 10_000_000
 MODES = {
-    "resting": RESTING,
+    "resting": UNCONTROLLED,
     "load position": LOAD_POSITION,
     "vehicle position": QUAD_POSITION,
     "load attitude": LOAD_ATTITUDE,
@@ -78,13 +78,13 @@ def hold(core: FlightCore, mode: int, now_us: int) -> None:
     )
     core.rows = core.rows._replace(targets=place, references=place)
     upward = (0.02, 0.01, math.sqrt(1.0 - 0.02**2 - 0.01**2))
-    stretch = at_rest(FOREVER_US, now_us, True)._replace(
+    stretch = uncontrolled_stretch(FOREVER_US, now_us, True)._replace(
         mode=mode, period_us=TICK_US, load_weight=1.0, anchor_height=HOVER_M, upward=upward
     )
     pack(stretch, core.rows.stretch, 0)
 
 
-def sense(core: FlightCore, count: int, now_us: int, tick: int, dt: float = TICK_US * 1e-6) -> None:
+def update_estimate(core: FlightCore, count: int, now_us: int, tick: int, dt: float = TICK_US * 1e-6) -> None:
     """The first half of a tick, after which the supervisor has to decide."""
     assert fly_tick(core.rows, core.law, count, now_us, tick, dt, False) == TO_DECIDE
 
@@ -94,14 +94,16 @@ def settled(law: int = 2, ticks: int = 8) -> FlightCore:
     core = new_core(CTL_LAW=law)
     for tick in range(ticks):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core, put_hover(core, now_us, tick), now_us, tick, 0.0 if tick == 0 else TICK_US * 1e-6)
+        update_estimate(
+            core, put_hover(core, now_us, tick), now_us, tick, 0.0 if tick == 0 else TICK_US * 1e-6
+        )
     return core
 
 
 # ---- compiled and interpreted
 
 
-def rows_of(core: FlightCore) -> dict[str, Any]:
+def queue_rows(core: FlightCore) -> dict[str, Any]:
     """All arrays that the tick reads and writes, by name."""
     rows: dict[str, Any] = {f"law {name}": row for name, row in core.law_rows._asdict().items()}
     for name, row in core.rows._asdict().items():
@@ -127,7 +129,7 @@ def fingerprints() -> dict[str, str]:
                 count = put_hover(core, now_us, 8 + tick)
                 came = fly_tick(core.rows, core.law, count, now_us, 8 + tick, TICK_US * 1e-6, False)
                 assert came == FLOWN
-            for array, row in rows_of(core).items():
+            for array, row in queue_rows(core).items():
                 found[f"{law.name}, {name}: {array}"] = hashlib.sha256(row.tobytes()).hexdigest()[:12]
     return found
 
@@ -195,10 +197,10 @@ def test_behind_any_readings_honest_ones_settle_the_estimate_again(script: list[
     core = settled()
     for tick in range(8, 8 + REPEATS):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core, put_rows(core, script[tick % len(script)], now_us), now_us, tick)
+        update_estimate(core, put_rows(core, script[tick % len(script)], now_us), now_us, tick)
     for tick in range(8 + REPEATS, 8 + REPEATS + 750):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core, put_hover(core, now_us, tick), now_us, tick)
+        update_estimate(core, put_hover(core, now_us, tick), now_us, tick)
     assert complaints(core.estimator, core.settings.failsafe.sensor_age_limit_s) == ()
     assert core.state.x_load == pytest.approx((0.0, 0.0, HOVER_M), abs=0.02)
 
@@ -213,7 +215,7 @@ def test_more_readings_than_the_inbox_has_room_for_are_all_heard() -> None:
     larger = box.new_inbox(len(readings))
     for at, reading in enumerate(readings):
         box.put_reading(larger, at, *reading)
-    core.take_inbox(larger)
+    core.use_inbox(larger)
     core.step(len(readings), BEGIN_US, 0, 0.0)
     heard = core.rows.history.consistency[0, 0]
     assert heard == 999.0, "the first one starts the estimate"
@@ -243,7 +245,7 @@ def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_
         for _ in range(250):
             craft.tick()
             core = craft.onboard.core
-            assert core.pilot.thrust == pytest.approx(weight, rel=0.02), "measured 0.5 %"
+            assert core.control.thrust == pytest.approx(weight, rel=0.02), "measured 0.5 %"
         assert core.rows.commands.shape == (rows, 4)
         assert craft.simulator.parameters.table["SIM_ACT_DELAY_MS"] == delay_ms
     assert craft.flight.phase == Phase.MISSION, craft.texts

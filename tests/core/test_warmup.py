@@ -43,7 +43,7 @@ def stick():
 
 steps = Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0)
 craft = Craft(*steps)
-craft.onboard.rehearse()
+craft.onboard.warm_up()
 craft.wait(1.0)
 before = census()
 assert len(before) > 100

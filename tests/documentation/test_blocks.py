@@ -31,8 +31,8 @@ from click.testing import CliRunner
 from pyarrow import Table, parquet
 
 import plumbline
-from autopilot.own.chosen import Own
 from autopilot.own.law import law_number
+from autopilot.own.own_code import OwnCode
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -45,10 +45,10 @@ from gcs.formats.missions import write_foreign
 from gcs.recorded.column_map import MAPS, ColumnMap
 from gcs.shell.link import free_port
 from gcs.sweep import plan as plans
-from gcs.sweep.flight import boarding
 from gcs.sweep.flight import fly as fly_swept
+from gcs.sweep.flight import start_times
 from gcs.workflows.before_flight import check_mission, check_options
-from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.fly import Flight
 from gcs.workflows.mission_file import load
 from gcs.workflows.new_file import new_file
@@ -96,11 +96,11 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @cache
-def flies_with(own: Own, law: str, sensors: str, vehicle: str, settings: tuple[str, ...]) -> str:
+def flies_with(own: OwnCode, law: str, sensors: str, vehicle: str, settings: tuple[str, ...]) -> str:
     """The outcome of the short mission with these options, flown as in a sweep: it is the same flight."""
-    given = {"CTL_LAW": float(law_number(law)), **dict(map(setting_of, settings))}
+    given = {"CTL_LAW": float(law_number(law)), **dict(map(parse_setting, settings))}
     conditions = Conditions(vehicle, sensors, 1, given, own)
-    return fly_swept(SHORT, conditions, boarding(SHORT, conditions)).outcome
+    return fly_swept(SHORT, conditions, start_times(SHORT, conditions)).outcome
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gcs.shell.processes.Processes.load", lambda processes, name: None)
     monkeypatch.setattr("gcs.workflows.fly.fly", fly)
     monkeypatch.setattr("gcs.workflows.sweep.make_plan", made)
-    monkeypatch.setattr("gcs.workflows.sweep.own_processes", in_this_process)
+    monkeypatch.setattr("gcs.workflows.sweep.local_processes", in_this_process)
     monkeypatch.setattr("gcs.workflows.sweep.dask_cluster", in_this_process)
     monkeypatch.setattr("gcs.workflows.sweep.write_report", lambda out, plan: out / "report.html")
     monkeypatch.setattr("plumbline.sweep", small_sweep)

@@ -12,13 +12,13 @@ from typing import get_args
 import pytest
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import COMMANDS, Command, Fate, fate
+from autopilot.wire.items import COMMANDS, Command, Handling, handling_of
 from gcs.formats.items import command_name
 from missions.model import Sine, Step, Term
 
 PAGE = Path(__file__).parents[2] / "docs" / "missions.md"
 HEAD = "| command | parameters | |\n|---|---|---|\n"
-WORDS = {Fate.FLOWN: "", Fate.KEPT: "kept: ", Fate.REFUSED: "refused: "}
+WORDS = {Handling.FLOWN: "", Handling.KEPT: "kept: ", Handling.REFUSED: "refused: "}
 OTHERS = (
     f"| all others up to {mavlink.MAV_CMD_NAV_LAST} | | refused: somebody would rely on being taken there |\n"
     f"| all others above {mavlink.MAV_CMD_NAV_LAST} that MAVLink defines "
@@ -37,7 +37,7 @@ def rows() -> str:
 
 
 def cells_of(row: Command) -> str:
-    return f"{'; '.join(field.described() for field in row.fields)} | {WORDS[row.fate]}{row.text} |"
+    return f"{'; '.join(field.describe() for field in row.fields)} | {WORDS[row.handling]}{row.text} |"
 
 
 def test_the_page_has_the_table_of_the_program() -> None:
@@ -47,7 +47,7 @@ def test_the_page_has_the_table_of_the_program() -> None:
 def test_every_command_has_one_row_and_every_record_is_written_by_one() -> None:
     numbers = [row.number for row in COMMANDS]
     assert len(set(numbers)) == len(numbers)
-    records = [row.makes for row in COMMANDS if row.written]
+    records = [row.record_type for row in COMMANDS if row.is_default]
     assert set(records) == {*get_args(Step), Term, Sine}
     assert len(records) == len(set(records))
 
@@ -55,19 +55,19 @@ def test_every_command_has_one_row_and_every_record_is_written_by_one() -> None:
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (mavlink.MAV_CMD_NAV_WAYPOINT, Fate.FLOWN),
-        (mavlink.MAV_CMD_DO_JUMP, Fate.FLOWN),
-        (mavlink.MAV_CMD_NAV_ROI, Fate.FLOWN),
-        (mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, Fate.REFUSED),
-        (mavlink.MAV_CMD_NAV_LAST, Fate.REFUSED),
-        (mavlink.MAV_CMD_NAV_LAST + 1, Fate.REFUSED),
-        (31998, Fate.REFUSED),
-        (mavlink.MAV_CMD_DO_PARACHUTE, Fate.REFUSED),
-        (mavlink.MAV_CMD_IMAGE_START_CAPTURE, Fate.KEPT),
+        (mavlink.MAV_CMD_NAV_WAYPOINT, Handling.FLOWN),
+        (mavlink.MAV_CMD_DO_JUMP, Handling.FLOWN),
+        (mavlink.MAV_CMD_NAV_ROI, Handling.FLOWN),
+        (mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, Handling.REFUSED),
+        (mavlink.MAV_CMD_NAV_LAST, Handling.REFUSED),
+        (mavlink.MAV_CMD_NAV_LAST + 1, Handling.REFUSED),
+        (31998, Handling.REFUSED),
+        (mavlink.MAV_CMD_DO_PARACHUTE, Handling.REFUSED),
+        (mavlink.MAV_CMD_IMAGE_START_CAPTURE, Handling.KEPT),
     ],
 )
-def test_what_becomes_of_a_command(command: int, expected: Fate) -> None:
-    assert fate(command) is expected
+def test_what_becomes_of_a_command(command: int, expected: Handling) -> None:
+    assert handling_of(command) is expected
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.layout import FEWEST, GREATEST_FORCE_N, MOST
-from autopilot.vehicle.model import LEAST_ROTOR_MAX_N, SHARE_OF_ARM, Moment, Offset, OneRotor, Vehicle
+from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, MAX_ROTORS, MIN_ROTORS
+from autopilot.vehicle.model import ARM_RATIOS, MIN_ROTOR_MAX_N, Moment, Offset, OneRotor, Vehicle
 from autopilot.vehicle.shipped import VEHICLES
 from missions.toml_files import bounds
 
@@ -163,9 +163,9 @@ RANGES = {
     "spin": "text",
     "rotor": "up to 14 tables",
     "parameters": "names and values of [parameters.md](parameters.md)",
-    "rotors": f"{FEWEST} ... {MOST}",
-    "rotor_min_n": f"{-GREATEST_FORCE_N:g} ... {GREATEST_FORCE_N:g}, or -inf",
-    "rotor_max_n": f"{LEAST_ROTOR_MAX_N:g} ... {GREATEST_FORCE_N:g}, or inf",
+    "rotors": f"{MIN_ROTORS} ... {MAX_ROTORS}",
+    "rotor_min_n": f"{-MAX_ROTOR_FORCE_N:g} ... {MAX_ROTOR_FORCE_N:g}, or -inf",
+    "rotor_max_n": f"{MIN_ROTOR_MAX_N:g} ... {MAX_ROTOR_FORCE_N:g}, or inf",
 }
 
 
@@ -184,8 +184,8 @@ def row(key: str, field: FieldInfo) -> str:
         allowed = "three of " + two_bounds(FieldInfo.from_annotation(Offset))
     else:
         allowed = RANGES.get(key) or two_bounds(field)
-    if key in SHARE_OF_ARM:
-        default = f"{SHARE_OF_ARM[key]:g} `arm_m`"
+    if key in ARM_RATIOS:
+        default = f"{ARM_RATIOS[key]:g} `arm_m`"
     elif key == "name":
         default = "the file's"
     elif key == "attachment_m":

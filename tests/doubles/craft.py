@@ -11,7 +11,7 @@ from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
-from autopilot.own.chosen import NOTHING_OWN, Own
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
@@ -47,7 +47,7 @@ class Craft:
         seed: int = 1,
         clock_waits: bool = True,
         lockstep: bool = True,
-        own: Own = NOTHING_OWN,
+        own: OwnCode = NO_OWN_CODE,
         vehicle: str = "bebop",
         **settings_: float,
     ) -> None:

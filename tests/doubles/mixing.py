@@ -8,7 +8,7 @@ from autopilot.control.actuators import mixer
 from autopilot.control.records import Vehicle
 from autopilot.geometry.linear import Vec3
 from autopilot.vehicle.layout import PLUS, Layout
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.rotors import mixer_table
 
 
 class Mixed(NamedTuple):
@@ -16,8 +16,8 @@ class Mixed(NamedTuple):
 
     forces: tuple[float, ...]
     saturated: int
-    thrust_done: float
-    moment_done: Vec3
+    achieved_thrust: float
+    achieved_moment: Vec3
 
 
 def mix(
@@ -32,9 +32,12 @@ def mix(
     """The forces commanded to the rotors of a vehicle, see `autopilot.control.actuators.mixer.mix`; by the
     functions of `room`, the mixer or a copy of it."""
     rotors = room.new_rotors()
-    result = room.mix(thrust, moment, vehicle, limited, allocate(layout, lost), rotors)
-    x, y, z = result.moment_done
+    result = room.mix(thrust, moment, vehicle, limited, mixer_table(layout, lost), rotors)
+    x, y, z = result.achieved_moment
     done = (float(x), float(y), float(z))
     return Mixed(
-        tuple(rotors[room.FORCE, : len(layout)].tolist()), result.saturated, float(result.thrust_done), done
+        tuple(rotors[room.FORCE, : len(layout)].tolist()),
+        result.saturated,
+        float(result.achieved_thrust),
+        done,
     )

@@ -12,7 +12,7 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import begin_legs
+from autopilot.supervisor.machine import start_phase_legs
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
@@ -27,7 +27,7 @@ from missions.model import Step
 ACCEPTED = ACCEPTANCE.result
 TABLE = autopilot_parameters(load_vehicle("bebop"))
 LAW = chosen_law(TABLE)
-SETTINGS = settings_from(TABLE, LAW.ramp_lag_s(build_law(TABLE)), LAW.reels, LAW.follows_shaped)
+SETTINGS = settings_from(TABLE, LAW.ramp_lag_s(build_law(TABLE)), LAW.supports_reeling, LAW.follows_shaped)
 STEP_US = 20_000
 LOAD_RADIUS, GEAR = 0.02, 0.06
 
@@ -46,8 +46,8 @@ def hanging(now_us: int = 0, x: Vec3 = (0.0, 0.0, 2.0), v: Vec3 = ZERO, **change
 
 def entered(flight: Flight, phase: Phase, seen: View, settings: Settings) -> Flight:
     """The flight as it begins a phase, whether or not the table leads there."""
-    begun = replace(flight, phase=phase, phase_start_us=seen.now_us, still_since_us=-1, following=())
-    return begin_legs(begun, seen, settings) if phase in IN_AIR else replace(begun, legs=())
+    begun = replace(flight, phase=phase, phase_start_us=seen.now_us, condition_since_us=-1, following=())
+    return start_phase_legs(begun, seen, settings) if phase in IN_AIR else replace(begun, legs=())
 
 
 class Sky:

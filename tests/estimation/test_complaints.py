@@ -6,7 +6,7 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.estimation.filter import complaints, load_complaint, vehicle_complaint
+from autopilot.estimation.filter import complaints, load_problem, vehicle_problem
 from autopilot.estimation.records import (
     CAMERA,
     NOBODY,
@@ -83,8 +83,8 @@ def test_each_doubt_has_its_limit_and_its_words(
         state = settled(source, load_source, part, value)
         assert complaints(state, OLDEST_S) == ((words.format(state.doubt.horizontal),) if words else ())
         about_the_load = words in ABOUT_THE_LOAD
-        assert bool(load_complaint(state, OLDEST_S)) == about_the_load
-        assert bool(vehicle_complaint(state, OLDEST_S)) == (bool(words) and not about_the_load)
+        assert bool(load_problem(state, OLDEST_S)) == about_the_load
+        assert bool(vehicle_problem(state, OLDEST_S)) == (bool(words) and not about_the_load)
         if about_the_load:
             assert complaints(state, OLDEST_S, carries=False) == ()
 

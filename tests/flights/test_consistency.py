@@ -33,7 +33,7 @@ from autopilot.estimation.records import (
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from gcs.closed_loop import Conditions
-from gcs.sweep.flight import boarding, fly
+from gcs.sweep.flight import fly, start_times
 from missions.fileformat import load_mission
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
@@ -132,7 +132,7 @@ def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
 
     def square(floats_per_min: float) -> float:
         told: dict[str, Any] = {"sensors": "rtk", "settings": {"SIM_GPS_FLT": floats_per_min}}
-        boarded = boarding(hover, Conditions(**told))
+        boarded = start_times(hover, Conditions(**told))
         flights = (fly(hover, Conditions(seed=seed, **told), boarded) for seed in (2, 3, 4))
         return sum(flown.load_error_rms_m**2 for flown in flights)
 

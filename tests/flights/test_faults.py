@@ -57,7 +57,7 @@ def restart(craft: Craft, sensors: str = "lab") -> None:
     craft.onboard = build_onboard(Conditions(sensors=sensors), Home(), mission)
     craft.onboard.add_link(GCS)
     craft.heard.clear()
-    craft.simulator.introduce()
+    craft.simulator.announce_boot()
     craft.tick()
 
 
@@ -259,7 +259,9 @@ def test_ticks_that_are_lost_for_long_end_the_flight_and_are_no_restart(seconds:
     assert said.startswith(f"Flight given up: no tick of the simulator for {seconds:.1f} s")
     assert craft.onboard is before
     craft.wait(2.0)
-    assert not craft.onboard.core.view(craft.onboard.now_us).complaints, "the sensors are heard as before"
+    assert not craft.onboard.core.view(craft.onboard.now_us).estimate_problems, (
+        "the sensors are heard as before"
+    )
 
 
 # ---- single sensors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from autopilot.onboard.onboard import plan_of
+from autopilot.onboard.onboard import mission_plan
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
@@ -22,7 +22,7 @@ def test_turns() -> None:
         WireItem(6, m.MAV_CMD_NAV_LOITER_TURNS, 0, 1, 1.0, 0.0, 1.5, 0.0, lat, lon, 2.0),
     )
     mission = StoredMission(items)
-    assert not plan_of(mission, Home(), SETTINGS.limits).prepared.refusal
+    assert not mission_plan(mission, Home(), SETTINGS.limits).prepared.refusal
     craft = Craft(*(located.step for located in located_steps(items, Home())))
     craft.begin()
     widest = 0.0

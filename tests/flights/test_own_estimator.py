@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff
@@ -73,7 +73,7 @@ class Undecided:
 
 def craft(estimator: str | type, *steps: Any) -> Craft:
     named = estimator if isinstance(estimator, str) else f"{__file__}:{estimator.__name__}"
-    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=Own(estimator=named))
+    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(estimator=named))
 
 
 def test_the_example_lifts_holds_and_lands() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.state import Phase
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -128,7 +128,7 @@ class Lifted(LoadPid):
 
 def craft(law: str | type, *steps: Any) -> Craft:
     reference = law if isinstance(law, str) else f"{__file__}:{law.__name__}"
-    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=Own(reference))
+    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(reference))
 
 
 @pytest.mark.parametrize("law", [*EXAMPLES, AllModes, AsAttitude, AsRates, AsWrench])
@@ -191,5 +191,5 @@ def test_its_parameters_are_changed_in_flight() -> None:
 
 def test_other_laws_can_be_chosen_where_one_was_brought() -> None:
     reference = f"{__file__}:{FailsInHold.__name__}"
-    onboard = build_onboard(Conditions(settings={"CTL_LAW": 0.0}, own=Own(reference)), Home())
+    onboard = build_onboard(Conditions(settings={"CTL_LAW": 0.0}, own=OwnCode(reference)), Home())
     assert onboard.core.setup.own is None

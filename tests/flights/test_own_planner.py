@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Land, Takeoff, Waypoint
@@ -41,7 +41,7 @@ class Fails(MinimumSnap):
 
 def craft(kind: type, **settings: Any) -> Craft:
     module = __file__ if kind.__module__ == __name__ else kind.__module__
-    return Craft(*CORNER, own=Own(planner=f"{module}:{kind.__name__}"), **settings)
+    return Craft(*CORNER, own=OwnCode(planner=f"{module}:{kind.__name__}"), **settings)
 
 
 def test_its_path_is_flown_past_the_waypoint() -> None:

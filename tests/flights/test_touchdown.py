@@ -9,14 +9,14 @@ import pytest
 
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.closed_loop import Conditions, fly
-from gcs.sweep.flight import boarding
 from gcs.sweep.flight import fly as sweep_fly
+from gcs.sweep.flight import start_times
 from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff
 from sitl.vehicles.truth import load_truth
 
 SIMULATOR = 27  # component of its truth telemetry in our dialect
-RESTING = 2e-3  # m, for the ground that gives way under the load, and for the interval of the telemetry
+UNCONTROLLED = 2e-3  # m, for the ground that gives way under the load, and for the interval of the telemetry
 
 
 def test_a_load_that_lags_is_not_taken_for_one_on_the_ground() -> None:
@@ -34,7 +34,7 @@ def test_a_load_that_lags_is_not_taken_for_one_on_the_ground() -> None:
         if message.get_type() == "STATUSTEXT" and "Load on the ground" in message.text:
             noted.append(height)
     assert len(noted) == 1
-    assert noted[0] == pytest.approx(load_truth("thesis").load_radius, abs=RESTING)
+    assert noted[0] == pytest.approx(load_truth("thesis").load_radius, abs=UNCONTROLLED)
 
 
 @pytest.mark.parametrize("seed", [2, 7])
@@ -54,6 +54,6 @@ def test_quiet_trackers_that_are_late_see_a_load_that_lies(noise: float) -> None
     mission = load_mission("case-b")
     settings = {"CTL_LAW": 2.0, "SIM_SENS_LAT_MS": 30.0, "SIM_NOISE_SCALE": noise}
     flown = sweep_fly(
-        mission, Conditions(settings=settings), boarding(mission, Conditions(settings=settings))
+        mission, Conditions(settings=settings), start_times(mission, Conditions(settings=settings))
     )
     assert (flown.outcome, flown.reason) == ("completed", "")

@@ -8,17 +8,24 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from autopilot.supervisor.settings import limits_from
+from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory import feasibility
 from autopilot.trajectory.feasibility import PathReport
-from autopilot.trajectory.prepare import ShapedPath
-from autopilot.trajectory.shaping import unshaped
+from autopilot.trajectory.prepare import ShapingResult
+from autopilot.trajectory.shaping import unshaped_signals
 from autopilot.trajectory.transfer import PEAK_SPEED
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
-from gcs.workflows.check_mission import Check, check_mission, flown_alone, reeled, reels_too_far, remarks_on
+from gcs.workflows.check_mission import (
+    CheckResult,
+    check_mission,
+    margin_warnings,
+    notes_after_release,
+    winch_notes,
+    winch_violations,
+)
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
@@ -26,11 +33,11 @@ CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # for `
 
 
 def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warned_of() -> None:
-    (warning,) = remarks_on([CASE_C], "heavy-real")
+    (warning,) = margin_warnings([CASE_C], "heavy-real")
     assert warning.startswith("warning: items[2] (signals): 16 % of the rotors' range is left for control")
     assert "heavy-real differs from what the autopilot assumes (heavy)" in warning
     assert "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1" in warning
-    assert Check("case-c", "heavy-real", (), (CASE_C,), (warning,)).lines()[-1] == warning
+    assert CheckResult("case-c", "heavy-real", (), (CASE_C,), (warning,)).lines()[-1] == warning
 
 
 @pytest.mark.parametrize(
@@ -38,11 +45,11 @@ def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warne
 )
 def test_either_limit_counts(low_n: float, high_n: float, warned_of: bool) -> None:
     path = PathReport(2, "signals", 50.5, 0.0, low_n, high_n, 3.9, 20.0)
-    assert bool(list(remarks_on([path], "heavy-real"))) == warned_of
+    assert bool(list(margin_warnings([path], "heavy-real"))) == warned_of
 
 
 def test_nothing_is_feared_of_a_vehicle_that_is_as_it_is_believed() -> None:
-    assert list(remarks_on([CASE_C], "heavy")) == []
+    assert list(margin_warnings([CASE_C], "heavy")) == []
 
 
 @pytest.mark.parametrize(("by_m", "cable_m", "limit_m"), [(-5.0, -4.3, 0.3), (2.31, 3.01, 3.0)])
@@ -50,11 +57,11 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     by_m: float, cable_m: float, limit_m: float
 ) -> None:
     mission = Mission("deep", "Deep", "", (), (Takeoff(5.0), Winch(0.2), Winch(-0.2), Winch(by_m), Land()))
-    (found,) = reels_too_far(mission, "bebop")
+    (found,) = winch_violations(mission, "bebop")
     assert (found.item, found.quantity, found.limit) == (3, "cable length", limit_m)
     assert found.value == pytest.approx(cable_m)
     within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 < limit
-    assert list(reels_too_far(within, "bebop")) == []
+    assert list(winch_violations(within, "bebop")) == []
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
 
 
@@ -93,17 +100,17 @@ def test_attitude_runs_tell_of_no_speed() -> None:
 
 def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:
     steps = (Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 2.0), Land())
-    (note,) = flown_alone(Mission("m", "M", "", (), steps))
+    (note,) = notes_after_release(Mission("m", "M", "", (), steps))
     assert note.startswith("note: items[2] to items[3]: flown without the load")
-    (note,) = flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Release(), Land())))
+    (note,) = notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Release(), Land())))
     assert note.startswith("note: items[2]: flown without the load")
-    assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Land())))) == []
-    assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Release())))) == []
+    assert list(notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Land())))) == []
+    assert list(notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Release())))) == []
 
 
 def test_a_cable_that_is_reeled_is_told_with_its_duration() -> None:
     steps = (Takeoff(5.0), Winch(0.6), Winch(-0.6, 0.1), Release(), Winch(0.1), Land())
-    longer, shorter = reeled(Mission("m", "M", "", (), steps), "bebop")
+    longer, shorter = winch_notes(Mission("m", "M", "", (), steps), "bebop")
     assert longer == (
         "note: items[1] (winch): 5.9 s, to a cable of 1.30 m; the vehicle stays in place, no path to report"
     )
@@ -119,7 +126,9 @@ def test_a_law_is_not_checked_and_its_paths_are() -> None:
 def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_mends_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(feasibility, "shaped_path", lambda step, _: ShapedPath(unshaped(step), "no way"))
+    monkeypatch.setattr(
+        feasibility, "shaped_path", lambda step, _: ShapingResult(unshaped_signals(step), "no way")
+    )
     (line,) = check_mission("case-a", "bebop", as_asked=False).lines()
     assert line.startswith("items[2] (signals): no way; a path must leave 15 % of the rotors' range free")
     for mends in ("amplitude_m", "rise_s", "MIS_ROTOR_MARG", "MIS_INFEASIBLE 1"):
@@ -135,9 +144,9 @@ def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Pa
     found = load_limits(str(file))
     assert found.tilt_max_rad == pytest.approx(radians(5.0))
     table = autopilot_parameters(load_belief(file))
-    assert found.shaping == limits_from(table, True)
+    assert found.shaping == path_limits(table, True)
 
 
 def test_limits_are_those_that_the_autopilot_shapes_to() -> None:
     shaping = load_limits("heavy-real").shaping
-    assert shaping == limits_from(autopilot_parameters(load_belief("heavy-real")), True)
+    assert shaping == path_limits(autopilot_parameters(load_belief("heavy-real")), True)

@@ -55,7 +55,7 @@ def commands():
 def nothing_left_to_compile(monkeypatch):
     """Messages about compiling are tested in test_warmup."""
     monkeypatch.setattr("gcs.workflows.fly.flight_parts", lambda laws: [])
-    monkeypatch.setattr("gcs.workflows.flight_here.parts_here", lambda laws: [])
+    monkeypatch.setattr("gcs.workflows.in_process_flight.in_process_parts", lambda laws: [])
 
 
 def one_line(result, code):

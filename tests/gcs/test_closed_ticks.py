@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from autopilot.control.law_exchange import Now
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from gcs import closed_loop
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions
-from gcs.closed_ticks import ClosedTicks, Flown
+from gcs.closed_ticks import ClosedTicks, FlownTicks
 from gcs.workflows.mission_file import load
 from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
 from plumbline.examples.load_pid import LoadPid
@@ -58,8 +58,8 @@ def flown(mission: Mission, conditions: Conditions, **how: Any) -> tuple[Outcome
         (ERRAND, Conditions(sensors="rtk", seed=2)),
         (load("hover"), Conditions("heavy-real", "field", 3, GUSTS)),
         (load("hover"), Conditions(settings={"SIM_CBL_LINKS": 3.0, "SIM_RATE_HZ": 500.0})),
-        (load("hover"), Conditions(own=Own("plumbline.examples.load_pid:LoadPid"))),
-        (load("hover"), Conditions(own=Own(f"{__name__}:Fails"))),
+        (load("hover"), Conditions(own=OwnCode("plumbline.examples.load_pid:LoadPid"))),
+        (load("hover"), Conditions(own=OwnCode(f"{__name__}:Fails"))),
     ],
     ids=["hover", "errand", "field", "links", "own law", "own law that fails"],
 )
@@ -67,9 +67,9 @@ def test_a_flight_is_the_same_without_python_at_each_tick(
     mission: Mission, conditions: Conditions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     windows = 0
-    run: Callable[..., Flown] = ClosedTicks.run
+    run: Callable[..., FlownTicks] = ClosedTicks.run
 
-    def counted(ticks: ClosedTicks, said: bytes, silent_until_us: int) -> Flown:
+    def counted(ticks: ClosedTicks, said: bytes, silent_until_us: int) -> FlownTicks:
         nonlocal windows
         found = run(ticks, said, silent_until_us)
         windows += sum(window.ends_us > 0 for window in found.windows)
@@ -91,6 +91,6 @@ def test_the_ground_station_has_its_turn_at_each_window() -> None:
         nonlocal turns
         turns += 1
 
-    _, log = flown(load("hover"), Conditions(sensors="ideal"), shown=shown)
+    _, log = flown(load("hover"), Conditions(sensors="ideal"), on_turn=shown)
     seconds = (log[-1][0] - log[0][0]) * 1e-6
     assert turns == pytest.approx(seconds / 0.02, rel=0.01)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gcs.workflows.expected import expected_s, in_words, remaining_s
+from gcs.workflows.expected import duration_text, expected_s, remaining_s
 
 COSTS = [26.0, 10.0, 8.0, 3.0]
 
@@ -43,4 +43,4 @@ def test_a_fast_machine_is_not_promised_to_stay_fast():
     [(0.0, "about 1 s"), (34.6, "about 35 s"), (134.0, "about 130 s"), (400.0, "about 7 min")],
 )
 def test_in_words(seconds, words):
-    assert in_words(seconds) == words
+    assert duration_text(seconds) == words

@@ -11,19 +11,19 @@ import pytest
 from click.testing import CliRunner
 
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE, GcsError, InputError, disk_trouble, not_written
+from gcs.errors import EXIT_USAGE, GcsError, InputError, disk_problem, write_error
 from gcs.folders import (
     PAGE_FILE,
     PLAN_FILE,
     RESULTS_FILE,
     SUMMARY_FILE,
     TLOG_FILE,
+    check_no_other_results,
     fresh_folder,
-    keep_others,
     reserved,
 )
 from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
-from gcs.workflows.report import make_report, report_again
+from gcs.workflows.report import make_report, remake_report
 from tests.doubles import recorded_flights
 
 
@@ -73,7 +73,7 @@ def test_the_report_of_a_log_does_not_take_the_place_of_another_flights(tmp_path
         log.parent.mkdir()
         recorded_flights.flight(float(seconds), recorded_flights.still).write(log)
     with pytest.raises(InputError, match=r"other: holds another flight; name another folder by --out$"):
-        report_again(logs[0], tmp_path / "other", quiet=True)
+        remake_report(logs[0], tmp_path / "other", quiet=True)
     assert list((tmp_path / "other").iterdir()) == [logs[1]]
 
 
@@ -150,7 +150,7 @@ def test_results_of_one_kind_do_not_take_the_place_of_others(
 ) -> None:
     (tmp_path / there).write_text("theirs", encoding="utf-8")
     with pytest.raises(GcsError, match=told):
-        keep_others(tmp_path, kind, (PAGE_FILE,))
+        check_no_other_results(tmp_path, kind, (PAGE_FILE,))
 
 
 def test_a_flight_leaves_a_sweep_and_files_of_others_as_they_are(tmp_path: Path) -> None:
@@ -173,7 +173,7 @@ def test_a_folder_that_is_written_into_is_not_anothers(tmp_path: Path) -> None:
 def test_a_full_disk_is_told_by_the_systems_word_whoever_writes() -> None:
     with pytest.raises(OSError) as error:
         arrow_on_a_full_disk(Path())
-    assert disk_trouble(error.value) == "no space left on device"
+    assert disk_problem(error.value) == "no space left on device"
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -212,7 +212,7 @@ def test_a_working_folder_that_is_not_writable_is_wrong_input_and_no_option_is_b
 
 @pytest.mark.parametrize(("number", "kind"), [(errno.EROFS, InputError), (errno.ENOSPC, GcsError)])
 def test_what_cannot_be_written_says_to_name_another(number: int, kind: type[GcsError]) -> None:
-    found = not_written(OSError(number, "wrapped by a library"), "replays/case-b")
+    found = write_error(OSError(number, "wrapped by a library"), "replays/case-b")
     assert type(found) is kind
     assert str(found).startswith(f"replays/case-b: {os.strerror(number)}; ")
     assert str(found).endswith("name another folder by --out")

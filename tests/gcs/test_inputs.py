@@ -12,7 +12,7 @@ from autopilot.vehicle.shipped import VEHICLES
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_inputs import check_flight_inputs, doubts
+from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings
 from sitl.sensors.shipped import PROFILES
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
@@ -137,7 +137,7 @@ def test_help_names_the_shipped_vehicles(command):
 )
 def test_of_a_time_that_may_be_meant_in_seconds_the_unit_is_told(name, value, meant):
     told = [f"{name} = {value:g} is in milliseconds; {meant}"] if meant else []
-    assert doubts("bebop", [(name, value)]) == told
+    assert setting_warnings("bebop", [(name, value)]) == told
 
 
 @pytest.mark.parametrize(

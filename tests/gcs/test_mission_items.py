@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gcs.clients.flight import Outcome
-from gcs.mission_items import of_mission
+from gcs.mission_items import in_mission_terms
 from missions.fileformat import load_mission
 
 CASE_C = load_mission("case-c")  # signals are its items[2], and items 2 ... 7 of the upload
@@ -26,5 +26,5 @@ CASE_C = load_mission("case-c")  # signals are its items[2], and items 2 ... 7 o
     ],
 )
 def test_an_item_that_the_mission_counts_otherwise_is_named_as_it_counts(said: str, told: str) -> None:
-    assert of_mission(said, CASE_C) == told
-    assert Outcome("refused", said).of_mission(CASE_C) == Outcome("refused", told)
+    assert in_mission_terms(said, CASE_C) == told
+    assert Outcome("refused", said).in_mission_terms(CASE_C) == Outcome("refused", told)

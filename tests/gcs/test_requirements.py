@@ -15,14 +15,20 @@ from gcs.cli import gcs
 from gcs.clients.flight import Outcome
 from gcs.errors import GcsError, InputError
 from gcs.workflows.fly import Flight
-from gcs.workflows.requirements import conclude, judge, read_requirements, reporting, unjudged
+from gcs.workflows.requirements import (
+    check_requirements,
+    junit_on_error,
+    parse_requirements,
+    report_verdicts,
+    uncovered_failures,
+)
 
 KEYS = ("load_error_max_m", "outcome", "slack_events")
 RECORD = {"load_error_max_m": 0.004, "outcome": "completed", "slack_events": None}
 
 
 @pytest.mark.parametrize(
-    ("text", "met"),
+    ("text", "is_met"),
     [
         ("load_error_max_m < 0.01", True),
         ("load_error_max_m<=0.004", True),
@@ -39,9 +45,9 @@ RECORD = {"load_error_max_m": 0.004, "outcome": "completed", "slack_events": Non
         ("slack_events != 0", False),
     ],
 )
-def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
-    (verdict,) = judge(read_requirements([text], KEYS, "gcs fly --json"), RECORD)
-    assert verdict.met is met
+def test_a_requirement_is_met_or_not(text: str, is_met: bool) -> None:
+    (verdict,) = check_requirements(parse_requirements([text], KEYS, "gcs fly --json"), RECORD)
+    assert verdict.is_met is is_met
 
 
 @pytest.mark.parametrize(
@@ -59,12 +65,12 @@ def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
 )
 def test_what_is_no_requirement_is_refused_with_what_to_write(text: str, says: str) -> None:
     with pytest.raises(InputError) as told:
-        read_requirements([text], KEYS, "gcs fly --json")
+        parse_requirements([text], KEYS, "gcs fly --json")
     assert says in str(told.value) and repr(text) in str(told.value)
 
 
 def test_a_figure_that_there_is_not_is_told_with_a_possible_reason() -> None:
-    (verdict,) = judge(read_requirements(["slack_events == 0"], KEYS, "gcs fly --json"), RECORD)
+    (verdict,) = check_requirements(parse_requirements(["slack_events == 0"], KEYS, "gcs fly --json"), RECORD)
     assert verdict.line.startswith("required slack_events == 0; found not known; this run has no such figure")
 
 
@@ -81,7 +87,7 @@ def test_a_figure_that_there_is_not_is_told_with_a_possible_reason() -> None:
 )
 def test_lost_flights_that_nothing_judges_are_told(required: list[str], completed: int, told: bool) -> None:
     keys = ("load_error_max_m", "completed", "failed", "completed_fraction")
-    line = unjudged(read_requirements(required, keys, "gcs sweep --json"), 4, completed)
+    line = uncovered_failures(parse_requirements(required, keys, "gcs sweep --json"), 4, completed)
     assert ('judges the 1 completed of 4 flights; add --require "completed == 4"' in line) == told
     assert told or not line
 
@@ -105,8 +111,12 @@ def test_what_was_missed_is_told_and_stands_in_the_report(
 ) -> None:
     junit = tmp_path / "deep" / "report.xml"
     texts = ["load_error_max_m < 0.001", "outcome == completed"]
-    assert not conclude(
-        "run", junit, "completed", 2.5, judge(read_requirements(texts, KEYS, "gcs fly --json"), RECORD)
+    assert not report_verdicts(
+        "run",
+        junit,
+        "completed",
+        2.5,
+        check_requirements(parse_requirements(texts, KEYS, "gcs fly --json"), RECORD),
     )
     assert capsys.readouterr().err == "gcs: required load_error_max_m < 0.001; found 0.004\n"
     (suite,) = ET.parse(junit).getroot()
@@ -121,14 +131,14 @@ def test_what_was_missed_is_told_and_stands_in_the_report(
 
 def test_a_flight_that_was_lost_fails_in_the_report(tmp_path: Path) -> None:
     junit = tmp_path / "report.xml"
-    assert conclude("run", junit, "diverged", 1.0, [], "it fell")
+    assert report_verdicts("run", junit, "diverged", 1.0, [], "it fell")
     (suite,) = ET.parse(junit).getroot()
     assert [fault.get("message") for case in suite for fault in case] == ["outcome diverged: it fell"]
 
 
 def test_a_run_that_does_not_come_about_is_an_error_in_the_report(tmp_path: Path) -> None:
     junit = tmp_path / "report.xml"
-    with pytest.raises(GcsError, match="no\x1bport"), reporting("run", junit):
+    with pytest.raises(GcsError, match="no\x1bport"), junit_on_error("run", junit):
         raise GcsError("no\x1bport")
     (suite,) = ET.parse(junit).getroot()
     assert suite.get("errors") == "1"
@@ -138,7 +148,7 @@ def test_a_run_that_does_not_come_about_is_an_error_in_the_report(tmp_path: Path
 def test_a_report_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(GcsError, match=r"--junit .*file/report.xml: File exists"):
-        conclude("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
+        report_verdicts("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
 
 
 @pytest.fixture
@@ -150,7 +160,7 @@ def one_after_another(monkeypatch: pytest.MonkeyPatch) -> None:
         with ThreadPoolExecutor(1) as executor:
             yield executor, 1
 
-    monkeypatch.setattr("gcs.workflows.sweep.own_processes", here)
+    monkeypatch.setattr("gcs.workflows.sweep.local_processes", here)
 
 
 @pytest.mark.usefixtures("one_after_another")

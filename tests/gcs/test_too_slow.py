@@ -16,9 +16,9 @@ from autopilot.wire.tlog import TlogWriter
 from gcs.clients.flight import Outcome
 from gcs.folders import TLOG_FILE
 from gcs.workflows import fly as workflow
-from gcs.workflows import own_flight
+from gcs.workflows import started_flight
 from gcs.workflows.flight_options import FlightOptions
-from gcs.workflows.too_slow import too_slow
+from gcs.workflows.too_slow import slowness_reason
 
 OWN_REASON = "the load is lost"
 
@@ -36,7 +36,7 @@ def write(log: TlogWriter, missed: int, seconds: int = 40, speed: float = 1.0, s
 def told(path: Path, **counted: Any) -> str:
     with (path / TLOG_FILE).open("wb") as file:
         write(TlogWriter(file), **counted)
-    return too_slow(path / TLOG_FILE)
+    return slowness_reason(path / TLOG_FILE)
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,12 @@ def test_the_outcome_of_a_flight_in_real_time_says_that_the_machine_was_too_slow
     def flown(mission: Any, options: Any, log: TlogWriter, own: Any, stop: Any, watch: Any, page: Any) -> Any:
         watch.start()
         write(log, missed=500)
-        return SimpleNamespace(outcome=Outcome(name, OWN_REASON), begun=True)
+        return SimpleNamespace(outcome=Outcome(name, OWN_REASON), started=True)
 
-    monkeypatch.setattr(workflow, "own_vehicle", no_vehicle)
+    monkeypatch.setattr(workflow, "start_vehicle", no_vehicle)
     monkeypatch.setattr(workflow, "warm_up", lambda parts, quiet: None)
     monkeypatch.setattr(workflow, "make_report", lambda tlog, out, meta, quiet, figures, pictures: meta)
-    monkeypatch.setattr(own_flight, "fly_own", flown)
+    monkeypatch.setattr(started_flight, "fly_started_vehicle", flown)
     options = FlightOptions(
         **{"mission": "hover", "law": "thesis", "sensors": "lab", "vehicle": "bebop", "seed": 1},
         **{"speed": 1.0, "real_time": real_time, "out": tmp_path / "out", "settings": (), "connect": None},

@@ -62,7 +62,7 @@ def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first
         part(name, f"open({str(marks)!r}, 'a').write('{name} ')", cost_s)
         for name, cost_s in (("paths", 1.0), ("tick", 9.0), ("world", 3.0))
     ]
-    parts[2].done()
+    parts[2].mark_done()
     warm_up(parts, quiet=True)
     assert sorted(marks.read_text().split()) == ["paths", "tick"]
     warm_up(parts, quiet=True)

@@ -12,7 +12,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from autopilot.control.laws import LAWS
-from autopilot.core.tick import CoreConstants, Pilot, Seen, Winch
+from autopilot.core.tick import ControlMemory, CoreConstants, EstimateSummary, Winch
 from autopilot.estimation.records import EstimatorState
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width, with_field
@@ -24,7 +24,7 @@ NEIGHBOUR = 7.25
 FLOATS = (0.0, -0.0, inf, -inf, nan, 5e-324, 1.7976931348623157e308, 0.1, -1.0 / 3.0)
 INTS = (0, -1, 2**53, -(2**53), 1_700_000_000_000_000)
 
-IN_ROWS = (EstimatorState, Pilot, Seen, Stretch, CoreConstants, Winch, World, WorldModel)
+IN_ROWS = (EstimatorState, ControlMemory, EstimateSummary, Stretch, CoreConstants, Winch, World, WorldModel)
 OF_LAWS = dict.fromkeys(kind for law in LAWS.values() for kind in (law.constants, law.memory))
 
 needs_compiler = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")

@@ -20,11 +20,11 @@ from autopilot.guidance.legs import (
     Transfer,
     asked_jet,
 )
-from autopilot.supervisor.settings import limits_from
+from autopilot.supervisor.settings import path_limits
 from autopilot.supervisor.state import Flight, jet_ahead
 from autopilot.trajectory.prepare import prepare
-from autopilot.trajectory.shaping import Shaped, unshaped
-from autopilot.trajectory.waypoint_path import Passage
+from autopilot.trajectory.shaping import ShapedSignals, unshaped_signals
+from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from missions.model import Signals, Sine, Takeoff, Term, Waypoint
@@ -37,7 +37,7 @@ LEGS = (
     Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0),
     Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
-    Run((0.1, 0.2, 0.3), unshaped(SIGNALS)),
+    Run((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
     Slow(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
 )
 
@@ -51,7 +51,7 @@ def test_a_leg_laid_out_is_the_leg(leg: Leg, asked: bool) -> None:
 
 
 def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
-    limits = limits_from(autopilot_parameters(load_vehicle("bebop")), True)._replace(shaped=True)
+    limits = path_limits(autopilot_parameters(load_vehicle("bebop")), True)._replace(shape_paths=True)
     steps = (
         Takeoff(1.0),
         Waypoint(2.0, 0.0, 2.0, 0.0),
@@ -59,9 +59,9 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
         Waypoint(0.0, 2.0, 1.5, 1.0),
         SIGNALS,
     )
-    made = prepare(steps, tuple(range(len(steps))), limits).made
+    made = prepare(steps, tuple(range(len(steps))), limits).paths
     passage, shaped = made[1], made[4]
-    assert isinstance(passage, Passage) and isinstance(shaped, Shaped) and len(shaped.pieces)
+    assert isinstance(passage, PathSegment) and isinstance(shaped, ShapedSignals) and len(shaped.pieces)
     times = np.arange(-3, 2500) * 0.004
     for leg in (Pass(passage, (0.1, -0.2, 0.05), 1.5), Run((0.1, 0.2, 0.3), shaped)):
         expected = [np.ravel(leg.jet(t)) for t in times.tolist()]
@@ -69,7 +69,10 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
 
 
 def test_signals_are_those_of_the_path_and_the_times_whatever_was_laid_out_before() -> None:
-    paths = [unshaped(SIGNALS), unshaped(replace(SIGNALS, duration_s=SIGNALS.duration_s + 1.0))]
+    paths = [
+        unshaped_signals(SIGNALS),
+        unshaped_signals(replace(SIGNALS, duration_s=SIGNALS.duration_s + 1.0)),
+    ]
     times = np.arange(600) * 0.004
     for anchor in ((0.0, 0.0, 1.0), (1.0, 2.0, 3.0)):
         for path in paths:
@@ -80,7 +83,7 @@ def test_signals_are_those_of_the_path_and_the_times_whatever_was_laid_out_befor
 
 def test_the_path_ahead_goes_on_into_what_follows() -> None:
     first, second = Transfer((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), 2.0), Hold((1.0, 0.0, 1.0), 0.5)
-    third = Run((1.0, 0.0, 1.0), unshaped(SIGNALS))
+    third = Run((1.0, 0.0, 1.0), unshaped_signals(SIGNALS))
     flight = Flight(legs=(first, second), following=(third,))
     times = np.arange(1000) * 0.004
     expected = [np.ravel(jet_ahead(flight, t)) for t in times.tolist()]

@@ -35,9 +35,9 @@ from autopilot.guidance.legs import (
     slow_leg,
     transfer_leg,
 )
-from autopilot.supervisor.settings import limits_from
-from autopilot.trajectory.shaping import shape, unshaped
-from autopilot.trajectory.waypoint_path import Passage, passage
+from autopilot.supervisor.settings import path_limits
+from autopilot.trajectory.shaping import shape, unshaped_signals
+from autopilot.trajectory.waypoint_path import PathSegment, plan_waypoint_path
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from missions.model import Signals, Sine, Term
@@ -45,21 +45,21 @@ from missions.model import Signals, Sine, Term
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
 SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
 TABLE = autopilot_parameters(load_vehicle("bebop"))
-LIMITS = limits_from(TABLE, chosen_law(TABLE).follows_shaped)
+LIMITS = path_limits(TABLE, chosen_law(TABLE).follows_shaped)
 SHAPED = shape(Signals(3.0, (Term("y", 0.2, 0.2, 0.7, None, 0.0),)), LIMITS.body, LIMITS.bounds)
 POINTS = (HERE, THERE, (3.0, 1.0, 3.0))
-_PATH, _TIMES = passage(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)
-PASSAGE = Passage(_PATH.table(), 0.0, float(_TIMES[1]), HERE)
+_PATH, _TIMES = plan_waypoint_path(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)
+PASSAGE = PathSegment(_PATH.table(), 0.0, float(_TIMES[1]), HERE)
 BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
 LEGS: dict[str, Leg] = {
     "hold": Hold(HERE, 5.0),
     "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
-    "run": Run(HERE, unshaped(SIGNALS)),
+    "run": Run(HERE, unshaped_signals(SIGNALS)),
     "shaped run": Run(HERE, SHAPED),
     "pass": Pass(PASSAGE, (0.02, -0.01, 0.0), 1.7),
-    "slow": Slow(Run(HERE, unshaped(SIGNALS)), 0.9, 2.4),
+    "slow": Slow(Run(HERE, unshaped_signals(SIGNALS)), 0.9, 2.4),
     "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
     "reel": Reel(HERE, HERE[2] + 0.7, 0.4, 1.0, 0.6),
     "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
@@ -132,7 +132,7 @@ def test_a_brake_out_of_steady_motion_keeps_to_its_limit_and_never_turns_back(
 
 @given(at=st.floats(0.0, 2.7), limit=st.floats(0.2, 5.0))
 def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit: float) -> None:
-    run = Run(HERE, unshaped(SIGNALS))
+    run = Run(HERE, unshaped_signals(SIGNALS))
     leg = slow_leg(run, at, limit, LEAST_S)
     assert leg.duration_s >= LEAST_S
     for stopped, going in zip(leg.jet(0.0), run.jet(at), strict=True):
@@ -146,7 +146,7 @@ def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit
 def test_a_stop_flies_no_part_of_its_path_faster() -> None:
     """The run reaches 2 m/s at the peak of its sine; a stop that begins while it accelerates must not become
     faster than that."""
-    run = Run(HERE, unshaped(SIGNALS))
+    run = Run(HERE, unshaped_signals(SIGNALS))
     fastest = max(norm(run.jet(0.02 * k)[1]) for k in range(200))
     leg = slow_leg(run, 0.75, 1.0, LEAST_S)
     speeds = [norm(leg.jet(leg.duration_s * k / 100)[1]) for k in range(101)]
@@ -158,7 +158,7 @@ def test_a_stop_flies_no_part_of_its_path_faster() -> None:
 
 
 def test_a_stop_out_of_a_stop_is_the_rest_of_it() -> None:
-    first = slow_leg(Run(HERE, unshaped(SIGNALS)), 0.9, 1.5, LEAST_S)
+    first = slow_leg(Run(HERE, unshaped_signals(SIGNALS)), 0.9, 1.5, LEAST_S)
     second = slow_leg(first, 0.4, 1.5, LEAST_S)
     third = slow_leg(second, 0.3, 1.5, LEAST_S)
     assert (third.leg, third.end) == (first.leg, first.end)

@@ -14,7 +14,7 @@ from autopilot.wire.items import decode_items, encode_mission
 from gcs.errors import InputError
 from gcs.mission_items import items_of
 from missions.fileformat import MissionFileError, mission_of
-from missions.limits import MOST_FACTORS, MOST_TERMS
+from missions.limits import MAX_FACTORS, MAX_TERMS
 from missions.schema import ITEMS, SineSpec, Spec, TermSpec
 
 HOME = Home(47.397742, 8.545594, 488.0)
@@ -100,7 +100,7 @@ def test_what_the_file_accepts_the_wire_carries(kind: str, spec: type[Spec], key
                 {
                     "type": "signals",
                     "duration_s": 9.0,
-                    "terms": [TERM | {"factors": [FACTOR] * MOST_FACTORS}] * MOST_TERMS,
+                    "terms": [TERM | {"factors": [FACTOR] * MAX_FACTORS}] * MAX_TERMS,
                 }
             ]
             * 32,

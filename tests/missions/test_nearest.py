@@ -27,4 +27,4 @@ def test_the_nearest_name_is_found_whatever_its_case(word: str, meant: str) -> N
 
 def test_how_near_it_must_be_can_be_told() -> None:
     assert nearest("hxxxr", SHIPPED) == ""
-    assert nearest("hxxxr", SHIPPED, likeness=0.3) == "hover"
+    assert nearest("hxxxr", SHIPPED, min_similarity=0.3) == "hover"

@@ -13,7 +13,7 @@ from pyulog import ULog
 from autopilot.estimation.records import ImuReading
 from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
 from autopilot.geometry.packed import pack, packed, unpack, width
-from autopilot.onboard.flight_log import MOST_WAITING, TAIL_US, FlightLog, LogChunk
+from autopilot.onboard.flight_log import MAX_WAITING_BYTES, TAIL_US, FlightLog, LogChunk
 from autopilot.onboard.log_topics import FAST, SLOW
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
@@ -85,7 +85,7 @@ def test_the_flight_is_the_same_bit_for_bit(flown: Flown) -> None:
 
 def test_one_log_from_arming_to_disarming(flown: Flown, log: ULog) -> None:
     assert {chunk.path for chunk in flown.chunks} == {("log", "2026-01-01_00-00-00.ulg")}
-    assert [chunk.ended for chunk in flown.chunks] == [False] * (len(flown.chunks) - 1) + [True]
+    assert [chunk.is_last for chunk in flown.chunks] == [False] * (len(flown.chunks) - 1) + [True]
     assert not log.file_corruption
     assert log.dropouts == []
     states = log.get_dataset("vehicle_status").data["arming_state"]
@@ -151,11 +151,11 @@ def test_a_log_that_cannot_be_stored_is_not_begun_again_in_the_same_flight(flown
     log, begun_us = make_log(), []
     for now_us in range(0, 20_000_000, 100_000):
         armed = not 8_000_000 <= now_us < 12_000_000
-        if log.due(now_us, armed):
+        if log.is_due(now_us, armed):
             log.step(now_us, armed, set, flown.onboard.log_sample)
         if log.path is not None:
             begun_us.append(now_us)
-            log.give_up()
+            log.abandon()
     assert begun_us == [0, 12_000_000]
 
 
@@ -165,17 +165,17 @@ def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
     table = autopilot_parameters(load_vehicle("bebop"))
     log = FlightLog(table, "0.1.0", BOOT_US, Home())
     sample = flown.onboard.log_sample
-    log.say(10, 4, "not ready")
+    log.add_text(10, 4, "not ready")
     log.step(1000, True, set, sample)
     table.set("NGC_KX", 7.0)
     log.step(5000, True, set, no_sample)
     log.step(20_000, True, set, sample)
     log.step(30_000, False, set, no_sample)
     log.step(30_000 + TAIL_US, False, set, no_sample)
-    chunk = log.take()
+    chunk = log.take_chunk()
     assert chunk is not None
-    assert chunk.ended
-    assert log.take() is None
+    assert chunk.is_last
+    assert log.take_chunk() is None
     path = tmp_path / "log.ulg"
     path.write_bytes(chunk.data)
     read = ULog(str(path))
@@ -193,11 +193,11 @@ def test_records_that_nobody_takes_are_dropped_and_the_gap_is_told(tmp_path: Pat
         log.step(now_us, True, set, lambda: sample)
         now_us += 20_000
         if now_us == 199_000_000:
-            first = log.take()
+            first = log.take_chunk()
     assert first is not None
-    assert len(first.data) <= MOST_WAITING
+    assert len(first.data) <= MAX_WAITING_BYTES
     log.end()
-    rest = log.take()
+    rest = log.take_chunk()
     assert rest is not None
     path = tmp_path / "log.ulg"
     path.write_bytes(first.data + rest.data)
@@ -214,7 +214,7 @@ def test_a_diverged_flight_is_still_logged(flown: Flown, tmp_path: Path) -> None
     pack(instant._replace(x_load=(1e300, -1e300, 0.0), seq=70_000), sample.instant, 0)
     log = make_log()
     log.step(0, True, set, lambda: sample)
-    chunk = log.take()
+    chunk = log.take_chunk()
     assert chunk is not None
     path = tmp_path / "log.ulg"
     path.write_bytes(chunk.data)
@@ -235,7 +235,7 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     log.step(7, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=True))
     log.step(20_000, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=False))
     path = tmp_path / "log.ulg"
-    path.write_bytes(log.take().data)  # type: ignore[union-attr]
+    path.write_bytes(log.take_chunk().data)  # type: ignore[union-attr]
     read = ULog(str(path))
 
     def logged(topic: str, *names: str) -> tuple[float, ...]:
@@ -275,8 +275,8 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
         "position": said.x_load_d,
         "velocity": said.v_load_d,
         "acceleration": said.a_load_d,
-        "position_asked": said.x_load_asked,
-        "velocity_asked": said.v_load_asked,
+        "position_asked": said.x_load_requested,
+        "velocity_asked": said.v_load_requested,
         "cable": said.q_cable_c,
     }.items():
         assert vector("load_setpoint", name) == float32(ned_from_enu(field))

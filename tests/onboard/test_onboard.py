@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.onboard.onboard import Onboard
-from autopilot.onboard.simulator_parameters import WorldParameters
+from autopilot.onboard.simulator_parameters import SimulatorParameters
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.records import WorldSaved
+from autopilot.services.records import SimulatorParametersSaved
 from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -84,16 +84,16 @@ def test_a_tick_of_the_past_is_ignored_and_counted() -> None:
     for time_us in (0, 4000, 8000):
         autopilot.receive_sensors(sensors(time_us))
     assert autopilot.receive_sensors(sensors(4000)) is None
-    assert (autopilot.out_of_time, autopilot.now_us, autopilot.tick) == (1, 8000, 2)
+    assert (autopilot.bad_time_ticks, autopilot.now_us, autopilot.tick) == (1, 8000, 2)
     autopilot.receive_sensors(sensors(12_000))
-    assert autopilot.out_of_time == 0
+    assert autopilot.bad_time_ticks == 0
 
 
 def test_a_tick_from_far_ahead_does_not_carry_the_clock_away() -> None:
     autopilot = onboard()
     autopilot.receive_sensors(sensors(0))
     assert autopilot.receive_sensors(sensors(2**60)) is None
-    assert autopilot.out_of_time == 1
+    assert autopilot.bad_time_ticks == 1
     assert controls(autopilot.receive_sensors(sensors(4000))).time_us == 4000
 
 
@@ -253,7 +253,7 @@ def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it(
     assert flight.area.home[:2] == pytest.approx((east, north), abs=0.01)
     plan = flight.mission.plan
     assert plan.steps == (Takeoff(4.0), ReturnHome(), Waypoint(flight.area.home[0], flight.area.home[1], 2.0))
-    assert len(plan.prepared.made) == 3
+    assert len(plan.prepared.paths) == 3
     assert not plan.prepared.pending
 
 
@@ -298,13 +298,13 @@ def test_a_reboot_is_handed_to_the_simulator_and_both_begin_anew() -> None:
     assert craft.simulator.now_us < 20_000
     for _ in range(4):
         craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
-    assert craft.onboard.out_of_time >= 3, "by which the shell knows that it is to begin anew too"
+    assert craft.onboard.bad_time_ticks >= 3, "by which the shell knows that it is to begin anew too"
 
 
 def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> None:
     craft = Craft(Takeoff(1.0), Land())
     craft.begin()
-    (received,), _ = decode(craft.onboard.stranded_heartbeat(GCS))
+    (received,), _ = decode(craft.onboard.paused_heartbeat(GCS))
     assert received.message.system_status == mavlink.MAV_STATE_EMERGENCY
     assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
@@ -324,7 +324,7 @@ def test_no_more_latency_is_believed_than_may_be() -> None:
 
 def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     craft = Craft()
-    craft.onboard.restore_world({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})
+    craft.onboard.restore_simulator_parameters({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})
     craft.run(lambda craft: craft.simulator.parameters.table["SIM_WIND_E"] == 2.5, 3.0)
     craft.wait(1.0)
     assert craft.onboard.parameters["SIM_WIND_E"] == 2.5
@@ -332,12 +332,12 @@ def test_the_saved_world_is_set_again_in_the_simulator() -> None:
 
 
 def test_a_simulator_that_falls_silent_gets_the_saved_world_and_nothing_that_was_asked_for() -> None:
-    world = WorldParameters(autopilot_parameters(load_vehicle("bebop")))
+    world = SimulatorParameters(autopilot_parameters(load_vehicle("bebop")))
     world.restore({"SIM_WIND_E": 2.5})
     for name, index in (("SIM_WIND_E", 0), ("SIM_LOAD_MASS", 1)):
         world.receive(mavlink.MAVLink_param_value_message(name.encode(), 0.0, 9, 2, index))
-    world.ask("SIM_LOAD_MASS", 0.2)
-    world.forget_asked()
+    world.request("SIM_LOAD_MASS", 0.2)
+    world.drop_unanswered()
     sent = [one for one in world.messages(0) if one.get_type() == "PARAM_SET"]
     assert [(one.param_id, one.param_value) for one in sent] == [("SIM_WIND_E", 2.5)]
 
@@ -368,7 +368,7 @@ def test_what_the_simulator_has_not_answered_yet_is_saved_as_it_was_asked_for() 
     )
     ground = FrameWriter(255, 190)
     events = craft.onboard.receive_ground(ground.frame(message) + ground.frame(save), GCS)
-    (saved,) = (event for event in events if isinstance(event, WorldSaved))
+    (saved,) = (event for event in events if isinstance(event, SimulatorParametersSaved))
     assert (saved.values["SIM_WIND_E"], saved.values["SIM_WIND_N"]) == (2.5, before)
 
 
@@ -434,12 +434,12 @@ def test_items_behind_a_landing_are_reported(behind: tuple[Step, ...]) -> None:
 
 def test_it_tells_in_which_run_of_the_simulated_world_it_flies() -> None:
     autopilot, writer = onboard(), FrameWriter(255, 190)
-    ask = mavlink.MAVLink_command_long_message(
+    request = mavlink.MAVLink_command_long_message(
         1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_SIM_BOOT, *(0.0,) * 6
     )
 
     def answers(time_us: int) -> list[Any]:
-        autopilot.receive_ground(writer.frame(ask), GCS)
+        autopilot.receive_ground(writer.frame(request), GCS)
         autopilot.receive_sensors(sensors(time_us))
         sent = [one for _, datagram in autopilot.ground_datagrams() for one in decode(datagram)[0]]
         return [one for one in sent if one.message.get_type() in ("SIM_BOOT", "COMMAND_ACK")]

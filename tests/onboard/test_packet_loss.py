@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.onboard.packet_loss import Loss
+from autopilot.onboard.packet_loss import PacketLoss
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -23,15 +23,15 @@ SIGMAS = 4.0
 @pytest.mark.parametrize("percent", [0.5, 10.0, 50.0, 99.0])
 @pytest.mark.parametrize("direction", [0, 1])
 def test_as_many_are_lost_as_asked(direction: int, percent: float) -> None:
-    loss = Loss(direction)
+    loss = PacketLoss(direction)
     lost = sum(loss.drops(HEARTBEAT, percent) for _ in range(DATAGRAMS))
     share = percent / 100.0
     assert abs(lost - share * DATAGRAMS) < SIGMAS * math.sqrt(DATAGRAMS * share * (1.0 - share))
 
 
 def test_all_or_nothing() -> None:
-    assert not any(Loss(0).drops(HEARTBEAT, 0.0) for _ in range(100))
-    loss = Loss(1)
+    assert not any(PacketLoss(0).drops(HEARTBEAT, 0.0) for _ in range(100))
+    loss = PacketLoss(1)
     assert all(loss.drops(HEARTBEAT, 100.0) for _ in range(100))
 
 
@@ -43,13 +43,13 @@ def test_all_or_nothing() -> None:
     ],
 )
 def test_a_link_that_loses_all_can_be_mended(message: Any) -> None:
-    loss = Loss(0)
+    loss = PacketLoss(0)
     frame = FrameWriter(255, 190).frame(message)
     assert not any(loss.drops(frame, 100.0) for _ in range(100))
 
 
 def test_the_clock_is_never_lost_and_takes_no_draw() -> None:
-    with_clock, without = Loss(0), Loss(0)
+    with_clock, without = PacketLoss(0), PacketLoss(0)
     drawn = []
     for _ in range(500):
         assert not with_clock.drops(TIMESYNC, 100.0)
@@ -59,7 +59,7 @@ def test_the_clock_is_never_lost_and_takes_no_draw() -> None:
 
 def test_losses_are_the_same_every_time_and_not_the_same_both_ways() -> None:
     def pattern(direction: int) -> list[bool]:
-        loss = Loss(direction)
+        loss = PacketLoss(direction)
         return [loss.drops(HEARTBEAT, 30.0) for _ in range(1000)]
 
     assert pattern(0) == pattern(0)
@@ -70,4 +70,4 @@ def test_losses_are_the_same_every_time_and_not_the_same_both_ways() -> None:
 
 @given(datagram=st.binary(max_size=40))
 def test_any_bytes_can_be_lost(datagram: bytes) -> None:
-    Loss(0).drops(datagram, 50.0)
+    PacketLoss(0).drops(datagram, 50.0)

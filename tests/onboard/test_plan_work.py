@@ -6,9 +6,9 @@ import pytest
 
 from autopilot.services import identity
 from autopilot.supervisor.state import Phase
-from autopilot.trajectory.prepare import PENDING, Prepared
-from autopilot.trajectory.shaping import Shaped
-from autopilot.trajectory.waypoint_path import Passage
+from autopilot.trajectory.prepare import PENDING, PreparedPaths
+from autopilot.trajectory.shaping import ShapedSignals
+from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
@@ -50,7 +50,7 @@ def test_on_the_ground_too_paths_are_left_to_another_where_the_clock_does_not_wa
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
     assert onboard.work is not None
     assert craft.flight.mission.plan.prepared.pending
-    onboard.finish(onboard.work, onboard.work.done())
+    onboard.finish(onboard.work, onboard.work.run())
     assert not craft.flight.mission.plan.prepared.pending
     upload(craft)
     assert onboard.work is None, "a mission without steps has no paths"
@@ -65,11 +65,11 @@ def test_where_the_clock_waits_paths_are_made_at_once() -> None:
 
 
 def test_the_rehearsal_of_another_is_work_that_can_be_done() -> None:
-    rehearsal = Craft(CTL_LAW=PLUMBLINE).onboard.rehearsal
-    prepared = rehearsal.paths.done()
-    assert rehearsal.gains.done() == rehearsal.gains.done()
+    warmup_work = Craft(CTL_LAW=PLUMBLINE).onboard.warmup_work
+    prepared = warmup_work.paths.run()
+    assert warmup_work.setup.run() == warmup_work.setup.run()
     assert not prepared.refusal
-    assert {type(path) for path in prepared.made} >= {Passage, Shaped}
+    assert {type(path) for path in prepared.paths} >= {PathSegment, ShapedSignals}
 
 
 def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() -> None:
@@ -84,7 +84,7 @@ def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() ->
     work = onboard.work
     assert work is not None
     assert craft.flight.mission.plan.prepared.pending
-    onboard.finish(work, work.done())
+    onboard.finish(work, work.run())
     assert onboard.work is None
     assert not craft.flight.mission.plan.prepared.pending
     onboard.finish(work, PENDING)
@@ -118,7 +118,7 @@ def test_a_mission_asked_for_right_after_its_upload_in_the_air_begins_by_itself(
     craft.wait(3.0)
     assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.HOLD, True)
     assert modes(craft)[-1] == PX4_MISSION
-    craft.onboard.finish(work, work.done())
+    craft.onboard.finish(work, work.run())
     assert craft.flight.mission.active
     craft.run(at_phase(Phase.MISSION))
     assert craft.results(command) == [ACCEPTED]
@@ -134,7 +134,7 @@ def test_a_vehicle_stays_armed_while_its_mission_waits_for_paths() -> None:
     craft.begin()
     craft.wait(15.0)
     assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.ARMED, True)
-    craft.onboard.finish(work, work.done())
+    craft.onboard.finish(work, work.run())
     craft.run(at_phase(Phase.MISSION))
     assert "Disarmed: no command received" not in craft.texts
 
@@ -149,7 +149,7 @@ def test_a_vehicle_that_nothing_is_asked_of_is_disarmed(refused: bool) -> None:
         assert work is not None
         craft.begin()
         craft.wait(15.0)
-        craft.onboard.finish(work, Prepared(refusal="no way", notes=()))
+        craft.onboard.finish(work, PreparedPaths(refusal="no way", notes=()))
     else:
         assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED), 11.0)
@@ -162,7 +162,7 @@ def test_a_mission_that_turns_out_not_to_be_flyable_is_told() -> None:
     work = craft.onboard.work
     assert work is not None
     assert craft.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
-    craft.onboard.finish(work, Prepared(refusal="no way", notes=()))
+    craft.onboard.finish(work, PreparedPaths(refusal="no way", notes=()))
     assert not craft.flight.mission.waiting
     craft.wait(0.1)
     assert any("Mission denied: no way" in x.text for x in craft.heard if x.get_type() == "STATUSTEXT")
@@ -204,7 +204,7 @@ def test_gains_are_designed_by_another_where_the_clock_does_not_wait_and_the_ans
         asked.append(onboard.work)
     onboard.finish(asked[0], None)
     assert onboard.work is asked[1], "the first is of no use any more"
-    onboard.finish(asked[1], asked[1].done())
+    onboard.finish(asked[1], asked[1].run())
     assert onboard.core.setup.law != before.law
     assert onboard.work is None
 
@@ -218,7 +218,7 @@ def test_a_design_that_failed_leaves_the_gains_and_is_told() -> None:
     craft.tick()
     work = craft.onboard.work
     assert work is not None
-    craft.onboard.finish(work, work.failed("the process has died"))
+    craft.onboard.finish(work, work.failure("the process has died"))
     craft.tick()
     assert craft.onboard.core.setup is before
     assert craft.texts[-1] == "Gains not designed: the old ones are in force"

@@ -20,7 +20,7 @@ def test_a_second_in_which_many_commands_were_missed_is_complained_of() -> None:
     punctuality = Punctuality()
     complaints = []
     for second, missed in enumerate((900, 902, 905, 930, 930)):
-        said = punctuality.hear(status(second, missed), second * TICKS)
+        said = punctuality.arming_problems(status(second, missed), second * TICKS)
         complaints.append([text.split(";")[0] for text in said])
     text = "machine too slow: {} of 250 commands came too late in the last second"
     assert complaints == [[], [], [text.format(3)], [text.format(25)], []]
@@ -28,8 +28,8 @@ def test_a_second_in_which_many_commands_were_missed_is_complained_of() -> None:
 
 def test_a_simulator_that_starts_again_counts_anew() -> None:
     punctuality = Punctuality()
-    punctuality.hear(status(9, 50), 9 * TICKS)
-    assert punctuality.hear(status(0, 0), 0) == ()
+    punctuality.arming_problems(status(9, 50), 9 * TICKS)
+    assert punctuality.arming_problems(status(0, 0), 0) == ()
 
 
 def test_the_vehicle_is_not_armed_while_the_machine_is_too_slow() -> None:

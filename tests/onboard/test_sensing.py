@@ -6,7 +6,7 @@ from math import isnan
 
 import pytest
 
-from autopilot.onboard.snapshot import Moment
+from autopilot.onboard.snapshot import CoreSnapshot
 from autopilot.services.snapshot import GEOFENCE, Sortie
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
@@ -16,14 +16,14 @@ from sitl.messages import pressure_pa
 from tests.doubles.craft import Craft
 
 
-def moment(craft: Craft) -> Moment:
+def moment(craft: Craft) -> CoreSnapshot:
     seen = craft.onboard.log_sample().snapshot
-    assert isinstance(seen, Moment)
+    assert isinstance(seen, CoreSnapshot)
     return seen
 
 
 def test_before_the_first_tick_nothing_was_sensed() -> None:
-    assert moment(Craft()).sensed is None
+    assert moment(Craft()).readings is None
 
 
 def test_the_slower_sensors_are_kept_between_their_readings() -> None:
@@ -32,7 +32,7 @@ def test_the_slower_sensors_are_kept_between_their_readings() -> None:
     read_us = set()
     for _ in range(100):
         craft.tick()
-        sensed = moment(craft).sensed
+        sensed = moment(craft).readings
         assert sensed is not None
         read_us.add((sensed.field_us, sensed.pressure_us))
         # a barometer of 0.3 m, at rest: 12 Pa per metre
@@ -45,7 +45,7 @@ def test_the_slower_sensors_are_kept_between_their_readings() -> None:
 def test_a_sensor_that_is_not_carried_never_read() -> None:
     craft = Craft(sensors="lab")
     craft.wait(0.5)
-    sensed = moment(craft).sensed
+    sensed = moment(craft).readings
     assert sensed is not None
     assert (sensed.field_us, sensed.pressure_us) == (-1, -1)
 
@@ -96,5 +96,5 @@ def test_a_fence_that_is_uploaded_is_shown_as_present_until_it_is_cleared() -> N
         WireItem(3, 5001, 0, 1, 4.0, 0.0, 0.0, 0.0, origin[0] + x, origin[1] + y, 0.0) for x, y in corners
     )
     for items in (fence, ()):
-        craft.onboard.take_areas(mavlink.MAV_MISSION_TYPE_FENCE, items)
+        craft.onboard.set_areas(mavlink.MAV_MISSION_TYPE_FENCE, items)
         assert bool(moment(craft).sensors_present & GEOFENCE) == bool(items)

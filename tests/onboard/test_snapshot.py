@@ -35,7 +35,7 @@ def watching(seen: Counter[str]) -> Callable[[Onboard, HilSimulator], bool]:
         assert said.distance > 0.0
         if not flight.legs:
             seen["no leg"] += 1
-            assert (said.x_load_d, said.v_load_d, said.x_load_asked) == (x_load, ZERO, x_load)
+            assert (said.x_load_d, said.v_load_d, said.x_load_requested) == (x_load, ZERO, x_load)
             assert said.elapsed_s == (onboard.now_us - flight.phase_start_us) * 1e-6
             assert isnan(said.duration_s)
             return True
@@ -46,11 +46,11 @@ def watching(seen: Counter[str]) -> Callable[[Onboard, HilSimulator], bool]:
         jet, asked = leg.jet(elapsed_s), asked_jet(leg, elapsed_s)
         if leg.control_mode == LOAD_POSITION:
             assert (said.x_load_d, said.v_load_d, said.a_load_d) == jet[:3]
-            assert (said.x_load_asked, said.v_load_asked) == asked[:2]
+            assert (said.x_load_requested, said.v_load_requested) == asked[:2]
             if isinstance(leg, Run):
                 seen["asked otherwise"] += asked[0] != jet[0]
         else:
-            assert (said.x_load_d, said.v_load_d, said.x_load_asked) == (x_load, ZERO, x_load)
+            assert (said.x_load_d, said.v_load_d, said.x_load_requested) == (x_load, ZERO, x_load)
         if leg.control_mode == QUAD_POSITION:
             assert said.x_quad_d == jet[0]
         else:

@@ -14,14 +14,14 @@ import numba
 import pytest
 
 from autopilot.control.law_exchange import Asked, Now
-from autopilot.own.asking import attitude, force, rates, wrench
-from autopilot.own.calls import CALL
+from autopilot.own.calls import USER_CALL
 from autopilot.own.compiled import is_compiled, kernel
-from autopilot.own.estimator import estimator_of
-from autopilot.own.law import law_of
-from autopilot.own.planner import planner_of
+from autopilot.own.estimator import estimator_from_class
+from autopilot.own.law import law_from_class
+from autopilot.own.law_commands import attitude, force, rates, wrench
+from autopilot.own.planner import planner_from_class
 from autopilot.own.source import OwnError
-from autopilot.own.trial import TICKS, try_estimator, try_out, try_planner
+from autopilot.own.trial import TICKS, try_estimator, try_law, try_planner
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -40,7 +40,7 @@ def law_that(answers: Callable[[Any, Now], Any]) -> type:
 
 
 def tried(kind: type) -> None:
-    try_out(law_of(kind, "mine.py:Own"), VALUES)
+    try_law(law_from_class(kind, "mine.py:Own"), VALUES)
 
 
 def test_a_law_remembers_from_its_start_on() -> None:
@@ -137,9 +137,9 @@ def test_so_is_one_of_an_estimator_or_a_planner_or_of_what_makes_them() -> None:
     here = r"\(test_host\.py:\d+\)$"
     for kind in (Own, Unmakable):
         with pytest.raises(OwnError, match=rf"Estimator \w+ failed: TypeError: .* argument.* {here}"):
-            try_estimator(estimator_of(kind, "mine.py:Own"), VALUES)
+            try_estimator(estimator_from_class(kind, "mine.py:Own"), VALUES)
         with pytest.raises(OwnError, match=rf"Planner \w+ failed: TypeError: .* argument.* {here}"):
-            try_planner(planner_of(kind, "mine.py:Own"), VALUES)
+            try_planner(planner_from_class(kind, "mine.py:Own"), VALUES)
     with pytest.raises(OwnError, match=rf"TypeError: .* argument.* {here}"):
         tried(Unmakable)
 
@@ -215,7 +215,7 @@ def test_a_call_that_does_not_come_back_is_broken_off() -> None:
             pass
         return memory, UPWARD
 
-    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(longest_s=0.05):
+    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(max_call_s=0.05):
         tried(law_that(hangs))
 
 
@@ -225,7 +225,7 @@ def test_one_that_sleeps_is_woken() -> None:
         return memory, UPWARD
 
     began_s = time.monotonic()
-    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(longest_s=0.05):
+    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(max_call_s=0.05):
         tried(law_that(sleeps))
     assert time.monotonic() - began_s < 30.0
 
@@ -233,12 +233,12 @@ def test_one_that_sleeps_is_woken() -> None:
 def test_in_real_time_a_law_must_keep_up(monkeypatch: pytest.MonkeyPatch) -> None:
     period = 1.0 / VALUES["CTL_RATE_HZ"]
     clock = iter(0.5 * n * 1.01 * period for n in range(10**6))
-    monkeypatch.setattr(CALL, "clock", lambda: next(clock))
-    quick = law_of(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own")
-    try_out(quick, VALUES)
-    monkeypatch.setattr(CALL, "clock", lambda: next(clock) * 3.0)
+    monkeypatch.setattr(USER_CALL, "clock", lambda: next(clock))
+    quick = law_from_class(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own")
+    try_law(quick, VALUES)
+    monkeypatch.setattr(USER_CALL, "clock", lambda: next(clock) * 3.0)
     with pytest.raises(OwnError, match=r"load_position takes \d\.\d ms, and there are 4\.0 ms: too slow"):
-        try_out(quick, VALUES, ticks=300)
+        try_law(quick, VALUES, ticks=300)
 
 
 # ---- compiled
@@ -279,17 +279,17 @@ needs_compiler = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="noth
 
 @needs_compiler
 def test_a_compiled_law_is_called_without_python() -> None:
-    assert is_compiled(law_of(Steady, "mine.py:Steady"), ("load_position",))
-    assert not is_compiled(law_of(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own"), ())
-    before = CALL.count
+    assert is_compiled(law_from_class(Steady, "mine.py:Steady"), ("load_position",))
+    assert not is_compiled(law_from_class(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own"), ())
+    before = USER_CALL.count
     tried(Steady)
-    assert before == CALL.count
+    assert before == USER_CALL.count
 
 
 def test_a_compiled_law_answers_as_python_would() -> None:
     answers = []
-    law = law_of(Steady, "mine.py:Steady")
-    try_out(law, VALUES, told=answers.append)
+    law = law_from_class(Steady, "mine.py:Steady")
+    try_law(law, VALUES, on_command=answers.append)
     rate = VALUES["CTL_RATE_HZ"]
     wanted = [(rate + n, 1.0 if n == 0 else 0.0, n / rate) for n in range(TICKS)]
     assert [asked.vector for asked in answers] == wanted

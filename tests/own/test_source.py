@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.own.chosen import Own, parameters_for
 from autopilot.own.law import load_law
+from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.vehicle.file import load_vehicle
 
@@ -63,7 +63,7 @@ def test_a_file_that_was_changed_is_another_law() -> None:
 def test_its_parameters_are_the_autopilots() -> None:
     brought = '    parameters = {"MY_GAIN": Parameter(2.0, 0.0, 5.0, "1/s", "A gain")}\n'
     written(FINE.replace("import force", "import Parameter, force") + brought)
-    table = parameters_for(load_vehicle("bebop"), Own("mine.py"))
+    table = parameters_for(load_vehicle("bebop"), OwnCode("mine.py"))
     gain = table.describe("MY_GAIN")
     assert (gain.default, gain.low, gain.high, gain.unit, gain.text) == (2.0, 0.0, 5.0, "1/s", "A gain")
     assert table["CTL_LAW"] == table.describe("CTL_LAW").high
@@ -130,7 +130,7 @@ IN_CLASS = {
 def test_what_a_law_must_not_say_is_told(line: str) -> None:
     written(FINE.replace("import force", "import Parameter, force") + line)
     with pytest.raises(OwnError, match=rf"^--law mine\.py: Fine\.?.*{IN_CLASS[line]}"):
-        parameters_for(load_vehicle("bebop"), Own("mine.py"))
+        parameters_for(load_vehicle("bebop"), OwnCode("mine.py"))
 
 
 def test_an_entry_point_is_a_law(here: Path) -> None:

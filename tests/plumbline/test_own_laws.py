@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 import plumbline
-from autopilot.own.chosen import Own
-from autopilot.own.doubts import own_doubts
+from autopilot.own.misspellings import misspelling_warnings
+from autopilot.own.own_code import OwnCode
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from missions.model import Delay, Land, Mission, Takeoff
@@ -131,11 +131,11 @@ class Misspelt(LoadPid):
 
 def test_a_method_whose_name_is_near_to_one_that_is_called_is_told() -> None:
     law = f"{__file__}:Misspelt"
-    assert own_doubts(Own(law)) == [
+    assert misspelling_warnings(OwnCode(law)) == [
         f"--law {law}: Misspelt.quad_postion is never called; did you mean quad_position?"
     ]
-    shipped = Own("plumbline.examples.load_pid:LoadPid", "plumbline.examples.luenberger:Luenberger")
-    assert own_doubts(shipped._replace(planner=PLANNER)) == []
+    shipped = OwnCode("plumbline.examples.load_pid:LoadPid", "plumbline.examples.luenberger:Luenberger")
+    assert misspelling_warnings(shipped._replace(planner=PLANNER)) == []
 
 
 def test_a_planner_that_is_never_asked_is_told() -> None:

@@ -182,11 +182,11 @@ def fly_px4(folder: Path, sensors: Sequence[bytes] = ()) -> tuple[dict[int, tupl
                 answered = False
                 while not answered:
                     # until its first answer it starts by the wall clock, and is not waited for
-                    link.settimeout(PATIENCE_S if exchange.in_step else 1.0 / px4.RATE_HZ)
+                    link.settimeout(PATIENCE_S if exchange.in_lockstep else 1.0 / px4.RATE_HZ)
                     try:
                         piece = link.recv(65536)
                     except TimeoutError:
-                        assert not exchange.in_step, f"no answer to tick {tick}"
+                        assert not exchange.in_lockstep, f"no answer to tick {tick}"
                         break
                     assert piece, "it has closed the connection"
                     for frame in stream.feed(piece):

@@ -102,12 +102,12 @@ def test_zones():
     square, disc = fence.zones
     assert isinstance(square, Polygon) and isinstance(disc, Disc)
     assert square.inclusion and not disc.inclusion
-    assert fence.complaint(5.0, 5.0) == ""
-    assert fence.complaint(0.5, 0.5) == "in an exclusion zone of the fence"
-    assert fence.complaint(30.0, 0.0) == "outside the fence"
+    assert fence.violation(5.0, 5.0) == ""
+    assert fence.violation(0.5, 0.5) == "in an exclusion zone of the fence"
+    assert fence.violation(30.0, 0.0) == "outside the fence"
     # a second inclusion zone allows what the first does not
     wider = read_fence((*GOOD, item(IN_CIRCLE, 100.0)), HOME)
-    assert wider.complaint(30.0, 0.0) == ""
+    assert wider.violation(30.0, 0.0) == ""
     assert read_rally(POINTS, HOME)[0][1] == pytest.approx(10.0, abs=0.1)
 
 
@@ -135,6 +135,6 @@ wild = st.builds(
 @given(st.lists(wild, max_size=8), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
 def test_no_items_raise_anything_else(items, x, y):
     try:
-        read_fence(items, HOME).complaint(x, y)
+        read_fence(items, HOME).violation(x, y)
     except MissionItemError as error:
         assert error.text

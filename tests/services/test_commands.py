@@ -9,7 +9,13 @@ import pytest
 
 from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
 from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, PX4, Identity
-from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldAsked, WorldSaved
+from autopilot.services.records import (
+    ParameterChanged,
+    ParametersSaved,
+    SimulatorParameterRequested,
+    SimulatorParametersSaved,
+    Verdict,
+)
 from autopilot.services.requests import (
     Arm,
     ChangeAltitude,
@@ -33,7 +39,7 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
-    TurnNose,
+    TurnHeading,
     Winch,
 )
 from autopilot.wire.convert.geodesy import geodetic_from_enu
@@ -125,13 +131,13 @@ LONG = [
     (420, (0, 2, 0), None, UNSUPPORTED),
     (420, (4, 1, 2), None, DENIED),
     (420, (5, 1, 0), None, UNSUPPORTED),
-    (115, (90,), TurnNose(0.0), OK),  # east
-    (115, (90, NAN), TurnNose(0.0), OK),
-    (115, (90, 180, -1), TurnNose(0.0, sense=1, rate_rad_s=math.pi), OK),
-    (115, (180, 0, 1), TurnNose(-0.5 * math.pi, sense=-1), OK),
-    (115, (180, 0, 0, 1), TurnNose(-math.pi, relative=True), OK),
-    (115, (180, 0, -1, 1), TurnNose(math.pi, relative=True), OK),
-    (115, (-180, 0, 0, 1), TurnNose(math.pi, relative=True), OK),
+    (115, (90,), TurnHeading(0.0), OK),  # east
+    (115, (90, NAN), TurnHeading(0.0), OK),
+    (115, (90, 180, -1), TurnHeading(0.0, sense=1, rate_rad_s=math.pi), OK),
+    (115, (180, 0, 1), TurnHeading(-0.5 * math.pi, sense=-1), OK),
+    (115, (180, 0, 0, 1), TurnHeading(-math.pi, relative=True), OK),
+    (115, (180, 0, -1, 1), TurnHeading(math.pi, relative=True), OK),
+    (115, (-180, 0, 0, 1), TurnHeading(math.pi, relative=True), OK),
     (115, (NAN,), None, DENIED),
     (115, (361,), None, DENIED),
     (115, (90, 0, 2), None, DENIED),
@@ -512,17 +518,17 @@ def test_the_home_position_and_the_origin_are_told(rig):
 
 
 def test_rotors_fail_and_work_again_by_the_simulators_parameter(rig):
-    rig.table.learn(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
+    rig.table.add_remote(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
     for p, failed in (((101, 1, 2), 0b0010), ((101, 1, 4), 0b1010), ((101, 0, 2), 0b1000), ((101, 1, 0), 15)):
         rig.send(long(420, p))
         assert rig.table["SIM_ENGINE_FAIL"] == failed
-        assert rig.events[-1] == WorldAsked("SIM_ENGINE_FAIL", failed)
+        assert rig.events[-1] == SimulatorParameterRequested("SIM_ENGINE_FAIL", failed)
     rig.send(long(420, (101, 0, 0)))
     assert rig.table["SIM_ENGINE_FAIL"] == 0
 
 
 def test_sensors_fail_and_work_again_by_the_simulators_parameter(rig):
-    rig.table.learn(Parameter("SIM_SENS_FAIL", 0.0, 0.0, 127.0, "", ""))
+    rig.table.add_remote(Parameter("SIM_SENS_FAIL", 0.0, 0.0, 127.0, "", ""))
     for p, failed in (
         ((0, 1, 0), 1),
         ((4, 1, 1), 17),
@@ -533,12 +539,12 @@ def test_sensors_fail_and_work_again_by_the_simulators_parameter(rig):
     ):
         rig.send(long(420, p))
         assert rig.table["SIM_SENS_FAIL"] == failed
-        assert rig.events[-1] == WorldAsked("SIM_SENS_FAIL", failed)
+        assert rig.events[-1] == SimulatorParameterRequested("SIM_SENS_FAIL", failed)
 
 
 def test_nothing_fails_in_a_simulator_that_is_silent(rig):
-    rig.table.learn(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
-    rig.endpoint.world_silent(True)
+    rig.table.add_remote(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
+    rig.endpoint.set_simulator_silent(True)
     told = {x.get_type(): x for x in rig.replies(long(420, (101, 1, 2)))}
     assert told["COMMAND_ACK"].result == mavlink.MAV_RESULT_DENIED
     assert told["STATUSTEXT"].text == "Failure: the simulator is silent"
@@ -546,12 +552,12 @@ def test_nothing_fails_in_a_simulator_that_is_silent(rig):
 
 
 def test_the_simulators_parameters_are_saved_on_request_alone(rig):
-    rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
+    rig.table.add_remote(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
-    assert not any(isinstance(event, WorldSaved) for event in rig.events)
+    assert not any(isinstance(event, SimulatorParametersSaved) for event in rig.events)
     rig.table.set("SIM_WIND_E", 3.0)  # as the simulator then reports
     rig.send(long(245, (1,)))
-    assert rig.events[-2:] == [ParametersSaved(), WorldSaved({"SIM_WIND_E": 3.0})]
+    assert rig.events[-2:] == [ParametersSaved(), SimulatorParametersSaved({"SIM_WIND_E": 3.0})]
     rig.send(long(245, (2,)))
-    assert rig.events[-1] == WorldSaved({})
-    assert WorldAsked("SIM_WIND_E", 0.0) in rig.events
+    assert rig.events[-1] == SimulatorParametersSaved({})
+    assert SimulatorParameterRequested("SIM_WIND_E", 0.0) in rig.events

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from autopilot.services.endpoint import LINK_SILENCE_US, MAKING_ROOM_US, MAX_LINKS, VehicleEndpoint
+from autopilot.services.endpoint import LINK_REPLACEMENT_US, LINK_SILENCE_US, MAX_LINKS, VehicleEndpoint
 from autopilot.services.identity import (
     AUTO,
     AUTO_MISSION,
@@ -17,7 +17,7 @@ from autopilot.services.identity import (
 )
 from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import TimesyncAnswered, Verdict
-from autopilot.services.snapshot import Sensed, Snapshot
+from autopilot.services.snapshot import SensorReadings, Snapshot
 from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import STREAMS
@@ -36,7 +36,7 @@ def types(received):
 ALL_THERE = {
     "x_quad_d": (0.0, 0.0, 1.0),
     "wind": (1.0, 0.0, 0.0),
-    "sensed": Sensed((0.0,) * 3, (0.0, 0.0, 9.81), (0.0,) * 3, 1e5, 0.0, 15.0, 0, 0),
+    "readings": SensorReadings((0.0,) * 3, (0.0, 0.0, 9.81), (0.0,) * 3, 1e5, 0.0, 15.0, 0, 0),
     "built_in": ((0.0, 0.0, 1.0), (0.1, 0.0, 0.0), (0.0, 0.0, 1.7)),
 }
 
@@ -119,7 +119,7 @@ def test_sequence_counters_run_by_link_and_component(rig):
 
 def test_datagrams_stay_below_the_mtu_and_hold_whole_frames(rig, snap):
     rig.send(m.MAVLink_param_request_list_message(1, 1))
-    rig.endpoint.say(4, "x" * 3000)
+    rig.endpoint.send_text(4, "x" * 3000)
     datagrams = rig.endpoint.poll(snap, 0)
     assert len(datagrams) > 1
     for _, datagram in datagrams:
@@ -133,9 +133,9 @@ def test_nothing_is_asked_of_the_core_when_nothing_is_due(rig):
     def never():
         raise AssertionError("a snapshot was made for nothing")
 
-    assert not rig.endpoint.due(rig.now_us)
+    assert not rig.endpoint.is_due(rig.now_us)
     assert rig.endpoint.poll(never, rig.now_us) == []
-    rig.endpoint.say(6, "only a text")
+    rig.endpoint.send_text(6, "only a text")
     assert len(rig.endpoint.poll(never, rig.now_us)) == 1
 
 
@@ -206,7 +206,7 @@ def test_garbage_makes_no_link(rig):
 def test_links_are_bounded_and_the_most_silent_makes_room(rig):
     for number in range(MAX_LINKS + 3):
         rig.send(GCS_BEAT, link=f"n{number}")
-        rig.now_us += MAKING_ROOM_US
+        rig.now_us += LINK_REPLACEMENT_US
     assert len(rig.endpoint.links) == MAX_LINKS + 1
     assert "gcs" in rig.endpoint.links
     assert "n0" not in rig.endpoint.links
@@ -223,7 +223,7 @@ def test_a_crowd_of_newcomers_makes_room_one_by_one(rig):
     arm = m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
     rig.send(arm, link=last)
     assert rig.asked == [], "nobody could be answered"
-    rig.now_us += MAKING_ROOM_US
+    rig.now_us += LINK_REPLACEMENT_US
     rig.send(arm, link=last)
     assert last in rig.endpoint.links
     assert rig.asked
@@ -234,10 +234,10 @@ def test_a_list_under_way_ends_with_its_link():
     endpoint = VehicleEndpoint(Identity(), Home(), many)
     ask = FrameWriter(255, 190).frame(m.MAVLink_param_request_list_message(1, 1))
     endpoint.receive(ask, "late", 0, lambda request: Verdict(m.MAV_RESULT_ACCEPTED))
-    assert endpoint.due(0)
+    assert endpoint.is_due(0)
     assert endpoint.poll(Snapshot, LINK_SILENCE_US + 1) == []
     assert endpoint.links == ()
-    assert not endpoint.due(2 * LINK_SILENCE_US)
+    assert not endpoint.is_due(2 * LINK_SILENCE_US)
 
 
 @pytest.mark.parametrize("origin", [{"component": 1}, {"component": DIALECT_COMPONENT}])
@@ -271,7 +271,7 @@ def test_commands_survive_garbage_in_the_same_datagram(rig):
 def test_texts_come_together_again(rig, length):
     text = "".join(chr(ord("a") + n % 26) for n in range(length))
     rig.poll()
-    rig.endpoint.say(m.MAV_SEVERITY_WARNING, text)
+    rig.endpoint.send_text(m.MAV_SEVERITY_WARNING, text)
     got = [r.message for r in rig.poll()["gcs"]]
     assert {x.severity for x in got} == {m.MAV_SEVERITY_WARNING}
     assert "".join(x.text for x in got) == text
@@ -282,8 +282,8 @@ def test_texts_come_together_again(rig, length):
 
 
 def test_two_long_texts_have_two_numbers(rig):
-    rig.endpoint.say(6, "a" * 60)
-    rig.endpoint.say(6, "b" * 60)
+    rig.endpoint.send_text(6, "a" * 60)
+    rig.endpoint.send_text(6, "b" * 60)
     got = [r.message for r in rig.poll()["gcs"] if r.message.get_type() == "STATUSTEXT"]
     assert len({(text.id, text.text[0]) for text in got}) == 2
     assert len({text.id for text in got}) == 2
@@ -291,7 +291,7 @@ def test_two_long_texts_have_two_numbers(rig):
 
 def test_texts_are_one_line_of_ascii(rig):
     rig.poll()
-    rig.endpoint.say(6, "Wind\n is 5 m/s \u2192 east")
+    rig.endpoint.send_text(6, "Wind\n is 5 m/s \u2192 east")
     (got,) = rig.poll()["gcs"]
     assert got.message.text == "Wind is 5 m/s ? east"
 
@@ -311,9 +311,9 @@ def test_only_what_is_to_be_answered_is_work(rig):
     rig.poll()
     rig.send(m.MAVLink_timesync_message(99, 12345))
     before_all_streams_us = -1
-    assert not rig.endpoint.due(before_all_streams_us)
+    assert not rig.endpoint.is_due(before_all_streams_us)
     rig.send(m.MAVLink_timesync_message(0, 12345))
-    assert rig.endpoint.due(before_all_streams_us)
+    assert rig.endpoint.is_due(before_all_streams_us)
 
 
 def test_a_timesync_answer_at_boot_is_no_question(rig):

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.services.faults import AGAIN_US
+from autopilot.services.faults import REPORT_INTERVAL_US
 from autopilot.services.ftp import Op, Packet, packet_of, payload_of
 from autopilot.services.records import ServiceFailed
 from autopilot.wire.dialect import plumbline as mavlink
@@ -45,7 +45,7 @@ def test_one_that_fails_at_every_tick_is_told_of_now_and_then(rig: Any, monkeypa
     monkeypatch.setattr("autopilot.services.missions.MissionService.poll", broken)
     monkeypatch.setattr("autopilot.services.missions.MissionService.next_timer", lambda _: 0)
     rig.endpoint.add_link("gcs")
-    out = rig.run(2 * AGAIN_US)
+    out = rig.run(2 * REPORT_INTERVAL_US)
     texts = [r.message.text for r in out if r.message.get_type() == "STATUSTEXT" and r.message.chunk_seq == 0]
     assert len(texts) == 2
     assert [r for r in out if r.message.get_type() == "HEARTBEAT"], "telemetry goes on"

@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
 from autopilot.services.file_tree import FileTree, checksum
-from autopilot.services.files import Card, FileError, Limits, MemoryCard, Trouble, path_of
+from autopilot.services.files import Card, ErrorCode, FileError, Limits, MemoryCard, path_of
 from autopilot.services.ftp import (
     BURST_PACKETS,
     DATA_BYTES,
     IDLE_US,
-    MOST_SESSIONS,
+    MAX_SESSIONS,
     REPEAT_US,
     FtpService,
     Op,
@@ -70,7 +70,7 @@ class Client:
             replies = next(filter(None, (self.poll() for _ in range(1000))))
         (reply,) = replies
         assert reply.seq == self.seq + 1
-        assert reply.asked == op
+        assert reply.request_opcode == op
         return reply
 
     def good(self, op: int, data: bytes = b"", **more: int) -> Packet:
@@ -102,7 +102,7 @@ class Client:
         data = b""
         while len(data) < size:
             data += self.good(Op.READ, session=session, offset=len(data), size=DATA_BYTES).data
-        assert self.trouble(Op.READ, session=session, offset=size, size=1) == Trouble.END_OF_FILE
+        assert self.trouble(Op.READ, session=session, offset=size, size=1) == ErrorCode.END_OF_FILE
         self.good(Op.TERMINATE, session=session)
         return data
 
@@ -114,14 +114,14 @@ class Client:
             free += 1
         self.service.forget(STRANGER.link)
         self.peer = own
-        return MOST_SESSIONS - free
+        return MAX_SESSIONS - free
 
     def names(self, path: bytes) -> list[str]:
         names: list[str] = []
         while True:
             reply = self.ask(Op.LIST, path, offset=len(names))
             if reply.opcode == Op.NAK:
-                assert reply.data == bytes((Trouble.END_OF_FILE,))
+                assert reply.data == bytes((ErrorCode.END_OF_FILE,))
                 return names
             names += reply.data.decode().rstrip("\0").split("\0")
 
@@ -151,7 +151,7 @@ def test_the_tree_is_listed_from_its_root(client: Client) -> None:
     assert client.names(b"/@MADE") == [f"Ffile\t{len(MADE)}"]
     assert client.names(b"/fs") == ["Dmicrosd"]
     assert client.names(b"/fs/microsd") == []
-    assert client.trouble(Op.LIST, b"/etc") == Trouble.NOT_FOUND
+    assert client.trouble(Op.LIST, b"/etc") == ErrorCode.NOT_FOUND
 
 
 def test_a_long_folder_is_listed_in_parts(client: Client) -> None:
@@ -167,7 +167,7 @@ def test_create_empties_and_open_to_write_keeps(client: Client) -> None:
     client.good(Op.WRITE, b"AB", offset=2)
     assert client.good(Op.READ, offset=0, size=10).data == b"01AB456789"
     client.good(Op.CREATE, b"/fs/microsd/a")
-    assert client.trouble(Op.READ, offset=0, size=10) == Trouble.END_OF_FILE
+    assert client.trouble(Op.READ, offset=0, size=10) == ErrorCode.END_OF_FILE
 
 
 def test_a_hole_reads_as_zeros(client: Client) -> None:
@@ -181,16 +181,16 @@ def test_a_hole_reads_as_zeros(client: Client) -> None:
 
 def test_folders_and_names(client: Client) -> None:
     client.good(Op.MAKE_FOLDER, b"/fs/microsd/d")
-    assert client.trouble(Op.MAKE_FOLDER, b"/fs/microsd/d") == Trouble.EXISTS
+    assert client.trouble(Op.MAKE_FOLDER, b"/fs/microsd/d") == ErrorCode.EXISTS
     client.put(b"/fs/microsd/d/a", b"1")
-    assert client.trouble(Op.REMOVE_FOLDER, b"/fs/microsd/d") in (Trouble.FAIL, Trouble.FAIL_ERRNO)
+    assert client.trouble(Op.REMOVE_FOLDER, b"/fs/microsd/d") in (ErrorCode.FAIL, ErrorCode.FAIL_ERRNO)
     client.good(Op.RENAME, b"/fs/microsd/d/a\0/fs/microsd/b\0")
     client.put(b"/fs/microsd/c", b"2")
-    assert client.trouble(Op.RENAME, b"/fs/microsd/b\0/fs/microsd/c\0") == Trouble.EXISTS
-    assert client.trouble(Op.RENAME, b"/fs/microsd/none\0/fs/microsd/e\0") == Trouble.NOT_FOUND
+    assert client.trouble(Op.RENAME, b"/fs/microsd/b\0/fs/microsd/c\0") == ErrorCode.EXISTS
+    assert client.trouble(Op.RENAME, b"/fs/microsd/none\0/fs/microsd/e\0") == ErrorCode.NOT_FOUND
     client.good(Op.REMOVE_FOLDER, b"/fs/microsd/d")
     client.good(Op.REMOVE, b"/fs/microsd/b")
-    assert client.trouble(Op.REMOVE, b"/fs/microsd/b") == Trouble.NOT_FOUND
+    assert client.trouble(Op.REMOVE, b"/fs/microsd/b") == ErrorCode.NOT_FOUND
     assert client.names(b"/fs/microsd") == ["Fc\t1"]
 
 
@@ -210,10 +210,10 @@ def test_the_checksum_is_the_one_of_the_protocol(client: Client) -> None:
 def test_made_files_can_be_read_and_not_written(client: Client) -> None:
     assert client.get(b"@MADE/file?a=1") == MADE
     for op in (Op.CREATE, Op.OPEN_WO, Op.REMOVE, Op.TRUNCATE, Op.MAKE_FOLDER, Op.REMOVE_FOLDER):
-        assert client.trouble(op, b"/@MADE/file") == Trouble.PROTECTED
-    assert client.trouble(Op.RENAME, b"/@MADE/file\0/fs/microsd/x") == Trouble.PROTECTED
+        assert client.trouble(op, b"/@MADE/file") == ErrorCode.PROTECTED
+    assert client.trouble(Op.RENAME, b"/@MADE/file\0/fs/microsd/x") == ErrorCode.PROTECTED
     client.good(Op.OPEN_RO, b"/@MADE/file")
-    assert client.trouble(Op.WRITE, b"x") == Trouble.PROTECTED
+    assert client.trouble(Op.WRITE, b"x") == ErrorCode.PROTECTED
 
 
 def test_what_the_vehicle_writes_is_protected(client: Client) -> None:
@@ -221,10 +221,10 @@ def test_what_the_vehicle_writes_is_protected(client: Client) -> None:
     client.put(b"/fs/microsd/log/now.ulg", b"ULog")
     client.good(Op.OPEN_WO, b"/fs/microsd/log/now.ulg")
     client.tree.protected = ("log", "now.ulg")
-    assert client.trouble(Op.WRITE, b"x") == Trouble.PROTECTED
+    assert client.trouble(Op.WRITE, b"x") == ErrorCode.PROTECTED
     for op in (Op.REMOVE, Op.CREATE, Op.TRUNCATE):
-        assert client.trouble(op, b"/fs/microsd/log/now.ulg") == Trouble.PROTECTED
-    assert client.trouble(Op.RENAME, b"/fs/microsd/log\0/fs/microsd/old\0") == Trouble.PROTECTED
+        assert client.trouble(op, b"/fs/microsd/log/now.ulg") == ErrorCode.PROTECTED
+    assert client.trouble(Op.RENAME, b"/fs/microsd/log\0/fs/microsd/old\0") == ErrorCode.PROTECTED
     assert client.get(b"/fs/microsd/log/now.ulg") == b"ULog"
 
 
@@ -243,7 +243,7 @@ def test_a_burst_is_paced_and_its_last_packet_marked(client: Client) -> None:
         asked = Packet(client.seq, 0, Op.BURST, DATA_BYTES, offset=len(got))
         assert client.send(asked) == []
         packets: list[Packet] = []
-        while not (packets and packets[-1].last):
+        while not (packets and packets[-1].burst_complete):
             assert client.service.next_timer() <= client.now_us + TICK_US
             more = client.poll()
             assert 0 < len(more) <= 16
@@ -253,7 +253,7 @@ def test_a_burst_is_paced_and_its_last_packet_marked(client: Client) -> None:
         got += burst(client, packets)
     assert got == MADE
     assert packets[-1].opcode == Op.NAK
-    assert packets[-1].data == bytes((Trouble.END_OF_FILE,))
+    assert packets[-1].data == bytes((ErrorCode.END_OF_FILE,))
     assert client.poll() == []
 
 
@@ -266,7 +266,7 @@ def test_two_clients_with_one_session_number_do_not_meet(card: Card) -> None:
     assert two.good(Op.READ, size=4).data == MADE[:4]
     one.good(Op.RESET)
     assert two.good(Op.READ, size=4).data == MADE[:4]
-    assert one.trouble(Op.READ, size=4) == Trouble.INVALID_SESSION
+    assert one.trouble(Op.READ, size=4) == ErrorCode.INVALID_SESSION
 
 
 def test_several_sessions_of_one_client(client: Client) -> None:
@@ -286,7 +286,7 @@ def test_a_repeated_request_is_answered_again_and_not_done_again(client: Client)
     assert client.send(asked) == first
     assert first[0].opcode == Op.ACK
     client.now_us += REPEAT_US + 1
-    assert client.send(asked)[0].data[0] == Trouble.NOT_FOUND
+    assert client.send(asked)[0].data[0] == ErrorCode.NOT_FOUND
 
 
 def test_a_lost_reply_to_create_does_not_empty_what_was_written(client: Client) -> None:
@@ -300,15 +300,15 @@ def test_a_lost_reply_to_create_does_not_empty_what_was_written(client: Client) 
 def test_sessions_end(client: Client) -> None:
     client.good(Op.OPEN_RO, b"@MADE/file")
     client.good(Op.TERMINATE)
-    assert client.trouble(Op.READ) == Trouble.INVALID_SESSION
-    assert client.trouble(Op.TERMINATE) == Trouble.INVALID_SESSION
+    assert client.trouble(Op.READ) == ErrorCode.INVALID_SESSION
+    assert client.trouble(Op.TERMINATE) == ErrorCode.INVALID_SESSION
     client.good(Op.OPEN_RO, b"@MADE/file", session=3)
     client.now_us += IDLE_US
     client.poll()
     assert client.open_sessions() == 0
-    for number in range(MOST_SESSIONS):
+    for number in range(MAX_SESSIONS):
         client.good(Op.OPEN_RO, b"@MADE/file", session=number)
-    assert client.trouble(Op.OPEN_RO, b"@MADE/file", session=200) == Trouble.NO_SESSIONS
+    assert client.trouble(Op.OPEN_RO, b"@MADE/file", session=200) == ErrorCode.NO_SESSIONS
     client.good(Op.OPEN_RO, b"@MADE/file", session=0)
     client.service.forget(GCS.link)
     assert client.open_sessions() == 0
@@ -360,10 +360,10 @@ def test_links_on_the_disk_are_not_followed(tmp_path: Path) -> None:
 
 def test_hostile_sizes_are_refused(client: Client) -> None:
     client.good(Op.CREATE, b"/fs/microsd/a")
-    assert client.trouble(Op.WRITE, b"x" * DATA_BYTES, size=240) == Trouble.INVALID_DATA_SIZE
+    assert client.trouble(Op.WRITE, b"x" * DATA_BYTES, size=240) == ErrorCode.INVALID_DATA_SIZE
     assert client.ask(Op.WRITE, b"x", offset=2**32 - 1).opcode == Op.NAK
     assert client.ask(Op.TRUNCATE, b"/fs/microsd/a", offset=2**32 - 1).opcode == Op.NAK
-    assert client.trouble(Op.READ, offset=2**32 - 1, size=239) == Trouble.END_OF_FILE
+    assert client.trouble(Op.READ, offset=2**32 - 1, size=239) == ErrorCode.END_OF_FILE
     assert client.get(b"/fs/microsd/a") == b""
 
 
@@ -395,10 +395,10 @@ def test_a_path_has_so_many_names_at_most(client: Client) -> None:
     for _ in range(Limits().depth):
         deep.append(deep[-1] + b"/d")
         client.good(Op.MAKE_FOLDER, deep[-1])
-    assert client.trouble(Op.MAKE_FOLDER, deep[-1] + b"/e") == Trouble.FAIL_ERRNO
-    assert client.trouble(Op.CREATE, deep[-1] + b"/e") == Trouble.FAIL_ERRNO
+    assert client.trouble(Op.MAKE_FOLDER, deep[-1] + b"/e") == ErrorCode.FAIL_ERRNO
+    assert client.trouble(Op.CREATE, deep[-1] + b"/e") == ErrorCode.FAIL_ERRNO
     client.put(deep[-2] + b"/e", b"1")
-    assert client.trouble(Op.RENAME, deep[-2] + b"/e\0" + deep[-1] + b"/e") == Trouble.FAIL_ERRNO
+    assert client.trouble(Op.RENAME, deep[-2] + b"/e\0" + deep[-1] + b"/e") == ErrorCode.FAIL_ERRNO
 
 
 @pytest.fixture
@@ -448,7 +448,7 @@ def test_a_checksum_is_counted_over_many_ticks(client: Client) -> None:
     client.send(asked)
     client.good(Op.REMOVE, b"/fs/microsd/a")
     (reply,) = client.poll()
-    assert (reply.opcode, reply.data[0]) == (Op.NAK, Trouble.NOT_FOUND)
+    assert (reply.opcode, reply.data[0]) == (Op.NAK, ErrorCode.NOT_FOUND)
 
 
 def test_checksums_of_many_clients_are_counted_in_turn(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -473,7 +473,7 @@ def test_checksums_of_many_clients_are_counted_in_turn(card: Card, monkeypatch: 
 
 
 def test_unknown_opcodes_and_replies(client: Client) -> None:
-    assert client.trouble(99) == Trouble.UNKNOWN_COMMAND
+    assert client.trouble(99) == ErrorCode.UNKNOWN_COMMAND
     assert client.send(Packet(1, 0, Op.ACK, 0)) == []
     assert client.send(Packet(1, 0, Op.NAK, 1, data=b"\1")) == []
 
@@ -523,8 +523,8 @@ PACKET = st.builds(
     session=st.integers(0, 3) | st.integers(0, 255),
     opcode=st.integers(0, 16) | st.integers(0, 255),
     size=st.integers(0, 255),
-    asked=st.integers(0, 255),
-    last=st.integers(0, 255),
+    request_opcode=st.integers(0, 255),
+    burst_complete=st.integers(0, 255),
     offset=st.integers(0, 300) | st.integers(0, 2**32 - 1),
     data=DATA,
 )
@@ -544,7 +544,7 @@ def test_no_requests_break_it_and_no_session_is_left(steps: list[Any], tmp_path_
             before = client.open_sessions()
             replies = client.send(whole)
             assert len(replies) <= 1
-            assert client.open_sessions() <= min(before + 1, MOST_SESSIONS)
+            assert client.open_sessions() <= min(before + 1, MAX_SESSIONS)
             client.now_us += pause_us
             client.poll()
     for client in clients:

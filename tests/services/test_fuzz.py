@@ -22,7 +22,7 @@ from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import MissionItemError, WireItem, encode_steps, located_steps
 from autopilot.wire.parameter_table import ParameterError, decimal_from_float32
-from autopilot.wire.signing import NEWEST, Signing
+from autopilot.wire.signing import MAX_TIMESTAMP, Signing
 from missions.model import Takeoff, Waypoint
 
 from .conftest import STREAMED
@@ -330,7 +330,7 @@ def test_with_a_key_no_service_hears_what_is_not_signed_with_it(rig_with, items,
     rig.asked.clear()
     rig.events.clear()
     before = state(rig)
-    sign = None if key is None else Signing(key, NEWEST).signer(1)
+    sign = None if key is None else Signing(key, MAX_TIMESTAMP).signer(1)
     for (link, system, component), message in steps:
         rig.send_bytes(FrameWriter(system, component).frame(message, sign), link)
         said = [r.message.get_type() for r in rig.poll().get("gcs", [])]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.services.guided import COMPLAIN_US, read_attitude, read_global, read_local, read_stick
+from autopilot.services.guided import WARNING_INTERVAL_US, read_attitude, read_global, read_local, read_stick
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     ChangeAltitude,
@@ -131,15 +131,15 @@ def test_yaw_is_from_north_and_clockwise(mask, yaw, rate, heading, turning):
     )
     for asked in (read_local(local(1, mask, yaw=yaw, rate=rate)), read_global(globally, HOME)):
         assert isinstance(asked, FollowSetpoint)
-        assert same((asked.heading_rad, asked.turning_rad_s), (heading, turning))
+        assert same((asked.heading_rad, asked.yaw_rate_rad_s), (heading, turning))
 
 
 def test_an_attitude_has_a_heading():
     half = 0.5 * math.radians(120.0)
     asked = read_attitude(attitude((math.cos(half), 0.0, 0.0, math.sin(half)), 0.5, 3, (9.0, 9.0, 0.2)))
     assert isinstance(asked, FollowAttitude)
-    assert same((asked.heading_rad, asked.turning_rad_s), (math.radians(-30.0), -0.2))
-    assert math.isnan(read_attitude(attitude((1.0, 0.0, 0.0, 0.0), 0.5)).turning_rad_s)
+    assert same((asked.heading_rad, asked.yaw_rate_rad_s), (math.radians(-30.0), -0.2))
+    assert math.isnan(read_attitude(attitude((1.0, 0.0, 0.0, 0.0), 0.5)).yaw_rate_rad_s)
 
 
 def test_body_rates_without_an_attitude():
@@ -157,11 +157,11 @@ def test_an_attitude_is_its_thrust_axis():
     # pitched down by 10 deg with the nose to the north: leans north
     pitched = read_attitude(attitude((math.cos(half), 0.0, -math.sin(half), 0.0), 0.6))
     assert isinstance(pitched, FollowAttitude)
-    assert same(pitched.upward, (0.0, math.sin(2 * half), math.cos(2 * half)))
+    assert same(pitched.thrust_axis, (0.0, math.sin(2 * half), math.cos(2 * half)))
     assert pitched.thrust == pytest.approx(0.6)
     rolled = read_attitude(attitude((math.cos(half), math.sin(half), 0.0, 0.0), 0.6, mask=7 | 64))
     assert isinstance(rolled, FollowAttitude)
-    assert same(rolled.upward, (math.sin(2 * half), 0.0, math.cos(2 * half)))
+    assert same(rolled.thrust_axis, (math.sin(2 * half), 0.0, math.cos(2 * half)))
     assert rolled.thrust is None
 
 
@@ -186,14 +186,14 @@ def test_attitudes_that_cannot_be_followed_are_refused(message):
 def test_the_stick():
     asked = read_stick(m.MAVLink_manual_control_message(1, 500, -1000, 750, 0, 0))
     assert isinstance(asked, FollowStick)
-    assert same((*asked.share, asked.turning), (0.5, 1.0, 0.5, 0.0))
+    assert same((*asked.velocity_share, asked.yaw_rate), (0.5, 1.0, 0.5, 0.0))
     turning = read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 250, 0))
     assert isinstance(turning, FollowStick)
-    assert turning.turning == -0.25  # clockwise
+    assert turning.yaw_rate == -0.25  # clockwise
     assert isinstance(read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 2000, 0)), Verdict)
     centred = read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
     assert isinstance(centred, FollowStick)
-    assert same(centred.share, (0.0, 0.0, 0.0))
+    assert same(centred.velocity_share, (0.0, 0.0, 0.0))
     assert isinstance(read_stick(m.MAVLink_manual_control_message(1, 2000, 0, 500, 0, 0)), Verdict)
 
 
@@ -206,7 +206,7 @@ def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):
 
 def test_a_refusal_is_said_once_in_a_while(rig):
     said = 0
-    for _ in range(2 * COMPLAIN_US // 100_000):
+    for _ in range(2 * WARNING_INTERVAL_US // 100_000):
         replies = rig.replies(local(1, 0xFFF))
         said += sum(r.get_type() == "STATUSTEXT" and r.chunk_seq == 0 for r in replies)
         rig.now_us += 100_000
@@ -256,5 +256,5 @@ def test_what_is_read_is_finite_wherever_it_is_asked(frame, mask, values):
     asked = read_local(local(frame, mask, *values[:6], a=values[6:9], yaw=values[9], rate=values[10]))
     if isinstance(asked, FollowSetpoint):
         used = (*asked.position, *asked.velocity, *asked.accel)
-        assert not any(map(math.isinf, (*used, asked.heading_rad, asked.turning_rad_s)))
+        assert not any(map(math.isinf, (*used, asked.heading_rad, asked.yaw_rate_rad_s)))
         assert not all(map(math.isnan, used))

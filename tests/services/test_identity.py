@@ -11,9 +11,9 @@ from autopilot.services.identity import (
     AUTO,
     AUTO_TAKEOFF,
     FLAVOURS,
-    FLOWN,
     OFFBOARD,
     PX4,
+    SUPPORTED_MODES,
     Identity,
     autopilot_version_message,
     available_modes_messages,
@@ -62,11 +62,11 @@ def test_the_modes_told_are_those_that_are_flown(flavour):
         pairs.add(mode.pair)
     # with ArduPilot, take-off has no separate number, and OFFBOARD is GUIDED
     hidden = {(AUTO, AUTO_TAKEOFF), (OFFBOARD, 0)} if flavour is ARDUPILOT else set()
-    assert pairs == set(FLOWN) - hidden
+    assert pairs == set(SUPPORTED_MODES) - hidden
 
 
 def test_what_is_called_flown_is_what_the_supervisor_flies():
-    assert set(FLOWN) == set(MODES)
+    assert set(SUPPORTED_MODES) == set(MODES)
 
 
 def test_the_parameters_choose_the_identity():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import MemoryCard
-from autopilot.services.logs import AT_ONCE, BLOCK, LogService
+from autopilot.services.logs import BLOCK, BLOCKS_PER_TICK, LogService
 from autopilot.services.records import Peer, Send, Verdict
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as m
@@ -109,7 +109,7 @@ def test_a_range_that_ends_inside_has_no_block_too_many() -> None:
 def test_blocks_are_paced() -> None:
     rig = Rig(os.urandom(100_000))
     rig.order(0, 0, 2**32 - 1)
-    assert all(0 < len(rig.poll()) <= AT_ONCE for _ in range(20))
+    assert all(0 < len(rig.poll()) <= BLOCKS_PER_TICK for _ in range(20))
 
 
 def test_gaps_are_filled_as_mavproxy_asks_for_them() -> None:

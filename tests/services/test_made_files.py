@@ -12,7 +12,7 @@ from autopilot.services.file_tree import checksum
 from autopilot.services.files import path_of
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.virtual_files import GENERAL, PARAMETER_TEXTS, PARAMETERS, made_files
+from autopilot.services.virtual_files import GENERAL, PARAMETER_METADATA, PARAMETERS, generated_files
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
@@ -20,7 +20,7 @@ from autopilot.wire.parameter_table import Parameter
 
 
 def made(table: Any) -> Any:
-    return made_files(Identity(), table, StoredMission)
+    return generated_files(Identity(), table, StoredMission)
 
 
 def test_a_ground_station_finds_the_texts_of_the_parameters(rig: Any) -> None:
@@ -42,7 +42,7 @@ def test_a_ground_station_finds_the_texts_of_the_parameters(rig: Any) -> None:
 
 def test_every_parameter_is_described() -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
-    record = json.loads(made(table)[PARAMETER_TEXTS]({}))
+    record = json.loads(made(table)[PARAMETER_METADATA]({}))
     assert record["version"] == 3
     assert [p["name"] for p in record["parameters"]] == list(table.names)
     for told in record["parameters"]:
@@ -62,7 +62,7 @@ def test_they_are_made_again_once_a_parameter_has_changed(monkeypatch: pytest.Mo
 
     def asked() -> int:
         described.clear()
-        for path in (PARAMETERS, PARAMETER_TEXTS, GENERAL, PARAMETERS):
+        for path in (PARAMETERS, PARAMETER_METADATA, GENERAL, PARAMETERS):
             files[path]({})
         return len(described)
 
@@ -71,14 +71,14 @@ def test_they_are_made_again_once_a_parameter_has_changed(monkeypatch: pytest.Mo
     before = files[PARAMETERS]({})
     table.set("MIS_SPEED", 2.0)
     assert files[PARAMETERS]({}) != before
-    table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
-    assert b"SIM_WIND_E" in files[PARAMETER_TEXTS]({})
+    table.add_remote(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
+    assert b"SIM_WIND_E" in files[PARAMETER_METADATA]({})
     assert files[PARAMETERS]({"start": "3"}) != files[PARAMETERS]({})
 
 
 def test_the_range_of_another_process_parameter_is_not_made_up(rig: Any) -> None:
-    rig.table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
-    told = {p["name"]: p for p in json.loads(made(rig.table)[PARAMETER_TEXTS]({}))["parameters"]}
+    rig.table.add_remote(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
+    told = {p["name"]: p for p in json.loads(made(rig.table)[PARAMETER_METADATA]({}))["parameters"]}
     assert not {"min", "max", "default"} & told["SIM_WIND_E"].keys()
 
 
@@ -98,8 +98,8 @@ _METADATA_KEYS = {
 
 def test_the_metadata_keep_to_mavlinks_schemas() -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
-    table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
-    texts = json.loads(made(table)[PARAMETER_TEXTS]({}))
+    table.add_remote(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
+    texts = json.loads(made(table)[PARAMETER_METADATA]({}))
     assert texts.keys() == {"version", "parameters"}
     assert isinstance(texts["version"], int) and texts["version"] >= 3
     for told in texts["parameters"]:

@@ -7,10 +7,17 @@ from typing import Any
 
 import pytest
 
-from autopilot.services.endpoint import REACHED_AGAIN, REACHED_US
+from autopilot.services.endpoint import REACHED_INTERVAL_US, REACHED_REPETITIONS
 from autopilot.services.identity import ARDUPILOT, Identity
 from autopilot.services.mission_store import MAX_ITEMS
-from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
+from autopilot.services.missions import (
+    ACK_INTERVAL_US,
+    ACK_REPETITIONS,
+    INT_REQUESTS,
+    LATE_ITEM_US,
+    MAX_REQUESTS,
+    RETRY_US,
+)
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ReplaceMission
 from autopilot.wire.convert.geodesy import Home
@@ -71,24 +78,24 @@ def test_nan_and_integer_coordinates_survive_bit_by_bit(rig, as_message):
 def test_asks_again_and_gives_up(rig_with, items):
     rig = rig_with(items(3))
     rig.send(count(5))
-    heard = silence(rig, (MAX_ASKS + 1) * ASK_US)
-    asked = [INT] * INT_ASKS + [REQUEST] * (MAX_ASKS - INT_ASKS)
+    heard = silence(rig, (MAX_REQUESTS + 1) * RETRY_US)
+    asked = [INT] * INT_REQUESTS + [REQUEST] * (MAX_REQUESTS - INT_REQUESTS)
     assert heard == [(kind, 0) for kind in asked] + [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
     assert rig.endpoint.mission.items == items(3)
-    assert silence(rig, 10 * ASK_US) == []
+    assert silence(rig, 10 * RETRY_US) == []
 
 
 def test_gives_up_in_the_middle_as_int_only(rig, items, as_message):
     rig.replies(count(3))
     rig.send(as_message(0, items(3)[0]))
-    heard = silence(rig, (MAX_ASKS + 1) * ASK_US)
-    assert heard == [(INT, 1)] * MAX_ASKS + [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
+    heard = silence(rig, (MAX_REQUESTS + 1) * RETRY_US)
+    assert heard == [(INT, 1)] * MAX_REQUESTS + [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
     assert rig.endpoint.mission.items == ()
     assert not rig.events
 
 
 def test_a_slow_upload_is_not_given_up(rig, items, as_message):
-    slow = ASK_US * 9 // 10
+    slow = RETRY_US * 9 // 10
     sent = items(20)
     rig.send(count(20))
     for seq, item in enumerate(sent):
@@ -101,27 +108,27 @@ def test_an_answer_after_most_of_the_tries_is_still_good(rig, items, as_message)
     sent = items(2)
     rig.send(count(2))
     for seq, item in enumerate(sent):
-        silence(rig, ASK_US * 2)
+        silence(rig, RETRY_US * 2)
         rig.send(as_message(seq, item))
-    assert silence(rig, ASK_US) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    assert silence(rig, RETRY_US) == [(ACK, m.MAV_MISSION_ACCEPTED)]
 
 
 def test_the_last_ack_is_repeated_where_messages_are_lost(rig, items, as_message):
     sent = items(2)
     rig.send(count(2))
     rig.send(as_message(0, sent[0]))
-    silence(rig, 3 * ASK_US // 2)  # item 1 is requested twice
+    silence(rig, 3 * RETRY_US // 2)  # item 1 is requested twice
     accepted = (ACK, m.MAV_MISSION_ACCEPTED)
     assert said(rig.replies(as_message(1, sent[1])))[-1] == accepted
-    assert silence(rig, 10 * ECHO_US) == [accepted] * ECHOES
+    assert silence(rig, 10 * ACK_INTERVAL_US) == [accepted] * ACK_REPETITIONS
     # the peer's next request shows that it received the acknowledgement
     rig.send(count(2))
     rig.send(as_message(0, sent[0]))
-    silence(rig, 3 * ASK_US // 2)
+    silence(rig, 3 * RETRY_US // 2)
     assert said(rig.replies(as_message(1, sent[1])))[-1] == accepted
-    assert silence(rig, 3 * ECHO_US // 2) == [accepted]
+    assert silence(rig, 3 * ACK_INTERVAL_US // 2) == [accepted]
     assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1, 0))) == [("MISSION_COUNT", 2)]
-    assert silence(rig, 10 * ECHO_US) == []
+    assert silence(rig, 10 * ACK_INTERVAL_US) == []
 
 
 # ---- order
@@ -151,7 +158,7 @@ def test_a_lost_ack_is_said_again_for_the_last_item(rig, items, as_message):
     assert said(rig.replies(as_message(2, sent[2]))) == [(ACK, m.MAV_MISSION_ACCEPTED)]
     assert said(rig.replies(as_message(1, sent[1]))) == []
     assert said(rig.replies(as_message(2, sent[2]), system=77)) == []
-    rig.now_us += LATE_US + 1
+    rig.now_us += LATE_ITEM_US + 1
     assert said(rig.replies(as_message(2, sent[2]))) == []
     assert len(rig.events) == 1
 
@@ -172,7 +179,7 @@ def test_the_client_gives_up(rig_with, items, as_message):
     rig = rig_with(items(2))
     rig.replies(count(5))
     rig.replies(m.MAVLink_mission_ack_message(1, 1, m.MAV_MISSION_OPERATION_CANCELLED))
-    assert silence(rig, 10 * ASK_US) == []
+    assert silence(rig, 10 * RETRY_US) == []
     assert rig.endpoint.mission.items == items(2)
 
 
@@ -383,7 +390,7 @@ def float_message(seq: int, item: WireItem) -> Any:
 def test_a_client_of_floats_uploads(rig, items):
     sent = items(4)
     rig.send(count(4))
-    heard = silence(rig, ASK_US * INT_ASKS + ASK_US // 2)
+    heard = silence(rig, RETRY_US * INT_REQUESTS + RETRY_US // 2)
     assert heard[-1] == (REQUEST, 0)
     for seq, item in enumerate(sent):
         answers = said(rig.replies(float_message(seq, item)))
@@ -432,17 +439,17 @@ def test_the_end_of_a_mission_is_said_again(rig):
     rig.endpoint.item_reached(3)
     rig.endpoint.item_reached(4, last=True)
     rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
-    assert _told_as_reached(rig, 20 * REACHED_US) == [3, 4] + [4] * REACHED_AGAIN
+    assert _told_as_reached(rig, 20 * REACHED_INTERVAL_US) == [3, 4] + [4] * REACHED_REPETITIONS
 
 
 def test_the_end_of_a_mission_is_not_said_of_the_next_one(rig):
     rig.endpoint.item_reached(4, last=True)
     rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
-    assert _told_as_reached(rig, 2 * REACHED_US) == [4, 4]
+    assert _told_as_reached(rig, 2 * REACHED_INTERVAL_US) == [4, 4]
     rig.changes = {"mission_state": m.MISSION_STATE_ACTIVE}
-    assert _told_as_reached(rig, 2 * REACHED_US) == []
+    assert _told_as_reached(rig, 2 * REACHED_INTERVAL_US) == []
     rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
-    assert _told_as_reached(rig, 2 * REACHED_US) == []
+    assert _told_as_reached(rig, 2 * REACHED_INTERVAL_US) == []
 
 
 def test_reached_items_are_told_to_all(rig):

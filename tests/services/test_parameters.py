@@ -11,13 +11,13 @@ from autopilot.services.identity import ARDUPILOT, GENERIC, Identity, ParameterE
 from autopilot.services.parameter_protocol import (
     DOES_NOT_EXIST,
     HASH_NAME,
-    LIST_PACE_US,
+    LIST_INTERVAL_US,
     OUT_OF_RANGE,
     READ_ONLY,
     TYPE_MISMATCH,
     ParameterService,
 )
-from autopilot.services.records import ParameterChanged, Peer, WorldAsked
+from autopilot.services.records import ParameterChanged, Peer, SimulatorParameterRequested
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import payload_of
 from autopilot.wire.dialect import plumbline as m
@@ -132,7 +132,7 @@ def test_the_list_is_paced_and_only_for_the_asker(rig):
         out = rig.poll()
         assert not values(r.message for r in out.get("api", []))
         names.append(len(values(r.message for r in out.get("gcs", []))))
-    per_tick = 4000 // LIST_PACE_US
+    per_tick = 4000 // LIST_INTERVAL_US
     assert names[0] <= per_tick
     assert names[:3] == [1, per_tick, per_tick]  # the hash and 4
 
@@ -267,29 +267,29 @@ def test_a_real_number_for_a_whole_one_is_taken_if_it_is_whole(rig):
 
 
 def test_what_the_simulator_is_asked_for_is_answered_when_it_has_said_what_holds(rig):
-    rig.table.learn(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
+    rig.table.add_remote(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
     assert rig.replies(set_(b"SIM_WIND_E", 500.0)) == []
-    assert rig.events == [WorldAsked("SIM_WIND_E", 500.0)]
+    assert rig.events == [SimulatorParameterRequested("SIM_WIND_E", 500.0)]
     assert rig.table["SIM_WIND_E"] == 0.5
     refusal = {x.get_type() for x in rig.replies(set_(b"SIM_WIND_E", 2e9))}
     assert refusal == {"STATUSTEXT", "PARAM_ERROR", "PARAM_VALUE"}
     rig.table.set("SIM_WIND_E", 3.0)
     rig.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, 2, *(0.0,) * 6))
-    assert WorldAsked("SIM_WIND_E", 0.5) in rig.events
+    assert SimulatorParameterRequested("SIM_WIND_E", 0.5) in rig.events
     assert rig.table["SIM_WIND_E"] == 3.0
 
 
 def test_nothing_is_set_in_a_simulator_that_is_silent(rig):
-    rig.table.learn(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
-    rig.endpoint.world_silent(True)
+    rig.table.add_remote(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
+    rig.endpoint.set_simulator_silent(True)
     told = {x.get_type(): x for x in rig.replies(set_(b"SIM_WIND_E", 3.0))}
     assert told["PARAM_ERROR"].error == m.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND
     assert told["PARAM_VALUE"].param_value == 0.5
     assert told["STATUSTEXT"].text == "SIM_WIND_E not set: the simulator is silent"
     assert rig.events == []
-    rig.endpoint.world_silent(False)
+    rig.endpoint.set_simulator_silent(False)
     rig.send(set_(b"SIM_WIND_E", 3.0))
-    assert rig.events == [WorldAsked("SIM_WIND_E", 3.0)]
+    assert rig.events == [SimulatorParameterRequested("SIM_WIND_E", 3.0)]
 
 
 def test_a_list_waits_until_the_table_is_complete(rig):
@@ -297,7 +297,7 @@ def test_a_list_waits_until_the_table_is_complete(rig):
     rig.endpoint.expect_parameters()
     rig.send(m.MAVLink_param_request_list_message(1, 1))
     assert not [r for r in rig.run(500_000) if r.message.get_type() == "PARAM_VALUE"]
-    rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
+    rig.table.add_remote(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.endpoint.parameters_complete(rig.now_us)
     got = listed(rig)
     assert [x.param_id for x in got] == list(rig.table.names)

@@ -6,20 +6,22 @@ import math
 
 import pytest
 
-from autopilot.services.snapshot import Sensed, Sortie
-from autopilot.services.telemetry import GROUPS
-from autopilot.wire.convert.simulator import padded
+from autopilot.services.snapshot import SensorReadings, Sortie
+from autopilot.services.telemetry import DATA_STREAM_GROUPS
+from autopilot.wire.convert.simulator import padded_forces
 from autopilot.wire.dialect import plumbline as m
 from tests.doubles.streams import sent
 
 FLOAT32_REL = 1e-6  # single-precision fields
 NOW_US = 5_000_000
 # turning left, pushed to the left and upwards
-READ = Sensed((0.1, 0.2, 0.3), (1.0, 2.0, 9.80665), (0.2, -0.1, -0.4), 101_325.0, 12.5, 21.25, NOW_US, NOW_US)
+READ = SensorReadings(
+    (0.1, 0.2, 0.3), (1.0, 2.0, 9.80665), (0.2, -0.1, -0.4), 101_325.0, 12.5, 21.25, NOW_US, NOW_US
+)
 
 
 def test_readings_are_told_in_the_axes_of_the_body_and_in_the_units_of_each_message(snap):
-    snapshot = snap(NOW_US, sensed=READ)
+    snapshot = snap(NOW_US, readings=READ)
     (fine,) = sent(snapshot, m.MAVLINK_MSG_ID_HIGHRES_IMU)
     assert (fine.xacc, fine.yacc, fine.zacc) == pytest.approx((1.0, -2.0, -9.80665), rel=FLOAT32_REL)
     assert (fine.xgyro, fine.ygyro, fine.zgyro) == pytest.approx((0.1, -0.2, -0.3), rel=FLOAT32_REL)
@@ -38,9 +40,9 @@ def test_readings_are_told_in_the_axes_of_the_body_and_in_the_units_of_each_mess
 
 def test_only_what_has_read_of_late_counts_as_updated(snap):
     stale = READ._replace(field_us=NOW_US - 100_000, pressure_us=-1)
-    (fine,) = sent(snap(NOW_US, sensed=stale), m.MAVLINK_MSG_ID_HIGHRES_IMU)
+    (fine,) = sent(snap(NOW_US, readings=stale), m.MAVLINK_MSG_ID_HIGHRES_IMU)
     assert fine.fields_updated == 0x3F
-    assert sent(snap(NOW_US, sensed=stale), m.MAVLINK_MSG_ID_SCALED_PRESSURE) == []
+    assert sent(snap(NOW_US, readings=stale), m.MAVLINK_MSG_ID_SCALED_PRESSURE) == []
 
 
 def test_a_vehicle_that_has_not_sensed_yet_says_nothing_of_it(snap):
@@ -81,7 +83,7 @@ def test_odometry_is_the_estimate_and_says_what_it_does_not_know(snap):
 
 
 def test_outputs_are_those_of_servo_output_raw(snap):
-    snapshot = snap(NOW_US, forces=padded((0.0, 0.49, 0.98, 1.96)), rotor_max=1.96)
+    snapshot = snap(NOW_US, forces=padded_forces((0.0, 0.49, 0.98, 1.96)), rotor_max=1.96)
     (said,) = sent(snapshot, m.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS)
     assert said.active == 4
     assert said.actuator == [1000.0, 1250.0, 1500.0, 2000.0, *[0.0] * 28]
@@ -102,8 +104,8 @@ def test_a_flight_is_known_by_when_it_was_armed(snap):
 
 
 def test_the_groups_of_a_ground_station_have_them():
-    assert GROUPS[m.MAV_DATA_STREAM_RAW_SENSORS] == (
+    assert DATA_STREAM_GROUPS[m.MAV_DATA_STREAM_RAW_SENSORS] == (
         m.MAVLINK_MSG_ID_SCALED_IMU,
         m.MAVLINK_MSG_ID_SCALED_PRESSURE,
     )
-    assert m.MAVLINK_MSG_ID_RC_CHANNELS in GROUPS[m.MAV_DATA_STREAM_RC_CHANNELS]
+    assert m.MAVLINK_MSG_ID_RC_CHANNELS in DATA_STREAM_GROUPS[m.MAV_DATA_STREAM_RC_CHANNELS]

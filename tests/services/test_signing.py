@@ -10,7 +10,7 @@ from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.identity import Identity
 from autopilot.services.records import SigningChanged, Verdict
 from autopilot.services.requests import ChangeSigningKey
-from autopilot.services.signing import AHEAD
+from autopilot.services.signing import STORED_LEAD
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
@@ -156,7 +156,7 @@ def test_the_stored_time_is_ahead_of_every_time_in_use(signed: Any) -> None:
         for received in made.values():
             for one in received:
                 assert int.from_bytes(one.frame[-12:-6], "little") <= stored
-    assert stored <= BOOT + timestamp_of(BOOT_US + 32_000_000) - BOOT + 2 * AHEAD
+    assert stored <= BOOT + timestamp_of(BOOT_US + 32_000_000) - BOOT + 2 * STORED_LEAD
 
 
 def test_after_a_restart_nothing_old_is_heard_and_our_times_go_on(signed: Any) -> None:
@@ -180,7 +180,7 @@ def test_after_a_restart_nothing_old_is_heard_and_our_times_go_on(signed: Any) -
 
 def test_the_wall_clock_counts_where_it_is_told(signed: Any) -> None:
     ahead = BOOT_US + 3_600_000_000
-    signed.endpoint.tell_time(ahead)
+    signed.endpoint.set_wall_clock(ahead)
     stamps = [int.from_bytes(one.frame[-12:-6], "little") for one in signed.run(100_000)]
     assert stamps[0] >= timestamp_of(ahead)
     assert stamps == sorted(set(stamps))

@@ -18,8 +18,8 @@ from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import Verdict
 from autopilot.services.stream_frames import BITS, StreamFrames
 from autopilot.services.telemetry import STREAMS
-from autopilot.vehicle.layout import FEWEST, MOST
-from autopilot.wire.codec import FrameWriter, decode, split
+from autopilot.vehicle.layout import MAX_ROTORS, MIN_ROTORS
+from autopilot.wire.codec import FrameWriter, decode, split_frames
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing
@@ -46,7 +46,7 @@ def row_of(rng: np.random.Generator, hostile: bool) -> Any:
             row[at] = rng.integers(0, 200) if kind is int else rng.integers(0, 2)
         at += width(kind)
     row[0] = rng.integers(0, 2**50)
-    row[ROTORS] = rng.integers(FEWEST, MOST + 1)
+    row[ROTORS] = rng.integers(MIN_ROTORS, MAX_ROTORS + 1)
     return row
 
 
@@ -144,7 +144,7 @@ def test_a_link_hears_the_same_by_either_way(snap: Any) -> None:
 
 def test_a_signed_link_signs_them(snap: Any) -> None:
     heard = _Heard(True, snap, Signing(bytes(32), 1))
-    frames = [frame for datagram in heard.poll(0) for frame in split(datagram)]
+    frames = [frame for datagram in heard.poll(0) for frame in split_frames(datagram)]
     ids = {one.id for frame in frames for one in decode(frame)[0]}
     assert ids > set(BITS)
     assert all(frame[2] == 1 for frame in frames)  # the flag of a signed frame

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.identity import Identity
-from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsFix, Sensed
+from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsFix, SensorReadings
 from autopilot.services.streams import OFF
-from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, PROGRAM_INTERVALS_US, STREAMS
+from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM_BIT, PROGRAM_INTERVALS_US, STREAMS
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.convert.simulator import padded
+from autopilot.wire.convert.simulator import padded_forces
 from autopilot.wire.dialect import plumbline as mavlink
 
 ALL = STREAMS | LOAD_STREAMS
@@ -45,7 +45,7 @@ FLYING = {
     "x_quad_d": (5.0, 6.0, 7.0),
     "e_x": (0.3, 0.4, 0.0),
     "tension": 0.9,
-    "forces": padded((0.98, 1.96, 0.0, -0.1)),
+    "forces": padded_forces((0.98, 1.96, 0.0, -0.1)),
     "rotor_max": 1.96,
     "gps": GpsFix(3_000, 3, (1.0, 2.0, 3.0), (0.0, 2.0, 0.0), 1.5, 2.5, 12),
     "battery_voltage": 11.1,
@@ -99,7 +99,7 @@ def test_every_stream_stands_any_numbers(key, vector, snap):
         scalar,
     )
     fix = GpsFix(0, 3, vector, vector, scalar, scalar, 300)
-    changes["sensed"] = Sensed(vector, vector, vector, scalar, scalar, scalar, 0, 0)
+    changes["readings"] = SensorReadings(vector, vector, vector, scalar, scalar, scalar, 0, 0)
     snapshot = snap(
         2**40, forces=(scalar,) * 14, quat_wxyz=(vector[0],) * 4, gps=fix, slack_events=2**20, **changes
     )
@@ -144,13 +144,13 @@ def test_health_as_the_sensors_say_and_no_fence_breach(snap):
     assert (status.voltage_battery, status.battery_remaining) == (11_100, 75)
 
 
-@pytest.mark.parametrize("guarded", [True, False])
-def test_a_fence_is_present_and_enabled_unless_it_is_switched_off(snap, guarded):
+@pytest.mark.parametrize("fence_enabled", [True, False])
+def test_a_fence_is_present_and_enabled_unless_it_is_switched_off(snap, fence_enabled):
     (status,) = sent(
-        mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO | GEOFENCE, guarded=guarded)
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO | GEOFENCE, fence_enabled=fence_enabled)
     )
     assert status.onboard_control_sensors_present & GEOFENCE
-    assert bool(status.onboard_control_sensors_enabled & GEOFENCE) == guarded
+    assert bool(status.onboard_control_sensors_enabled & GEOFENCE) == fence_enabled
     assert status.onboard_control_sensors_enabled & GYRO
     (status,) = sent(mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO))
     assert not (status.onboard_control_sensors_present | status.onboard_control_sensors_enabled) & GEOFENCE
@@ -223,7 +223,7 @@ def test_named_values_carry_tension_and_the_length_of_the_load_error(snap):
 
 
 def test_attitude_of_the_load_is_that_of_the_cable(snap):
-    (attitude,) = sent(LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_ATTITUDE, snap(**FLYING))
+    (attitude,) = sent(LOAD_SYSTEM_BIT | mavlink.MAVLINK_MSG_ID_ATTITUDE, snap(**FLYING))
     sin, cos = math.sin, math.cos
     roll, pitch = attitude.roll, attitude.pitch
     # third column of Ry(pitch) Rx(roll): body down in NED
@@ -240,7 +240,7 @@ def test_attitude_of_the_load_is_that_of_the_cable(snap):
 @pytest.mark.parametrize("key", ALL, ids=lambda key: f"{key:#x}")
 def test_every_stream_and_its_rate_stand_in_the_manual(key):
     stream = ALL[key]
-    message = mavlink.mavlink_map[key & ~LOAD_SYSTEM]
+    message = mavlink.mavlink_map[key & ~LOAD_SYSTEM_BIT]
     rate = "on request" if stream.interval_us == OFF else f"{1_000_000 // stream.interval_us} Hz"
     if key in PROGRAM_INTERVALS_US:
         rate += f"; {1_000_000 // PROGRAM_INTERVALS_US[key]} Hz to programs"

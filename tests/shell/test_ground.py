@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from autopilot.services.endpoint import PATIENCE, VehicleEndpoint
+from autopilot.services.endpoint import MAX_GARBAGE_BYTES, VehicleEndpoint
 from autopilot.services.identity import Identity
 from autopilot.services.records import Verdict
 from autopilot.shell.ground import AutopilotError, GroundStations, listen
 from autopilot.shell.options import StopRequest
-from autopilot.shell.storing import Storing
+from autopilot.shell.storage_worker import StorageWorker
 from autopilot.shell.tcp_server import MAX_CLIENTS, SILENCE_US, TcpServer
 from autopilot.wire import codec
 from autopilot.wire.codec import FrameWriter, decode
@@ -83,7 +83,7 @@ class Ground:
             peer.bind((LOOPBACK, 0))
             peer.settimeout(HEARS_S)
         stations = tuple(peer.getsockname() for peer in self.peers)
-        self.stations = GroundStations(stations, (), tcp, Storing(aside=False))
+        self.stations = GroundStations(stations, (), tcp, StorageWorker(threaded=False))
         self.stations.join(self.onboard)
         self.onboard.said = [((i, address), b"hello") for i, address in enumerate(stations)]
         self.theirs = [self.address_towards(peer) for peer in self.peers]
@@ -165,7 +165,7 @@ def test_a_client_by_tcp_is_read_2_kb_at_a_time(ground: Callable[[], Ground]) ->
     with socket.create_connection(address, 5.0) as client:
         client.sendall(said)
         while len(b"".join(taken)) < len(said):
-            arrived = server.take(autopilot.onboard)
+            arrived = server.receive(autopilot.onboard)
             if arrived is not None:
                 taken.append(arrived[0])
                 assert len(b"".join(taken)) <= len(taken) * MOST_READ
@@ -206,10 +206,10 @@ def test_a_whole_datagram_of_begins_of_frames_is_soon_given_up(
     autopilot.onboard = searching
     autopilot.peers[0].sendto(b"\xfe" * LONGEST, autopilot.theirs[0])
     autopilot.exchange()
-    assert 0 < searching.checksums <= 2 * (PATIENCE + 1)
+    assert 0 < searching.checksums <= 2 * (MAX_GARBAGE_BYTES + 1)
     searching.checksums = 0
     searching.receive_ground(b"\xfe" * LONGEST, "ground")
-    assert 0 < searching.checksums <= 2 * (PATIENCE + 1), "nor where it comes in one piece"
+    assert 0 < searching.checksums <= 2 * (MAX_GARBAGE_BYTES + 1), "nor where it comes in one piece"
 
 
 def test_a_flood_by_one_way_leaves_the_others_their_turn(ground: Callable[[], Ground]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from autopilot.services.records import Event, TimesyncAnswered
-from autopilot.shell.ground import AutopilotError, GroundInStep
+from autopilot.shell.ground import AutopilotError, LockstepGroundStation
 from autopilot.shell.options import Stop
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
@@ -33,7 +33,7 @@ class Vehicle:
     def ground_datagrams(self) -> list[tuple[str, bytes]]:
         return [("ground", self.writer.frame(mavlink.MAVLink_system_time_message(self.now_us, 0)))]
 
-    def question(self, link: str) -> bytes | None:
+    def timesync_request(self, link: str) -> bytes | None:
         ask = mavlink.MAVLink_timesync_message(0, self.now_us * 1000)
         return None if self.now_us % WINDOW_US else self.writer.frame(ask)
 
@@ -67,7 +67,7 @@ class Rig:
         self.ground.bind(("127.0.0.1", 0))
         self.ground.settimeout(5.0)
         self.vehicle: Any = Vehicle()
-        self.step = GroundInStep(self.ground.getsockname())
+        self.step = LockstepGroundStation(self.ground.getsockname())
         self.step.join(self.vehicle)
         self.writer = FrameWriter(255, 190)
         with pytest.raises(Waits):

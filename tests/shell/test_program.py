@@ -39,8 +39,8 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     found: list[Onboard] = []
 
     class Begun(program.Program):
-        def tell(self, troubles: list[str]) -> None:
-            super().tell(troubles)
+        def report_problems(self, troubles: list[str]) -> None:
+            super().report_problems(troubles)
             found.append(self.onboard)
             raise Stop
 
@@ -60,7 +60,7 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
 def keep_fence(folder: Path, damaged: bool) -> Path:
     """Store a fence around home; return its file."""
-    Storage(folder).keep_areas(FENCE, TRIANGLE)
+    Storage(folder).store_areas(FENCE, TRIANGLE)
     path = folder / "fence.bin"
     whole = path.read_bytes()
     path.write_bytes(whole[:-1] + bytes([whole[-1] ^ damaged]))

@@ -51,9 +51,9 @@ def upload(storage: Storage, name: bytes) -> None:
     tree.write(file, 5, NEW[5:])
 
 
-def keep_log(number: int, most_mb: float) -> Callable[[Storage], object]:
+def store_log(number: int, most_mb: float) -> Callable[[Storage], object]:
     chunk = LogChunk(("log", f"{number}.ulg"), NEW, False)
-    return lambda storage: storage.keep_log(chunk, most_mb)
+    return lambda storage: storage.store_log(chunk, most_mb)
 
 
 CHANGES = {
@@ -65,12 +65,12 @@ CHANGES = {
     "a file cut": Change(lambda s: s.card.truncate(("a",), 4), [BEFORE, but(a=OLD[:4])]),
     "a file taken away": Change(lambda s: s.card.remove(("a",)), [BEFORE, but(a=None)]),
     "a file renamed": Change(lambda s: s.card.rename(("a",), ("b",)), [BEFORE, but(a=None, b=OLD)]),
-    "a log continued": Change(keep_log(2, LARGE_MB), [but(log_2=data) for data in parts(b"a log")]),
+    "a log continued": Change(store_log(2, LARGE_MB), [but(log_2=data) for data in parts(b"a log")]),
     "a log begun where there is room": Change(
-        keep_log(3, LARGE_MB), [BEFORE, *(but(log_3=data) for data in parts())]
+        store_log(3, LARGE_MB), [BEFORE, *(but(log_3=data) for data in parts())]
     ),
     "a log begun in place of others": Change(
-        keep_log(3, NO_MB),
+        store_log(3, NO_MB),
         [BEFORE, but(log_1=None), *(but(log_1=None, log_2=None, log_3=data) for data in (None, *parts()))],
     ),
 }

@@ -9,16 +9,16 @@ import pytest
 
 from autopilot.onboard.flight_log import LogChunk
 from autopilot.services.mission_store import StoredMission
+from autopilot.shell.atomic_file import seal
 from autopilot.shell.storage import (
     CARD_DIRECTORY,
     MISSION_FILE,
     PARAMETER_FILE,
     SIGNING_FILE,
-    WORLD_FILE,
+    SIMULATOR_PARAMETER_FILE,
     Storage,
     StorageError,
 )
-from autopilot.shell.whole_file import seal
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
@@ -41,7 +41,7 @@ def stored(name: str) -> StoredMission:
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_mission_comes_back_as_it_was(tmp_path: Path, name: str) -> None:
-    Storage(tmp_path).keep_mission(stored(name))
+    Storage(tmp_path).store_mission(stored(name))
     assert Storage(tmp_path).load_mission(HOME) == (stored(name), "")
     assert [p.name for p in tmp_path.iterdir() if p.is_file()] == [MISSION_FILE], "nothing half written stays"
 
@@ -49,16 +49,16 @@ def test_a_mission_comes_back_as_it_was(tmp_path: Path, name: str) -> None:
 def test_no_mission_and_an_empty_one_are_the_same(tmp_path: Path) -> None:
     storage = Storage(tmp_path / "new" / "deep")
     assert storage.load_mission(HOME) == (None, "")
-    storage.keep_mission(stored("hover"))
-    storage.keep_mission(StoredMission())
+    storage.store_mission(stored("hover"))
+    storage.store_mission(StoredMission())
     assert storage.load_mission(HOME) == (None, "")
-    storage.keep_mission(StoredMission())
+    storage.store_mission(StoredMission())
 
 
 @pytest.mark.parametrize("damage", ["cut", "bit", "empty", "other"])
 def test_a_corrupt_mission_is_set_aside_and_said(tmp_path: Path, damage: str) -> None:
     storage = Storage(tmp_path)
-    storage.keep_mission(stored("hover"))
+    storage.store_mission(stored("hover"))
     path = tmp_path / MISSION_FILE
     data = path.read_bytes()
     bad = {
@@ -94,8 +94,8 @@ def test_logs_are_stored_in_parts_and_the_oldest_make_room(tmp_path: Path) -> No
     folder = tmp_path / CARD_DIRECTORY / "log"
     for name in ("a", "b", "c"):
         path = ("log", f"{name}.ulg")
-        storage.keep_log(LogChunk(path, bytes(600_000), False), 1.0)
-        storage.keep_log(LogChunk(path, b"end", True), 1.0)
+        storage.store_log(LogChunk(path, bytes(600_000), False), 1.0)
+        storage.store_log(LogChunk(path, b"end", True), 1.0)
     # room is made when a log begins: the logs before it are no more than a megabyte
     assert sorted(log.name for log in folder.iterdir()) == ["b.ulg", "c.ulg"]
     assert (folder / "c.ulg").read_bytes() == bytes(600_000) + b"end"
@@ -106,7 +106,7 @@ def test_a_log_is_not_written_through_a_link(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / CARD_DIRECTORY / "log").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(OSError, match="symbolic links"):
-        storage.keep_log(LogChunk(("log", "a.ulg"), b"x", False), 1.0)
+        storage.store_log(LogChunk(("log", "a.ulg"), b"x", False), 1.0)
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
@@ -114,12 +114,12 @@ def test_a_signing_key_is_kept_for_nobody_else_to_read(tmp_path: Path) -> None:
     storage, key = Storage(tmp_path), bytes(range(32))
     assert storage.load_signing() is None
     for timestamp in (5, 7):
-        storage.keep_signing(key, timestamp)
+        storage.store_signing(key, timestamp)
         assert (tmp_path / SIGNING_FILE).stat().st_mode & 0o777 == 0o600
     again = Storage(tmp_path).load_signing()
     assert again is not None
     assert (again.key, again.timestamp) == (key, 7)
-    storage.keep_signing(None, 0)
+    storage.store_signing(None, 0)
     assert Storage(tmp_path).load_signing() is None
 
 
@@ -131,7 +131,7 @@ def test_a_key_that_cannot_be_read_is_no_reason_to_fly_without(tmp_path: Path, t
 
 
 def test_a_key_or_its_time_is_never_another_one(tmp_path: Path) -> None:
-    Storage(tmp_path).keep_signing(bytes(range(32)), 123456)
+    Storage(tmp_path).store_signing(bytes(range(32)), 123456)
     path = tmp_path / SIGNING_FILE
     whole = path.read_bytes()
     for place in range(len(whole)):
@@ -143,9 +143,9 @@ def test_a_key_or_its_time_is_never_another_one(tmp_path: Path) -> None:
 
 def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
-    storage.keep_parameter("NGC_KX", 5.123456789012345)
-    storage.keep_parameter("MIS_SPEED", 0.7)
-    storage.keep_parameter("NGC_KX", 5.25)
+    storage.store_parameter("NGC_KX", 5.123456789012345)
+    storage.store_parameter("MIS_SPEED", 0.7)
+    storage.store_parameter("NGC_KX", 5.25)
     again = table()
     assert Storage(tmp_path).load_parameters(again) == []
     assert again.changed() == {"NGC_KX": 5.25, "MIS_SPEED": 0.7}
@@ -153,10 +153,10 @@ def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> No
 
 
 def test_a_parameter_is_stored_beside_those_of_earlier_runs(tmp_path: Path) -> None:
-    Storage(tmp_path).keep_parameter("NGC_KX", 5.0)
+    Storage(tmp_path).store_parameter("NGC_KX", 5.0)
     later = Storage(tmp_path)
     later.load_parameters(table())
-    later.keep_parameter("NGC_KV", 2.0)
+    later.store_parameter("NGC_KV", 2.0)
     again = table()
     Storage(tmp_path).load_parameters(again)
     assert again.changed() == {"NGC_KX": 5.0, "NGC_KV": 2.0}
@@ -185,28 +185,28 @@ def test_a_file_that_is_none_is_said_and_changes_nothing(tmp_path: Path, text: b
     assert again.changed() == {}
     storage = Storage(tmp_path)
     assert storage.load_parameters(again) == troubles, "also the next time"
-    storage.keep_parameters()
+    storage.store_parameters()
     assert (tmp_path / "parameters.corrupt").read_bytes() == text
     assert Storage(tmp_path).load_parameters(again) == []
 
 
 @pytest.mark.parametrize("name", ["fence", "rally", "world"])
 def test_a_damaged_file_is_kept_aside_when_another_takes_its_place(tmp_path: Path, name: str) -> None:
-    file = {"fence": "fence.bin", "rally": "rally.bin", "world": WORLD_FILE}[name]
+    file = {"fence": "fence.bin", "rally": "rally.bin", "world": SIMULATOR_PARAMETER_FILE}[name]
     (tmp_path / file).write_bytes(b"rubbish")
     storage = Storage(tmp_path)
-    assert len(storage.load_areas(HOME)[1] + storage.load_world()[1]) == 1
+    assert len(storage.load_areas(HOME)[1] + storage.load_simulator_parameters()[1]) == 1
     assert [p.name for p in tmp_path.glob(f"{name}.*")] == [file], "it stays where it is"
     for kind in (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY):
-        storage.keep_areas(kind, ())
-    storage.keep_world({"SIM_WIND_E": 3.0})
+        storage.store_areas(kind, ())
+    storage.store_simulator_parameters({"SIM_WIND_E": 3.0})
     assert (tmp_path / f"{name}.corrupt").read_bytes() == b"rubbish"
     assert [p.name for p in tmp_path.glob("*.corrupt*")] == [f"{name}.corrupt"], (
         "of what was read none is kept"
     )
     again = Storage(tmp_path)
     assert again.load_areas(HOME) == ({}, [])
-    assert again.load_world() == ({"SIM_WIND_E": 3.0}, [])
+    assert again.load_simulator_parameters() == ({"SIM_WIND_E": 3.0}, [])
 
 
 def test_what_was_lost_is_a_reason_not_to_arm_until_it_is_stored_again(tmp_path: Path) -> None:
@@ -221,8 +221,8 @@ def test_what_was_lost_is_a_reason_not_to_arm_until_it_is_stored_again(tmp_path:
         "the stored fence is damaged",
         "the stored parameters are damaged",
     ]
-    storage.keep_areas(mavlink.MAV_MISSION_TYPE_FENCE, ())
-    storage.keep_parameters()
+    storage.store_areas(mavlink.MAV_MISSION_TYPE_FENCE, ())
+    storage.store_parameters()
     assert storage.lost == ()
     again = Storage(tmp_path)
     assert again.load_parameters(table()) == []
@@ -240,10 +240,10 @@ def test_a_directory_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 
 def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
-    storage.keep_parameter("NGC_KX", 5.0)
+    storage.store_parameter("NGC_KX", 5.0)
     (tmp_path / "parameters.new").mkdir()  # has the effect of a full or read-only disk, also for root
     with pytest.raises(OSError, match=r"parameters\.new"):
-        storage.keep_parameter("NGC_KX", 7.0)
+        storage.store_parameter("NGC_KX", 7.0)
     again = table()
     Storage(tmp_path).load_parameters(again)
     assert again["NGC_KX"] == 5.0
@@ -259,11 +259,11 @@ def test_a_directory_serves_one_autopilot_at_a_time(tmp_path: Path) -> None:
 
 
 def test_the_simulators_parameters_come_back_where_they_were_saved(tmp_path: Path) -> None:
-    assert Storage(tmp_path).load_world() == ({}, [])
-    Storage(tmp_path).keep_world({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1})
-    assert Storage(tmp_path).load_world() == ({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1}, [])
-    Storage(tmp_path).keep_world({})
-    assert Storage(tmp_path).load_world() == ({}, [])
-    (tmp_path / WORLD_FILE).write_bytes(seal("SIM_WIND_E three"))
-    values, troubles = Storage(tmp_path).load_world()
+    assert Storage(tmp_path).load_simulator_parameters() == ({}, [])
+    Storage(tmp_path).store_simulator_parameters({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1})
+    assert Storage(tmp_path).load_simulator_parameters() == ({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1}, [])
+    Storage(tmp_path).store_simulator_parameters({})
+    assert Storage(tmp_path).load_simulator_parameters() == ({}, [])
+    (tmp_path / SIMULATOR_PARAMETER_FILE).write_bytes(seal("SIM_WIND_E three"))
+    values, troubles = Storage(tmp_path).load_simulator_parameters()
     assert values == {} and len(troubles) == 1

@@ -11,7 +11,7 @@ import pytest
 from numba import config
 
 from autopilot.onboard.onboard import Onboard
-from autopilot.onboard.running import NO_QUESTIONS, Questions
+from autopilot.onboard.tick_batch import NO_TIMESYNC_REQUESTS, TimesyncRequests
 from autopilot.services.streams import NEVER_US
 from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.shell.options import set_timeout
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(
 TICK_US = 4000
 GROUND = "ground"
 IN_FLIGHT = 2503  # ticks, after which the vehicle hovers, and the next tick sends nothing special
-ALWAYS = Questions(NEVER_US, NEVER_US, 4, (b"",))  # questions are allowed
+ALWAYS = TimesyncRequests(NEVER_US, NEVER_US, 4, (b"",))  # questions are allowed
 
 
 class Said(NamedTuple):
@@ -58,7 +58,7 @@ def flight() -> list[Said]:
         answer = onboard.receive_sensors(sensors)
         assert answer is not None
         told = [datagram for _, datagram in onboard.ground_datagrams()]
-        question = onboard.question(GROUND)
+        question = onboard.timesync_request(GROUND)
         heard: tuple[bytes, ...] = ()
         window += told
         if question is not None:
@@ -109,7 +109,7 @@ def step(onboard: Onboard, said: Said) -> None:
     """A tick in Python, as in the flight."""
     assert onboard.receive_sensors(said.sensors) == said.answer
     told = [datagram for _, datagram in onboard.ground_datagrams()]
-    question = onboard.question(GROUND)
+    question = onboard.timesync_request(GROUND)
     assert b"".join([*told, question or b""]) == said.told
     for datagram in said.heard:
         onboard.receive_ground(datagram, GROUND)
@@ -132,9 +132,9 @@ def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
         before = rig.onboard.tick
         met = rig.loop.run(rig.onboard, ALWAYS._replace(unsent=tuple(unsent)))
         ran = rig.onboard.tick - before
-        assert met.ran == (ran > 0)
-        if met.ran:
-            unsent = rig.onboard.said
+        assert met.flew_ticks == (ran > 0)
+        if met.flew_ticks:
+            unsent = rig.onboard.unsent_windows
             heard += rig.heard()
             told = b"".join(one.told for one in rig.flight[: done + ran])
             assert b"".join((*heard, *unsent)) == told
@@ -142,11 +142,11 @@ def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
                 assert rig.simulator.recv(65535) == said.answer
         done, alone = done + ran, alone + ran
         drain(rig.socket)
-        if met.decide is not None:
-            assert rig.onboard.complete(met.decide) == rig.flight[done].answer
+        if met.tick_to_decide is not None:
+            assert rig.onboard.complete(met.tick_to_decide) == rig.flight[done].answer
             unsent += told_in_python(rig.onboard, rig.flight[done], unsent.pop())
             done += 1
-        elif not met.more and done < len(rig.flight):
+        elif not met.can_continue and done < len(rig.flight):
             assert met.datagram is None
             assert rig.onboard.receive_sensors(rig.flight[done].sensors) == rig.flight[done].answer
             unsent += told_in_python(rig.onboard, rig.flight[done], unsent.pop())
@@ -158,7 +158,7 @@ def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
 def told_in_python(onboard: Onboard, said: Said, before: bytes) -> list[bytes]:
     """The open window, which so far holds `before`, and the next one if this tick ends it."""
     told = [datagram for _, datagram in onboard.ground_datagrams()]
-    question = onboard.question(GROUND)
+    question = onboard.timesync_request(GROUND)
     assert b"".join([*told, question or b""]) == said.told
     return [before + said.told] if question is None else [before + said.told, b""]
 
@@ -175,17 +175,17 @@ def drain(sock: socket.socket) -> list[bytes]:
 def test_windows_are_sent_some_at_a_time_and_one_by_one_where_the_ground_will_be_waited_for(rig: Rig) -> None:
     for said in rig.flight[:20]:
         rig.simulator.send(said.sensors)
-    together = ALWAYS._replace(most=3, unsent=(b"one", b"two", b"op"))
+    together = ALWAYS._replace(max_windows=3, unsent=(b"one", b"two", b"op"))
     rig.loop.run(rig.onboard, together)
     first, second, third, *later = rig.heard()
     assert (first, second, third[:2]) == (b"one", b"two", b"op")
-    assert (len(later), len(rig.onboard.said)) == (3, 1)
+    assert (len(later), len(rig.onboard.unsent_windows)) == (3, 1)
     for said in rig.flight[20:25]:
         rig.simulator.send(said.sensors)
-    rig.loop.run(rig.onboard, ALWAYS._replace(alone_us=rig.onboard.now_us))
+    rig.loop.run(rig.onboard, ALWAYS._replace(send_singly_us=rig.onboard.now_us))
     (window,) = rig.heard()
     assert decode(window)[0][-1].id == mavlink.MAVLINK_MSG_ID_TIMESYNC
-    assert len(rig.onboard.said) == 1
+    assert len(rig.onboard.unsent_windows) == 1
 
 
 @pytest.mark.parametrize("unsent", [(bytes(60_000), b""), (b"window",) * 16 + (b"",)])
@@ -208,7 +208,7 @@ def test_what_are_no_plain_sensors_is_handed_to_python_and_flies_nothing(rig: Ri
     datagram = forge(rig.flight[0].sensors)  # type: ignore[operator]
     rig.simulator.send(datagram)
     met = rig.loop.run(rig.onboard, ALWAYS)
-    assert (met.ran, met.datagram) == (False, datagram)
+    assert (met.flew_ticks, met.datagram) == (False, datagram)
     step(rig.onboard, rig.flight[0])
 
 
@@ -216,7 +216,7 @@ def test_ticks_that_are_over_or_far_ahead_are_handed_to_python(rig: Rig, flight:
     for said in (flight[IN_FLIGHT - 1], rig.flight[1]):
         rig.simulator.send(said.sensors)
         met = rig.loop.run(rig.onboard, ALWAYS)
-        assert (met.ran, met.datagram) == (False, said.sensors)
+        assert (met.flew_ticks, met.datagram) == (False, said.sensors)
     assert rig.onboard.receive_sensors(flight[IN_FLIGHT - 1].sensors) == flight[IN_FLIGHT - 1].answer
     step(rig.onboard, rig.flight[0])
 
@@ -225,19 +225,19 @@ def test_a_tick_that_was_flown_is_answered_again_with_the_same(rig: Rig) -> None
     rig.simulator.send(rig.flight[0].sensors)
     rig.simulator.send(rig.flight[0].sensors)
     met = rig.loop.run(rig.onboard, ALWAYS)
-    assert (met.ran, met.datagram) == (True, rig.flight[0].sensors)
+    assert (met.flew_ticks, met.datagram) == (True, rig.flight[0].sensors)
     assert rig.onboard.receive_sensors(rig.flight[0].sensors) == rig.flight[0].answer
 
 
 def test_no_question_is_asked_for_whose_answer_the_shell_waits(rig: Rig) -> None:
     for said in rig.flight[:20]:
         rig.simulator.send(said.sensors)
-    rig.loop.run(rig.onboard, NO_QUESTIONS)
+    rig.loop.run(rig.onboard, NO_TIMESYNC_REQUESTS)
     next_us = rig.onboard.now_us + TICK_US
     assert next_us % 20_000 == 0
-    assert len(rig.onboard.said) == 1, "an open window"
+    assert len(rig.onboard.unsent_windows) == 1, "an open window"
 
 
 def test_a_request_is_answered_by_python(rig: Rig) -> None:
-    rig.onboard.endpoint.say(6, "a text")
+    rig.onboard.endpoint.send_text(6, "a text")
     assert rig.loop.run(rig.onboard, ALWAYS) == (False, False, None, None)

@@ -9,7 +9,7 @@ import pytest
 
 from autopilot.geometry.packed import unpack
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
 from sitl.hil import HilSimulator
 from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
@@ -17,7 +17,7 @@ from sitl.settings import settings_of
 from sitl.sim_core import SimCore
 from sitl.vehicles.sim_parameters import apply, sim_parameters
 from sitl.vehicles.truth import load_truth
-from sitl.world import FITTED, READING, READINGS, SENSORS, SHOWS, arrived
+from sitl.world import FITTED, READING, READINGS, SENSORS, STAMP_US, pop_arrived
 
 Forces = tuple[float, float, float, float]
 
@@ -60,9 +60,9 @@ class ReadCore(SimCore):
         if not self.rows.clock[sensor, FITTED]:
             return ()
         found = []
-        while (at := arrived(sensor, self.now_us, self.rows)) >= 0:
+        while (at := pop_arrived(sensor, self.now_us, self.rows)) >= 0:
             row = self.rows.queue[sensor, at]
-            found.append(Measurement(int(row[SHOWS]), unpack(READINGS[sensor], row, READING)))
+            found.append(Measurement(int(row[STAMP_US]), unpack(READINGS[sensor], row, READING)))
         return tuple(found)
 
 
@@ -107,7 +107,7 @@ class Answerer:
         self.writer = FrameWriter(system, 1)
 
     def answer(self, time_us: int, forces: Forces | None = None, armed: bool = True) -> bytes:
-        message = hil_actuator_controls_message(time_us, padded(forces or self.forces), armed, True)
+        message = hil_actuator_controls_message(time_us, padded_forces(forces or self.forces), armed, True)
         return self.writer.frame(message)
 
     def fly(self, simulator: HilSimulator, ticks: int) -> list[bytes]:

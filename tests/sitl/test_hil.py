@@ -18,12 +18,12 @@ from autopilot.wire.convert.simulator import (
     MAG,
     PRESSURE,
     hil_actuator_controls_message,
-    padded,
+    padded_forces,
     read_hil_gps,
     read_hil_state_quaternion,
     read_load_sensor,
     read_odometry,
-    speed_rpm,
+    rotor_speed_rpm,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures
@@ -83,7 +83,7 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     assert odometry.time_usec == load.time_usec == speeds.time_usec == simulator.now_us
     greatest = simulator.core.truth.rotor_max
     assert speeds.index == 0
-    told = [speed_rpm(force, greatest) for force in simulator.core.rotor_force]
+    told = [rotor_speed_rpm(force, greatest) for force in simulator.core.rotor_force]
     assert speeds.rpm == told
     assert len(set(speeds.rpm)) == 4  # of one rotor each
     assert inertial.fields_updated == ACCEL | GYRO
@@ -215,12 +215,12 @@ def test_rubbish_is_harmless(noise: bytes, place: int, value: int) -> None:
     simulator = HilSimulator.build()
     before = simulator.sensor_datagram()
     frame = bytearray(
-        FrameWriter(1, 1).frame(hil_actuator_controls_message(0, padded((1.0,) * 4), True, True))
+        FrameWriter(1, 1).frame(hil_actuator_controls_message(0, padded_forces((1.0,) * 4), True, True))
     )
     frame[place % len(frame)] ^= value or 1
     for datagram in (noise, bytes(frame), bytes(frame[:place]), noise + bytes(frame)):
         assert not simulator.receive(datagram)
-        assert not simulator.greets(datagram)
+        assert not simulator.has_heartbeat(datagram)
     assert simulator.sensor_datagram() == before
 
 
@@ -249,9 +249,9 @@ def test_disarmed_rotors_stand(answerer) -> None:
 def test_greeting_is_a_heartbeat_of_the_vehicle(answerer) -> None:
     simulator = HilSimulator.build()
     beat = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
-    assert simulator.greets(FrameWriter(1, 1).frame(beat))
-    assert not simulator.greets(FrameWriter(255, 190).frame(beat))
-    assert not simulator.greets(answerer().answer(0))
+    assert simulator.has_heartbeat(FrameWriter(1, 1).frame(beat))
+    assert not simulator.has_heartbeat(FrameWriter(255, 190).frame(beat))
+    assert not simulator.has_heartbeat(answerer().answer(0))
     assert not simulator.receive(FrameWriter(1, 1).frame(beat))
 
 
@@ -429,7 +429,7 @@ def test_which_run_it_is_is_told_at_first_each_second_and_to_who_comes(answerer,
         pilot.fly(simulator, 1)
     assert told == [0, 250, 500]
     plain = simulator.sensor_datagram()
-    simulator.introduce()
+    simulator.announce_boot()
     (boot,) = boots(simulator, messages)
     assert (boot.time_usec, boot.boot_id) == (simulator.now_us, 2**63 - 1)
     assert simulator.sensor_datagram().endswith(plain), "with the sensors of this tick"
@@ -445,7 +445,7 @@ def test_who_comes_is_told_what_the_rotors_do(answerer, messages) -> None:
     def rotors() -> tuple[int, list[float]]:
         for _ in range(2):
             simulator.advance()
-        simulator.introduce()
+        simulator.announce_boot()
         boot = boots(simulator, messages)[0]
         return boot.rotors, list(boot.force)
 
@@ -523,6 +523,6 @@ def test_five_times_a_second_the_truth_says_whose_it_is_in_numbers_of_its_own(an
         pilot.fly(simulator, 1)
     assert list(told) == [0, 50, 100]
     assert {(boot.get_type(), boot.boot_id) for boot in told.values()} == {("SIM_BOOT", 41)}
-    simulator.begin_anew()
+    simulator.restart()
     (boot,) = messages(simulator.run_datagram())
     assert boot.boot_id == 42

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
 from autopilot.wire.dialect import plumbline as mavlink
 
 PATIENCE_S = 30.0  # the first start compiles
@@ -59,7 +59,7 @@ class Pilot:
                 return datagram, time_us
 
     def answer(self, time_us: int) -> None:
-        message = hil_actuator_controls_message(time_us, padded((1.0,) * 4), True, True)
+        message = hil_actuator_controls_message(time_us, padded_forces((1.0,) * 4), True, True)
         self.socket.send(self.writer.frame(message))
 
 

@@ -45,8 +45,8 @@ def test_the_clock_is_that_of_the_wall_unless_another_is_asked_for(
         run.append((name, pacing.speed if pacing else None))
         raise Stop
 
-    monkeypatch.setattr(program, "be_punctual", lambda real_time: None)
-    monkeypatch.setattr(program, "meet", lambda link, simulator, stop: None)
+    monkeypatch.setattr(program, "reduce_latency", lambda real_time: None)
+    monkeypatch.setattr(program, "wait_for_autopilot", lambda link, simulator, stop: None)
     monkeypatch.setattr(program, "run_lockstep", lambda *given: run_loop(LOCKSTEP, given[4]))
     monkeypatch.setattr(program, "run_real_time", lambda *given, **_: run_loop(REAL_TIME, given[2]))
     places = [word for name in ("--listen", "--truth") for word in (name, str(free_port()))]

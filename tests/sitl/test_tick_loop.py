@@ -11,7 +11,7 @@ from numba import config
 
 from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
 from gcs.shell.link import LOOPBACK, free_port
 from sitl.hil import HilSimulator
 from sitl.shell.link import TRUTH_WINDOW_US, Link
@@ -64,9 +64,11 @@ class Rig:
 
     def answer(self, now_us: int, forces: tuple[float, ...] = LIFTING) -> bytes:
         writer = FrameWriter(1, 1)
-        return writer.frame(hil_actuator_controls_message(now_us, padded(forces), True, True, False, 0.0))
+        return writer.frame(
+            hil_actuator_controls_message(now_us, padded_forces(forces), True, True, False, 0.0)
+        )
 
-    def say(self, *datagrams: bytes) -> None:
+    def send_datagrams(self, *datagrams: bytes) -> None:
         for datagram in datagrams:
             self.autopilot.sendto(datagram, self.link.address)
 
@@ -97,7 +99,7 @@ def rig() -> Iterator[Rig]:
 def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
     ticks = 12
     rig.told.append(rig.twin.truth_datagram() or b"")
-    rig.say(*(rig.answer(TICK_US * (1 + i)) for i in range(ticks)))
+    rig.send_datagrams(*(rig.answer(TICK_US * (1 + i)) for i in range(ticks)))
     assert rig.loop.run() == (False, None), "then there is no answer"
     assert rig.simulator.now_us == TICK_US * (1 + ticks)
     for _ in range(ticks):
@@ -109,7 +111,7 @@ def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
 
 
 def test_python_goes_on_where_the_loop_has_ended(rig: Rig) -> None:
-    rig.say(*(rig.answer(TICK_US * (1 + i)) for i in range(7)))
+    rig.send_datagrams(*(rig.answer(TICK_US * (1 + i)) for i in range(7)))
     rig.loop.run()
     for _ in range(7):
         rig.step_twin()
@@ -123,7 +125,7 @@ def test_python_goes_on_where_the_loop_has_ended(rig: Rig) -> None:
 
 def test_a_tick_with_more_to_say_is_left_to_python(rig: Rig) -> None:
     ticks = GUST_US // TICK_US
-    rig.say(*(rig.answer(TICK_US * i) for i in range(1, ticks + 5)))
+    rig.send_datagrams(*(rig.answer(TICK_US * i) for i in range(1, ticks + 5)))
     moved, arrived = rig.loop.run()
     assert (moved, arrived) == (True, None)
     assert rig.simulator.now_us == GUST_US
@@ -143,13 +145,13 @@ def test_a_tick_with_more_to_say_is_left_to_python(rig: Rig) -> None:
         lambda good: good + good,
         lambda good: good[:-1],
         lambda good: FrameWriter(9, 1).frame(
-            hil_actuator_controls_message(TICK_US, padded(LIFTING), True, True, False, 0.0)
+            hil_actuator_controls_message(TICK_US, padded_forces(LIFTING), True, True, False, 0.0)
         ),
     ],
 )
 def test_what_is_no_plain_answer_is_handed_to_python_and_moves_nothing(rig: Rig, forge: object) -> None:
     datagram = forge(rig.answer(TICK_US))  # type: ignore[operator]
-    rig.say(datagram)
+    rig.send_datagrams(datagram)
     before = rig.simulator.core.state
     assert rig.loop.run() == (False, (datagram, rig.link.peer))
     assert (rig.simulator.now_us, rig.simulator.core.state) == (TICK_US, before)
@@ -157,7 +159,7 @@ def test_what_is_no_plain_answer_is_handed_to_python_and_moves_nothing(rig: Rig,
 
 def test_answers_of_other_ticks_and_answers_that_are_no_numbers_move_nothing(rig: Rig) -> None:
     for datagram in (rig.answer(0), rig.answer(2 * TICK_US), rig.answer(TICK_US, (math.nan, 1.0, 1.0, 1.0))):
-        rig.say(datagram)
+        rig.send_datagrams(datagram)
         assert rig.loop.run() == (False, (datagram, rig.link.peer))
         assert rig.simulator.now_us == TICK_US
 
@@ -169,7 +171,7 @@ def test_a_stranger_moves_nothing(rig: Rig) -> None:
 
 
 def test_a_simulator_that_has_more_to_say_waits_for_python(rig: Rig) -> None:
-    rig.simulator.parameters.say("something")
-    rig.say(rig.answer(TICK_US))
+    rig.simulator.parameters.send_text("something")
+    rig.send_datagrams(rig.answer(TICK_US))
     assert rig.loop.run() == (False, (rig.answer(TICK_US), rig.link.peer))
     assert rig.simulator.now_us == TICK_US

@@ -55,7 +55,7 @@ def test_all_that_is_carried_lies_in_the_rows(core, sensors: str) -> None:
         for name in WorldRows._fields
         if not np.array_equal(getattr(before, name), getattr(rows, name), equal_nan=True)
     }
-    assert changed == set(WorldRows._fields) - {"model", "seed", "fate", "rotor_table"}
+    assert changed == set(WorldRows._fields) - {"model", "seed", "delivery", "rotor_table"}
 
 
 def test_a_load_hangs_on_the_cable_as_the_winch_has_it_and_falls_free_of_the_gripper(core_in_the_air) -> None:

@@ -97,7 +97,7 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
 
 def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
     sky = Sky(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0))
-    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, again_from=1))
+    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, repeat_from=1))
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     sky.run(lambda s: len(s.reached) == 8)
@@ -325,7 +325,10 @@ NAN3 = (math.nan, 0.0, 0.0)
 TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
     "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121 deg exceeds FS_TILT_DEG 120"),
     "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is not a number"),
-    "nothing to land by": ({"lost": "no reading of the inertial unit"}, "no reading of the inertial unit"),
+    "nothing to land by": (
+        {"estimate_loss": "no reading of the inertial unit"},
+        "no reading of the inertial unit",
+    ),
     "x_quad is no number": ({"x_quad": NAN3}, "the estimate is not a number"),
     "v_quad is no number": ({"v_quad": NAN3}, "the estimate is not a number"),
     "x_load is no number": ({"x_load": NAN3}, "the estimate is not a number"),
@@ -361,7 +364,7 @@ def test_trouble_in_the_air_ends_in_failsafe_and_says_why(phase: Phase, trouble:
 @pytest.mark.parametrize("phase", sorted(IN_AIR - LANDING))
 def test_readings_that_are_missing_in_the_air_lead_to_a_landing(phase: Phase) -> None:
     flight = under_way(phase)
-    blind = hanging(STEP_US, HERE)._replace(complaints=("no load position from a tracker",))
+    blind = hanging(STEP_US, HERE)._replace(estimate_problems=("no load position from a tracker",))
     after, report = advance(flight, blind, SETTINGS)
     assert after.phase == (Phase.SET_DOWN if phase == Phase.TAUTEN else Phase.LOWER)
     assert not after.mission.active
@@ -373,7 +376,7 @@ def test_readings_that_are_missing_in_the_air_lead_to_a_landing(phase: Phase) ->
 
 @pytest.mark.parametrize("phase", sorted(LANDING))
 def test_a_landing_goes_on_while_readings_are_missing(phase: Phase) -> None:
-    blind = hanging(STEP_US, HERE)._replace(complaints=("no load position from a tracker",))
+    blind = hanging(STEP_US, HERE)._replace(estimate_problems=("no load position from a tracker",))
     after, report = advance(under_way(phase), blind, SETTINGS)
     assert (after.phase, report.texts) == (phase, ())
 
@@ -389,7 +392,7 @@ def test_a_load_that_is_too_far_off_ends_the_flight(phase: Phase) -> None:
 
 @pytest.mark.parametrize("phase", sorted(ON_GROUND))
 def test_trouble_on_the_ground_ends_nothing(phase: Phase) -> None:
-    after, report = advance(Flight(phase=phase), view(STEP_US, complaints=("no pose",)), SETTINGS)
+    after, report = advance(Flight(phase=phase), view(STEP_US, estimate_problems=("no pose",)), SETTINGS)
     assert (after.phase, report.texts) == (phase, ())
 
 

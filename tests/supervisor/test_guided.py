@@ -17,7 +17,7 @@ from autopilot.guidance.setpoint_follower import (
     PositionSetpoint,
     Posture,
 )
-from autopilot.onboard.snapshot import mode_of
+from autopilot.onboard.snapshot import reported_mode
 from autopilot.services import identity
 from autopilot.services.requests import (
     Arm,
@@ -32,7 +32,7 @@ from autopilot.services.requests import (
     SetMode,
     Takeoff,
 )
-from autopilot.supervisor.state import Guide, Phase, pace_of
+from autopilot.supervisor.state import Phase, SetpointSource, follow_limits
 from autopilot.wire.dialect import plumbline as m
 from tests.doubles.motion import CABLE_LENGTH
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
@@ -80,7 +80,7 @@ def test_offboard_needs_a_stream() -> None:
     assert sky.ask(OFFBOARD).result == LATER  # the setpoint is too old
     assert sky.ask(at(1.0, 0.0, 2.0)).result == ACCEPTED
     assert sky.ask(OFFBOARD).result == ACCEPTED
-    assert mode_of(sky.flight) == (identity.OFFBOARD, 0)
+    assert reported_mode(sky.flight) == (identity.OFFBOARD, 0)
 
 
 def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() -> None:
@@ -106,7 +106,7 @@ def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
 
 
 def test_setpoints_for_the_vehicle_are_a_cable_above_those_for_the_load() -> None:
-    guided = replace(SETTINGS.setpoints, guides_vehicle=True)
+    guided = replace(SETTINGS.setpoints, target_is_vehicle=True)
     sky = Sky(settings=replace(SETTINGS, setpoints=guided)).airborne()
     sky.ask(at(0.0, 0.0, 5.0))
     asked = sky.flight.setpoints.offboard.asked
@@ -119,12 +119,12 @@ def test_offboard_from_the_ground_takes_off_when_asked_up() -> None:
     stream(sky, at(0.0, 0.0, 0.0), 0.1)
     assert sky.ask(OFFBOARD).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
-    assert mode_of(sky.flight) == (identity.OFFBOARD, 0)
+    assert reported_mode(sky.flight) == (identity.OFFBOARD, 0)
     stream(sky, at(0.0, 0.0, 0.0), 1.0)
     assert sky.flight.phase == Phase.ARMED
     while sky.flight.phase != Phase.GUIDED:
         stream(sky, at(1.0, 0.0, 3.0), 0.1)
-        assert mode_of(sky.flight) == (identity.OFFBOARD, 0)
+        assert reported_mode(sky.flight) == (identity.OFFBOARD, 0)
         assert sky.now_us < 60_000_000
     stream(sky, at(1.0, 0.0, 3.0), 8.0)
     assert norm(sub(sky.view.x_load, (1.0, 0.0, 3.0))) < 0.01
@@ -163,7 +163,7 @@ def test_the_stick_leads_and_is_lost() -> None:
     assert sky.ask(POSCTL).result == LATER
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 0.1)
     assert sky.ask(POSCTL).result == ACCEPTED
-    assert mode_of(sky.flight) == (identity.POSCTL, 0)
+    assert reported_mode(sky.flight) == (identity.POSCTL, 0)
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 4.0)
     assert sky.view.v_load[0] == pytest.approx(SETTINGS.setpoints.stick_speed_m_s, rel=0.01)
     stream(sky, FollowStick(ZERO), 5.0)
@@ -176,13 +176,13 @@ def test_the_stick_leads_and_is_lost() -> None:
 def test_an_orbit_is_flown_about_its_centre_without_a_stream() -> None:
     sky = Sky().airborne()
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
-    assert sky.flight.setpoints.guide == Guide.ORBIT
+    assert sky.flight.setpoints.source == SetpointSource.ORBIT
     sky.wait(20.0)
     x, v = sky.view.x_load, sky.view.v_load
     assert math.hypot(x[0], x[1]) == pytest.approx(2.0, abs=0.01)
     assert x[2] == pytest.approx(3.0, abs=0.01)
     assert x[0] * v[1] - x[1] * v[0] < 0.0  # clockwise
-    assert mode_of(sky.flight) == (identity.AUTO, identity.AUTO_LOITER)
+    assert reported_mode(sky.flight) == (identity.AUTO, identity.AUTO_LOITER)
     assert sky.ask(Orbit(-2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
     sky.wait(20.0)
     x, v = sky.view.x_load, sky.view.v_load
@@ -233,12 +233,12 @@ def test_a_return_leads_to_the_home_that_was_set() -> None:
 
 def test_the_pace_is_that_of_the_pendulum() -> None:
     sky = Sky().airborne()
-    assert pace_of(sky.flight, SETTINGS).rate == pytest.approx(3.5 * math.sqrt(9.81 / 0.7))
+    assert follow_limits(sky.flight, SETTINGS).rate == pytest.approx(3.5 * math.sqrt(9.81 / 0.7))
 
 
 # ---- ArduPilot's GUIDED
 
-ARDUPILOT = replace(SETTINGS, setpoints=replace(SETTINGS.setpoints, guided_mode=True))
+ARDUPILOT = replace(SETTINGS, setpoints=replace(SETTINGS.setpoints, ardupilot_guided=True))
 GUIDED = SetMode(identity.AUTO, identity.AUTO_LOITER, number=4)
 LOITER = SetMode(identity.AUTO, identity.AUTO_LOITER, number=5)
 
@@ -263,7 +263,7 @@ def test_one_place_is_enough_in_guided() -> None:
     assert norm(sub(sky.view.x_load, (2.0, 1.0, 3.0))) < 0.01
     assert sky.ask(GUIDED).result == ACCEPTED
     assert sky.flight.phase == Phase.GUIDED
-    assert identity.ARDUPILOT.mode(*mode_of(sky.flight)).name == "GUIDED"  # type: ignore[union-attr]
+    assert identity.ARDUPILOT.mode(*reported_mode(sky.flight)).name == "GUIDED"  # type: ignore[union-attr]
 
 
 def test_a_velocity_in_guided_ceases_after_its_time() -> None:
@@ -296,7 +296,7 @@ def test_a_setpoint_ends_a_circle_in_guided() -> None:
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
     sky.wait(3.0)
     assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
-    assert sky.flight.setpoints.guide == Guide.OFFBOARD
+    assert sky.flight.setpoints.source == SetpointSource.OFFBOARD
 
 
 def test_with_other_identities_holding_heeds_no_setpoint() -> None:

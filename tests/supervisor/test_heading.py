@@ -23,7 +23,7 @@ from autopilot.services.requests import (
     Pause,
     Reposition,
     SetMode,
-    TurnNose,
+    TurnHeading,
 )
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
@@ -32,13 +32,13 @@ from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, view
 NORTH, SOUTH, WEST = 0.5 * math.pi, -0.5 * math.pi, math.pi
 OFFBOARD, POSCTL = SetMode(identity.OFFBOARD, 0), SetMode(identity.POSCTL, 0)
 DENIED, LATER = m.MAV_RESULT_DENIED, m.MAV_RESULT_TEMPORARILY_REJECTED
-ARDUPILOT = replace(SETTINGS, setpoints=replace(SETTINGS.setpoints, guided_mode=True))
+ARDUPILOT = replace(SETTINGS, setpoints=replace(SETTINGS.setpoints, ardupilot_guided=True))
 NORTH_NOSE: Mat3 = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def place(heading: float = math.nan, turning: float = math.nan, **more: Any) -> FollowSetpoint:
     return FollowSetpoint(
-        (0.0, 0.0, 2.0), NOWHERE, NOWHERE, False, heading_rad=heading, turning_rad_s=turning
+        (0.0, 0.0, 2.0), NOWHERE, NOWHERE, False, heading_rad=heading, yaw_rate_rad_s=turning
     )
 
 
@@ -71,30 +71,30 @@ def turned(sky: Sky, request: Any, seconds: float = 15.0) -> float:
 
 
 def test_to_a_heading_the_shorter_way_or_the_one_that_is_asked_for(sky: Sky) -> None:
-    assert turned(sky, TurnNose(NORTH)) == NORTH
-    assert turned(sky, TurnNose(WEST)) == pytest.approx(WEST)
-    assert turned(sky, TurnNose(SOUTH)) == pytest.approx(1.5 * math.pi)
-    assert turned(sky, TurnNose(WEST, sense=1), 20.0) == pytest.approx(WEST + 2.0 * math.pi)
-    assert turned(sky, TurnNose(SOUTH, sense=-1), 20.0) == pytest.approx(1.5 * math.pi)
+    assert turned(sky, TurnHeading(NORTH)) == NORTH
+    assert turned(sky, TurnHeading(WEST)) == pytest.approx(WEST)
+    assert turned(sky, TurnHeading(SOUTH)) == pytest.approx(1.5 * math.pi)
+    assert turned(sky, TurnHeading(WEST, sense=1), 20.0) == pytest.approx(WEST + 2.0 * math.pi)
+    assert turned(sky, TurnHeading(SOUTH, sense=-1), 20.0) == pytest.approx(1.5 * math.pi)
 
 
 def test_by_an_angle_more_than_once_round(sky: Sky) -> None:
-    assert turned(sky, TurnNose(-math.pi, relative=True)) == pytest.approx(-math.pi)
-    assert sky.ask(TurnNose(-math.pi, relative=True)).result == ACCEPTED
+    assert turned(sky, TurnHeading(-math.pi, relative=True)) == pytest.approx(-math.pi)
+    assert sky.ask(TurnHeading(-math.pi, relative=True)).result == ACCEPTED
     sky.wait(0.5)
     # counted from the heading that it is turning to
-    assert turned(sky, TurnNose(-math.pi, relative=True), 20.0) == pytest.approx(-3.0 * math.pi)
+    assert turned(sky, TurnHeading(-math.pi, relative=True), 20.0) == pytest.approx(-3.0 * math.pi)
 
 
 def test_as_slowly_as_is_asked_for(sky: Sky) -> None:
-    assert sky.ask(TurnNose(NORTH, rate_rad_s=0.1)).result == ACCEPTED
+    assert sky.ask(TurnHeading(NORTH, rate_rad_s=0.1)).result == ACCEPTED
     sky.wait(5.0)
     assert 0.3 < sky.flight.heading.angle < 0.5
 
 
 def test_on_the_ground_the_nose_is_not_turned() -> None:
     ground = Sky()
-    for request in (TurnNose(NORTH), LookAt(5.0, 5.0), LookAt(None, None)):
+    for request in (TurnHeading(NORTH), LookAt(5.0, 5.0), LookAt(None, None)):
         assert ground.ask(request).result == LATER
     assert ground.flight.heading.rests
 
@@ -113,7 +113,7 @@ def test_a_place_to_look_at_stays_ahead_until_it_is_let_go(sky: Sky) -> None:
 
 
 def test_looking_no_more_leaves_another_heading_alone(sky: Sky) -> None:
-    assert sky.ask(TurnNose(NORTH)).result == ACCEPTED
+    assert sky.ask(TurnHeading(NORTH)).result == ACCEPTED
     assert sky.ask(LookAt(None, None)).result == ACCEPTED
     assert sky.flight.heading.aim == Towards(NORTH)
 
@@ -139,7 +139,7 @@ def test_the_heading_of_a_setpoint_is_taken_once(sky: Sky) -> None:
     stream(sky, place(), 1.0)  # states no heading
     assert sky.flight.heading.aim == Towards(NORTH, since_us=sky.flight.heading.aim.since_us)  # type: ignore[union-attr]
     # a heading requested in between holds until a setpoint states one
-    assert sky.ask(TurnNose(0.0)).result == ACCEPTED
+    assert sky.ask(TurnHeading(0.0)).result == ACCEPTED
     stream(sky, place(), 6.0)
     assert sky.flight.heading.angle == pytest.approx(0.0, abs=1e-3)
     stream(sky, place(NORTH), 6.0)
@@ -170,7 +170,7 @@ def test_turning_lasts_as_long_as_it_is_asked_for(sky: Sky, then: str) -> None:
 def test_the_stick_turns_and_flies_along_the_nose(sky: Sky) -> None:
     assert sky.ask(FollowStick((0.0, 0.0, 0.0))).result == ACCEPTED
     assert sky.ask(POSCTL).result == ACCEPTED
-    stream(sky, FollowStick((0.0, 0.0, 0.0), turning=1.0), 4.0)
+    stream(sky, FollowStick((0.0, 0.0, 0.0), yaw_rate=1.0), 4.0)
     assert sky.flight.heading.rate == pytest.approx(SETTINGS.heading.fastest, abs=0.01)
     stream(sky, FollowStick((0.0, 0.0, 0.0)), 10.0)
     angle = sky.flight.heading.angle
@@ -180,7 +180,7 @@ def test_the_stick_turns_and_flies_along_the_nose(sky: Sky) -> None:
 
 
 def test_axes_of_the_nose(sky: Sky) -> None:
-    turned(sky, TurnNose(NORTH))
+    turned(sky, TurnHeading(NORTH))
     nan = math.nan
     for asked, velocity in (
         ((1.0, nan, nan), (0.0, 1.0, 0.0)),
@@ -195,7 +195,7 @@ def test_axes_of_the_nose(sky: Sky) -> None:
 def test_yaw_in_axes_of_the_nose_is_from_north_or_from_the_nose(settings: Any, angle: float) -> None:
     """The nose points south: yaw 0 means north to PX4, and no turn to ArduPilot."""
     sky = Sky(settings=settings).airborne()
-    turned(sky, TurnNose(SOUTH))
+    turned(sky, TurnHeading(SOUTH))
     forward = FollowSetpoint(NOWHERE, (0.0, 0.0, 0.0), NOWHERE, True, body=True, heading_rad=NORTH)
     stream(sky, forward, 0.1)
     if settings is SETTINGS:

@@ -193,7 +193,7 @@ def test_the_way_begins_where_the_load_stands() -> None:
     assert uploaded(sky, *steps) == f"Mission denied: item 1 leads {ZONE}"
     assert sky.ask(StartMission(None)).text == f"Mission denied: item 1 leads {ZONE}"
     # an estimate that is not available yet is not used
-    sky.view = sky.view._replace(complaints=("position not settled",))
+    sky.view = sky.view._replace(estimate_problems=("position not settled",))
     assert not uploaded(sky, *steps)
 
 
@@ -288,7 +288,7 @@ def test_a_winch_that_is_taken_up_again_counts_with_what_is_left_of_it() -> None
     for _ in range(250):
         tick()
     assert sky.flight.phase == Phase.HOLD
-    assert sky.settings.cable_length_m + 1.5 > sky.settings.winch.longest_m
+    assert sky.settings.cable_length_m + 1.5 > sky.settings.winch.max_length_m
     assert sky.ask(StartMission(None)).result == ACCEPTED
 
 
@@ -298,7 +298,7 @@ def test_what_swings_a_load_that_a_step_before_it_releases_is_refused() -> None:
     plan = sky.flight.mission.plan
     for late, text in ((Winch(0.3), "item 2 needs the load"), (RUN, "item 2 needs the load")):
         changed = (*steps[:2], late, steps[3])
-        sky.flight = with_plan(sky.flight, replace(plan, steps=changed, sequence=(0, 1, 2, 3), items=4))
+        sky.flight = with_plan(sky.flight, replace(plan, steps=changed, sequence=(0, 1, 2, 3), item_count=4))
         assert text in str(sky.ask(StartMission(None)).text)
 
 

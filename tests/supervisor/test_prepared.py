@@ -30,7 +30,7 @@ ROUND = (
 )
 # error of the trapezoid rule over a tick, at a jerk of a few m/s^3
 TRAPEZOID_M = 1e-5
-LIMITS = SETTINGS.limits._replace(shaped=True)
+LIMITS = SETTINGS.limits._replace(shape_paths=True)
 prepared_once = cache(prepare)
 
 

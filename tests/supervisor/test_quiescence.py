@@ -37,12 +37,12 @@ from autopilot.services.requests import (
     SetMode,
     StartMission,
     Terminate,
-    TurnNose,
+    TurnHeading,
 )
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide, next_stretch
+from autopilot.supervisor.quiescence import UNCONTROLLED, Stretch, may_need_decision, next_stretch
 from autopilot.supervisor.state import Flight, Phase, Report, View, setpoint
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence
@@ -59,11 +59,13 @@ OFFBOARD, POSCTL = SetMode(identity.OFFBOARD, 0), SetMode(identity.POSCTL, 0)
 
 def asks(flight: Flight, stretch: Stretch, seen: View) -> bool:
     """Whether the supervisor is called at a tick of the stretch."""
-    jet = None if stretch.mode == RESTING else setpoint(flight, seen.now_us)
+    jet = None if stretch.mode == UNCONTROLLED else setpoint(flight, seen.now_us)
     state = State(seen.x_load, seen.v_load, (0.0, 0.0, -1.0), ZERO, seen.x_quad, seen.v_quad, IDENTITY, ZERO)
     target = ZERO if jet is None else jet[0]
-    known = not seen.complaints
-    return may_decide(stretch, seen.now_us, state, known, seen.taut, seen.tilt_rad, seen.pull_n, target)
+    known = not seen.estimate_problems
+    return may_need_decision(
+        stretch, seen.now_us, state, known, seen.taut, seen.tilt_rad, seen.pull_n, target
+    )
 
 
 # ---- in a sky that does as it is told
@@ -88,7 +90,7 @@ DISTURBANCES: dict[str, Callable[[View], View]] = {
     "load is nowhere": lambda v: v._replace(x_load=(math.inf, 0.0, 0.0)),
     "vehicle without speed": lambda v: v._replace(v_quad=(0.0, 0.0, math.nan)),
     "load without speed": lambda v: v._replace(v_load=(math.nan, 0.0, 0.0)),
-    "not known": lambda v: v._replace(complaints=("no load position from a tracker",)),
+    "not known": lambda v: v._replace(estimate_problems=("no load position from a tracker",)),
     "both far off": lambda v: v._replace(
         x_quad=moved(v.x_quad, 5.1, 0.0, 0.0), x_load=moved(v.x_load, 5.1, 0.0, 0.0)
     ),
@@ -155,7 +157,7 @@ class Watched(Sky):
         length = self.flight.cable.length_m
         if length is not None and length != self.settings.cable_length_m:
             least_s = least_move_s(length, self.settings.gravity_m_s2)
-            self.settings = replace(self.settings, cable_length_m=length, least_move_s=least_s)
+            self.settings = replace(self.settings, cable_length_m=length, min_move_s=least_s)
 
     def _disturb(self, stretch: Stretch) -> None:
         """Whatever the view: where the supervisor is not called, it would have changed nothing."""
@@ -272,7 +274,7 @@ def attitudes() -> Watched:
 
 def turns() -> Watched:
     """Ticks pass while the nose rests; while it turns, the supervisor decides at every tick."""
-    sky = after(Watched(), TurnNose(1.5), wait_s=10.0)
+    sky = after(Watched(), TurnHeading(1.5), wait_s=10.0)
     passed = sky.passed[Phase.HOLD]
     assert passed > 0
     sky.wait(1.0)
@@ -444,7 +446,7 @@ class Witness:
             elif asked:
                 self.decided[phase] += 1
             else:
-                seen = core.view(now_us, pulls=True)
+                seen = core.view(now_us, with_pull=True)
                 assert advance(core.flight, seen, core.settings) == (core.flight, Report()), (phase, seen)
                 assert report == Report()
                 self.passed[phase] += 1

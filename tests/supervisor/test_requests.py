@@ -13,17 +13,17 @@ from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.requests.arming import arming_complaints
+from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as YES
 from autopilot.supervisor.state import (
     IN_AIR,
     ON_GROUND,
+    ActionWhenArmed,
     Flight,
     MissionPlan,
     MissionProgress,
     Phase,
-    Selected,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
@@ -50,7 +50,7 @@ REQUESTS: list[Any] = [
     R.Arm(False, False),
     R.Arm(False, True),
     R.EnableFence(False),
-    R.FailParts("SIM_ENGINE_FAIL", 1, True),
+    R.InjectFailure("SIM_ENGINE_FAIL", 1, True),
     R.Takeoff(None),
     R.Takeoff(3.0),
     R.Takeoff(0.1),
@@ -79,8 +79,8 @@ REQUESTS: list[Any] = [
     R.FollowAttitude((1.0, 0.0, 0.0), 0.5, 1.0, 0.1),
     R.FollowRates((0.1, 0.2, 0.3), 0.5),
     R.FollowSetpoint((math.nan,) * 3, (1.0, math.nan, 0.0), (math.nan,) * 3, True, True, 1.0, 0.2),
-    R.TurnNose(1.0),
-    R.TurnNose(1.0, True, -1, 0.1),
+    R.TurnHeading(1.0),
+    R.TurnHeading(1.0, True, -1, 0.1),
     R.LookAt(1.0, 2.0),
     R.LookAt(math.inf, 2.0),
     R.LookAt(None, None),
@@ -120,11 +120,11 @@ REQUESTS: list[Any] = [
 def flight_in(phase: Phase, on_mission: bool, plan: MissionPlan) -> Flight:
     """A flight in the first leg of a phase; on the mission's waypoint if it is on a mission."""
     step = 2 if plan.steps else 0
-    selected = Selected.MISSION if on_mission else Selected.NOTHING
+    action_when_armed = ActionWhenArmed.MISSION if on_mission else ActionWhenArmed.NOTHING
     held = Flight(
         Phase.HOLD,
         mission=MissionProgress(plan=plan, step=step, takeoff_altitude_m=4.0, speed_m_s=1.0),
-        selected=selected,
+        action_when_armed=action_when_armed,
     )
     if phase in ON_GROUND or phase == Phase.FAILSAFE:
         return replace(held, phase=phase)
@@ -167,7 +167,7 @@ def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothi
 # ---- arming
 
 COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
-    "sensors": ({"complaints": ("no vehicle pose from a tracker",)}, "no vehicle pose from a tracker"),
+    "sensors": ({"estimate_problems": ("no vehicle pose from a tracker",)}, "no vehicle pose from a tracker"),
     "tilt": ({"tilt_rad": math.radians(25.0)}, "tilted by 25 deg"),
     "tilt is no number": ({"tilt_rad": math.nan}, "tilted by nan deg"),
     "motion": ({"v_quad": (0.5, 0.0, 0.0)}, "moving at 0.5 m/s"),
@@ -179,7 +179,7 @@ COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
 def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> None:
     changes, why = COMPLAINTS[trouble]
     seen = view(**changes)
-    assert arming_complaints(Flight(), seen, SETTINGS) == (why,)
+    assert arming_problems(Flight(), seen, SETTINGS) == (why,)
     after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
     assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
     _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
@@ -189,13 +189,13 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
 
 
 def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:
-    flight = Flight(hindrances={"storage": ("the stored fence is damaged",)})
+    flight = Flight(external_arming_problems={"storage": ("the stored fence is damaged",)})
     after, verdict = decide(flight, R.Arm(True, False), view(), SETTINGS)
     assert (after.phase, verdict.text) == (Phase.DISARMED, "Arming denied: the stored fence is damaged")
 
 
 def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
-    assert arming_complaints(Flight(), view(), SETTINGS) == ()
+    assert arming_problems(Flight(), view(), SETTINGS) == ()
     assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1] == Verdict(ACCEPTED, "Ready to arm")
 
 
@@ -309,8 +309,8 @@ def test_a_reposition_that_may_not_change_the_mode_needs_a_hold(phase: Phase) ->
 def test_a_takeoff_that_waits_for_arming_is_taken_back(request_: Any) -> None:
     sky = Sky()
     assert sky.ask(R.Takeoff(2.0)).result == ACCEPTED
-    assert sky.flight.selected == Selected.TAKEOFF
+    assert sky.flight.action_when_armed == ActionWhenArmed.TAKEOFF
     assert sky.ask(request_).result == ACCEPTED
-    assert sky.flight.selected == Selected.NOTHING
+    assert sky.flight.action_when_armed == ActionWhenArmed.NOTHING
     assert sky.ask(R.Arm(True, False)).result == ACCEPTED
     assert sky.flight.phase == Phase.ARMED

@@ -21,9 +21,9 @@ def settings_for(name: str) -> Settings:
     rotors = replace(
         SETTINGS.rotors,
         layout=vehicle.layout,
-        low_n=vehicle.rotor_min_n,
-        high_n=vehicle.rotor_max_n,
-        thrust_n=weight,
+        min_effort_n=vehicle.rotor_min_n,
+        max_effort_n=vehicle.rotor_max_n,
+        hover_thrust_n=weight,
     )
     return replace(SETTINGS, rotors=rotors)
 

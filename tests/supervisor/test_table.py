@@ -17,8 +17,8 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import happen
-from autopilot.supervisor.recovery import Found, take_up
+from autopilot.supervisor.machine import try_transition
+from autopilot.supervisor.recovery import RestartState, resume_flight
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import (
     CARRYING,
@@ -31,7 +31,7 @@ from autopilot.supervisor.state import (
     Phase,
     Setpoints,
     View,
-    off_mission,
+    interrupt_mission,
 )
 from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions.model import Land, Step, Takeoff, Waypoint
@@ -73,7 +73,7 @@ def test_the_document_shows_the_table() -> None:
 def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
     expected = table().get((phase, event))
     assert TRANSITIONS.get((phase, event)) == expected
-    after = happen(replace(on_mission(*STEPS), phase=phase), event, hanging(5 * SECOND), SETTINGS)
+    after = try_transition(replace(on_mission(*STEPS), phase=phase), event, hanging(5 * SECOND), SETTINGS)
     if expected is None:
         assert after is None
     else:
@@ -91,7 +91,7 @@ def test_every_phase_can_be_left_and_reached() -> None:
 
 def test_who_disarms_selects_nothing_and_rewinds_the_mission() -> None:
     flight = entered(on_mission(*STEPS, step=1), Phase.SET_DOWN, hanging(), SETTINGS)
-    after = happen(flight, Event.VEHICLE_DOWN, view(SECOND), SETTINGS)
+    after = try_transition(flight, Event.VEHICLE_DOWN, view(SECOND), SETTINGS)
     assert after is not None
     assert (after.mission.active, after.mission.step, after.legs) == (False, 0, ())
     assert after.mission.plan == flight.mission.plan
@@ -129,9 +129,9 @@ def under_way(phase: Phase, *steps: Step, step: int = 0, active: bool = False) -
     """A flight that has just entered a phase, over (1, 0, 2)."""
     flight = on_mission(*(steps or STEPS), step=step)
     if phase not in IN_AIR:
-        return off_mission(replace(flight, phase=phase))
+        return interrupt_mission(replace(flight, phase=phase))
     begun = entered(flight, phase, hanging(x=HERE), SETTINGS)
-    return begun if active or phase == Phase.MISSION else off_mission(begun)
+    return begun if active or phase == Phase.MISSION else interrupt_mission(begun)
 
 
 def asked(flight: Flight, request: Any, seen: View | None = None) -> Flight:
@@ -149,7 +149,7 @@ def flown(flight: Flight) -> Flight:
 
 def landed(flight: Flight) -> Flight:
     """The flight after a tick in its last leg, long after the sinking load or vehicle has come to rest."""
-    flight = replace(flight, legs=flight.legs[-1:], leg_start_us=0, still_since_us=0)
+    flight = replace(flight, legs=flight.legs[-1:], leg_start_us=0, condition_since_us=0)
     return advance(flight, view(20 * SECOND), SETTINGS)[0]
 
 
@@ -172,11 +172,11 @@ def taken_off_alone(phase: Phase) -> Flight:
 
 
 def tautened(phase: Phase) -> Flight:
-    flight = replace(under_way(phase), still_since_us=0)
+    flight = replace(under_way(phase), condition_since_us=0)
     return advance(replace(flight, legs=flight.legs[-1:]), hanging(SECOND, HERE), SETTINGS)[0]
 
 
-def legs_done(phase: Phase) -> Flight:
+def after_last_leg(phase: Phase) -> Flight:
     """A mission ends with its last step, another phase with its last leg."""
     return flown(under_way(phase, Waypoint(3.0, 0.0, 2.0)))
 
@@ -219,7 +219,7 @@ def vehicle_down(phase: Phase) -> Flight:
     if phase == Phase.SET_DOWN:
         return landed(under_way(phase))
     alone = replace(on_mission(*STEPS), cable=CableState(released=True))
-    return landed(off_mission(entered(alone, phase, hanging(x=HERE), SETTINGS)))
+    return landed(interrupt_mission(entered(alone, phase, hanging(x=HERE), SETTINGS)))
 
 
 CAUSES: dict[Event, Callable[[Phase], Flight]] = {
@@ -228,7 +228,7 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.TAKEOFF: taken_off,
     Event.TAKEOFF_ALONE: taken_off_alone,
     Event.TAUT: tautened,
-    Event.DONE: legs_done,
+    Event.DONE: after_last_leg,
     Event.STEP: next_step,
     Event.LAND_STEP: landing_step,
     Event.HOLD: lambda phase: asked(under_way(phase), R.Pause()),
@@ -241,7 +241,9 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.RELEASED: lambda phase: asked(under_way(phase), R.Release()),
     Event.LOAD_DOWN: load_down,
     Event.VEHICLE_DOWN: vehicle_down,
-    Event.FOUND: lambda phase: take_up(under_way(phase), Found(5.0, 0.0, False), hanging(SECOND), SETTINGS),
+    Event.FOUND_IN_FLIGHT: lambda phase: resume_flight(
+        under_way(phase), RestartState(5.0, 0.0, False), hanging(SECOND), SETTINGS
+    ),
     Event.FAIL: lambda phase: asked(under_way(phase), R.Terminate()),
 }
 
@@ -326,8 +328,8 @@ def test_nothing_but_the_machine_enters_a_phase() -> None:
         "Flight(Phase.HOLD)",
         "Flight(phase=Phase.HOLD)",
         "replace(flight, **{'phase': Phase.HOLD})",
-        "from autopilot.supervisor.machine import _enter",
-        "machine._enter(flight, Phase.HOLD, view, settings)",
+        "from autopilot.supervisor.machine import _enter_phase",
+        "machine._enter_phase(flight, Phase.HOLD, view, settings)",
         "object.__setattr__(flight, 'phase', Phase.HOLD)",
     ],
 )

@@ -103,7 +103,7 @@ def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     assert stopped.cable.reel_rate == 0.0
     resting = replace(flight, legs=(Hold((0.0, 0.0, 2.0)),))
     assert commanded_rate(resting, 0, 0.004) == 0.0
-    assert SETTINGS.winch.longest_m == 3.0
+    assert SETTINGS.winch.max_length_m == 3.0
 
 
 def test_while_the_winch_works_no_stream_takes_over() -> None:

@@ -130,7 +130,7 @@ def direction_at(q_0: Vec3, turn: float, t: float) -> DirectionCommand:
 
 
 @kernel
-def wanted_force(m: Motion, q_0: Vec3, turn: float, t: float, vehicle: Vehicle) -> Vec3:
+def commanded_force(m: Motion, q_0: Vec3, turn: float, t: float, vehicle: Vehicle) -> Vec3:
     """F of (3-31)."""
     command = direction_at(q_0, turn, t)
     return load_attitude_force(
@@ -148,17 +148,17 @@ def wanted_force(m: Motion, q_0: Vec3, turn: float, t: float, vehicle: Vehicle) 
 @kernel
 def along(m: Motion, q_0: Vec3, turn: float, t: float, vehicle: Vehicle, h: float) -> Vec3:
     """F h seconds later on the motion under f of (3-35). M does not reach F within two derivatives."""
-    f = thrust_along(wanted_force(m, q_0, turn, t, vehicle), m.R)
+    f = thrust_along(commanded_force(m, q_0, turn, t, vehicle), m.R)
     half = shifted(m, m, f, ZERO, vehicle, 0.5 * h)
-    f = thrust_along(wanted_force(half, q_0, turn, t + 0.5 * h, vehicle), half.R)
-    return wanted_force(shifted(m, half, f, ZERO, vehicle, h), q_0, turn, t + h, vehicle)
+    f = thrust_along(commanded_force(half, q_0, turn, t + 0.5 * h, vehicle), half.R)
+    return commanded_force(shifted(m, half, f, ZERO, vehicle, h), q_0, turn, t + h, vehicle)
 
 
 @kernel
 def exact_attitude(m: Motion, q_0: Vec3, turn: float, t: float, vehicle: Vehicle) -> AttitudeCommand:
     """R_c of (3-27) with Omega_c, Omega_c' from F', F'' along the motion, by central differences."""
     h = 1e-4
-    F = wanted_force(m, q_0, turn, t, vehicle)
+    F = commanded_force(m, q_0, turn, t, vehicle)
     later = along(m, q_0, turn, t, vehicle, h)
     before = along(m, q_0, turn, t, vehicle, -h)
     F_dot = scale(0.5 / h, sub(later, before))
@@ -171,7 +171,7 @@ def cable_flight(m: Motion, q_0: Vec3, turn: float, vehicle: Vehicle, out: NDArr
     """Psi_q and Psi_R of each step."""
     for k in range(out.shape[0]):
         t = k * H
-        F = wanted_force(m, q_0, turn, t, vehicle)
+        F = commanded_force(m, q_0, turn, t, vehicle)
         command = exact_attitude(m, q_0, turn, t, vehicle)
         result = attitude_moment(
             m.R, m.Omega, command, GAINS.k_R, GAINS.k_Omega, GAINS.epsilon, vehicle.inertia

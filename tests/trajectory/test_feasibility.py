@@ -190,6 +190,6 @@ def test_expected_duration_adds_take_off_and_landing() -> None:
 def test_a_vehicle_that_cannot_hover_is_not_advised_to_fly_slower() -> None:
     heavy = replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update={"load_mass_kg": 50.0}))
     (found,) = check(mission(), heavy)
-    assert found.value > found.limit == pytest.approx(heavy.usable_n)
+    assert found.value > found.limit == pytest.approx(heavy.usable_thrust_n)
     assert "it cannot hover; lower load_mass_kg, or raise rotor_max_n" in found.text
     assert "speed_m_s" not in found.text

@@ -12,15 +12,15 @@ from autopilot.trajectory.route import (
     Path,
     PlanError,
     Route,
+    bound_violation,
     check_path,
-    passages,
+    path_segments,
     polynomials,
     samples,
     slower,
-    trouble_of,
     use,
 )
-from autopilot.trajectory.waypoint_path import evaluate_path, passage_jets
+from autopilot.trajectory.waypoint_path import evaluate_path, sample_path
 from autopilot.vehicle.file import load_vehicle
 
 LIMITS = VehicleLimits(load_vehicle("bebop")).shaping
@@ -42,21 +42,21 @@ def straight(duration: float) -> Path:
 def test_a_polynomial_is_the_path_and_its_derivatives() -> None:
     path = straight(4.0)
     check_path(path, ROUTE)
-    jets = passage_jets(path.table, np.array([0.0, 2.0, 4.0]))
+    jets = sample_path(path.table, np.array([0.0, 2.0, 4.0]))
     assert jets[0, :, 0] == pytest.approx([0.0, 1.0, 2.0], abs=EXACT)
     assert jets[1, 1, 0] == pytest.approx(2.0 / 4.0 * 630.0 / 256.0, abs=EXACT)  # 630 s^4 (1 - s)^4 at 1/2
     assert np.abs(jets[1:5, [0, 2], :]).max() < EXACT
-    (one,) = passages(path, ROUTE)
+    (one,) = path_segments(path, ROUTE)
     assert (one.begin_s, one.end_s, one.start) == (0.0, 4.0, POINTS[0])
 
 
 def test_samples_are_passed_from_rest_to_rest() -> None:
     exact = straight(4.0)
     times = np.linspace(0.0, 4.0, 41)
-    path = samples(times, passage_jets(exact.table, times)[0], [0.0, 4.0])
+    path = samples(times, sample_path(exact.table, times)[0], [0.0, 4.0])
     check_path(path, ROUTE)
     between = np.linspace(0.0, 4.0, 333)
-    off = passage_jets(path.table, between)[0] - passage_jets(exact.table, between)[0]
+    off = sample_path(path.table, between)[0] - sample_path(exact.table, between)[0]
     assert np.abs(off).max() < SAMPLED
 
 
@@ -72,9 +72,9 @@ def test_use_tells_how_much_longer_a_path_must_take() -> None:
     peak = 2.0 / 4.0 * 630.0 / 256.0  # m/s
     fast = ROUTE._replace(accel_m_s2=100.0)
     assert use(straight(4.0), fast) == pytest.approx(peak / 1.5, rel=1e-3)
-    assert trouble_of(straight(4.0), ROUTE) == ""
+    assert bound_violation(straight(4.0), ROUTE) == ""
     assert use(straight(0.8), ROUTE) > 1.0
-    assert trouble_of(straight(0.8), ROUTE).startswith("a rotor would have to give ")
+    assert bound_violation(straight(0.8), ROUTE).startswith("a rotor would have to give ")
 
 
 def changed(change: Callable[[Path], Path]) -> Path:
@@ -94,7 +94,7 @@ def jumping(path: Path) -> Path:
     """The path in two halves, the second displaced by 1 cm."""
     table = np.vstack([path.table, path.table])
     table[1] = 0.0
-    jets = passage_jets(path.table, np.array([2.0]))
+    jets = sample_path(path.table, np.array([2.0]))
     table[0, 1] = table[1, 0] = 2.0
     table[1, 1] = 4.0
     factorials = np.cumprod([1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])

@@ -11,27 +11,41 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from autopilot.trajectory import prepare as preparation
-from autopilot.trajectory.convex import NO_ROWS, Goal, Problem
+from autopilot.trajectory.convex import NO_CONSTRAINTS, Objective, Problem
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import (
-    AS_ASKED,
+    AS_REQUESTED,
     REFUSE,
     SLOW_DOWN,
-    Limits,
+    PathLimits,
     prepare,
     shaped_path,
+    shaping_problem,
     slow_down,
-    trouble_of,
 )
-from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand, slopes
-from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, unshaped
+from autopilot.trajectory.rotor_demand import (
+    COS_TILT,
+    TENSION,
+    Bounds,
+    demand,
+    demand_derivatives,
+    rotor_commands,
+)
+from autopilot.trajectory.shaping import (
+    INTERVAL_S,
+    LEAD_TOLERANCE_M,
+    ShapedSignals,
+    path_jets,
+    requested_jets,
+    unshaped_signals,
+)
 from autopilot.trajectory.splines import Array, Basis
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Term
 
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
 BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)
-LIMITS = Limits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
+LIMITS = PathLimits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
 # samples of an optimisation are 10 ms apart, those here 1 ms: in between a bound may be exceeded by this; the
 # worst that was found, with steps of 0.734375 m: 0.053
 BETWEEN_N = 0.06
@@ -40,7 +54,7 @@ BETWEEN_N = 0.06
 HASTY = 1.0, 0.7  # m, s: a step that no vehicle flies
 
 
-def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
+def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
     """The shaped step, computed once for all tests (`shaped_once`)."""
     return preparation.shape(step, body, bounds)
 
@@ -53,16 +67,16 @@ def edge(height: float, rise: float, axis: str = "y", by: float | None = None) -
     return Signals(rise + 4.0, (Term(axis, height, 0.0, rise, None, 0.0, (), by),))
 
 
-def along(shaped: Shaped, spacing: float = 1e-3) -> tuple[Array, Array, Array]:
+def along(shaped: ShapedSignals, spacing: float = 1e-3) -> tuple[Array, Array, Array]:
     """Times, jets of the flown path, positions of the asked one."""
     times = np.arange(-shaped.lead_s, shaped.duration_s + shaped.tail_s, spacing)
-    return times, path_jets(shaped, times), asked_jets(shaped.table, shaped.duration_s, times)[0]
+    return times, path_jets(shaped, times), requested_jets(shaped.table, shaped.duration_s, times)[0]
 
 
-def assert_within(shaped: Shaped, bounds: Bounds = BOUNDS) -> None:
+def assert_within(shaped: ShapedSignals, bounds: Bounds = BOUNDS) -> None:
     _, jets, _ = along(shaped)
     found = demand(jets, BODY)
-    asked = commanded(found, 1e-3, bounds.rotor_tau)
+    asked = rotor_commands(found, 1e-3, bounds.rotor_tau)
     assert asked.max() <= bounds.rotor_high + BETWEEN_N
     assert asked.min() >= bounds.rotor_low - BETWEEN_N
     assert found[:, TENSION].min() >= bounds.tension_low - BETWEEN_N
@@ -81,7 +95,7 @@ def test_what_can_be_flown_is_flown_exactly_as_asked() -> None:
 @pytest.mark.parametrize("name", ["case-a", "case-b-extended", "case-c"])
 def test_shipped_signals_keep_within_the_bounds_near_the_asked_path(name: str) -> None:
     shaped = shape(signals_of(name), BODY, BOUNDS)
-    assert trouble_of(shaped, LIMITS) == ""
+    assert shaping_problem(shaped, LIMITS) == ""
     assert_within(shaped)
     # measured: 11.1 mm where Case A is required to be early, 0.2 mm elsewhere
     assert shaped.distance_m < (0.013 if name == "case-a" else 0.001)
@@ -103,7 +117,7 @@ def test_case_a_arrives_as_it_is_asked_and_waits_until_it_begins() -> None:
     by = step.terms[0].rise_90_by_s
     assert by is not None
     assert times[np.argmax(y >= 0.9 * 0.25)] <= by + 1e-3
-    assert np.abs(y[times <= 0.0]).max() <= HELD_M
+    assert np.abs(y[times <= 0.0]).max() <= LEAD_TOLERANCE_M
     # measured 1.3 %
     assert y.max() <= 1.03 * 0.25
     free = shape(replace(step, terms=(replace(step.terms[0], rise_90_by_s=None),)), BODY, BOUNDS)
@@ -139,24 +153,24 @@ def test_any_step_is_within_the_bounds_or_said_not_to_be(
     times, jets, _ = along(shaped)
     if not shaped.reason:
         assert_within(shaped)
-        assert np.abs(jets[0][times <= 0.0]).max() <= HELD_M + 1e-4
+        assert np.abs(jets[0][times <= 0.0]).max() <= LEAD_TOLERANCE_M + 1e-4
         assert jets[0][-1] == pytest.approx(path_jets(shaped, times[-1:] + 1.0)[0, 0], abs=1e-3)
     # a step that takes a second for a quarter of a metre is gentle: it must not be refused
     if height <= 0.25 * rise**2:
-        assert trouble_of(shaped, LIMITS) == ""
+        assert shaping_problem(shaped, LIMITS) == ""
 
 
 def test_preparation_slows_refuses_or_flies_as_asked() -> None:
     hasty = edge(*HASTY)
-    for choice in (AS_ASKED, SLOW_DOWN, REFUSE):
+    for choice in (AS_REQUESTED, SLOW_DOWN, REFUSE):
         prepared = prepare((hasty,), (3,), LIMITS._replace(when_infeasible=choice))
-        (made,) = prepared.made
-        assert isinstance(made, Shaped)
+        (made,) = prepared.paths
+        assert isinstance(made, ShapedSignals)
         assert "3" in prepared.notes[0]
         assert bool(prepared.refusal) == (choice == REFUSE)
         if choice == SLOW_DOWN:
-            assert made.slowed > 1.0
-            assert made.duration_s == pytest.approx(made.slowed * hasty.duration_s)
+            assert made.duration_factor > 1.0
+            assert made.duration_s == pytest.approx(made.duration_factor * hasty.duration_s)
             assert_within(made)
         else:
             assert len(made.pieces) == 0
@@ -164,9 +178,9 @@ def test_preparation_slows_refuses_or_flies_as_asked() -> None:
 
 def test_what_no_time_makes_flyable_is_found_so_by_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
     hasty, tried = edge(*HASTY), []
-    hopeless = replace(unshaped(hasty), reason="no way")
+    hopeless = replace(unshaped_signals(hasty), reason="no way")
 
-    def never(step: Signals, *_: object) -> Shaped:
+    def never(step: Signals, *_: object) -> ShapedSignals:
         tried.append(step)
         return hopeless
 
@@ -183,11 +197,11 @@ def test_slowing_down_is_no_slower_than_it_must_be() -> None:
     hasty = edge(*HASTY)
     slowed = slow_down(hasty, LIMITS)
     assert slowed is not None
-    assert trouble_of(slowed, LIMITS) == ""
+    assert shaping_problem(slowed, LIMITS) == ""
     # the search ends within a few percent
     height, rise = HASTY
-    quicker = edge(height, rise * slowed.slowed * 0.93)
-    assert trouble_of(shape(quicker, BODY, BOUNDS), LIMITS) != ""
+    quicker = edge(height, rise * slowed.duration_factor * 0.93)
+    assert shaping_problem(shape(quicker, BODY, BOUNDS), LIMITS) != ""
 
 
 def test_a_swing_beyond_the_rotors_is_named() -> None:
@@ -204,8 +218,8 @@ def test_of_a_path_that_is_far_beyond_the_rotors_no_figure_is_told() -> None:
 
 def test_without_shaping_the_asked_path_is_flown() -> None:
     step = signals_of("case-a")
-    (made,) = prepare((step,), (0,), LIMITS._replace(shaped=False)).made
-    asked = unshaped(step)
+    (made,) = prepare((step,), (0,), LIMITS._replace(shape_paths=False)).paths
+    asked = unshaped_signals(step)
     plain = [one.name for one in fields(asked) if one.name not in ("table", "pieces")]
     assert [getattr(made, name) for name in plain] == [getattr(asked, name) for name in plain]
 
@@ -215,7 +229,7 @@ def test_the_slopes_of_the_demand_are_its_derivatives() -> None:
     sizes = np.array([1.0, 1.0, 1.0, 5.0, 30.0, 200.0, 2000.0])
     jets = rng.normal(size=(7, 5, 3)) * sizes[:, None, None]
     change = rng.normal(size=(7, 5, 3)) * sizes[:, None, None] * 1e-5
-    found = np.einsum("irod,oid->ir", slopes(jets, BODY), change)
+    found = np.einsum("irod,oid->ir", demand_derivatives(jets, BODY), change)
     true = 0.5 * (demand(jets + change, BODY) - demand(jets - change, BODY))
     # central differences of second order, steps of 1e-5 of the size
     assert found == pytest.approx(true, rel=1e-4, abs=1e-7)
@@ -224,13 +238,13 @@ def test_the_slopes_of_the_demand_are_its_derivatives() -> None:
 def test_the_quadratic_programme_is_the_least_squares_solution_where_nothing_binds() -> None:
     """The same cost, minimised by dense least squares over all free coefficients."""
     basis = Basis(0.0, 0.8, 20)
-    fixed = basis.ends(np.zeros((7, 3)), np.vstack([[0.0, 0.01, 0.0], np.zeros((6, 3))]))
+    fixed = basis.end_coefficients(np.zeros((7, 3)), np.vstack([[0.0, 0.01, 0.0], np.zeros((6, 3))]))
     times = np.linspace(0.0, 0.8, 4 * 20 + 1)
     target = np.zeros((81, 3))
     target[:, 1] = 0.01 * np.clip((times - 0.2) / 0.4, 0.0, 1.0)
-    goal = Goal(target, 1e6, ((6, 1e-7),))
+    goal = Objective(target, 1e6, ((6, 1e-7),))
     wide = Bounds(-inf, inf, -inf, -2.0, 0.0)
-    solution = Problem(basis, fixed, BODY, wide, goal, NO_ROWS).solve()
+    solution = Problem(basis, fixed, BODY, wide, goal, NO_CONSTRAINTS).solve()
     values, first = basis.band(times, 7)
     dense = np.zeros((7, 81, basis.count))
     for order in range(7):

@@ -20,7 +20,7 @@ from autopilot.trajectory.timeline import (
     timeline,
 )
 from autopilot.trajectory.transfer import transfer_duration
-from autopilot.trajectory.waypoint_path import Passage
+from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from missions.model import (
     AttitudeRun,
@@ -141,9 +141,9 @@ LIMITS = VehicleLimits(WITHOUT_DRAG).shaping
 CORNERS = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0))
 
 
-def passages(*steps: Step, home: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Passage | None]:
-    made = prepare(steps, range(len(steps)), LIMITS, home).made
-    return [one if isinstance(one, Passage) else None for one in made]
+def passages(*steps: Step, home: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[PathSegment | None]:
+    made = prepare(steps, range(len(steps)), LIMITS, home).paths
+    return [one if isinstance(one, PathSegment) else None for one in made]
 
 
 def test_a_path_through_waypoints_begins_at_the_home_that_is_set() -> None:
@@ -164,11 +164,13 @@ def test_a_path_through_waypoints_does_not_begin_where_nobody_knows(step: Step) 
 def test_the_least_time_of_a_return_is_that_of_the_way_to_the_home_that_is_set() -> None:
     weak = LIMITS._replace(bounds=LIMITS.bounds._replace(rotor_high=1.24), accel_m_s2=2.5, speed_m_s=15.0)
     far = (20.0, 0.0, 0.0)
-    least = prepare((Takeoff(5.0), ReturnHome()), range(2), weak, far).least_s[1]
+    least = prepare((Takeoff(5.0), ReturnHome()), range(2), weak, far).min_durations_s[1]
     assert least > transfer_duration(20.0, 15.0, 2.5)
     along = survey_transfer((0.0, 0.0, 5.0), (20.0, 0.0, 5.0), least, weak.body)
     assert along.rotor_high.value <= 1.24
-    assert prepare((Takeoff(5.0), ReturnHome()), range(2), weak).least_s[1] == 0.0, "there is no way to go"
+    assert prepare((Takeoff(5.0), ReturnHome()), range(2), weak).min_durations_s[1] == 0.0, (
+        "there is no way to go"
+    )
 
 
 # ---- how long it takes

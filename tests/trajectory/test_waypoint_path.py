@@ -13,23 +13,23 @@ from hypothesis import strategies as st
 
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.peaks import Body, survey_transfer
-from autopilot.trajectory.prepare import REFUSE, Limits, prepare
-from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand
+from autopilot.trajectory.prepare import REFUSE, PathLimits, prepare
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
 from autopilot.trajectory.splines import Array
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.trajectory.waypoint_path import (
-    TURN_S,
+    ROTATION_TIME_S,
     MinimumSnap,
-    Passage,
+    PathSegment,
     evaluate_path,
-    passage,
-    passage_jets,
+    plan_waypoint_path,
+    sample_path,
 )
 from missions.model import Land, Speed, Step, Takeoff, Waypoint
 
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
 BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)
-LIMITS = Limits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
+LIMITS = PathLimits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
 SQUARE: tuple[Vec3, ...] = ((0.0, 0.0, 2.0), (4.0, 0.0, 2.0), (4.0, 4.0, 3.0), (0.0, 4.0, 3.0))
 # samples of the search are 10 ms apart
 PEAK = 5e-3
@@ -45,7 +45,7 @@ def apart(points: list[Vec3]) -> bool:
 
 def assert_within(jets: Array, spacing: float) -> None:
     found = demand(jets, BODY)
-    asked = commanded(found, spacing, BOUNDS.rotor_tau)
+    asked = rotor_commands(found, spacing, BOUNDS.rotor_tau)
     assert asked.max() <= BOUNDS.rotor_high + 0.02
     assert asked.min() >= BOUNDS.rotor_low - 0.02
     assert found[:, TENSION].min() >= BOUNDS.tension_low
@@ -55,12 +55,12 @@ def assert_within(jets: Array, spacing: float) -> None:
 @settings(max_examples=15, deadline=None)
 @given(points=st.lists(places, min_size=3, max_size=6).filter(apart), quick=st.booleans())
 def test_every_point_is_passed_at_its_time_within_the_bounds(points: list[Vec3], quick: bool) -> None:
-    path, times = passage(points, 2.0, 1.5, BODY, BOUNDS, quick)
+    path, times = plan_waypoint_path(points, 2.0, 1.5, BODY, BOUNDS, quick)
     table = path.table()
     for point, time in zip(points, times, strict=True):
         assert evaluate_path(table, float(time))[0] == pytest.approx(point, abs=ROUNDING_M)
     fine = np.arange(0.0, times[-1], 2e-3)
-    jets = passage_jets(table, fine)
+    jets = sample_path(table, fine)
     assert_within(jets, 2e-3)
     if not quick:
         assert np.linalg.norm(jets[1], axis=1).max() <= 2.0 * (1.0 + PEAK)
@@ -68,7 +68,7 @@ def test_every_point_is_passed_at_its_time_within_the_bounds(points: list[Vec3],
 
 
 def test_a_path_is_smooth_to_the_sixth_derivative_and_rests_at_its_ends() -> None:
-    path, times = passage(SQUARE, 2.0, 1.5, BODY, BOUNDS, False)
+    path, times = plan_waypoint_path(SQUARE, 2.0, 1.5, BODY, BOUNDS, False)
     table = path.table()
     spacing = table[0, 1] - table[0, 0]
     for t in table[:, 0]:
@@ -93,7 +93,7 @@ def test_the_path_is_that_of_a_dense_programme() -> None:
     for i, begin in enumerate(first):
         dense[:, i, begin : begin + 10] = values[:, i]
     weight = np.tile(half * weights, basis.intervals)[:, None]
-    H = dense[4].T @ (weight * dense[4]) + TURN_S**4 * dense[6].T @ (weight * dense[6])
+    H = dense[4].T @ (weight * dense[4]) + ROTATION_TIME_S**4 * dense[6].T @ (weight * dense[6])
     point_values, point_first = basis.band(times[1:-1], 1)
     A = np.zeros((2, basis.count))
     for i, begin in enumerate(point_first):
@@ -115,17 +115,17 @@ def test_the_path_is_that_of_a_dense_programme() -> None:
 
 def test_times_between_points_are_better_than_equal_ones() -> None:
     points = np.array([(0.0, 0.0, 2.0), (1.0, 0.0, 2.0), (9.0, 0.0, 2.0), (9.0, 3.0, 2.0)])
-    _, times = passage([tuple(p) for p in points], 2.0, 2.0, BODY, BOUNDS, False)
+    _, times = plan_waypoint_path([tuple(p) for p in points], 2.0, 2.0, BODY, BOUNDS, False)
     equal = np.linspace(0.0, times[-1], 4)
     assert MinimumSnap(points, times).cost < 0.5 * MinimumSnap(points, equal).cost
 
 
 def test_time_optimal_is_quicker_and_at_a_bound() -> None:
-    _, slow = passage(SQUARE, 2.0, 1.5, BODY, BOUNDS, False)
-    path, quick = passage(SQUARE, 2.0, 1.5, BODY, BOUNDS, True)
+    _, slow = plan_waypoint_path(SQUARE, 2.0, 1.5, BODY, BOUNDS, False)
+    path, quick = plan_waypoint_path(SQUARE, 2.0, 1.5, BODY, BOUNDS, True)
     # measured 13.9 s and 6.1 s
     assert quick[-1] < 0.6 * slow[-1]
-    _, hasty = passage(SQUARE, 2.0, 1.5, BODY, replace_rotor(1.3), True)
+    _, hasty = plan_waypoint_path(SQUARE, 2.0, 1.5, BODY, replace_rotor(1.3), True)
     assert hasty[-1] > 1.1 * quick[-1], "a weaker rotor takes longer: the rotors are what binds"
     assert_within(path.jets()[1], float(path.jets()[0][1]))
 
@@ -137,14 +137,16 @@ def replace_rotor(high: float) -> Bounds:
 def test_drag_binds_at_speed() -> None:
     """At 14 m/s the drag is half the weight: a vehicle without drag is far quicker."""
     far = ((0.0, 0.0, 5.0), (80.0, 0.0, 5.0), (160.0, 0.0, 5.0))
-    _, in_air = passage(far, 14.0, 10.0, BODY, BOUNDS, True)
-    _, in_vacuum = passage(far, 14.0, 10.0, BODY._replace(drag_linear=0.0, drag_quadratic=0.0), BOUNDS, True)
+    _, in_air = plan_waypoint_path(far, 14.0, 10.0, BODY, BOUNDS, True)
+    _, in_vacuum = plan_waypoint_path(
+        far, 14.0, 10.0, BODY._replace(drag_linear=0.0, drag_quadratic=0.0), BOUNDS, True
+    )
     assert in_air[-1] > 1.2 * in_vacuum[-1]
 
 
 def made_of(*steps: Step) -> list[bool]:
-    found = prepare((Takeoff(2.0), *steps, Land()), range(len(steps) + 2), LIMITS).made
-    return [isinstance(made, Passage) for made in found][1:-1]
+    found = prepare((Takeoff(2.0), *steps, Land()), range(len(steps) + 2), LIMITS).paths
+    return [isinstance(made, PathSegment) for made in found][1:-1]
 
 
 def test_waypoints_in_a_row_are_one_passage() -> None:
@@ -165,9 +167,9 @@ def test_a_single_transfer_takes_longer_where_a_bound_binds() -> None:
         Land(),
     )
     gentle = prepare(steps, range(5), LIMITS._replace(accel_m_s2=1.0))
-    assert gentle.least_s == (0.0,) * 5
+    assert gentle.min_durations_s == (0.0,) * 5
     weak = LIMITS._replace(bounds=BOUNDS._replace(rotor_high=1.35))
-    least = prepare(steps, range(5), weak).least_s
+    least = prepare(steps, range(5), weak).min_durations_s
     assert least[2] > 1.05 * transfer_duration(400.0, 15.0, 1.5)
     along = survey_transfer((0.0, 0.0, 5.0), (400.0, 0.0, 5.0), least[2], BODY)
     assert along.rotor_high.value <= 1.35
@@ -176,7 +178,7 @@ def test_a_single_transfer_takes_longer_where_a_bound_binds() -> None:
 
 def test_the_stretches_of_a_passage_join() -> None:
     steps = (Takeoff(2.0), *(Waypoint(x, 1.0 * x, 2.0) for x in (2.0, 4.0, 5.0)), Land())
-    made = [m for m in prepare(steps, range(5), LIMITS).made if isinstance(m, Passage)]
+    made = [m for m in prepare(steps, range(5), LIMITS).paths if isinstance(m, PathSegment)]
     assert made[0].begin_s == 0.0
     assert all(x.end_s == y.begin_s and x.table is y.table for x, y in pairwise(made))
     assert made[-1].end_s == made[-1].table[-1, 1]

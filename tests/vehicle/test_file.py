@@ -10,7 +10,7 @@ import pytest
 
 from autopilot.vehicle.file import belief_of, load_belief, load_vehicle
 from autopilot.vehicle.layout import PLUS
-from autopilot.vehicle.model import SHARE_OF_ARM, Vehicle
+from autopilot.vehicle.model import ARM_RATIOS, Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from sitl.vehicles.sim_parameters import sim_parameters
@@ -87,7 +87,7 @@ def test_a_shipped_file_states_every_key_and_is_read_as_written(name):
     assert {key: list(v) if isinstance(v, tuple) else v for key, v in read.items()} == {
         **{"rotors": 4, "frame": "plus", "spin": "", "rotor": [], "believed": "", "parameters": {}},
         **EFFECTS,
-        "rotor_radius_m": SHARE_OF_ARM["rotor_radius_m"] * table["arm_m"],
+        "rotor_radius_m": ARM_RATIOS["rotor_radius_m"] * table["arm_m"],
         **CABLE_OF_LINKS,
         **table,
     }
@@ -120,7 +120,7 @@ def test_what_may_be_left_out_has_its_default(tmp_path):
     }
     assert len(drags) == 6
     assert set(drags.values()) == {0.0}
-    for key, share in SHARE_OF_ARM.items():
+    for key, share in ARM_RATIOS.items():
         assert getattr(vehicle, key) == share * 0.2
 
 

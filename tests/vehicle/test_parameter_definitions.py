@@ -10,9 +10,9 @@ import pytest
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import (
+    BENCH_MEASURED,
     DEFAULT_LAW,
     LAWS,
-    MEASURED,
     SHAPE_ALWAYS,
     SHAPE_NEVER,
     SHAPE_WITH_PLUMBLINE,
@@ -115,8 +115,8 @@ def test_without_a_rotor_limit_the_forces_are_those_of_the_wire():
 
 
 def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():
-    assert MEASURED.keys() <= sim_definitions().parameters.keys()
-    assert set(MEASURED.values()) <= definitions().parameters.keys()
+    assert BENCH_MEASURED.keys() <= sim_definitions().parameters.keys()
+    assert set(BENCH_MEASURED.values()) <= definitions().parameters.keys()
 
 
 def test_naming_the_laws_costs_no_heavy_import():

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire.codec import LONGEST_FRAME, FrameWriter, Received, decode
+from autopilot.wire.codec import MAX_FRAME_BYTES, FrameWriter, Received, decode
 from autopilot.wire.convert.simulator import ACCEL, GYRO, hil_sensor_message
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -214,7 +214,7 @@ def test_an_unknown_incompatibility_flag_is_refused() -> None:
 def test_no_frame_is_longer_than_it_says(any_message: Sample) -> None:
     rng = np.random.default_rng(0)
     writer = FrameWriter(1, 1)
-    assert max(len(writer.frame(any_message(c, rng))) for c in CLASSES) <= LONGEST_FRAME - 13
+    assert max(len(writer.frame(any_message(c, rng))) for c in CLASSES) <= MAX_FRAME_BYTES - 13
 
 
 def test_the_search_for_messages_has_an_end_where_that_is_asked_for():

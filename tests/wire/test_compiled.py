@@ -14,14 +14,14 @@ from autopilot.geometry.kernel import kernel
 from autopilot.wire import simulator_frames as frames
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import (
-    FRAME_ROOM,
-    PAYLOAD_ROOM,
+    MAX_FRAME_BYTES,
+    MAX_PAYLOAD_BYTES,
     Bytes,
     Origin,
     frame_end,
-    holds,
+    match_frame,
     put_frame,
-    taken,
+    unpack_payload,
     wire_record,
 )
 from autopilot.wire.convert.simulator import hil_actuator_controls_message, read_hil_actuator_controls
@@ -80,9 +80,9 @@ def put_sensor(values: Any, payload: Bytes, buffer: Bytes, at: int, sequence: in
 @kernel
 def sensor_in(data: bytes, start: int, payload: Bytes) -> tuple[int, bool, int, float]:
     end = frame_end(data, start)
-    if end == 0 or not holds(SENSOR, data, start, payload):
+    if end == 0 or not match_frame(SENSOR, data, start, payload):
         return (end, False, 0, 0.0)
-    message = taken(SENSOR, payload)
+    message = unpack_payload(SENSOR, payload)
     return (end, True, message.time_usec, message.zgyro)
 
 
@@ -98,7 +98,7 @@ def test_a_frame_is_that_of_pymavlink_and_its_record_comes_back(
 ) -> None:
     numbers, message = data.draw(numbers_of(kind))
     record = getattr(frames, kind)
-    payload, buffer = np.full(PAYLOAD_ROOM, 0xAA, np.uint8), np.full(2 * FRAME_ROOM, 0xAA, np.uint8)
+    payload, buffer = np.full(MAX_PAYLOAD_BYTES, 0xAA, np.uint8), np.full(2 * MAX_FRAME_BYTES, 0xAA, np.uint8)
     end = put_frame(record, tuple(numbers), payload, buffer, 7, Origin(sequence, 1, 26))
     frame = bytes(buffer[7:end])
     link = mavlink.MAVLink(None, srcSystem=1, srcComponent=26)
@@ -108,8 +108,8 @@ def test_a_frame_is_that_of_pymavlink_and_its_record_comes_back(
 
     padded = b"#" + frame + b"\xfd"
     assert frame_end(padded, 1) == 1 + len(frame)
-    assert holds(record, padded, 1, payload)
-    read = taken(record, payload)
+    assert match_frame(record, padded, 1, payload)
+    read = unpack_payload(record, payload)
     for name in message.ordered_fieldnames:
         found, sent = getattr(read, name), getattr(message, name)
         pairs = zip(found, sent, strict=True) if isinstance(sent, list) else ((found, sent),)
@@ -121,7 +121,7 @@ def test_a_frame_is_that_of_pymavlink_and_its_record_comes_back(
 def test_machine_code_writes_and_reads_what_python_does(made: tuple[list[Any], Any], sequence: int) -> None:
     numbers, message = made
     values = (int(numbers[0]), *map(float, numbers[1:-2]), int(numbers[-2]), int(numbers[-1]))
-    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    payload, buffer = np.zeros(MAX_PAYLOAD_BYTES, np.uint8), np.zeros(MAX_FRAME_BYTES, np.uint8)
     end = put_sensor(values, payload, buffer, 0, sequence)
     writer = FrameWriter(1, 26)
     writer.sequence = sequence
@@ -133,7 +133,7 @@ def test_machine_code_writes_and_reads_what_python_does(made: tuple[list[Any], A
 
 
 def test_a_number_beyond_single_precision_is_sent_as_infinite() -> None:
-    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    payload, buffer = np.zeros(MAX_PAYLOAD_BYTES, np.uint8), np.zeros(MAX_FRAME_BYTES, np.uint8)
     end = put_sensor((1, 1e300, -1e300, *(0.0,) * 11, 0, 0), payload, buffer, 0, 0)
     message = decode(bytes(buffer[:end]))[0][0].message
     assert (message.xacc, message.yacc) == (math.inf, -math.inf)
@@ -141,7 +141,7 @@ def test_a_number_beyond_single_precision_is_sent_as_infinite() -> None:
 
 def test_times_of_64_bits_are_read_as_negative_and_do_not_raise() -> None:
     frame = FrameWriter(1, 1).frame(mavlink.MAVLink_hil_sensor_message(2**64 - 1, *(0.0,) * 13, 0))
-    assert sensor_in(frame, 0, np.zeros(PAYLOAD_ROOM, np.uint8))[:3] == (len(frame), True, -1)
+    assert sensor_in(frame, 0, np.zeros(MAX_PAYLOAD_BYTES, np.uint8))[:3] == (len(frame), True, -1)
 
 
 SENSOR_FRAME = FrameWriter(1, 26).frame(mavlink.MAVLink_hil_sensor_message(4000, *range(1, 14), 63))
@@ -163,7 +163,7 @@ def test_what_is_found_in_any_bytes_is_what_the_general_decoder_finds(
     bytes_in = bytearray(datagram)
     if at < len(bytes_in):
         bytes_in[at] = to
-    data, payload = bytes(bytes_in), np.zeros(PAYLOAD_ROOM, np.uint8)
+    data, payload = bytes(bytes_in), np.zeros(MAX_PAYLOAD_BYTES, np.uint8)
     first = start % (len(data) + 1)
     end, found, _, _ = sensor_in(data, first, payload)
     assert 0 <= end <= len(data)
@@ -184,14 +184,14 @@ def test_a_signed_frame_and_one_of_version_1_are_left_to_the_general_decoder() -
 
 def test_a_text_is_written_as_the_numbers_of_its_bytes() -> None:
     record = wire_record(mavlink.MAVLink_named_value_float_message, __name__)
-    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    payload, buffer = np.zeros(MAX_PAYLOAD_BYTES, np.uint8), np.zeros(MAX_FRAME_BYTES, np.uint8)
     name = tuple(b"SWING".ljust(10, b"\0"))
     end = put_frame(record, (7, 0.5, *name), payload, buffer, 0, Origin(3, 1, 1))
     link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     link.seq = 3
     assert bytes(buffer[:end]) == mavlink.MAVLink_named_value_float_message(7, b"SWING", 0.5).pack(link)
-    assert holds(record, bytes(buffer[:end]), 0, payload)
-    assert taken(record, payload).name == name
+    assert match_frame(record, bytes(buffer[:end]), 0, payload)
+    assert unpack_payload(record, payload).name == name
 
 
 # ---- the answer to a tick
@@ -207,7 +207,7 @@ def test_a_text_is_written_as_the_numbers_of_its_bytes() -> None:
 @quick
 def test_the_answer_is_the_message_and_is_read_as_the_message(answer: Any, sequence: int) -> None:
     time_us, forces, armed, lockstep, gripper_open, reel_rate = answer
-    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    payload, buffer = np.zeros(MAX_PAYLOAD_BYTES, np.uint8), np.zeros(MAX_FRAME_BYTES, np.uint8)
     asked = (armed, lockstep, gripper_open, reel_rate)
     end = frames.put_answer(buffer, payload, sequence, 1, 1, time_us, np.array(forces), *asked)
     writer = FrameWriter(1, 1)
@@ -216,7 +216,7 @@ def test_the_answer_is_the_message_and_is_read_as_the_message(answer: Any, seque
     assert bytes(buffer[:end]) == frame
     said = read_hil_actuator_controls(decode(frame)[0][0].message)
     read = (said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
-    assert frames.answer_in(frame, 1, payload) == (True, *read)
+    assert frames.read_answer(frame, 1, payload) == (True, *read)
 
 
 @pytest.mark.parametrize(
@@ -225,12 +225,12 @@ def test_the_answer_is_the_message_and_is_read_as_the_message(answer: Any, seque
     ids=["nothing", "a begin", "another message", "rubbish"],
 )
 def test_what_is_no_answer_is_none(datagram: bytes) -> None:
-    assert not frames.answer_in(datagram, 1, np.zeros(PAYLOAD_ROOM, np.uint8))[0]
+    assert not frames.read_answer(datagram, 1, np.zeros(MAX_PAYLOAD_BYTES, np.uint8))[0]
 
 
 def test_an_answer_of_another_system_or_beside_another_frame_is_left_to_the_general_decoder() -> None:
     frame = FrameWriter(2, 1).frame(hil_actuator_controls_message(0, (1.0,) * 14, True, True))
-    payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-    assert frames.answer_in(frame, 2, payload)[0]
-    assert not frames.answer_in(frame, 1, payload)[0]
-    assert not frames.answer_in(frame + frame, 2, payload)[0]
+    payload = np.zeros(MAX_PAYLOAD_BYTES, np.uint8)
+    assert frames.read_answer(frame, 2, payload)[0]
+    assert not frames.read_answer(frame, 1, payload)[0]
+    assert not frames.read_answer(frame + frame, 2, payload)[0]

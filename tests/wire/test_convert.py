@@ -55,7 +55,7 @@ from autopilot.wire.convert.simulator import (
     hil_state_quaternion_message,
     load_sensor_message,
     odometry_message,
-    padded,
+    padded_forces,
     read_hil_actuator_controls,
     read_hil_gps,
     read_hil_sensor,
@@ -551,7 +551,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        rotor_state_message(0, 2, padded((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
+        rotor_state_message(0, 2, padded_forces((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
         {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
     ),
     (wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
@@ -574,7 +574,7 @@ def test_every_field_has_its_axis_and_its_sign(message: Any, expected: dict[str,
 
 
 def test_full_scale_of_the_actuators() -> None:
-    message = hil_actuator_controls_message(4000, padded((0.0, 0.98, 1.96, 3.92, 0.49)), True, True)
+    message = hil_actuator_controls_message(4000, padded_forces((0.0, 0.98, 1.96, 3.92, 0.49)), True, True)
     assert message.controls[:7] == [0.0, 0.5, 1.0, 2.0, 0.0, 0.0, 0.25]
     assert len(message.controls) == 16
     assert (message.time_usec, message.mode & 128, message.flags & 1) == (4000, 128, 1)

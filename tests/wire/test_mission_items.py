@@ -23,11 +23,11 @@ from autopilot.wire.items import (
     decode_items,
     encode_mission,
     encode_steps,
-    endless_from,
+    endless_jump_target,
     located_steps,
-    unflown,
+    unflown_items,
 )
-from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MOST_FACTORS, MOST_TERMS
+from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MAX_FACTORS, MAX_TERMS
 from missions.fileformat import load_mission, shipped
 from missions.model import (
     AttitudeRun,
@@ -41,7 +41,7 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
-    TurnNose,
+    TurnHeading,
     Waypoint,
     Winch,
 )
@@ -69,7 +69,7 @@ terms = st.builds(
     edges,
     st.none() | seconds,
     edges,
-    st.lists(sines, max_size=MOST_FACTORS).map(tuple),
+    st.lists(sines, max_size=MAX_FACTORS).map(tuple),
 )
 steps: st.SearchStrategy[Step] = st.one_of(
     st.builds(Takeoff, real(0.1, 1000.0)),
@@ -254,8 +254,8 @@ REFUSALS = [
     ([TERM, FACTOR._replace(x=0), RUN], 1, "INVALID_PARAM5_X", "period = 0 s"),
     ([TERM, FACTOR._replace(param1=math.nan), RUN], 1, "INVALID_PARAM1", "phase = nan rad"),
     ([TERM, RUN._replace(x=0)], 1, "INVALID_PARAM5_X", "duration = 0 s"),
-    ([TERM] * (MOST_TERMS + 1) + [RUN], MOST_TERMS, "NO_SPACE", "more than"),
-    ([TERM] + [FACTOR] * (MOST_FACTORS + 1) + [RUN], MOST_FACTORS + 1, "NO_SPACE", "more than"),
+    ([TERM] * (MAX_TERMS + 1) + [RUN], MAX_TERMS, "NO_SPACE", "more than"),
+    ([TERM] + [FACTOR] * (MAX_FACTORS + 1) + [RUN], MAX_FACTORS + 1, "NO_SPACE", "more than"),
     ([item(31013, 3.0, 0.1, x=1000)], 0, "INVALID_PARAM1", "mode = 3"),
     ([item(31013, 1.0, 1.6, x=1000)], 0, "INVALID_PARAM2", "tilt north = 1.6 rad"),
     ([item(31013, 1.0, 0.0, math.nan, x=1000)], 0, "INVALID_PARAM3", "tilt east = nan rad"),
@@ -397,15 +397,15 @@ def test_commands_for_other_things_are_kept_and_not_flown() -> None:
 
 
 def test_what_is_not_flown_is_known() -> None:
-    assert unflown([item(93, 1.0), item(203), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
+    assert unflown_items([item(93, 1.0), item(203), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
 
 
 def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
     items = [item(93, 1.0), item(203), item(93, 2.0), TERM, RUN, item(177, 1.0, -1.0), item(93, 9.0)]
     located = located_steps(items, HOME)
     assert [one.last for one in located] == [0, 2, 4], "what stands behind it is never flown"
-    assert endless_from(items, located) == 1
-    assert endless_from(items[:-2], located) is None
+    assert endless_jump_target(items, located) == 1
+    assert endless_jump_target(items[:-2], located) is None
 
 
 def test_items_that_turn_the_nose_belong_to_the_step_behind_them() -> None:
@@ -418,15 +418,17 @@ def test_items_that_turn_the_nose_belong_to_the_step_behind_them() -> None:
     ]
     steps = located_steps(items, HOME)
     assert [one.last for one in steps] == [1, 2, 4, 7, 9, 10]
-    assert steps[0].aims == (), "on the ground no nose turns"
-    assert steps[1].aims == (TurnNose(0.0),), "from north, clockwise: to the east"
-    (seen,) = steps[2].aims
+    assert steps[0].heading_commands == (), "on the ground no nose turns"
+    assert steps[1].heading_commands == (TurnHeading(0.0),), "from north, clockwise: to the east"
+    (seen,) = steps[2].heading_commands
     assert isinstance(seen, LookAt) and seen.east_m is not None and seen.north_m is not None
     assert (seen.east_m, seen.north_m) == pytest.approx((12.0, -7.0), abs=PLACE_M)
-    turned = TurnNose(math.radians(30.0), relative=True, rate_rad_s=math.radians(20.0))
-    assert steps[3].aims == (LookAt(None, None), turned)
-    assert steps[4].aims == (seen,)
-    assert (steps[5].step, steps[5].aims) == (Delay(0.0), (LookAt(None, None),)), "held as it turns"
+    turned = TurnHeading(math.radians(30.0), relative=True, rate_rad_s=math.radians(20.0))
+    assert steps[3].heading_commands == (LookAt(None, None), turned)
+    assert steps[4].heading_commands == (seen,)
+    assert (steps[5].step, steps[5].heading_commands) == (Delay(0.0), (LookAt(None, None),)), (
+        "held as it turns"
+    )
 
 
 @pytest.mark.parametrize("last", [item(21), item(20)])
@@ -434,14 +436,14 @@ def test_behind_what_lands_the_nose_is_not_turned(last: WireItem) -> None:
     items = [item(22, frame=6, z=4.0), item(115, 90.0), last, item(197)]
     steps = located_steps(items, HOME)
     assert [one.last for one in steps] == [0, 2]
-    assert steps[1].aims == (TurnNose(0.0),)
+    assert steps[1].heading_commands == (TurnHeading(0.0),)
 
 
 def test_jumps_without_end_turn_the_nose_each_time() -> None:
     items = [item(22, frame=6, z=4.0), item(93, 2.0), item(115, 90.0), item(177, 1.0, -1.0)]
     steps = located_steps(items, HOME)
-    assert [one.aims for one in steps] == [(), (), (TurnNose(0.0),)]
-    assert endless_from(items, steps) == 1
+    assert [one.heading_commands for one in steps] == [(), (), (TurnHeading(0.0),)]
+    assert endless_jump_target(items, steps) == 1
 
 
 def test_jumps_fly_their_items_again() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.signing import NEWEST, UNITS_PER_S, NoKeyError, Signing, key_of_text, timestamp_of
+from autopilot.wire.signing import MAX_TIMESTAMP, UNITS_PER_S, NoKeyError, Signing, key_of_text, timestamp_of
 
 KEY = bytes(range(32))
 NOW = timestamp_of(1_767_225_600_000_000)
@@ -83,7 +83,7 @@ def test_times_follow_whoever_is_ahead() -> None:
     assert receiver.timestamp == NOW + 1_000_001
     receiver.advance(NOW)
     assert receiver.timestamp == NOW + 1_000_001
-    at_the_end = Signing(KEY, NEWEST)
+    at_the_end = Signing(KEY, MAX_TIMESTAMP)
     assert len(frame(at_the_end)) == len(frame(Signing(KEY, NOW)))
 
 

@@ -22,7 +22,7 @@ def read(tmp_path: Path, data: bytes) -> ULog:
 
 def test_everything_comes_back(tmp_path: Path) -> None:
     writer = UlogWriter([ONE, TWO])
-    data = writer.beginning(1000, {"sys_name": "Plumbline", "number": 7}, {"A": 1.5, "B": -2.0}, {"B": 3.0})
+    data = writer.header(1000, {"sys_name": "Plumbline", "number": 7}, {"A": 1.5, "B": -2.0}, {"B": 3.0})
     data += writer.record(0, 1000, 0.1, 1.0, 2.0, 3.0, 4, 5, 6, True)
     data += writer.record(1, 2000, -9)
     data += ulog.parameter("A", 2.5)
@@ -52,7 +52,7 @@ def test_everything_comes_back(tmp_path: Path) -> None:
 
 def test_a_log_that_was_cut_short_is_read_up_to_there(tmp_path: Path) -> None:
     writer = UlogWriter([TWO])
-    data = writer.beginning(0, {}, {}, {}) + b"".join(writer.record(0, i, i) for i in range(100))
+    data = writer.header(0, {}, {}, {}) + b"".join(writer.record(0, i, i) for i in range(100))
     assert len(read(tmp_path, data[:-7]).get_dataset("two").data["i"]) == 99
 
 

@@ -5,14 +5,14 @@
 | x_Q'' | a_quad | I | m/s^2 | accelerometer |
 | f | thrust | B | N | `actuation` |
 | D | air | I | N | assumed drag of the vehicle |
-| r | rest | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
+| r | residual | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
 | w | pull | | m/s^2 | L q'.q' - q . (x_Q'' + g e_3) |
 | b | axis | I | | R e_3, axis of the rotors |
 | T | tension | | N | (r . b) / (q . b) |
 | m_L | load_mass | | kg | T / w |
 | P | push | I | N | p + k s |
-| p | steady | I | N | r - T q - k s |
-| s | shaped | I | N | drag of the shape `shape` |
+| p | steady_push | I | N | r - T q - k s |
+| s | shape_drag | I | N | drag of the shape `shape` |
 | k | factor | | | of s, beyond the assumed drag |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
@@ -37,13 +37,13 @@ from typing import NamedTuple
 
 from autopilot.control.actuators.torque_observer import (
     NO_TORQUE,
-    Torque,
     TorqueConstants,
+    TorqueEstimate,
     observe_torque,
     torque_constants,
-    unheeded,
+    without_compensation,
 )
-from autopilot.control.drag import GUSTY, Drag, air_force
+from autopilot.control.drag import GUST_RANDOM_WALK, Drag, drag_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
@@ -53,23 +53,23 @@ from autopilot.geometry.s2 import pull_of
 # m: a load this much higher than where it lay is in the air
 _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
-_STANDING = 0.2
+_ON_GROUND_SHARE = 0.2
 _CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
 # s, time constant that smooths the estimator's wind on the load: the commanded direction of the cable jumps
 # with this wind, and a reading corrects it by more than the wind has changed
 _AIR_TIME = 0.15
 # drag is learned from motion faster than this, m/s; the greatest factor on its shape
-_DRAG_SPEED, _GREATEST_FACTOR = 0.2, 50.0
+_DRAG_SPEED, _MAX_FACTOR = 0.2, 50.0
 # 1/s, linear drag divided by the mass: the shape where no drag is assumed
-_ASSUMED_SHAPE = 0.05
+_DEFAULT_DRAG_RATE = 0.05
 # m/s^2, standard deviation of an accelerometer sample up to which, in still air, the push is learned as
 # fast as configured
-_QUIET = 0.06
+_QUIET_ACCEL_STD = 0.06
 # of the weight: a smaller push may be nothing but noise
-_BREEZE = 0.03
+_PUSH_NOISE_SHARE = 0.03
 # of the nominal mass of the load
-_LEAST_MASS = 0.25
-_GREATEST_MASS = 4.0
+_MIN_MASS_RATIO = 0.25
+_MAX_MASS_RATIO = 4.0
 
 
 class ObserverConstants(NamedTuple):
@@ -80,35 +80,35 @@ class ObserverConstants(NamedTuple):
     drag: float
     contact: float
     air: float
-    gusty: float  # m/s^2 / N: noise that the gusts of a wind outweigh, for each newton of its push
-    breeze: float  # N, push that may be nothing but noise
-    greatest_push: float  # N
+    gust_noise: float  # m/s^2 / N: noise that the gusts of a wind outweigh, for each newton of its push
+    push_noise: float  # N, push that may be nothing but noise
+    max_push: float  # N
     shape: Drag
-    least_factor: float
+    min_factor: float
     torque: TorqueConstants
 
 
-class Observed(NamedTuple):
+class DisturbanceEstimate(NamedTuple):
     """What is estimated of the load and of the air."""
 
     load_mass: float  # kg
     push: Vec3  # N, world, on the vehicle
-    correlation: float  # of T and w, N m/s^2
-    square: float  # of w, m^2/s^4
-    support: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
-    load_ground: float  # m, height at which the load lay
-    steady: Vec3  # N, the part of the push that does not follow the speed
+    mass_correlation: float  # of T and w, N m/s^2
+    mass_square: float  # of w, m^2/s^4
+    ground_force: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
+    load_ground_height: float  # m, height at which the load lay
+    steady_push: Vec3  # N, the part of the push that does not follow the speed
     drag: Drag  # learned drag, beyond the assumed drag
-    mean_shaped: Vec3  # N
-    mean_rest: Vec3  # N
+    mean_shape_drag: Vec3  # N
+    mean_residual: Vec3  # N
     drag_correlation: float  # of s and r, N^2
     drag_square: float  # of s, N^2
-    load_air: Vec3  # m/s^2, world, acceleration of the load by the air besides its drag
+    load_air_accel: Vec3  # m/s^2, world, acceleration of the load by the air besides its drag
     load_drag: float  # 1/s, divided by the load's mass
-    torque: Torque  # on the vehicle besides that of rotors and cable
+    torque: TorqueEstimate  # on the vehicle besides that of rotors and cable
 
 
-def share_of(period: float, time: float) -> float:
+def averaging_share(period: float, time: float) -> float:
     """Share of a new value in an average that fades with this time constant (s); 0 learns nothing."""
     return min(1.0, period / time) if time > 0.0 else 0.0
 
@@ -118,7 +118,7 @@ def observer_constants(
     push_time: float,
     drag_time: float,
     torque_time: float,
-    greatest_push: float,
+    max_push: float,
     period: float,
     drag: Drag,
     vehicle: Vehicle,
@@ -126,47 +126,53 @@ def observer_constants(
     """For averages that fade with these time constants (s); 0 learns nothing. `drag` is the assumed drag."""
 
     def share(time: float) -> float:
-        return share_of(period, time)
+        return averaging_share(period, time)
 
-    believed = max(drag.linear, drag.quadratic) > 0.0
+    has_drag = max(drag.linear, drag.quadratic) > 0.0
     return ObserverConstants(
         share(mass_time),
         share(push_time),
         share(drag_time),
         share(_CONTACT_TIME),
         share(_AIR_TIME),
-        GUSTY * push_time / (sqrt(period) * vehicle.quad_mass),
-        _BREEZE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
-        greatest_push,
-        drag if believed else Drag(_ASSUMED_SHAPE * vehicle.quad_mass, 0.0),
-        -1.0 if believed else 0.0,
+        GUST_RANDOM_WALK * push_time / (sqrt(period) * vehicle.quad_mass),
+        _PUSH_NOISE_SHARE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
+        max_push,
+        drag if has_drag else Drag(_DEFAULT_DRAG_RATE * vehicle.quad_mass, 0.0),
+        -1.0 if has_drag else 0.0,
         torque_constants(share(torque_time), share(drag_time), period, vehicle),
     )
 
 
 @kernel
-def rested(constants: ObserverConstants, observed: Observed, accel_var: float) -> ObserverConstants:
+def slowed_by_noise(
+    constants: ObserverConstants, observed: DisturbanceEstimate, accel_var: float
+) -> ObserverConstants:
     """The constants by which the push is learned more slowly if the accelerometer is noisy against the gusts.
 
     `accel_var`, (m/s^2)^2, is the variance of a sample. The filter of a push that wanders by w sqrt(t) and is
     measured every T seconds with noise of standard deviation s has the time constant s sqrt(T) / w.
     """
-    quiet = _QUIET + constants.gusty * max(0.0, norm(observed.steady) - constants.breeze)
+    quiet = _QUIET_ACCEL_STD + constants.gust_noise * max(
+        0.0, norm(observed.steady_push) - constants.push_noise
+    )
     return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / quiet))
 
 
 @kernel
-def blown(observed: Observed, gust: Vec3, drag: float, constants: ObserverConstants) -> Observed:
+def with_wind_on_load(
+    observed: DisturbanceEstimate, gust: Vec3, drag: float, constants: ObserverConstants
+) -> DisturbanceEstimate:
     """With the estimator's `gust`, acceleration of the load besides its drag (m/s^2), and `drag` (1/s)."""
-    slowly = axpy(constants.air, sub(gust, observed.load_air), observed.load_air)
-    return with_field(with_field(observed, "load_air", slowly), "load_drag", drag)
+    smoothed = axpy(constants.air, sub(gust, observed.load_air_accel), observed.load_air_accel)
+    return with_field(with_field(observed, "load_air_accel", smoothed), "load_drag", drag)
 
 
 @kernel
-def nominal(vehicle: Vehicle) -> Observed:
+def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
     """Nothing observed: the configured mass of the load, still air, vehicle on the ground, load at home."""
     g = vehicle.gravity
-    return Observed(
+    return DisturbanceEstimate(
         vehicle.load_mass,
         ZERO,
         vehicle.load_mass * g * g,
@@ -185,38 +191,38 @@ def nominal(vehicle: Vehicle) -> Observed:
     )
 
 
-def aloft(vehicle: Vehicle) -> Observed:
-    """As `nominal`, but vehicle and load are off the ground, wherever they are."""
-    return nominal(vehicle)._replace(support=0.0, load_ground=-inf)
+def nominal_in_flight(vehicle: Vehicle) -> DisturbanceEstimate:
+    """As `nominal_on_ground`, but vehicle and load are off the ground, wherever they are."""
+    return nominal_on_ground(vehicle)._replace(ground_force=0.0, load_ground_height=-inf)
 
 
 @kernel
-def standing(observed: Observed, vehicle: Vehicle) -> bool:
+def vehicle_on_ground(observed: DisturbanceEstimate, vehicle: Vehicle) -> bool:
     """Whether the ground holds the vehicle."""
-    return observed.support > _STANDING * vehicle.quad_mass * vehicle.gravity
+    return observed.ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity
 
 
 @kernel
-def lying(observed: Observed, state: State) -> bool:
+def load_on_ground(observed: DisturbanceEstimate, state: State) -> bool:
     """Whether the load is no higher than where it lay while the cable was slack."""
-    return not state.x_load[2] > observed.load_ground + _OFF_GROUND
+    return not state.x_load[2] > observed.load_ground_height + _OFF_GROUND
 
 
 @kernel
-def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
+def with_load_mass(vehicle: Vehicle, load_mass: float) -> Vehicle:
     """The vehicle with a load of this mass."""
     return with_field(vehicle, "load_mass", load_mass)
 
 
 @kernel
-def pulled(force: Vec3, q: Vec3, axis: Vec3) -> float:
+def cable_force(force: Vec3, q: Vec3, axis: Vec3) -> float:
     """The cable's part of a force on the vehicle, N along q; the rest acts across the rotors' axis."""
     return pull_of(dot(force, axis), q, axis)
 
 
 @kernel
 def observe(
-    observed: Observed,
+    observed: DisturbanceEstimate,
     state: State,
     taut: float,
     thrust: float,
@@ -224,73 +230,78 @@ def observe(
     constants: ObserverConstants,
     drag: Drag,
     vehicle: Vehicle,
-) -> Observed:
+) -> DisturbanceEstimate:
     """The estimates a period later. `thrust`, N, is what the rotors give now, `moment`, N m, that of rotors
     and cable; `vehicle` is the nominal one."""
     q, a = state.q_cable, state.a_quad
-    load_mass, steady, learned = observed.load_mass, observed.steady, observed.drag
-    mean_shaped, mean_rest = observed.mean_shaped, observed.mean_rest
-    together, alone = observed.drag_correlation, observed.drag_square
-    correlation, square = observed.correlation, observed.square
-    support, load_ground = observed.support, observed.load_ground
+    load_mass, steady_push, learned = observed.load_mass, observed.steady_push, observed.drag
+    mean_shape_drag, mean_residual = observed.mean_shape_drag, observed.mean_residual
+    drag_correlation, drag_square = observed.drag_correlation, observed.drag_square
+    mass_correlation, mass_square = observed.mass_correlation, observed.mass_square
+    ground_force, load_ground_height = observed.ground_force, observed.load_ground_height
     if not taut > 0.0:
-        load_ground = state.x_load[2]
+        load_ground_height = state.x_load[2]
 
-    felt: Vec3 = (a[0], a[1], a[2] + vehicle.gravity)
-    known = axpy(thrust, column(state.R, 2), air_force(state.v_quad, drag))
-    rest = sub(scale(vehicle.quad_mass, felt), known)
+    specific_force: Vec3 = (a[0], a[1], a[2] + vehicle.gravity)
+    known = axpy(thrust, column(state.R, 2), drag_force(state.v_quad, drag))
+    residual = sub(scale(vehicle.quad_mass, specific_force), known)
     shape = constants.shape
-    shaped = air_force(state.v_quad, shape)
-    support += constants.contact * ((0.0 if taut > 0.0 else rest[2]) - support)
+    shape_drag = drag_force(state.v_quad, shape)
+    ground_force += constants.contact * ((0.0 if taut > 0.0 else residual[2]) - ground_force)
     if taut > 0.0:
         axis = column(state.R, 2)
-        tension = pulled(rest, q, axis)
-        pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
-        rest = axpy(-tension, q, rest)
-        shaped = axpy(-pulled(shaped, q, axis), q, shaped)
-        if not lying(observed, state) and pull > 0.0:
-            correlation += constants.mass * (tension * pull - correlation)
-            square += constants.mass * (pull * pull - square)
-            found = correlation / square
-            load_mass = min(_GREATEST_MASS * vehicle.load_mass, max(_LEAST_MASS * vehicle.load_mass, found))
+        tension = cable_force(residual, q, axis)
+        pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, specific_force)
+        residual = axpy(-tension, q, residual)
+        shape_drag = axpy(-cable_force(shape_drag, q, axis), q, shape_drag)
+        if not load_on_ground(observed, state) and pull > 0.0:
+            mass_correlation += constants.mass * (tension * pull - mass_correlation)
+            mass_square += constants.mass * (pull * pull - mass_square)
+            ratio = mass_correlation / mass_square
+            load_mass = min(
+                _MAX_MASS_RATIO * vehicle.load_mass, max(_MIN_MASS_RATIO * vehicle.load_mass, ratio)
+            )
     else:
         # the vertical part cannot be distinguished from the ground's force
-        rest, shaped = (rest[0], rest[1], 0.0), (shaped[0], shaped[1], 0.0)
+        residual, shape_drag = (residual[0], residual[1], 0.0), (shape_drag[0], shape_drag[1], 0.0)
     factor = learned.linear / shape.linear if shape.linear > 0.0 else learned.quadratic / shape.quadratic
     # only where neither vehicle nor load can touch the ground: its forces are no drag
-    hangs = taut > 0.0 and not lying(observed, state)
-    if hangs:
-        mean_shaped = axpy(constants.drag, sub(shaped, mean_shaped), mean_shaped)
-        mean_rest = axpy(constants.drag, sub(rest, mean_rest), mean_rest)
-        moving = sub(shaped, mean_shaped)
-        together += constants.drag * (dot(moving, sub(rest, mean_rest)) - together)
-        alone += constants.drag * (dot(moving, moving) - alone)
-        slow = (shape.linear + shape.quadratic * _DRAG_SPEED) * _DRAG_SPEED
-        factor = min(_GREATEST_FACTOR, max(constants.least_factor, together / (alone + slow * slow)))
+    suspended = taut > 0.0 and not load_on_ground(observed, state)
+    if suspended:
+        mean_shape_drag = axpy(constants.drag, sub(shape_drag, mean_shape_drag), mean_shape_drag)
+        mean_residual = axpy(constants.drag, sub(residual, mean_residual), mean_residual)
+        deviation = sub(shape_drag, mean_shape_drag)
+        drag_correlation += constants.drag * (dot(deviation, sub(residual, mean_residual)) - drag_correlation)
+        drag_square += constants.drag * (dot(deviation, deviation) - drag_square)
+        min_drag_force = (shape.linear + shape.quadratic * _DRAG_SPEED) * _DRAG_SPEED
+        factor = min(
+            _MAX_FACTOR,
+            max(constants.min_factor, drag_correlation / (drag_square + min_drag_force * min_drag_force)),
+        )
         learned = Drag(factor * shape.linear, factor * shape.quadratic)
-    if hangs:
+    if suspended:
         torque = observe_torque(observed.torque, state, moment, constants.torque, vehicle)
     else:
-        torque = unheeded(observed.torque, state)
-    if not support > _STANDING * vehicle.quad_mass * vehicle.gravity:
-        steady = axpy(constants.push, sub(axpy(-factor, shaped, rest), steady), steady)
-        size = norm(steady)
-        if size > constants.greatest_push:
-            steady = scale(constants.greatest_push / size, steady)
-    return Observed(
+        torque = without_compensation(observed.torque, state)
+    if not ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity:
+        steady_push = axpy(constants.push, sub(axpy(-factor, shape_drag, residual), steady_push), steady_push)
+        size = norm(steady_push)
+        if size > constants.max_push:
+            steady_push = scale(constants.max_push / size, steady_push)
+    return DisturbanceEstimate(
         load_mass,
-        axpy(factor, shaped, steady),
-        correlation,
-        square,
-        support,
-        load_ground,
-        steady,
+        axpy(factor, shape_drag, steady_push),
+        mass_correlation,
+        mass_square,
+        ground_force,
+        load_ground_height,
+        steady_push,
         learned,
-        mean_shaped,
-        mean_rest,
-        together,
-        alone,
-        observed.load_air,
+        mean_shape_drag,
+        mean_residual,
+        drag_correlation,
+        drag_square,
+        observed.load_air_accel,
         observed.load_drag,
         torque,
     )

@@ -13,14 +13,14 @@ for any number of rotors at any positions.
 
     f = sum F_i     M_x = l sum y_i F_i     M_y = -l sum x_i F_i     M_z = c sum c_i F_i
 
-`vehicle.rotors.allocate` prepares, outside the loop, four columns over the usable rotors. The columns for
+`vehicle.rotors.mixer_table` prepares, outside the loop, four columns over the usable rotors. The columns for
 thrust, roll and pitch each leave the other two unchanged and need the smallest forces (the pseudo-inverse of
 these three rows; their effect on yaw is accounted for). The column for yaw is the part of the row c_i that
 the other three do not affect. Without limits, the sum of the four is the least-squares inverse of all four
 rows. For the plus quadrotor of (2-13) they are 1/4, -+1/2, +-1/2 and -+1/4.
 
 Within limits low <= u_i <= high the priorities are met one after the other, by moving along these columns,
-each as far as the rotors allow (`_room`):
+each as far as the rotors allow (`_feasible_range`):
 
 1. roll and pitch, first together: shortened to what is possible with some thrust; then each by itself towards
    its demand, as far as the rotors still allow;
@@ -42,27 +42,27 @@ from autopilot.control.records import Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
-from autopilot.vehicle.layout import MOST
-from autopilot.vehicle.rotors import LIFT_BY, PITCH, PITCH_BY, ROLL, ROLL_BY, STRENGTH, YAW, YAW_BY
+from autopilot.vehicle.layout import MAX_ROTORS
+from autopilot.vehicle.rotors import FROM_PITCH, FROM_ROLL, FROM_THRUST, FROM_YAW, PITCH, ROLL, STRENGTH, YAW
 
 Array = NDArray[np.float64]
 
 # rows of the rotors' memory, one column per rotor
-FORCE, EFFORT, ALONG, EXPECTED, MISSED, GIVES, TOLD = range(7)
-_LEAST = 1e-9  # N: a bound on less than this is rounding
+FORCE, EFFORT, DIRECTION, EXPECTED_FORCE, MISSED_COUNT, ASSUMED_FORCE, REPORTED_SPEED = range(7)
+_ROUNDING = 1e-9  # N: a bound on less than this is rounding
 
 
 class MixerResult(NamedTuple):
     """The part of a demand that the rotors carry out; their forces are in the row FORCE."""
 
     saturated: int  # bit i: the plain inverse of (2-13) asked rotor i+1 for more or less than it can give
-    thrust_done: float  # N
-    moment_done: Vec3  # N m, body
+    achieved_thrust: float  # N
+    achieved_moment: Vec3  # N m, body
 
 
 def new_rotors() -> Array:
     """The memory of rotors that stand still."""
-    return np.zeros((7, MOST))
+    return np.zeros((7, MAX_ROTORS))
 
 
 @kernel
@@ -72,86 +72,90 @@ def clamp(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def _room(rotors: Array, table: Array, beside: int, low: float, high: float) -> tuple[float, float]:
-    """Least and greatest s for which some m keeps EFFORT + s ALONG + m times the column `beside` (STRENGTH:
-    none) of every rotor in low ... high.
+def _feasible_range(
+    rotors: Array, table: Array, free_column: int, low: float, high: float
+) -> tuple[float, float]:
+    """Lowest and highest s for which some m keeps EFFORT + s DIRECTION + m times the column `free_column`
+    (STRENGTH: none) of every rotor in low ... high.
 
     Each rotor gives two bounds w s + v m <= b; each two bounds whose v differ in sign give one of s alone,
     and so does each bound in which m does not occur.
     """
     count = table.shape[0] - 1
-    free = 0.0 if beside == STRENGTH else 1.0
-    least, greatest = -np.inf, np.inf
+    free = 0.0 if free_column == STRENGTH else 1.0
+    lowest, highest = -np.inf, np.inf
     for i in range(2 * count):
         sign, rotor = (1.0, i) if i < count else (-1.0, i - count)
-        v = sign * free * table[rotor, beside]
+        v = sign * free * table[rotor, free_column]
         if v < 0.0:
             continue
-        w = sign * rotors[ALONG, rotor]
+        w = sign * rotors[DIRECTION, rotor]
         b = (high if i < count else -low) - sign * rotors[EFFORT, rotor]
         if v == 0.0:
-            end = b / if_above(abs(w), _LEAST, w, 1.0)
-            least = max(least, if_above(-w, _LEAST, end, -np.inf))
-            greatest = min(greatest, if_above(w, _LEAST, end, np.inf))
+            end = b / if_above(abs(w), _ROUNDING, w, 1.0)
+            lowest = max(lowest, if_above(-w, _ROUNDING, end, -np.inf))
+            highest = min(highest, if_above(w, _ROUNDING, end, np.inf))
             continue
         for j in range(2 * count):
             sign, rotor = (1.0, j) if j < count else (-1.0, j - count)
-            other = sign * table[rotor, beside]
+            other = sign * table[rotor, free_column]
             if other < 0.0:
                 bound = (high if j < count else -low) - sign * rotors[EFFORT, rotor]
-                slope = v * sign * rotors[ALONG, rotor] - other * w
+                slope = v * sign * rotors[DIRECTION, rotor] - other * w
                 bound = v * bound - other * b
-                end = bound / if_above(abs(slope), _LEAST, slope, 1.0)
-                least = max(least, if_above(-slope, _LEAST, end, -np.inf))
-                greatest = min(greatest, if_above(slope, _LEAST, end, np.inf))
-    return least, greatest
+                end = bound / if_above(abs(slope), _ROUNDING, slope, 1.0)
+                lowest = max(lowest, if_above(-slope, _ROUNDING, end, -np.inf))
+                highest = min(highest, if_above(slope, _ROUNDING, end, np.inf))
+    return lowest, highest
 
 
 @kernel
-def _blend(
+def _combine_columns(
     rotors: Array, table: Array, row: int, thrust: float, roll: float, pitch: float, yaw: float
 ) -> None:
     """Write the sum of the columns, each times its amount, into a row."""
     for i in range(table.shape[0] - 1):
-        level = thrust * table[i, LIFT_BY] + yaw * table[i, YAW_BY]
-        rotors[row, i] = level + roll * table[i, ROLL_BY] + pitch * table[i, PITCH_BY]
+        level = thrust * table[i, FROM_THRUST] + yaw * table[i, FROM_YAW]
+        rotors[row, i] = level + roll * table[i, FROM_ROLL] + pitch * table[i, FROM_PITCH]
 
 
 @kernel
-def _turns(table: Array, thrust: float, roll: float, pitch: float) -> float:
+def _yaw_effect(table: Array, thrust: float, roll: float, pitch: float) -> float:
     """The effect on yaw of these amounts of the columns for thrust, roll and pitch."""
     last = table.shape[0] - 1
-    lift, roll_by, pitch_by = table[last, LIFT_BY], table[last, ROLL_BY], table[last, PITCH_BY]
+    lift, roll_by, pitch_by = table[last, FROM_THRUST], table[last, FROM_ROLL], table[last, FROM_PITCH]
     turns: float = thrust * lift + roll * roll_by + pitch * pitch_by
     return turns
 
 
 @kernel
-def _fit(
+def _fit_by_priority(
     rotors: Array, table: Array, thrust: float, roll: float, pitch: float, yaw: float, low: float, high: float
 ) -> None:
     """Write the efforts within their limits, by priority, into the row EFFORT."""
-    _blend(rotors, table, EFFORT, 0.0, 0.0, 0.0, 0.0)
-    _blend(rotors, table, ALONG, 0.0, roll, pitch, 0.0)
-    share = clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
+    _combine_columns(rotors, table, EFFORT, 0.0, 0.0, 0.0, 0.0)
+    _combine_columns(rotors, table, DIRECTION, 0.0, roll, pitch, 0.0)
+    share = clamp(_feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0)
     if share < 1.0:
         rest_roll, rest_pitch = (1.0 - share) * roll, (1.0 - share) * pitch
         roll, pitch = share * roll, share * pitch
-        _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
-        _blend(rotors, table, ALONG, 0.0, rest_roll, 0.0, 0.0)
-        roll = roll + rest_roll * clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
-        _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
-        _blend(rotors, table, ALONG, 0.0, 0.0, rest_pitch, 0.0)
-        pitch = pitch + rest_pitch * clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
-    _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
-    _blend(rotors, table, ALONG, 1.0, 0.0, 0.0, 0.0)
-    least, greatest = _room(rotors, table, YAW_BY, low, high)
-    thrust = clamp(thrust, least, greatest)
-    _blend(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
-    _blend(rotors, table, ALONG, 0.0, 0.0, 0.0, 1.0)
-    least, greatest = _room(rotors, table, STRENGTH, low, high)
-    yaw = clamp(yaw - _turns(table, thrust, roll, pitch), least, greatest)
-    _blend(rotors, table, EFFORT, thrust, roll, pitch, yaw)
+        _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        _combine_columns(rotors, table, DIRECTION, 0.0, rest_roll, 0.0, 0.0)
+        roll = roll + rest_roll * clamp(_feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0)
+        _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        _combine_columns(rotors, table, DIRECTION, 0.0, 0.0, rest_pitch, 0.0)
+        pitch = pitch + rest_pitch * clamp(
+            _feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0
+        )
+    _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+    _combine_columns(rotors, table, DIRECTION, 1.0, 0.0, 0.0, 0.0)
+    lowest, highest = _feasible_range(rotors, table, FROM_YAW, low, high)
+    thrust = clamp(thrust, lowest, highest)
+    _combine_columns(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
+    _combine_columns(rotors, table, DIRECTION, 0.0, 0.0, 0.0, 1.0)
+    lowest, highest = _feasible_range(rotors, table, STRENGTH, low, high)
+    yaw = clamp(yaw - _yaw_effect(table, thrust, roll, pitch), lowest, highest)
+    _combine_columns(rotors, table, EFFORT, thrust, roll, pitch, yaw)
     for i in range(table.shape[0] - 1):
         # removes rounding only
         rotors[EFFORT, i] = clamp(rotors[EFFORT, i], low, high)
@@ -170,7 +174,9 @@ def mix(
     low, high = vehicle.rotor_min, vehicle.rotor_max
     count = table.shape[0] - 1
     roll, pitch, yaw = moment[0] / vehicle.arm, moment[1] / vehicle.arm, moment[2] / vehicle.torque_ratio
-    _blend(rotors, table, EFFORT, thrust, roll, pitch, yaw - _turns(table, thrust, roll, pitch))
+    _combine_columns(
+        rotors, table, EFFORT, thrust, roll, pitch, yaw - _yaw_effect(table, thrust, roll, pitch)
+    )
     saturated = 0
     for i in range(count):
         effort = rotors[EFFORT, i]
@@ -179,11 +185,11 @@ def mix(
     if not valid:
         saturated = (1 << count) - 1
     if saturated != 0 and limited != 0.0:
-        _fit(rotors, table, thrust, roll, pitch, yaw, low, high)
+        _fit_by_priority(rotors, table, thrust, roll, pitch, yaw, low, high)
     for i in range(count):
         rotors[FORCE, i] = table[i, STRENGTH] * rotors[EFFORT, i]
-    thrust_done, moment_done = thrust_and_moment(rotors, vehicle, table)
-    return MixerResult(saturated, thrust_done, moment_done)
+    achieved_thrust, achieved_moment = thrust_and_moment(rotors, vehicle, table)
+    return MixerResult(saturated, achieved_thrust, achieved_moment)
 
 
 @kernel
@@ -200,7 +206,7 @@ def thrust_and_moment(rotors: Array, vehicle: Vehicle, table: Array) -> tuple[fl
 
 
 @kernel
-def spread(force: float, table: Array, rotors: Array) -> MixerResult:
+def equal_forces(force: float, table: Array, rotors: Array) -> MixerResult:
     """The same force (N) from every usable rotor, whatever their positions."""
     total = 0.0
     for i in range(table.shape[0] - 1):

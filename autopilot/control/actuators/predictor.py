@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants, after_delay, lagged
-from autopilot.control.drag import Drag, air_force
+from autopilot.control.drag import Drag, drag_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, column, cross, dot, scale, sub, times
@@ -32,7 +32,7 @@ from autopilot.geometry.so3 import (
 )
 
 
-class Ahead(NamedTuple):
+class Prediction(NamedTuple):
     """The state at the instant at which a command takes effect, and what the rotors give then."""
 
     state: State
@@ -79,7 +79,7 @@ def _rates(
     J, q = vehicle.inertia, m.q
     v_quad = axpy(-vehicle.cable_length, m.q_dot, m.v) if taut > 0.0 else m.v
     b3 = column(rotation_from_quat(m.quat), 2)
-    F = axpy(thrust, b3, add(air_force(v_quad, drag), push))
+    F = axpy(thrust, b3, add(drag_force(v_quad, drag), push))
     if taut > 0.0:
         s = dot(m.q_dot, m.q_dot)
         share = vehicle.quad_mass + vehicle.load_mass
@@ -87,8 +87,8 @@ def _rates(
         # pull = -T / m_L
         pull = min(pull, 0.0)
         a = scale(pull, q)
-        across = scale(-1.0 / (vehicle.quad_mass * vehicle.cable_length), tangent(q, F))
-        q_ddot = axpy(-s, q, across)
+        q_ddot_across = scale(-1.0 / (vehicle.quad_mass * vehicle.cable_length), tangent(q, F))
+        q_ddot = axpy(-s, q, q_ddot_across)
     else:
         a = scale(1.0 / vehicle.quad_mass, F)
         q_ddot = (0.0, 0.0, 0.0)
@@ -104,7 +104,7 @@ def _rates(
 
 
 @kernel
-def _glide(
+def _midpoint_step(
     m: _Motion,
     actuation: Actuation,
     row: int,
@@ -117,17 +117,17 @@ def _glide(
     vehicle: Vehicle,
 ) -> _Motion:
     """The motion after h seconds under command `row`; after h/2 the share `half` of the lag remains."""
-    begin = _rates(m, actuation.thrust, actuation.moment, taut, push, torque, drag, vehicle)
+    start_rate = _rates(m, actuation.thrust, actuation.moment, taut, push, torque, drag, vehicle)
     thrust, moment = lagged(actuation.thrust, actuation.moment, actuation.queue, row, half)
-    middle = _shifted(m, 0.5 * h, begin)
+    middle = _shifted(m, 0.5 * h, start_rate)
     return _shifted(m, h, _rates(middle, thrust, moment, taut, push, torque, drag, vehicle))
 
 
 @kernel
-def stay(state: State, actuation: Actuation, constants: ActuationConstants) -> Ahead:
+def predict_on_ground(state: State, actuation: Actuation, constants: ActuationConstants) -> Prediction:
     """A vehicle that the ground holds stays as it is, whatever its rotors do."""
     thrust, moment = after_delay(actuation, constants)
-    return Ahead(state, thrust, moment)
+    return Prediction(state, thrust, moment)
 
 
 @kernel
@@ -141,30 +141,41 @@ def predict(
     torque: Vec3,
     drag: Drag,
     vehicle: Vehicle,
-) -> Ahead:
+) -> Prediction:
     """The state after the delay of `constants`, under the commands on their way, a steady `push` (N) and
     a steady `torque` (N m, body).
 
     With taut = 0.0 only the vehicle is predicted; load and cable stay as they are.
     """
-    if not (constants.late > 0.0 or constants.whole > 0):
-        return Ahead(state, actuation.thrust, actuation.moment)
+    if not (constants.remainder > 0.0 or constants.whole_periods > 0):
+        return Prediction(state, actuation.thrust, actuation.moment)
     x, v = state.x_quad, state.v_quad
     if taut > 0.0:
         x, v = state.x_load, state.v_load
     m = _Motion(x, v, state.q_cable, state.q_cable_dot, quat_from_rotation(state.R), state.omega_body)
     thrust, moment = actuation.thrust, actuation.moment
-    if constants.late > 0.0:
-        row = constants.whole
-        m = _glide(
-            m, actuation, row, constants.kept_half_late, constants.late, taut, push, torque, drag, vehicle
+    if constants.remainder > 0.0:
+        row = constants.whole_periods
+        m = _midpoint_step(
+            m,
+            actuation,
+            row,
+            constants.decay_half_remainder,
+            constants.remainder,
+            taut,
+            push,
+            torque,
+            drag,
+            vehicle,
         )
-        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept_late)
-    for i in range(constants.whole):
-        row = constants.whole - 1 - i
-        at = Actuation(actuation.queue, thrust, moment)
-        m = _glide(m, at, row, constants.kept_half, period, taut, push, torque, drag, vehicle)
-        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.decay_remainder)
+    for i in range(constants.whole_periods):
+        row = constants.whole_periods - 1 - i
+        rotors = Actuation(actuation.queue, thrust, moment)
+        m = _midpoint_step(
+            m, rotors, row, constants.decay_half_period, period, taut, push, torque, drag, vehicle
+        )
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.decay_period)
     x_load, v_load, x_quad, v_quad = state.x_load, state.v_load, m.x, m.v
     q, q_dot = state.q_cable, state.q_cable_dot
     if taut > 0.0:
@@ -173,7 +184,7 @@ def predict(
         # the distance between the cable's ends in the estimate is kept
         x_quad = add(state.x_quad, sub(sub(m.x, state.x_load), scale(L, sub(m.q, state.q_cable))))
         v_quad = add(state.v_quad, sub(sub(m.v, state.v_load), scale(L, sub(m.q_dot, state.q_cable_dot))))
-    ahead = State(
+    predicted_state = State(
         x_load,
         v_load,
         q,
@@ -184,4 +195,4 @@ def predict(
         m.omega,
         state.a_quad,
     )
-    return Ahead(ahead, thrust, moment)
+    return Prediction(predicted_state, thrust, moment)

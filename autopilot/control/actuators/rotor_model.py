@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 
-LONGEST_DELAY = 0.3  # s
-GREATEST_RATE = 1000.0  # Hz
-ROWS = round(LONGEST_DELAY * GREATEST_RATE) + 2
+MAX_DELAY = 0.3  # s
+MAX_RATE_HZ = 1000.0  # Hz
+ROWS = round(MAX_DELAY * MAX_RATE_HZ) + 2
 
 Queue = NDArray[np.float64]
 
@@ -36,14 +36,14 @@ Queue = NDArray[np.float64]
 class ActuationConstants(NamedTuple):
     """Delay and lag for one control period."""
 
-    whole: int  # n, whole periods in the delay
-    late: float  # c, s
+    whole_periods: int  # n, whole periods in the delay
+    remainder: float  # c, s
     lag: float  # tau, s
-    kept_late: float  # share of the difference left after c: exp(-c / tau)
-    kept_rest: float  # after T - c
-    kept: float  # after T
-    kept_half_late: float  # after c / 2
-    kept_half: float  # after T / 2
+    decay_remainder: float  # share of the difference left after c: exp(-c / tau)
+    decay_rest: float  # after T - c
+    decay_period: float  # after T
+    decay_half_remainder: float  # after c / 2
+    decay_half_period: float  # after T / 2
 
 
 class Actuation(NamedTuple):
@@ -57,35 +57,35 @@ class Actuation(NamedTuple):
 def actuation_constants(delay: float, lag: float, period: float) -> ActuationConstants:
     """Constants for a transport delay and a first-order lag of the rotors, all in seconds."""
     # a delay that is a whole number of periods except for rounding counts as that number
-    whole = floor(delay / period + 1e-9)
-    late = max(0.0, delay - whole * period)
+    whole_periods = floor(delay / period + 1e-9)
+    remainder = max(0.0, delay - whole_periods * period)
 
-    def kept(duration: float) -> float:
+    def decay(duration: float) -> float:
         return exp(-duration / lag) if lag > 0.0 else (0.0 if duration > 0.0 else 1.0)
 
     return ActuationConstants(
-        whole,
-        late,
+        whole_periods,
+        remainder,
         lag,
-        kept(late),
-        kept(period - late),
-        kept(period),
-        kept(0.5 * late),
-        kept(0.5 * period),
+        decay(remainder),
+        decay(period - remainder),
+        decay(period),
+        decay(0.5 * remainder),
+        decay(0.5 * period),
     )
 
 
-def rows_of(constants: ActuationConstants) -> int:
+def queue_rows(constants: ActuationConstants) -> int:
     """Number of commands that must be stored for this delay."""
-    return constants.whole + 2
+    return constants.whole_periods + 2
 
 
-def resting(rows: int = ROWS) -> Actuation:
+def stopped_actuation(rows: int = ROWS) -> Actuation:
     """Rotors that stand still, and no command on its way."""
     return Actuation(np.zeros((rows, 4)), 0.0, ZERO)
 
 
-def steady(thrust: float, rows: int = ROWS) -> Actuation:
+def steady_actuation(thrust: float, rows: int = ROWS) -> Actuation:
     """Rotors that have been commanded this thrust (N) for a long time."""
     queue = np.zeros((rows, 4))
     queue[:, 0] = thrust
@@ -93,14 +93,14 @@ def steady(thrust: float, rows: int = ROWS) -> Actuation:
 
 
 @kernel
-def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> tuple[float, Vec3]:
-    """Thrust and moment of the rotors when the share `kept` of the difference to command `row` is left."""
+def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, decay: float) -> tuple[float, Vec3]:
+    """Thrust and moment of the rotors when the share `decay` of the difference to command `row` is left."""
     f, x = float(queue[row, 0]), float(queue[row, 1])
     y, z = float(queue[row, 2]), float(queue[row, 3])
-    return f + kept * (thrust - f), (
-        x + kept * (moment[0] - x),
-        y + kept * (moment[1] - y),
-        z + kept * (moment[2] - z),
+    return f + decay * (thrust - f), (
+        x + decay * (moment[0] - x),
+        y + decay * (moment[1] - y),
+        z + decay * (moment[2] - z),
     )
 
 
@@ -108,11 +108,13 @@ def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> 
 def after_delay(actuation: Actuation, constants: ActuationConstants) -> tuple[float, Vec3]:
     """What the rotors will give when the command of this tick takes effect: thrust N, moment N m."""
     thrust, moment = actuation.thrust, actuation.moment
-    if constants.late > 0.0:
-        thrust, moment = lagged(thrust, moment, actuation.queue, constants.whole, constants.kept_late)
-    for i in range(constants.whole):
-        row = constants.whole - 1 - i
-        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
+    if constants.remainder > 0.0:
+        thrust, moment = lagged(
+            thrust, moment, actuation.queue, constants.whole_periods, constants.decay_remainder
+        )
+    for i in range(constants.whole_periods):
+        row = constants.whole_periods - 1 - i
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.decay_period)
     return thrust, moment
 
 
@@ -128,9 +130,13 @@ def advance(actuation: Actuation, thrust: float, moment: Vec3, constants: Actuat
     queue[0, 1] = moment[0]
     queue[0, 2] = moment[1]
     queue[0, 3] = moment[2]
-    now, turning = actuation.thrust, actuation.moment
+    thrust_now, moment_now = actuation.thrust, actuation.moment
     # now that the queue contains the command of this tick, u_{k-n-1} is row n + 1
-    if constants.late > 0.0:
-        now, turning = lagged(now, turning, queue, constants.whole + 1, constants.kept_late)
-    now, turning = lagged(now, turning, queue, constants.whole, constants.kept_rest)
-    return Actuation(queue, now, turning)
+    if constants.remainder > 0.0:
+        thrust_now, moment_now = lagged(
+            thrust_now, moment_now, queue, constants.whole_periods + 1, constants.decay_remainder
+        )
+    thrust_now, moment_now = lagged(
+        thrust_now, moment_now, queue, constants.whole_periods, constants.decay_rest
+    )
+    return Actuation(queue, thrust_now, moment_now)

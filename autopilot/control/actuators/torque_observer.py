@@ -4,9 +4,9 @@ that is attached elsewhere than assumed, rotors that are not alike.
 | symbol | code name | frame | unit | equation |
 |---|---|---|---|---|
 | J, Omega, M | inertia, omega_body, moment | B | | Table 4-1, (2-34), `actuation` |
-| d | felt | B | N m | J Omega' + Omega x J Omega - M |
+| d | external_torque | B | N m | J Omega' + Omega x J Omega - M |
 | u | | B | m/s | R^T x_Q' |
-| s | swept | B | m/s | (u_y, -u_x, 0) |
+| s | cross_flow | B | m/s | (u_y, -u_x, 0) |
 | k | factor | | N s | k s is the part of d that follows s |
 | p | steady | B | N m | d - k s |
 
@@ -27,9 +27,9 @@ from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, axpy, c
 from autopilot.geometry.packed import with_field
 
 # of the moment that the rotors can exert: bound of the estimate
-GREATEST_TORQUE = 0.3
+MAX_TORQUE_SHARE = 0.3
 # k is learned from motion faster than this, m/s
-_SWEPT_SPEED = 0.2
+_FLOW_SPEED = 0.2
 
 
 class TorqueConstants(NamedTuple):
@@ -37,23 +37,23 @@ class TorqueConstants(NamedTuple):
 
     steady: float
     factor: float
-    greatest: Vec3  # N m, about each axis of the body
+    limit: Vec3  # N m, about each axis of the body
     period: float  # s
 
 
-class Torque(NamedTuple):
+class TorqueEstimate(NamedTuple):
     """The estimate of d."""
 
-    now: Vec3  # k s + p, N m
+    total: Vec3  # k s + p, N m
     steady: Vec3
-    mean_swept: Vec3  # m/s
-    mean_felt: Vec3  # N m
-    together: float  # of s and d, N m^2/s
-    alone: float  # of s, m^2/s^2
+    mean_cross_flow: Vec3  # m/s
+    mean_torque: Vec3  # N m
+    correlation: float  # of s and d, N m^2/s
+    square: float  # of s, m^2/s^2
     omega_body: Vec3  # rad/s, a period ago
 
 
-NO_TORQUE = Torque(ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ZERO)
+NO_TORQUE = TorqueEstimate(ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ZERO)
 
 
 def torque_constants(
@@ -61,48 +61,50 @@ def torque_constants(
 ) -> TorqueConstants:
     """With bounds from the vehicle's rotors; `period` in s. A steady share of 0 learns nothing."""
     force = vehicle.rotor_max - vehicle.rotor_min
-    level = GREATEST_TORQUE * 0.5 * vehicle.level * vehicle.arm * force
-    yaw = GREATEST_TORQUE * 0.5 * vehicle.lift * vehicle.torque_ratio * force
+    level = MAX_TORQUE_SHARE * 0.5 * vehicle.moment_per_force * vehicle.arm * force
+    yaw = MAX_TORQUE_SHARE * 0.5 * vehicle.thrust_per_force * vehicle.torque_ratio * force
     learned = factor_share if steady_share > 0.0 else 0.0
     return TorqueConstants(steady_share, learned, (level, level, yaw), period)
 
 
 @kernel
-def unheeded(torque: Torque, state: State) -> Torque:
+def without_compensation(torque: TorqueEstimate, state: State) -> TorqueEstimate:
     """The estimate a period later, while the load does not hang free: kept, but not compensated."""
-    return with_field(with_field(torque, "now", ZERO), "omega_body", state.omega_body)
+    return with_field(with_field(torque, "total", ZERO), "omega_body", state.omega_body)
 
 
 @kernel
-def _within(value: float, greatest: float) -> float:
-    return min(greatest, max(-greatest, value))
+def _clamped(value: float, limit: float) -> float:
+    return min(limit, max(-limit, value))
 
 
 @kernel
 def observe_torque(
-    torque: Torque, state: State, moment: Vec3, constants: TorqueConstants, vehicle: Vehicle
-) -> Torque:
+    torque: TorqueEstimate, state: State, moment: Vec3, constants: TorqueConstants, vehicle: Vehicle
+) -> TorqueEstimate:
     """The estimate a period later, while the load hangs free; `moment`, N m: of rotors and cable now."""
     J, W = vehicle.inertia, state.omega_body
     turning = scale(1.0 / constants.period, times(J, sub(W, torque.omega_body)))
-    felt = sub(add(turning, cross(W, times(J, W))), moment)
+    external_torque = sub(add(turning, cross(W, times(J, W))), moment)
     u = apply_transposed(state.R, state.v_quad)
-    swept: Vec3 = (u[1], -u[0], 0.0)
-    mean_swept = axpy(constants.factor, sub(swept, torque.mean_swept), torque.mean_swept)
-    mean_felt = axpy(constants.factor, sub(felt, torque.mean_felt), torque.mean_felt)
-    moving = sub(swept, mean_swept)
-    together = torque.together + constants.factor * (dot(moving, sub(felt, mean_felt)) - torque.together)
-    alone = torque.alone + constants.factor * (dot(moving, moving) - torque.alone)
-    factor = together / (alone + _SWEPT_SPEED * _SWEPT_SPEED)
-    rest = axpy(-factor, swept, felt)
-    steady = axpy(constants.steady, sub(rest, torque.steady), torque.steady)
-    now, greatest = axpy(factor, swept, steady), constants.greatest
-    return Torque(
-        (_within(now[0], greatest[0]), _within(now[1], greatest[1]), _within(now[2], greatest[2])),
-        (_within(steady[0], greatest[0]), _within(steady[1], greatest[1]), _within(steady[2], greatest[2])),
-        mean_swept,
-        mean_felt,
-        together,
-        alone,
+    cross_flow: Vec3 = (u[1], -u[0], 0.0)
+    mean_cross_flow = axpy(constants.factor, sub(cross_flow, torque.mean_cross_flow), torque.mean_cross_flow)
+    mean_torque = axpy(constants.factor, sub(external_torque, torque.mean_torque), torque.mean_torque)
+    deviation = sub(cross_flow, mean_cross_flow)
+    correlation = torque.correlation + constants.factor * (
+        dot(deviation, sub(external_torque, mean_torque)) - torque.correlation
+    )
+    square = torque.square + constants.factor * (dot(deviation, deviation) - torque.square)
+    factor = correlation / (square + _FLOW_SPEED * _FLOW_SPEED)
+    residual = axpy(-factor, cross_flow, external_torque)
+    steady = axpy(constants.steady, sub(residual, torque.steady), torque.steady)
+    total, limit = axpy(factor, cross_flow, steady), constants.limit
+    return TorqueEstimate(
+        (_clamped(total[0], limit[0]), _clamped(total[1], limit[1]), _clamped(total[2], limit[2])),
+        (_clamped(steady[0], limit[0]), _clamped(steady[1], limit[1]), _clamped(steady[2], limit[2])),
+        mean_cross_flow,
+        mean_torque,
+        correlation,
+        square,
         W,
     )

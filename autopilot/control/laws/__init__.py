@@ -16,19 +16,21 @@ from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.parameter_table import ParameterTable
 
 
-def _found() -> dict[int, Law]:
+def _load_laws() -> dict[int, Law]:
     modules = (import_module(f"{__name__}.{entry.name}") for entry in iter_modules(__path__))
     laws = [register(module.LAW) for module in modules if hasattr(module, "LAW")]
-    named = {law.number: law.name for law in law_files()}
+    declared_names = {law.number: law.name for law in law_files()}
     found = {law.number: law for law in laws}
-    if {number: law.name for number, law in found.items()} != named:
-        told = ", ".join(f"{law.name} {law.number}" for law in laws)
-        read = ", ".join(f"{name} {number}" for number, name in named.items())
-        raise ValueError(f'laws are {told}, their files say {read}; write LAW = Law(name="...", number=...,')
-    return {number: found[number] for number in named}
+    if {number: law.name for number, law in found.items()} != declared_names:
+        defined = ", ".join(f"{law.name} {law.number}" for law in laws)
+        declared = ", ".join(f"{name} {number}" for number, name in declared_names.items())
+        raise ValueError(
+            f'laws are {defined}, their files say {declared}; write LAW = Law(name="...", number=...,'
+        )
+    return {number: found[number] for number in declared_names}
 
 
-LAWS = _found()  # by the number of CTL_LAW
+LAWS = _load_laws()  # by the number of CTL_LAW
 register(OWN)
 
 

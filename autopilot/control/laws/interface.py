@@ -56,7 +56,7 @@ class Law:
     preview_s: Callable[[Any], float] = lambda constants: 0.0  # how much later than now its reference applies
     # time by which the load lags behind a reference that rises or sinks steadily
     ramp_lag_s: Callable[[Any], float] = lambda constants: 0.0
-    reels: bool = True  # it can fly with a cable length other than the one it was built for
+    supports_reeling: bool = True  # it can fly with a cable length other than the one it was built for
     follows_shaped: bool = False  # it follows a path accurately enough for shaping to be worthwhile
 
 
@@ -99,44 +99,44 @@ def memory_of(rows: Any) -> Any:
     return unpack(law_of(rows).memory, rows.memory, 0)
 
 
-def _known(kind: Any) -> Law | None:
+def _law_of_type(kind: Any) -> Law | None:
     return _BY_RECORD.get(getattr(kind, "instance_class", None))
 
 
 @overload(kernels_of, jit_options=INSIDE)
 def _kernels_of(record: Any) -> Any:
-    law = _known(record)
+    law = _law_of_type(record)
     if law is None:
         return None
     kernels = law.kernels
 
-    def known(record: Any) -> Any:
+    def constant_kernels(record: Any) -> Any:
         return kernels
 
-    return known
+    return constant_kernels
 
 
 @overload(constants_of, jit_options=INSIDE)
 def _constants_of(rows: Any) -> Any:
-    law = _known(rows)
+    law = _law_of_type(rows)
     if law is None:
         return None
     kind = law.constants
 
-    def taken(rows: Any) -> Any:
+    def unpacked(rows: Any) -> Any:
         return unpack(kind, rows.constants, 0)
 
-    return taken
+    return unpacked
 
 
 @overload(memory_of, jit_options=INSIDE)
 def _memory_of(rows: Any) -> Any:
-    law = _known(rows)
+    law = _law_of_type(rows)
     if law is None:
         return None
     kind = law.memory
 
-    def taken(rows: Any) -> Any:
+    def unpacked(rows: Any) -> Any:
         return unpack(kind, rows.memory, 0)
 
-    return taken
+    return unpacked

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control import lqr as regulator_of
-from autopilot.control.actuators.disturbance_observer import Observed
+from autopilot.control import lqr as lqr_regulator
+from autopilot.control.actuators.disturbance_observer import DisturbanceEstimate
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.laws import thesis
 from autopilot.control.laws.interface import Kernels, Law
@@ -25,7 +25,7 @@ from autopilot.wire.parameter_table import ParameterTable
 class LqrLaw(NamedTuple):
     """The regulator, and the law of the other modes."""
 
-    regulator: regulator_of.Lqr
+    regulator: lqr_regulator.Lqr
     other_modes: thesis.ThesisLaw
 
 
@@ -38,7 +38,7 @@ class LqrRows(NamedTuple):
 
 def build(table: ParameterTable, vehicle: Vehicle) -> LqrLaw:
     """Weights from the LQR_ parameters; the other modes from NGC_ and QP_."""
-    weights = regulator_of.LqrWeights(
+    weights = lqr_regulator.LqrWeights(
         position=table["LQR_Q_POS"],
         tilt=table["LQR_Q_TILT"],
         yaw=table["LQR_Q_YAW"],
@@ -47,7 +47,7 @@ def build(table: ParameterTable, vehicle: Vehicle) -> LqrLaw:
         thrust=table["LQR_R_THRUST"],
         moment=table["LQR_R_MOMENT"],
     )
-    return LqrLaw(regulator_of.lqr(vehicle, weights), thesis.build(table, vehicle))
+    return LqrLaw(lqr_regulator.lqr(vehicle, weights), thesis.build(table, vehicle))
 
 
 @kernel
@@ -63,11 +63,11 @@ def load_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """The vehicle is steered to a point one cable length above the load's reference."""
-    return memory, regulator_of.load_position(state, reference, law.regulator)
+    return memory, lqr_regulator.load_position(state, reference, law.regulator)
 
 
 @kernel
@@ -77,7 +77,7 @@ def quad_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """As the law `thesis`."""
@@ -93,7 +93,7 @@ def load_attitude(
     b1_d: Vec3,
     pull: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """As the law `thesis`."""
@@ -108,7 +108,7 @@ def quad_attitude(
     R_d: Mat3,
     thrust: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """As the law `thesis`."""
@@ -124,5 +124,5 @@ LAW = Law(
     build=build,
     kernels=Kernels(start, load_position, quad_position, load_attitude, quad_attitude),
     ramp_lag_s=lambda law: law.regulator.ramp_lag,
-    reels=False,
+    supports_reeling=False,
 )

@@ -10,7 +10,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control.actuators.disturbance_observer import Observed, lying, standing
+from autopilot.control.actuators.disturbance_observer import (
+    DisturbanceEstimate,
+    load_on_ground,
+    vehicle_on_ground,
+)
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.law_exchange import (
     FORCE,
@@ -22,8 +26,8 @@ from autopilot.control.law_exchange import (
     Held,
     Link,
     Now,
-    ask,
-    is_sound,
+    call_law,
+    is_valid,
 )
 from autopilot.control.laws import plumbline
 from autopilot.control.laws.interface import Kernels, Law
@@ -74,13 +78,13 @@ def start(law: OwnLaw, state: State, x_d: Vec3, v_d: Vec3) -> OwnMemory:
 
 
 @kernel
-def _staying(x: Vec3, b1_d: Vec3) -> Reference:
+def _reference_at_rest(x: Vec3, b1_d: Vec3) -> Reference:
     """A reference at rest."""
     return Reference((x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), b1_d, ZERO, ZERO)
 
 
 @kernel
-def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Observed) -> Believed:
+def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: DisturbanceEstimate) -> Believed:
     vehicle = law.vehicle
     return Believed(
         vehicle.quad_mass,
@@ -90,40 +94,45 @@ def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Observe
         observed.push,
         actuation.thrust,
         actuation.moment,
-        lying(observed, state),
-        standing(observed, vehicle),
+        load_on_ground(observed, state),
+        vehicle_on_ground(observed, vehicle),
     )
 
 
 @kernel
-def _asked(law: OwnLaw, function: int, now: Now) -> Asked:
+def _law_command(law: OwnLaw, function: int, now: Now) -> Asked:
     """The command of the function; if it is not a number, the alarm is raised."""
-    asked = ask(function, law.link.desk, now)
-    if not is_sound(asked):
-        call_at(law.link.alarm, law.link.desk)
-    return asked
+    law_command = call_law(function, law.link.row, now)
+    if not is_valid(law_command):
+        call_at(law.link.alarm, law.link.row)
+    return law_command
 
 
 @kernel
-def _obeyed(
-    law: OwnLaw, memory: OwnMemory, now: Now, asked: Asked, actuation: Actuation, observed: Observed
+def _rotor_command(
+    law: OwnLaw,
+    memory: OwnMemory,
+    now: Now,
+    law_command: Asked,
+    actuation: Actuation,
+    observed: DisturbanceEstimate,
 ) -> tuple[OwnMemory, Command]:
     """The rotor command that carries out what the custom law commands."""
     state, built_in = now.state, memory.built_in
-    thrust, moment = asked.thrust, asked.vector
-    if asked.kind in (WRENCH, RATES):
-        if asked.kind == RATES:
+    thrust, moment = law_command.thrust, law_command.vector
+    if law_command.kind in (WRENCH, RATES):
+        if law_command.kind == RATES:
             inertia, gains = law.vehicle.inertia, law.built_in.other_modes.gains
-            braking = times(gains.k_Omega, sub(asked.vector, state.omega_body))
-            moment = add(braking, cross(state.omega_body, times(inertia, state.omega_body)))
+            rate_feedback = times(gains.k_Omega, sub(law_command.vector, state.omega_body))
+            moment = add(rate_feedback, cross(state.omega_body, times(inertia, state.omega_body)))
         command = Command(
             thrust, moment, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, state.q_cable, state.R
         )
     else:
-        R_d = asked.attitude
-        if asked.kind == FORCE:
-            R_d = attitude_towards(asked.vector, now.reference.b1_d, state.R)
-            thrust = thrust_along(asked.vector, state.R)
+        R_d = law_command.attitude
+        if law_command.kind == FORCE:
+            R_d = attitude_towards(law_command.vector, now.reference.b1_d, state.R)
+            thrust = thrust_along(law_command.vector, state.R)
         built_in, command = plumbline.quad_attitude(
             law.built_in, built_in, state, R_d, thrust, actuation, observed, now.cable
         )
@@ -131,7 +140,7 @@ def _obeyed(
 
 
 @kernel
-def _tried(
+def _run_function(
     law: OwnLaw,
     function: int,
     memory: OwnMemory,
@@ -139,7 +148,7 @@ def _tried(
     reference: Reference,
     held: Held,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[bool, OwnMemory, Command]:
     """Whether the function's command is sound, and the memory and rotor command that follow from it."""
@@ -153,9 +162,9 @@ def _tried(
         cable,
         _believed(law, state, actuation, observed),
     )
-    asked = _asked(law, function, now)
-    after, command = _obeyed(law, memory, now, asked, actuation, observed)
-    return is_sound(asked), after, command
+    law_command = _law_command(law, function, now)
+    memory_after, command = _rotor_command(law, memory, now, law_command, actuation, observed)
+    return is_valid(law_command), memory_after, command
 
 
 @kernel
@@ -165,19 +174,19 @@ def load_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[OwnMemory, Command]:
     """The load follows a reference."""
     function, x_d, v_d = law.link.load_position, reference.jet[0], reference.jet[1]
     if function != 0:
         held = Held(state.q_cable, 0.0, state.R, 0.0)
-        sound, after, command = _tried(
+        valid, memory_after, command = _run_function(
             law, function, memory, state, reference, held, actuation, observed, cable
         )
-        if sound:
+        if valid:
             e_x, e_v = sub(state.x_load, x_d), sub(state.v_load, v_d)
-            return after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
+            return memory_after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
         memory = start(law, state, x_d, v_d)
     built_in, command = plumbline.load_position(
         law.built_in, memory.built_in, state, reference, actuation, observed, cable
@@ -192,19 +201,19 @@ def quad_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[OwnMemory, Command]:
     """The vehicle follows a reference, without a load."""
     function, x_d, v_d = law.link.quad_position, reference.jet[0], reference.jet[1]
     if function != 0:
         held = Held(state.q_cable, 0.0, state.R, 0.0)
-        sound, after, command = _tried(
+        valid, memory_after, command = _run_function(
             law, function, memory, state, reference, held, actuation, observed, cable
         )
-        if sound:
+        if valid:
             e_x, e_v = sub(state.x_quad, x_d), sub(state.v_quad, v_d)
-            return after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
+            return memory_after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
         memory = start(law, state, x_d, v_d)
     built_in, command = plumbline.quad_position(
         law.built_in, memory.built_in, state, reference, actuation, observed, cable
@@ -221,18 +230,26 @@ def load_attitude(
     b1_d: Vec3,
     pull: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[OwnMemory, Command]:
     """The cable's direction follows q_d under a given pull (N)."""
     function = law.link.load_attitude
     if function != 0:
         held = Held(q_d, pull, state.R, 0.0)
-        sound, after, command = _tried(
-            law, function, memory, state, _staying(state.x_load, b1_d), held, actuation, observed, cable
+        valid, memory_after, command = _run_function(
+            law,
+            function,
+            memory,
+            state,
+            _reference_at_rest(state.x_load, b1_d),
+            held,
+            actuation,
+            observed,
+            cable,
         )
-        if sound:
-            return after, command
+        if valid:
+            return memory_after, command
         memory = start(law, state, state.x_load, ZERO)
     built_in, command = plumbline.load_attitude(
         law.built_in, memory.built_in, state, q_d, b1_d, pull, actuation, observed, cable
@@ -248,18 +265,21 @@ def quad_attitude(
     R_d: Mat3,
     thrust: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[OwnMemory, Command]:
     """The vehicle's attitude follows R_d under a given thrust (N)."""
     function = law.link.quad_attitude
     if function != 0:
-        held, reference = Held(state.q_cable, 0.0, R_d, thrust), _staying(state.x_quad, column(R_d, 0))
-        sound, after, command = _tried(
+        held, reference = (
+            Held(state.q_cable, 0.0, R_d, thrust),
+            _reference_at_rest(state.x_quad, column(R_d, 0)),
+        )
+        valid, memory_after, command = _run_function(
             law, function, memory, state, reference, held, actuation, observed, cable
         )
-        if sound:
-            return after, command
+        if valid:
+            return memory_after, command
         memory = start(law, state, state.x_load, ZERO)
     built_in, command = plumbline.quad_attitude(
         law.built_in, memory.built_in, state, R_d, thrust, actuation, observed, cable

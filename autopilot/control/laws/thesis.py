@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from autopilot.control import quad_position as position_law
 from autopilot.control import thesis_cascade as cascade
-from autopilot.control.actuators.disturbance_observer import Observed
+from autopilot.control.actuators.disturbance_observer import DisturbanceEstimate
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.laws.interface import Kernels, Law
-from autopilot.control.records import Cable, Command, Reference, State, Vehicle, with_length
+from autopilot.control.records import Cable, Command, Reference, State, Vehicle, with_cable_length
 from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
@@ -64,10 +64,10 @@ def build(table: ParameterTable, vehicle: Vehicle) -> ThesisLaw:
 @kernel
 def with_cable(law: ThesisLaw, cable: Cable) -> ThesisLaw:
     """The law for the present cable; gains scaled so that the cable's loop keeps its bandwidth."""
-    longer = cable.length / law.vehicle.cable_length
-    gains = with_field(law.gains, "k_q", longer * law.gains.k_q)
-    gains = with_field(gains, "k_omega", longer * law.gains.k_omega)
-    return ThesisLaw(gains, law.filters, law.position_gains, with_length(law.vehicle, cable.length))
+    length_ratio = cable.length / law.vehicle.cable_length
+    gains = with_field(law.gains, "k_q", length_ratio * law.gains.k_q)
+    gains = with_field(gains, "k_omega", length_ratio * law.gains.k_omega)
+    return ThesisLaw(gains, law.filters, law.position_gains, with_cable_length(law.vehicle, cable.length))
 
 
 @kernel
@@ -85,12 +85,12 @@ def load_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """The load follows a reference; only its position is used."""
-    now = with_cable(law, cable)
-    return cascade.load_position(memory, state, reference, now.gains, now.filters, now.vehicle)
+    adapted = with_cable(law, cable)
+    return cascade.load_position(memory, state, reference, adapted.gains, adapted.filters, adapted.vehicle)
 
 
 @kernel
@@ -100,13 +100,21 @@ def quad_position(
     state: State,
     reference: Reference,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """The vehicle follows a reference, without a load."""
-    now = with_cable(law, cable)
+    adapted = with_cable(law, cable)
     return position_law.quad_position(
-        memory, state, reference, 0.0, ZERO, now.position_gains, now.gains, now.filters, now.vehicle
+        memory,
+        state,
+        reference,
+        0.0,
+        ZERO,
+        adapted.position_gains,
+        adapted.gains,
+        adapted.filters,
+        adapted.vehicle,
     )
 
 
@@ -119,12 +127,14 @@ def load_attitude(
     b1_d: Vec3,
     pull: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """The cable's direction follows q_d under a given pull (N)."""
-    now = with_cable(law, cable)
-    return cascade.load_attitude(memory, state, q_d, b1_d, pull, now.gains, now.filters, now.vehicle)
+    adapted = with_cable(law, cable)
+    return cascade.load_attitude(
+        memory, state, q_d, b1_d, pull, adapted.gains, adapted.filters, adapted.vehicle
+    )
 
 
 @kernel
@@ -135,12 +145,12 @@ def quad_attitude(
     R_d: Mat3,
     thrust: float,
     actuation: Actuation,
-    observed: Observed,
+    observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[ThesisMemory, Command]:
     """The vehicle's attitude follows R_d under a given thrust (N)."""
-    now = with_cable(law, cable)
-    return cascade.quad_attitude(memory, state, R_d, thrust, now.gains, now.filters, now.vehicle)
+    adapted = with_cable(law, cable)
+    return cascade.quad_attitude(memory, state, R_d, thrust, adapted.gains, adapted.filters, adapted.vehicle)
 
 
 LAW = Law(

@@ -12,7 +12,7 @@ estimated while nothing pulled.
 
 from __future__ import annotations
 
-from autopilot.control.drag import air_force
+from autopilot.control.drag import drag_force
 from autopilot.estimation.correction import enter_attitude, enter_direction, heard, inject, look_back
 from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
 from autopilot.estimation.records import (
@@ -52,7 +52,7 @@ def pulling(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Ve
     vehicle, push = state.vehicle, state.air.vehicle
     R = rotation_from_quat(vehicle.quat_wxyz)
     a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
-    known = axpy(thrust, column(R, 2), air_force(vehicle.v_quad, tuning.drag))
+    known = axpy(thrust, column(R, 2), drag_force(vehicle.v_quad, tuning.drag))
     return sub(scale(tuning.quad_mass, (a[0] - push[0], a[1] - push[1], a[2])), known)
 
 

@@ -34,7 +34,7 @@ from autopilot.services.requests import (
 )
 from autopilot.supervisor.requests.arming import arm, run_checks, terminate
 from autopilot.supervisor.requests.guided import follow_attitude, follow_rates, follow_setpoint, follow_stick
-from autopilot.supervisor.requests.heading import look_at, turn_nose
+from autopilot.supervisor.requests.heading import look_at, turn_heading
 from autopilot.supervisor.requests.mission import (
     continue_mission,
     replace_mission,
@@ -43,14 +43,14 @@ from autopilot.supervisor.requests.mission import (
 )
 from autopilot.supervisor.requests.modes import enable_fence, hold, land, return_home, set_home, set_mode
 from autopilot.supervisor.requests.orbit import orbit
-from autopilot.supervisor.requests.payload import grab, let_go, winch
+from autopilot.supervisor.requests.payload import grab, release_load, winch
 from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
 from autopilot.supervisor.requests.takeoff import takeoff
 from autopilot.supervisor.requests.verdicts import Decision, Handler
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, View
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import LookAt, TurnNose
+from missions.model import LookAt, TurnHeading
 
 
 def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
@@ -77,14 +77,14 @@ HANDLERS: dict[type, Handler] = {
     FollowAttitude: follow_attitude,
     FollowRates: follow_rates,
     FollowStick: follow_stick,
-    TurnNose: turn_nose,
+    TurnHeading: turn_heading,
     LookAt: look_at,
     Orbit: orbit,
     ChangeAltitude: change_altitude,
     SetHome: set_home,
     EnableFence: enable_fence,
     Winch: winch,
-    Release: let_go,
+    Release: release_load,
     Grab: grab,
     ChangeSpeed: change_speed,
     Terminate: terminate,

@@ -10,32 +10,45 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
-from autopilot.supervisor.motion import length_at, stop
-from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
+from autopilot.supervisor.motion import cable_length_at, stopping_legs
+from autopilot.supervisor.requests.limits import MIN_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, fenced, forbidden
+from autopilot.supervisor.state import (
+    ON_GROUND,
+    Flight,
+    MissionPlan,
+    View,
+    fence_violation,
+    is_fence_active,
+    load_position_below,
+)
 from autopilot.trajectory.timeline import (
     ANYWHERE,
-    LEAST_REEL_M,
+    MIN_REEL_M,
     MissionState,
     TimelineEntry,
-    cable_trouble,
+    cable_length_problem,
     timeline,
 )
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
-WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is checked, and their greatest number
+# spacing of the places at which a straight line is checked, and their greatest number
+CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
 
-Ahead = list[tuple[int, TimelineEntry]]  # each with its mission item
+RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
 
 
-def mission_trouble(flight: Flight, view: View, settings: Settings) -> str:
+def mission_problem(flight: Flight, view: View, settings: Settings) -> str:
     """Which remaining item must not be flown from here, and why; an empty string if there is none."""
-    ahead = steps_ahead(flight, view, settings)
-    return leaves_fence(flight, ahead, settings) or needs_load(ahead) or reels_too_far(ahead, settings)
+    ahead = remaining_timeline(flight, view, settings)
+    return (
+        fence_exit_problem(flight, ahead, settings)
+        or missing_load_problem(ahead)
+        or winch_problem(ahead, settings)
+    )
 
 
-def upload_trouble(
+def upload_problem(
     flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
 ) -> str:
     """Which item of an uploaded mission leads beyond the fence, and why; an empty string if none does.
@@ -46,10 +59,10 @@ def upload_trouble(
     if flight.phase in ON_GROUND:
         start = _on_ground(flight, view, settings)
     ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
-    return leaves_fence(flight, ahead, settings)
+    return fence_exit_problem(flight, ahead, settings)
 
 
-def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
+def remaining_timeline(flight: Flight, view: View, settings: Settings) -> RemainingSteps:
     """The remaining steps of the mission, flown from where the load is or comes to rest."""
     mission, cable = flight.mission, flight.cable
     steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
@@ -61,12 +74,12 @@ def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
         else:  # lifted although no step requests it
             steps, sequence = (lift, *steps), (sequence[0], *sequence)
     else:
-        here = stop(flight, view, settings)[1]
-        length = length_at(flight, here, settings)
+        here = stopping_legs(flight, view, settings)[1]
+        length = cable_length_at(flight, here, settings)
         if mission.step_anchor is not None and isinstance(steps[0], Signals | AttitudeRun):
             here = mission.step_anchor  # flown again from where it began
-        if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # resumed
-            steps = (replace(steps[0], length_m=cable.reel_to_m - length), *steps[1:])
+        if cable.reel_target_m is not None and isinstance(steps[0], Winch):  # resumed
+            steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
@@ -84,51 +97,51 @@ def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
     """
     released = flight.cable.released
     here = view.x_quad if released else view.x_load
-    start = ANYWHERE if view.complaints else MissionState(here)
+    start = ANYWHERE if view.estimate_problems else MissionState(here)
     return replace(start, cable_m=settings.cable_length_m, released=released)
 
 
-def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
+def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which item leads beyond the fence, and why; an empty string if none does.
 
     This checks the straight ways to take-off height, to waypoints and home, and the places at which signals
     and the winch leave the load; signals and curves between waypoints are watched in flight.
     """
-    if not fenced(flight, settings):
+    if not is_fence_active(flight, settings):
         return ""
     for seq, entry in ahead:
-        why = _why_forbidden(flight, entry, settings)
-        if why:
-            return f"item {seq} leads {why}"
+        reason = _violation_of_step(flight, entry, settings)
+        if reason:
+            return f"item {seq} leads {reason}"
     return ""
 
 
-def _why_forbidden(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
+def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
     begin, end, cable = entry.before.expected, entry.after.expected, entry.after.cable_m
     if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | Signals | Winch):
         return ""
     if cable is not None:
         settings = replace(settings, cable_length_m=cable)
 
-    def why(place: Vec3) -> str:
-        load = below(place, settings) if entry.after.released else place
-        return forbidden(flight.area.fence, load, settings)
+    def violation(place: Vec3) -> str:
+        load = load_position_below(place, settings) if entry.after.released else place
+        return fence_violation(flight.area.fence, load, settings)
 
     straight = not isinstance(entry.step, Signals | Winch)
     # a way that begins beyond the fence leads back: only its end counts
-    if begin is None or not straight or why(begin):
-        return why(end)
-    return next(filter(None, map(why, _along(begin, end))), "")
+    if begin is None or not straight or violation(begin):
+        return violation(end)
+    return next(filter(None, map(violation, _points_along(begin, end))), "")
 
 
-def _along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
-    """Places on a straight way, at most WAY_M apart, up to its end."""
-    way = sub(end, begin)
-    pieces = min(max(1, math.ceil(norm(way) / WAY_M)), MOST_PIECES)
-    return (axpy((k + 1) / pieces, way, begin) for k in range(pieces))
+def _points_along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
+    """Places on a straight line, at most CHECK_SPACING_M apart, up to its end."""
+    displacement = sub(end, begin)
+    pieces = min(max(1, math.ceil(norm(displacement) / CHECK_SPACING_M)), MAX_CHECK_POINTS)
+    return (axpy((k + 1) / pieces, displacement, begin) for k in range(pieces))
 
 
-def needs_load(ahead: Ahead) -> str:
+def missing_load_problem(ahead: RemainingSteps) -> str:
     """Which item requires a load that is released by then, and why; an empty string if none does."""
     for seq, entry in ahead:
         if entry.before.released and isinstance(entry.step, Signals | AttitudeRun):
@@ -136,31 +149,31 @@ def needs_load(ahead: Ahead) -> str:
     return ""
 
 
-def reels_too_far(ahead: Ahead, settings: Settings) -> str:
+def winch_problem(ahead: RemainingSteps, settings: Settings) -> str:
     """Which item demands too much of the winch, and why; an empty string if none does."""
     for seq, entry in ahead:
-        step, left = entry.step, entry.after
+        step, after = entry.step, entry.after
         if not isinstance(step, Winch):
             continue
         if not settings.winch.usable:
             return f"item {seq}: the law lqr flies one length of the cable"
-        if left.released:
+        if after.released:
             return f"item {seq} needs the load, which is released"
         if step.speed_m_s is not None and step.speed_m_s > settings.winch.speed_m_s:
             return f"item {seq}: {step.speed_m_s:g} m/s exceeds WNC_SPEED {settings.winch.speed_m_s:g}"
-        assert left.cable_m is not None, "a flight knows its cable"
-        height = math.inf if left.position is None else left.position[2]
-        beyond = reel_trouble(left.cable_m, height, settings)
-        if beyond:
-            return f"item {seq}: {beyond}"
+        assert after.cable_m is not None, "a flight knows its cable"
+        height = math.inf if after.position is None else after.position[2]
+        problem = reel_problem(after.cable_m, height, settings)
+        if problem:
+            return f"item {seq}: {problem}"
     return ""
 
 
-def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
-    """Why the cable may not become `wanted` m long with the load at `height`; an empty string if it may."""
-    beyond = cable_trouble(wanted, settings.winch.shortest_m, settings.winch.longest_m)
-    if beyond:
-        return beyond
-    if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
-        return f"load height {height:.2f} m, min {LEAST_ALTITUDE_M} m"
+def reel_problem(target_m: float, height: float, settings: Settings) -> str:
+    """Why the cable may not become `target_m` m long with the load at `height`; an empty string if it may."""
+    problem = cable_length_problem(target_m, settings.winch.min_length_m, settings.winch.max_length_m)
+    if problem:
+        return problem
+    if height < MIN_ALTITUDE_M - MIN_REEL_M:
+        return f"load height {height:.2f} m, min {MIN_ALTITUDE_M} m"
     return ""

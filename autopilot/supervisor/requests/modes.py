@@ -9,32 +9,32 @@ from typing import Any
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import EnableFence, SetHome, SetMode, Takeoff
-from autopilot.supervisor.machine import happen
+from autopilot.supervisor.machine import try_transition
 from autopilot.supervisor.requests.guided import offboard, position_control
-from autopilot.supervisor.requests.limits import FARTHEST_M
+from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.mission import continue_mission
 from autopilot.supervisor.requests.takeoff import takeoff
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, Handler, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     ON_GROUND,
+    ActionWhenArmed,
     Event,
     Flight,
-    Guide,
     Phase,
-    Selected,
+    SetpointSource,
     View,
-    off_mission,
+    interrupt_mission,
 )
 
-LEVEL_HOME_M = 1.0
+MAX_HOME_HEIGHT_M = 1.0
 
 
 def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Stop and hold; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
-        return replace(off_mission(flight), selected=Selected.NOTHING), ACCEPTED
-    after = happen(off_mission(flight), Event.HOLD, view, settings)
+        return replace(interrupt_mission(flight), action_when_armed=ActionWhenArmed.NOTHING), ACCEPTED
+    after = try_transition(interrupt_mission(flight), Event.HOLD, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
 
 
@@ -42,32 +42,32 @@ def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
     """Set the load down where it is, and the vehicle beside it; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
         return hold(flight, request, view, settings)
-    here = replace(flight, returning=False)
+    not_returning = replace(flight, returning=False)
     if flight.phase in (Phase.LOWER, Phase.SET_DOWN):
-        return here, ACCEPTED
-    after = happen(off_mission(here), Event.LAND, view, settings)
+        return not_returning, ACCEPTED
+    after = try_transition(interrupt_mission(not_returning), Event.LAND, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Landing"))
 
 
 def return_home(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Fly to home or a nearer rally point, and land."""
-    after = happen(off_mission(flight), Event.RETURN, view, settings)
+    after = try_transition(interrupt_mission(flight), Event.RETURN, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Return"))
 
 
 def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -> Decision:
     """Set the place to which a return leads: this one, or the requested one."""
     place = view.x_quad if request.position is None else request.position
-    if not math.hypot(place[0], place[1]) <= FARTHEST_M:
-        return flight, denied(f"Home denied: more than {FARTHEST_M:g} m from the origin")
-    if request.position is not None and not abs(place[2]) <= LEVEL_HOME_M:
+    if not math.hypot(place[0], place[1]) <= MAX_DISTANCE_M:
+        return flight, denied(f"Home denied: more than {MAX_DISTANCE_M:g} m from the origin")
+    if request.position is not None and not abs(place[2]) <= MAX_HOME_HEIGHT_M:
         return flight, denied("Home denied: its height must be that of the ground here, which is flat")
     return replace(flight, area=replace(flight.area, home=(place[0], place[1], 0.0))), ACCEPTED
 
 
 def enable_fence(flight: Flight, request: EnableFence, view: View, settings: Settings) -> Decision:
     """Enable or disable the fence; a previous breach is forgotten."""
-    area = replace(flight.area, guarded=request.on, breach="")
+    area = replace(flight.area, fence_enabled=request.on, breach="")
     return replace(flight, area=area), Verdict(ACCEPTED.result, f"Fence {'on' if request.on else 'off'}")
 
 
@@ -94,16 +94,25 @@ def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -
     handler = MODES.get((main, sub_mode))
     if handler is None:
         return flight, denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
-    heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
-    if settings.setpoints.guided_mode and handler is hold and heeds and _in_guided_mode(flight):
+    accepts_setpoints = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
+    if (
+        settings.setpoints.ardupilot_guided
+        and handler is hold
+        and accepts_setpoints
+        and _in_guided_mode(flight)
+    ):
         return flight, ACCEPTED
     after, verdict = handler(flight, request, view, settings)
-    return (replace(after, heeds=heeds) if verdict.result == ACCEPTED.result else after), verdict
+    return (
+        replace(after, accepts_setpoints=accepts_setpoints) if verdict.result == ACCEPTED.result else after
+    ), verdict
 
 
 def _in_guided_mode(flight: Flight) -> bool:
     """Whether the present flight is part of ArduPilot's GUIDED: take-off, transfer to a place, setpoints."""
     if flight.mission.active:
         return False
-    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)
-    return rising or (flight.phase == Phase.GUIDED and flight.setpoints.guide != Guide.MANUAL)
+    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (
+        flight.phase == Phase.HOLD and flight.accepts_setpoints
+    )
+    return rising or (flight.phase == Phase.GUIDED and flight.setpoints.source != SetpointSource.MANUAL)

@@ -8,25 +8,25 @@ from dataclasses import replace
 from autopilot.geometry.linear import Vec3, add, sub
 from autopilot.guidance.setpoint_follower import NEVER_US, Circle
 from autopilot.services.requests import Orbit
-from autopilot.supervisor.motion import asked_motion
-from autopilot.supervisor.requests.guided import begin_guided
-from autopilot.supervisor.requests.limits import FARTHEST_M, LEAST_ALTITUDE_M
+from autopilot.supervisor.motion import commanded_motion
+from autopilot.supervisor.requests.guided import start_guided
+from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MIN_ALTITUDE_M
 from autopilot.supervisor.requests.verdicts import Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Guide, View, beyond_fence
+from autopilot.supervisor.state import CARRYING, Flight, SetpointSource, View, fence_problem
 
-LEAST_RADIUS_M = 0.2
-LEAST_SPEED_M_S = 0.05
+MIN_RADIUS_M = 0.2
+MIN_CIRCLE_SPEED_M_S = 0.05
 RAMP_SHARE = 4.0  # a circle begins with a quarter of MIS_ACCEL along it
 CIRCLE_POINTS = 72
-LONGEST_CIRCLE_S = 1e9
+MAX_CIRCLE_S = 1e9
 
 
 def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Decision:
     """Fly a circle with the load."""
     if flight.phase not in CARRYING:
         return flight, wrong_phase(flight, "Orbit")
-    here = asked_motion(flight, view, settings)[0]
+    here = commanded_motion(flight, view, settings)[0]
     centre: Vec3 = (
         here[0] if request.east_m is None else request.east_m,
         here[1] if request.north_m is None else request.north_m,
@@ -34,37 +34,41 @@ def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Dec
     )
     radius = abs(request.radius_m)
     speed = flight.mission.speed_m_s if request.speed_m_s is None else request.speed_m_s
-    why = _complaint(flight, centre, radius, speed, settings)
-    if why:
-        return flight, denied(f"Orbit denied: {why}")
-    out = sub(here, centre)
-    phase = math.atan2(out[1], out[0]) if math.hypot(out[0], out[1]) > 0.0 else 0.0
+    reason = _circle_problem(flight, centre, radius, speed, settings)
+    if reason:
+        return flight, denied(f"Orbit denied: {reason}")
+    from_centre = sub(here, centre)
+    phase = (
+        math.atan2(from_centre[1], from_centre[0])
+        if math.hypot(from_centre[0], from_centre[1]) > 0.0
+        else 0.0
+    )
     rate, ramp_s = -speed / request.radius_m, RAMP_SHARE * abs(speed) / settings.motion.accel_m_s2
     ends_us = NEVER_US
     if request.turns is not None:
-        turning_s = min(2.0 * math.pi * request.turns / abs(rate) + 0.5 * ramp_s, LONGEST_CIRCLE_S)
+        turning_s = min(2.0 * math.pi * request.turns / abs(rate) + 0.5 * ramp_s, MAX_CIRCLE_S)
         ends_us = view.now_us + round(1e6 * turning_s)
     circle = Circle(centre, radius, rate, phase, view.now_us, ramp_s, ends_us)
     circling = replace(flight, setpoints=replace(flight.setpoints, circle=circle))
-    return begin_guided(circling, Guide.ORBIT, "Orbit", view, settings)
+    return start_guided(circling, SetpointSource.ORBIT, "Orbit", view, settings)
 
 
-def _complaint(flight: Flight, centre: Vec3, radius: float, speed: float, settings: Settings) -> str:
+def _circle_problem(flight: Flight, centre: Vec3, radius: float, speed: float, settings: Settings) -> str:
     """Why a circle cannot be flown, or an empty string."""
-    if not (math.isfinite(speed) and LEAST_RADIUS_M <= radius <= FARTHEST_M):
-        return f"radius {radius:g} m, min {LEAST_RADIUS_M} m"
-    if not all(abs(value) <= FARTHEST_M for value in centre) or centre[2] < LEAST_ALTITUDE_M:
-        return f"load height {centre[2]:.2f} m, min {LEAST_ALTITUDE_M} m"
-    if not LEAST_SPEED_M_S <= abs(speed) <= settings.setpoints.fastest_m_s:
-        limits = f"{LEAST_SPEED_M_S:g} ... {settings.setpoints.fastest_m_s:g} m/s"
+    if not (math.isfinite(speed) and MIN_RADIUS_M <= radius <= MAX_DISTANCE_M):
+        return f"radius {radius:g} m, min {MIN_RADIUS_M} m"
+    if not all(abs(value) <= MAX_DISTANCE_M for value in centre) or centre[2] < MIN_ALTITUDE_M:
+        return f"load height {centre[2]:.2f} m, min {MIN_ALTITUDE_M} m"
+    if not MIN_CIRCLE_SPEED_M_S <= abs(speed) <= settings.setpoints.max_speed_m_s:
+        limits = f"{MIN_CIRCLE_SPEED_M_S:g} ... {settings.setpoints.max_speed_m_s:g} m/s"
         return f"{speed:.2f} m/s; must be {limits}"
-    inward = speed * speed / radius
-    if inward > settings.motion.accel_m_s2:
-        return f"{inward:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.motion.accel_m_s2:g}"
+    centripetal = speed * speed / radius
+    if centripetal > settings.motion.accel_m_s2:
+        return f"{centripetal:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.motion.accel_m_s2:g}"
     for k in range(CIRCLE_POINTS):
-        at = 2.0 * math.pi * k / CIRCLE_POINTS
-        there = add(centre, (radius * math.cos(at), radius * math.sin(at), 0.0))
-        beyond = beyond_fence(flight, there, settings)
-        if beyond:
-            return beyond
+        angle = 2.0 * math.pi * k / CIRCLE_POINTS
+        there = add(centre, (radius * math.cos(angle), radius * math.sin(angle), 0.0))
+        problem = fence_problem(flight, there, settings)
+        if problem:
+            return problem
     return ""

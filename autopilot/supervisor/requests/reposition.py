@@ -9,13 +9,13 @@ from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.heading import Towards, nearest
 from autopilot.guidance.legs import Hold, carry_leg
 from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
-from autopilot.supervisor.heading import pointed
-from autopilot.supervisor.motion import as_flown
-from autopilot.supervisor.requests.limits import FARTHEST_M, FASTEST_M_S, LEAST_ALTITUDE_M, SLOWEST_M_S
+from autopilot.supervisor.heading import with_aim
+from autopilot.supervisor.motion import with_control_modes
+from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MAX_SPEED_M_S, MIN_ALTITUDE_M, MIN_SPEED_M_S
 from autopilot.supervisor.requests.modes import hold
-from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, temporarily_denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Phase, View, beyond_fence
+from autopilot.supervisor.state import CARRYING, Flight, Phase, View, fence_problem
 from autopilot.wire.dialect import plumbline as mavlink
 
 
@@ -24,44 +24,44 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     if flight.phase not in CARRYING:
         return flight, wrong_phase(flight, "Reposition")
     if flight.phase != Phase.HOLD and not request.change_mode:
-        return flight, later("Reposition denied: not holding")
+        return flight, temporarily_denied("Reposition denied: not holding")
     speed = flight.mission.speed_m_s if request.speed_m_s is None else request.speed_m_s
-    if not SLOWEST_M_S <= speed <= FASTEST_M_S:
+    if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
         return flight, denied(
-            f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S:g} ... {FASTEST_M_S:g}"
+            f"Reposition denied: {speed:.2f} m/s; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
         )
     held, verdict = hold(flight, request, view, settings)
-    asked = (request.east_m, request.north_m, request.altitude_m)
+    requested = (request.east_m, request.north_m, request.altitude_m)
     if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
         return held, verdict
-    resting = held.legs[-1]
-    if not isinstance(resting, Hold) and asked != (None, None, None):
-        return flight, later("Reposition denied while the load swings: hold first")
+    hold_leg = held.legs[-1]
+    if not isinstance(hold_leg, Hold) and requested != (None, None, None):
+        return flight, temporarily_denied("Reposition denied while the load swings: hold first")
     if request.heading_rad is not None:
-        held = pointed(held, Towards(nearest(request.heading_rad, held.heading)), view)
-    if asked == (None, None, None):
+        held = with_aim(held, Towards(nearest(request.heading_rad, held.heading)), view)
+    if requested == (None, None, None):
         return held, verdict
-    assert isinstance(resting, Hold)
-    here = resting.position
+    assert isinstance(hold_leg, Hold)
+    here = hold_leg.position
     there: Vec3 = (
-        here[0] if asked[0] is None else asked[0],
-        here[1] if asked[1] is None else asked[1],
-        here[2] if asked[2] is None else asked[2],
+        here[0] if requested[0] is None else requested[0],
+        here[1] if requested[1] is None else requested[1],
+        here[2] if requested[2] is None else requested[2],
     )
     if not all(map(math.isfinite, there)):
         return flight, denied("Reposition denied: not a place")
-    if max(map(abs, there)) > FARTHEST_M:
-        return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m from home")
-    if there[2] < LEAST_ALTITUDE_M:
-        return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, min {LEAST_ALTITUDE_M} m")
-    beyond = beyond_fence(flight, there, settings)
-    if beyond:
-        return flight, denied(f"Reposition denied: {beyond}")
+    if max(map(abs, there)) > MAX_DISTANCE_M:
+        return flight, denied(f"Reposition denied: more than {MAX_DISTANCE_M:g} m from home")
+    if there[2] < MIN_ALTITUDE_M:
+        return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, min {MIN_ALTITUDE_M} m")
+    problem = fence_problem(flight, there, settings)
+    if problem:
+        return flight, denied(f"Reposition denied: {problem}")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
-    go = carry_leg(here, there, speed, settings.motion.accel_m_s2, settings.least_move_s)
-    legs = as_flown(held, (*held.legs[:-1], go, Hold(there)))
-    return replace(held, legs=legs, heeds=True), ACCEPTED
+    go = carry_leg(here, there, speed, settings.motion.accel_m_s2, settings.min_move_s)
+    legs = with_control_modes(held, (*held.legs[:-1], go, Hold(there)))
+    return replace(held, legs=legs, accepts_setpoints=True), ACCEPTED
 
 
 def change_altitude(flight: Flight, request: ChangeAltitude, view: View, settings: Settings) -> Decision:
@@ -71,8 +71,8 @@ def change_altitude(flight: Flight, request: ChangeAltitude, view: View, setting
 
 def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
     """Fly transfers at another speed from now on."""
-    if not SLOWEST_M_S <= request.speed_m_s <= FASTEST_M_S:
+    if not MIN_SPEED_M_S <= request.speed_m_s <= MAX_SPEED_M_S:
         return flight, denied(
-            f"Speed {request.speed_m_s:.2f} m/s denied; must be {SLOWEST_M_S:g} ... {FASTEST_M_S:g}"
+            f"Speed {request.speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
         )
     return replace(flight, mission=replace(flight.mission, speed_m_s=request.speed_m_s)), ACCEPTED

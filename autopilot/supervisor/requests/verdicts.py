@@ -12,7 +12,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 Decision = tuple[Flight, Verdict]  # the flight after the request
-_MEANWHILE = {
+_PHASE_TEXTS = {
     Phase.DISARMED: "disarmed",
     Phase.ARMED: "on the ground",
     Phase.TAUTEN: "the cable is tautened",
@@ -33,11 +33,11 @@ def denied(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_DENIED, text)
 
 
-def later(text: str) -> Verdict:
+def temporarily_denied(text: str) -> Verdict:
     """The request is refused for now."""
     return Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text)
 
 
-def wrong_phase(flight: Flight, what: str) -> Verdict:
+def wrong_phase(flight: Flight, request_name: str) -> Verdict:
     """The request is refused because it cannot be carried out in the present phase."""
-    return later(f"{what} denied while {_MEANWHILE[flight.phase]}")
+    return temporarily_denied(f"{request_name} denied while {_PHASE_TEXTS[flight.phase]}")

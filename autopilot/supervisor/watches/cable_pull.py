@@ -7,11 +7,12 @@ from math import isfinite
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import View
 
-SLACK, PULLED = 0.1, 0.3  # weights of the load: less than the first is no pull, more than the second is one
+# weights of the load: less than the first is no pull, more than the second is one
+SLACK_PULL_SHARE, TAUT_PULL_SHARE = 0.1, 0.3
 PULL_US = 100_000  # time for which a cable must pull to count as taut
 
 
-def share_pulled(view: View, settings: Settings) -> float:
+def cable_pull_share(view: View, settings: Settings) -> float:
     """Pull of the cable in weights of the load; without an accelerometer, one if it is taut by its length."""
     if isfinite(view.pull_n):
         return view.pull_n / settings.load_weight_n

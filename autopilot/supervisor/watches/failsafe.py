@@ -17,38 +17,40 @@ from autopilot.supervisor.state import (
     Event,
     Flight,
     View,
-    off_mission,
+    interrupt_mission,
     setpoint,
 )
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
 
 
-def watch_failsafe(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_failsafe(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Give the flight up when it cannot continue."""
-    why = trouble(flight, view, settings) if flight.phase in IN_AIR else ""
-    return given_up(flight, why) if why else Watched(flight)
+    why = failure_reason(flight, view, settings) if flight.phase in IN_AIR else ""
+    return give_up_flight(flight, why) if why else WatchResult(flight)
 
 
-def watch_blind(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_missing_readings(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Land when readings that the flight requires are missing, whatever is being flown."""
-    aloft = flight.phase in IN_AIR and flight.phase not in LANDING
-    if not view.complaints or not aloft or isinstance(flight.legs[0], Steady):
-        return Watched(flight)
-    text = f"Failsafe: {view.complaints[0]}, landing"
-    return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
+    in_air = flight.phase in IN_AIR and flight.phase not in LANDING
+    if not view.estimate_problems or not in_air or isinstance(flight.legs[0], Steady):
+        return WatchResult(flight)
+    text = f"Failsafe: {view.estimate_problems[0]}, landing"
+    return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
 
 
-def given_up(flight: Flight, why: str) -> Watched:
+def give_up_flight(flight: Flight, why: str) -> WatchResult:
     """The end of a flight, with its reason."""
-    return Watched(off_mission(flight), Event.FAIL, ((MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),))
+    return WatchResult(
+        interrupt_mission(flight), Event.FAIL, ((MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),)
+    )
 
 
-def trouble(flight: Flight, view: View, settings: Settings) -> str:
+def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
     """Why the flight cannot continue, or an empty string."""
     limits = settings.failsafe
-    if view.lost and not (flight.legs and isinstance(flight.legs[0], Steady)):
-        return view.lost
+    if view.estimate_loss and not (flight.legs and isinstance(flight.legs[0], Steady)):
+        return view.estimate_loss
     if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
         return "the estimate is not a number"
     if view.tilt_rad > limits.tilt_limit_rad:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import axpy, sub
 from autopilot.guidance.legs import Catch, Steady
-from autopilot.supervisor.motion import asked_motion, stop, swings
+from autopilot.supervisor.motion import commanded_motion, stopping_legs, tracks_attitude
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CARRYING,
@@ -14,54 +14,62 @@ from autopilot.supervisor.state import (
     Event,
     Flight,
     View,
-    below,
-    fenced,
-    forbidden,
-    off_mission,
+    fence_violation,
+    interrupt_mission,
+    is_fence_active,
+    load_position_below,
 )
 from autopilot.supervisor.table import TRANSITIONS
-from autopilot.supervisor.watches.failsafe import given_up
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.watches.failsafe import give_up_flight
+from autopilot.supervisor.watches.watch_result import WatchResult
 
 NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
 FENCE_EVENTS = {2: Event.HOLD, 3: Event.RETURN, 5: Event.LAND}
 STOP_MARGIN = 0.05  # share by which the stopping distance is extended: while the load speeds up, it grows
 
 
-def limited(flight: Flight, settings: Settings) -> bool:
+def has_fence(flight: Flight, settings: Settings) -> bool:
     """Whether there is a fence, in force or not: zones that were uploaded, or limits by parameters."""
     limits = settings.fence
     return bool(flight.area.fence.zones) or limits.radius_m > 0.0 or limits.height_m > 0.0
 
 
-def watch_fence(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """React as GF_ACTION requires when the fence is breached, or the load can no longer stop before it."""
     limits, area = settings.fence, flight.area
-    if flight.phase not in CARRYING or not fenced(flight, settings) or not limited(flight, settings):
-        return Watched(flight)
+    if (
+        flight.phase not in CARRYING
+        or not is_fence_active(flight, settings)
+        or not has_fence(flight, settings)
+    ):
+        return WatchResult(flight)
     if isinstance(flight.legs[0], Catch | Steady):
-        return Watched(flight)
+        return WatchResult(flight)
     why = _breach(flight, view, settings)
     if bool(why) == bool(area.breach):
-        return Watched(flight)
+        return WatchResult(flight)
     if not why:
-        return Watched(replace(flight, area=replace(area, breach="")))
-    noted = replace(area, breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
-    flight = replace(flight, area=noted)
+        return WatchResult(replace(flight, area=replace(area, breach="")))
+    breached = replace(area, breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
+    flight = replace(flight, area=breached)
     if limits.action == TERMINATE:
-        return given_up(flight, f"fence: {why}")
+        return give_up_flight(flight, f"fence: {why}")
     event, texts = FENCE_EVENTS.get(limits.action), ((WARNING, f"Fence: {why}"),)
     if event is None or (flight.phase, event) not in TRANSITIONS:
-        return Watched(flight, None, texts)
-    return Watched(off_mission(flight), event, texts)
+        return WatchResult(flight, None, texts)
+    return WatchResult(interrupt_mission(flight), event, texts)
 
 
 def _breach(flight: Flight, view: View, settings: Settings) -> str:
     """Why the fence is breached, or is about to be; an empty string if it is not."""
-    over = below(view.x_quad, settings)
-    places = [over] if flight.cable.released else [view.x_load, over]
-    if not swings(flight.legs[0]):
-        here, end = asked_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
-        ahead = [here, axpy(STOP_MARGIN, sub(end, here), end)]
-        places += [below(place, settings) for place in ahead] if flight.cable.released else ahead
-    return next(filter(None, (forbidden(flight.area.fence, place, settings) for place in places)), "")
+    load_below = load_position_below(view.x_quad, settings)
+    places = [load_below] if flight.cable.released else [view.x_load, load_below]
+    if not tracks_attitude(flight.legs[0]):
+        here, end = commanded_motion(flight, view, settings)[0], stopping_legs(flight, view, settings)[1]
+        stop_places = [here, axpy(STOP_MARGIN, sub(end, here), end)]
+        places += (
+            [load_position_below(place, settings) for place in stop_places]
+            if flight.cable.released
+            else stop_places
+        )
+    return next(filter(None, (fence_violation(flight.area.fence, place, settings) for place in places)), "")

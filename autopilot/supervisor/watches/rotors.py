@@ -5,27 +5,29 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, LANDING, Event, Flight, Phase, View, off_mission
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.state import IN_AIR, LANDING, Event, Flight, Phase, View, interrupt_mission
+from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
 
 
-def watch_rotors(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_rotors(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Note the rotors that are lost, and land; while disarmed nothing is known about the rotors."""
     if flight.phase == Phase.DISARMED:
-        return Watched(flight)
+        return WatchResult(flight)
     lost = flight.rotors_lost | view.rotors_lost
     if lost == flight.rotors_lost:
-        return Watched(flight)
+        return WatchResult(flight)
     flight = replace(flight, rotors_lost=lost)
     numbers = [str(i + 1) for i in range(lost.bit_length()) if lost >> i & 1]
-    named = f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
+    rotor_names = f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
     if not settings.rotors.can_fly_without(lost):
-        text = f"Failsafe: {named} lost, the others cannot fly it"
-        return Watched(flight, None, ((MAV_SEVERITY_EMERGENCY, text),))
-    told = named + " lost"
+        text = f"Failsafe: {rotor_names} lost, the others cannot fly it"
+        return WatchResult(flight, None, ((MAV_SEVERITY_EMERGENCY, text),))
+    loss_text = rotor_names + " lost"
     if not settings.rotors.can_hold_heading_without(lost):
-        told += ", heading given up"
+        loss_text += ", heading given up"
     if flight.phase not in IN_AIR or flight.phase in LANDING:
-        return Watched(flight, None, ((MAV_SEVERITY_ERROR, f"Failsafe: {told}"),))
-    return Watched(off_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, f"Failsafe: {told}, landing"),))
+        return WatchResult(flight, None, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}"),))
+    return WatchResult(
+        interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}, landing"),)
+    )

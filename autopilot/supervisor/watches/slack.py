@@ -17,42 +17,44 @@ from autopilot.supervisor.state import (
     Flight,
     Phase,
     View,
-    off_mission,
+    interrupt_mission,
 )
-from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK, share_pulled
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, cable_pull_share
+from autopilot.supervisor.watches.watch_result import WatchResult
 
 LIFT_OFF_US = 1_000_000  # time after which a load that is being lifted is off the ground
-LYING_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
-LEAST_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
+ON_GROUND_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
+MIN_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
 SLACK_US = 20_000  # time for which this must be the case
 
 
-def watch_slack(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Catch a load that falls freely; begin the phase again when it hangs on the cable."""
     if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], Steady):
-        return Watched(flight)
+        return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
-    fallen = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < LYING_SPEED
-    if isinstance(flight.legs[0], Catch) and fallen:
-        flight = replace(off_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
-        return Watched(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
+    on_ground = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
+    if isinstance(flight.legs[0], Catch) and on_ground:
+        flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
+        return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
     if flight.cable.slack_since_us < 0:
-        return Watched(flight)
+        return WatchResult(flight)
     lasted_us = view.now_us - flight.cable.slack_since_us
     if not isinstance(flight.legs[0], Catch):
         if lasted_us < SLACK_US:
-            return Watched(flight)
+            return WatchResult(flight)
         cable = replace(flight.cable, slack_since_us=-1)
         catch = Catch(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
         flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
-        return Watched(flight, None, ((WARNING, "Cable slack: falling with the load to catch it"),))
-    if lasted_us < PULL_US and not (lasted_us >= SLACK_US and share_pulled(view, settings) > SLACK):
-        return Watched(flight)
-    return _caught(flight)
+        return WatchResult(flight, None, ((WARNING, "Cable slack: falling with the load to catch it"),))
+    if lasted_us < PULL_US and not (
+        lasted_us >= SLACK_US and cable_pull_share(view, settings) > SLACK_PULL_SHARE
+    ):
+        return WatchResult(flight)
+    return _after_catch(flight)
 
 
-def _caught(flight: Flight) -> Watched:
+def _after_catch(flight: Flight) -> WatchResult:
     """The load hangs on the cable again; a mission step that slackens the cable twice is not continued."""
     mission = flight.mission
     again = mission.active and flight.cable.slack_step == mission.step
@@ -60,8 +62,8 @@ def _caught(flight: Flight) -> Watched:
     flight = replace(flight, legs=(), cable=cable)
     if again:
         text = "Cable slack again in this mission item: holding"
-        return Watched(off_mission(flight), Event.HOLD, ((CRITICAL, text),))
-    return Watched(flight, Event.CAUGHT, ((INFO, "Load caught"),))
+        return WatchResult(interrupt_mission(flight), Event.HOLD, ((CRITICAL, text),))
+    return WatchResult(flight, Event.CAUGHT, ((INFO, "Load caught"),))
 
 
 def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -72,13 +74,13 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
     only if the pull confirms it.
     """
     if isinstance(flight.legs[0], Catch):
-        noted = view.taut
+        in_condition = view.taut
     else:
         gap = flight.cable.taut_length_m - norm(sub(view.x_quad, view.x_load))
-        loose = not view.taut or (gap > LEAST_GAP and share_pulled(view, settings) < SLACK)
+        is_slack = not view.taut or (gap > MIN_GAP and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
         lifting = flight.phase == Phase.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
         on_ground = lifting or (flight.phase == Phase.LOWER and isinstance(flight.legs[0], Creep))
-        noted = loose and not on_ground
-    if noted == (flight.cable.slack_since_us >= 0):
+        in_condition = is_slack and not on_ground
+    if in_condition == (flight.cable.slack_since_us >= 0):
         return flight
-    return replace(flight, cable=replace(flight.cable, slack_since_us=view.now_us if noted else -1))
+    return replace(flight, cable=replace(flight.cable, slack_since_us=view.now_us if in_condition else -1))

@@ -15,40 +15,44 @@ from autopilot.supervisor.state import (
     Flight,
     Phase,
     View,
+    interrupt_mission,
     leg_time_s,
-    off_mission,
 )
-from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, share_pulled
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
+from autopilot.supervisor.watches.watch_result import WatchResult
 
-ASTRAY = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
-LIFTING = "Cable taut, lifting the load"
-LIFTING_UNSEEN = "Cable taut, lifting the load; no load sensor"
-LONG_AFTER = 2.0  # factor of the time in which the vehicle would rise from the ground to TAUT_LATEST
-TAUT_LATEST = 1.3  # cable lengths over the load at which the cable must have come taut
+MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
+LIFTING_TEXT = "Cable taut, lifting the load"
+LIFTING_UNOBSERVED_TEXT = "Cable taut, lifting the load; no load sensor"
+LATE_FACTOR = 2.0  # factor of the time in which the vehicle would rise from the ground to MAX_TAUT_HEIGHT
+MAX_TAUT_HEIGHT = 1.3  # cable lengths over the load at which the cable must have come taut
 
 
-def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Lift when the cable pulls; land if it never does although the vehicle rises."""
     if flight.phase != Phase.TAUTEN or len(flight.legs) != 1:
-        return Watched(flight)
+        return WatchResult(flight)
     flight = _note_pull(flight, view, settings)
-    if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
+    if flight.condition_since_us >= 0 and view.now_us - flight.condition_since_us >= PULL_US:
         length = norm(sub(view.x_quad, view.x_load))
         flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
-        return Watched(flight, Event.TAUT, ((INFO, LIFTING_UNSEEN if view.unseen else LIFTING),))
+        return WatchResult(
+            flight, Event.TAUT, ((INFO, LIFTING_UNOBSERVED_TEXT if view.load_unobserved else LIFTING_TEXT),)
+        )
     at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
     over = (view.x_load[0], view.x_load[1], at[2])
-    if not norm(sub(over, at)) <= ASTRAY:  # for example because the load was not seen well from the ground
-        if _hangs(flight, view, settings):
+    if (
+        not norm(sub(over, at)) <= MAX_LOAD_OFFSET
+    ):  # for example because the load was not seen well from the ground
+        if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
-            return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
-        return Watched(_moved(flight, view, at, over))
-    if flight.still_since_us < 0 and at[2] > _taut_by(flight, view, settings):
+            return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
+        return WatchResult(_moved_over_load(flight, view, at, over))
+    if flight.condition_since_us < 0 and at[2] > _max_taut_height(flight, view, settings):
         text = "Cable never taut, landing; check VEH_CABLE_LEN"
-        return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
-    return Watched(flight)
+        return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
+    return WatchResult(flight)
 
 
 def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -57,21 +61,21 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     The estimate counts the cable as taut a little before it is: if lifting began then, the cable would come
     taut in the middle of the lift.
     """
-    pulls = share_pulled(view, settings) > PULLED and view.taut
-    if pulls == (flight.still_since_us >= 0):
+    pulls = cable_pull_share(view, settings) > TAUT_PULL_SHARE and view.taut
+    if pulls == (flight.condition_since_us >= 0):
         return flight
-    return replace(flight, still_since_us=view.now_us if pulls else -1)
+    return replace(flight, condition_since_us=view.now_us if pulls else -1)
 
 
-def _hangs(flight: Flight, view: View, settings: Settings) -> bool:
+def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:
     """Whether the load is beside the vehicle because it swings on a cable that is shorter than assumed: the
     cable pulls, long after it should have come taut, and is not as long as a taut cable would be."""
-    latest_s = LONG_AFTER * TAUT_LATEST * settings.cable_length_m / settings.motion.taut_speed_m_s
+    latest_s = LATE_FACTOR * MAX_TAUT_HEIGHT * settings.cable_length_m / settings.motion.taut_speed_m_s
     late = view.now_us - flight.phase_start_us > latest_s * 1e6
-    return late and not view.taut and share_pulled(view, settings) > PULLED
+    return late and not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
 
 
-def _moved(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
+def _moved_over_load(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
     """The flight whose rising vehicle is moved from `at` to `over`, above the load."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
@@ -82,9 +86,9 @@ def _moved(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
     return replace(flight, legs=legs, leg_start_us=view.now_us)
 
 
-def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
+def _max_taut_height(flight: Flight, view: View, settings: Settings) -> float:
     """Height over home (m) at which the rising vehicle must have pulled the cable taut."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
-    unsure = HEIGHT_SIGMAS * view.height_std
-    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m + unsure
+    height_margin = HEIGHT_SIGMAS * view.height_std
+    return creep.begin[2] + (MAX_TAUT_HEIGHT - CLEARANCE) * settings.cable_length_m + height_margin

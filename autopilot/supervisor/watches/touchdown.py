@@ -8,27 +8,28 @@ from autopilot.guidance.legs import LOAD_POSITION, Creep
 from autopilot.supervisor.phase_legs import TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_time_s
-from autopilot.supervisor.watches.cable_pull import SLACK, share_pulled
-from autopilot.supervisor.watches.watched import Watched
+from autopilot.supervisor.watches.cable_pull import SLACK_PULL_SHARE, cable_pull_share
+from autopilot.supervisor.watches.watch_result import WatchResult
 
-LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below a load or vehicle that stopped
-STANDS = 2.0  # m, ten seconds of sinking: then only the ground can hold the vehicle up, however it trembles
+LOAD_DEPTH, VEHICLE_DEPTH = 0.05, 0.15  # m by which the setpoint must be below a load or vehicle that stopped
+# m, ten seconds of sinking: then only the ground can hold the vehicle up, however it trembles
+ON_GROUND_DEPTH = 2.0
 STILL_SPEED, STILL_US = 0.05, 200_000
 
 
-def watch_touchdown(flight: Flight, view: View, settings: Settings) -> Watched:
+def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Set the vehicle down when the load lies on the ground; disarm when the vehicle stands."""
     if flight.phase not in (Phase.LOWER, Phase.SET_DOWN):
-        return Watched(flight)
-    flight = _note_stop(flight, view, settings)
-    if flight.still_since_us < 0 or view.now_us - flight.still_since_us < STILL_US:
-        return Watched(flight)
+        return WatchResult(flight)
+    flight = _note_touchdown(flight, view, settings)
+    if flight.condition_since_us < 0 or view.now_us - flight.condition_since_us < STILL_US:
+        return WatchResult(flight)
     if flight.phase == Phase.LOWER and not flight.cable.released:
-        return Watched(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
+        return WatchResult(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
     return _landed(flight)
 
 
-def _landed(flight: Flight) -> Watched:
+def _landed(flight: Flight) -> WatchResult:
     """The vehicle stands on the ground: a mission in progress has reached its landing item."""
     mission = flight.mission
     reached: tuple[int, ...] = ()
@@ -36,10 +37,10 @@ def _landed(flight: Flight) -> Watched:
         reached = (mission.plan.sequence[mission.step],)
         mission = replace(mission, done=mission.step + 1 >= len(mission.plan.steps))
     text = (INFO, "Landed, disarmed")
-    return Watched(replace(flight, mission=mission), Event.VEHICLE_DOWN, (text,), reached)
+    return WatchResult(replace(flight, mission=mission), Event.VEHICLE_DOWN, (text,), reached)
 
 
-def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
+def _note_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the load or vehicle that is set down no longer follows its sinking setpoint.
 
     A load that still sinks lags behind the setpoint by the distance that it sinks in the lag of the law.
@@ -51,12 +52,16 @@ def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
     if isinstance(leg, Creep):
         target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
         if leg.control_mode == LOAD_POSITION:
-            down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
+            down = view.x_load[2] - target > LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED
             # while readings are missing, the pull shows that the load is down
-            down = down or (bool(view.complaints) and share_pulled(view, settings) < SLACK)
+            down = down or (
+                bool(view.estimate_problems) and cable_pull_share(view, settings) < SLACK_PULL_SHARE
+            )
         else:
-            sunk = view.x_quad[2] - target
-            down = sunk > VEHICLE_SUNK and (sunk > STANDS or abs(view.v_quad[2]) < STILL_SPEED)
+            depth = view.x_quad[2] - target
+            down = depth > VEHICLE_DEPTH and (depth > ON_GROUND_DEPTH or abs(view.v_quad[2]) < STILL_SPEED)
         if down:
-            return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
-    return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
+            return (
+                flight if flight.condition_since_us >= 0 else replace(flight, condition_since_us=view.now_us)
+            )
+    return flight if flight.condition_since_us < 0 else replace(flight, condition_since_us=-1)

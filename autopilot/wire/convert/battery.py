@@ -58,9 +58,9 @@ def battery_status_message(reading: BatteryReading) -> Any:
 
 def read_battery_status(m: Any) -> BatteryReading:
     """Inverse of `battery_status_message`; also reads a message that contains the cells singly."""
-    told = [entry for entry in m.voltages if entry != _UINT16]
+    known_mv = [entry for entry in m.voltages if entry != _UINT16]
     return BatteryReading(
-        sum(told) * 1e-3 if told else nan,
+        sum(known_mv) * 1e-3 if known_mv else nan,
         m.current_battery * 0.01 if m.current_battery >= 0 else nan,
         float(m.current_consumed) if m.current_consumed >= 0 else nan,
         m.battery_remaining * 0.01 if m.battery_remaining >= 0 else nan,

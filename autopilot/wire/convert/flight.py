@@ -14,7 +14,7 @@ from autopilot.geometry.linear import Vec3
 from autopilot.wire.codec import Fields, layout_of
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.scaling import uint16
-from autopilot.wire.convert.simulator import Forces, padded
+from autopilot.wire.convert.simulator import Forces, padded_forces
 from autopilot.wire.dialect import plumbline as mavlink
 
 _LOAD_STATE = layout_of(mavlink.MAVLink_load_state_message)
@@ -54,7 +54,7 @@ def load_state_values(
     slack_events: int,
 ) -> tuple[float, ...]:
     """LOAD_STATE, see `LoadState`: the numbers in the order of the wire."""
-    pulls = 1 if taut else 0
+    taut_flag = 1 if taut else 0
     return (
         time_us,
         *ned_from_enu(x_load),
@@ -64,7 +64,7 @@ def load_state_values(
         distance,
         tension,
         uint16(slack_events),
-        pulls,
+        taut_flag,
         source,
     )
 
@@ -76,8 +76,8 @@ def load_state_message(*record: Any) -> Fields:
 
 def filter_state_message(time_us: int, x_load: Vec3, v_load: Vec3, x_quad: Vec3) -> Fields:
     """FILTER_STATE: the estimate of the built-in filter while a custom estimator flies."""
-    places = (*ned_from_enu(x_load), *ned_from_enu(v_load), *ned_from_enu(x_quad))
-    return _FILTER_STATE, (time_us, *places)
+    positions = (*ned_from_enu(x_load), *ned_from_enu(v_load), *ned_from_enu(x_quad))
+    return _FILTER_STATE, (time_us, *positions)
 
 
 def read_load_state(m: Any) -> LoadState:
@@ -109,8 +109,8 @@ class LoadSetpoint(NamedTuple):
     q_cable_c: Vec3  # commanded direction of the cable
     elapsed: float  # s since the item or phase began
     duration: float  # s, NaN if open
-    asked_position: Vec3  # what the mission specifies; `position` is as near to it as can be flown
-    asked_velocity: Vec3
+    requested_position: Vec3  # what the mission specifies; `position` is as near to it as can be flown
+    requested_velocity: Vec3
 
 
 @register_jitable
@@ -125,8 +125,8 @@ def load_setpoint_values(
     q_cable_c: Vec3,
     elapsed: float,
     duration: float,
-    asked_position: Vec3,
-    asked_velocity: Vec3,
+    requested_position: Vec3,
+    requested_velocity: Vec3,
 ) -> tuple[float, ...]:
     """LOAD_SETPOINT, see `LoadSetpoint`: the numbers in the order of the wire."""
     return (
@@ -140,8 +140,8 @@ def load_setpoint_values(
         uint16(seq),
         phase,
         control_mode,
-        *ned_from_enu(asked_position),
-        *ned_from_enu(asked_velocity),
+        *ned_from_enu(requested_position),
+        *ned_from_enu(requested_velocity),
     )
 
 
@@ -281,10 +281,20 @@ def rotor_state_values(
     rotors: int = 4,
 ) -> tuple[float, ...]:
     """ROTOR_STATE, see `RotorState`: the numbers in the order of the wire."""
-    first, more = saturated & 255, saturated >> 8
+    first_saturated, more_saturated = saturated & 255, saturated >> 8
     # zero for a quadrotor, as when there were only quadrotors, so that their logs do not change
     count = 0 if rotors == 4 else rotors
-    return (time_us, *forces[:4], force_min, force_max, first, source, *forces[4:], more, count)
+    return (
+        time_us,
+        *forces[:4],
+        force_min,
+        force_max,
+        first_saturated,
+        source,
+        *forces[4:],
+        more_saturated,
+        count,
+    )
 
 
 def rotor_state_message(*record: Any) -> Fields:
@@ -294,6 +304,6 @@ def rotor_state_message(*record: Any) -> Fields:
 
 def read_rotor_state(m: Any) -> RotorState:
     """Inverse of `rotor_state_message`."""
-    forces = padded((*m.force, *m.more_force))
+    forces = padded_forces((*m.force, *m.more_force))
     saturated = m.saturated | m.more_saturated << 8
     return RotorState(m.time_usec, m.source, forces, m.force_min, m.force_max, saturated, m.rotors or 4)

@@ -1,9 +1,9 @@
 """The simulator link: HIL_SENSOR, ODOMETRY, LOAD_SENSOR, HIL_GPS down, HIL_ACTUATOR_CONTROLS up.
 
 Both ends are machine code: `x_values` returns the numbers of a message in the order of the wire, arrays
-spread out, which `autopilot.wire.compiled` writes; `x_in`, or `read_x` where nothing can be missing, reads
-the records of that module as well as pymavlink's objects. In `x_values` and `x_in` a vector that was not
-measured is NaN.
+spread out, which `autopilot.wire.compiled` writes; `x_record`, or `read_x` where nothing can be missing,
+reads the records of that module as well as pymavlink's objects. In `x_values` and `x_record` a vector that
+was not measured is NaN.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ def _message(message_type: Any, values: tuple[float, ...]) -> Any:
     return message_type(*(fields[place] for place in message_type.orders))
 
 
-def padded(forces: Sequence[float]) -> Forces:
+def padded_forces(forces: Sequence[float]) -> Forces:
     """The forces of a vehicle, with zeros for the rotors that it does not have."""
     f = (*forces, *NO_FORCES[len(forces) :])
     return (f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], f[12], f[13])
 
 
 @register_jitable
-def forces_in(row: Row, at: int) -> Forces:
+def forces_from_row(row: Row, at: int) -> Forces:
     """Fourteen numbers of a row."""
     return (
         row[at],
@@ -194,7 +194,7 @@ def odometry_values(
     reset_counter: int = 0,
 ) -> tuple[float, ...]:
     """ODOMETRY, see `Odometry`. Position and velocity in MAV_FRAME_LOCAL_NED."""
-    stated = velocity_std * velocity_std if velocity[0] == velocity[0] else math.nan
+    velocity_variance = velocity_std * velocity_std if velocity[0] == velocity[0] else math.nan
     return (
         time_us,
         *ned_from_enu(position),
@@ -202,7 +202,7 @@ def odometry_values(
         *ned_from_enu(velocity),
         *frd_from_flu(omega_body),
         *_covariance(position_std * position_std, attitude_std * attitude_std),
-        *_covariance(stated, math.nan),
+        *_covariance(velocity_variance, math.nan),
         mavlink.MAV_FRAME_LOCAL_NED,
         mavlink.MAV_FRAME_LOCAL_NED,
         reset_counter,
@@ -225,7 +225,7 @@ def odometry_message(
 
 
 @register_jitable
-def odometry_in(m: Any) -> Any:
+def odometry_record(m: Any) -> Any:
     """The record of an ODOMETRY; vectors that were not measured are NaN."""
     q = m.q
     return Odometry(
@@ -243,7 +243,7 @@ def odometry_in(m: Any) -> Any:
 
 def read_odometry(m: Any) -> Odometry:
     """Inverse of `odometry_message`."""
-    read: Odometry = odometry_in(m)
+    read: Odometry = odometry_record(m)
     return read._replace(velocity=_or_none(read.velocity), omega_body=_or_none(read.omega_body))
 
 
@@ -306,7 +306,7 @@ def load_sensor_message(
 
 
 @register_jitable
-def load_sensor_in(m: Any) -> Any:
+def load_sensor_record(m: Any) -> Any:
     """The record of a LOAD_SENSOR; vectors that were not measured are NaN."""
     return LoadSensor(
         m.time_usec,
@@ -322,7 +322,7 @@ def load_sensor_in(m: Any) -> Any:
 
 def read_load_sensor(m: Any) -> LoadSensor:
     """Inverse of `load_sensor_message`."""
-    read: LoadSensor = load_sensor_in(m)
+    read: LoadSensor = load_sensor_record(m)
     return read._replace(
         position=_or_none(read.position),
         velocity=_or_none(read.velocity),
@@ -547,21 +547,21 @@ def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
 
 
 @register_jitable
-def speed_rpm(force: float, greatest: float) -> float:
-    """Speed (rpm) of a rotor that gives this force and can give `greatest` (N; the nominal one if unlimited),
-    as a speed controller reports it: a whole number, negative for backwards. The force grows with the square
-    of the speed."""
-    full = greatest if 0.0 < greatest < math.inf else ROTOR_FMAX
-    speed = np.rint(math.sqrt(abs(force) / full) * FULL_SPEED_RPM)
+def rotor_speed_rpm(force: float, max_force: float) -> float:
+    """Speed (rpm) of a rotor that gives this force and can give `max_force` (N; the nominal one if
+    unlimited), as a speed controller reports it: a whole number, negative for backwards. The force grows with
+    the square of the speed."""
+    full_force = max_force if 0.0 < max_force < math.inf else ROTOR_FMAX
+    speed = np.rint(math.sqrt(abs(force) / full_force) * FULL_SPEED_RPM)
     return if_above(force, 0.0, speed, -speed)
 
 
 @register_jitable
-def force_at(rpm: float, greatest: float) -> float:
-    """Inverse of `speed_rpm`, N."""
-    full = greatest if 0.0 < greatest < math.inf else ROTOR_FMAX
+def force_at(rpm: float, max_force: float) -> float:
+    """Inverse of `rotor_speed_rpm`, N."""
+    full_force = max_force if 0.0 < max_force < math.inf else ROTOR_FMAX
     share = rpm / FULL_SPEED_RPM
-    return full * share * abs(share)
+    return full_force * share * abs(share)
 
 
 @register_jitable

@@ -35,7 +35,7 @@ _EXTENSIONS = {
 _STAMP = "# Generated with pymavlink "
 
 
-def extended(text: str) -> str:
+def add_extensions(text: str) -> str:
     """common.xml with the extension fields that it lacks."""
     for message, fields in _EXTENSIONS.items():
         found = re.search(rf'<message id="\d+" name="{message}">.*?</message>', text, re.DOTALL)
@@ -49,14 +49,14 @@ def extended(text: str) -> str:
     return text
 
 
-def generated() -> bytes:
+def generate_module() -> bytes:
     """The module that the installed pymavlink makes of plumbline.xml."""
     definitions = Path(str(files("pymavlink") / "dialects" / "v20"))
     with tempfile.TemporaryDirectory() as folder:
         for source in (MISSING, *(definitions / name for name in _INCLUDED)):
             shutil.copy(source, folder)
         common = Path(folder) / "common.xml"
-        common.write_text(extended(common.read_text(encoding="utf-8")), encoding="utf-8")
+        common.write_text(add_extensions(common.read_text(encoding="utf-8")), encoding="utf-8")
         include = "<include>{}</include>".format
         both = include("common.xml") + include(MISSING.name)
         text = DIALECT.read_text(encoding="utf-8").replace(include("common.xml"), both)
@@ -72,7 +72,7 @@ def generated() -> bytes:
         return f"{_STAMP}{version('pymavlink')}\n".encode() + output.read_bytes()
 
 
-def generated_with() -> str:
+def generator_version() -> str:
     """The version of pymavlink that made the module on disk; empty if the module does not state it."""
     with MODULE.open(encoding="utf-8") as module:
         first = module.readline().strip()
@@ -81,7 +81,7 @@ def generated_with() -> str:
 
 def main() -> None:
     """Replace plumbline.py."""
-    text = generated()
+    text = generate_module()
     MODULE.write_bytes(text)
     sys.stdout.write(f"{MODULE}: {len(text)} bytes, pymavlink {version('pymavlink')}\n")
 

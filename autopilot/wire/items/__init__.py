@@ -9,29 +9,29 @@ Positions are positions of the load. Items that turn the nose are not steps: the
 step after them. DO_JUMP is flown by flying its items again.
 """
 
-from autopilot.wire.items.command import Command, Fate
-from autopilot.wire.items.decode import decode_items, endless_from, located_steps, unflown
-from autopilot.wire.items.encode import encode_mission, encode_steps, step_of
-from autopilot.wire.items.nose import turn_nose
+from autopilot.wire.items.command import Command, Handling
+from autopilot.wire.items.decode import decode_items, endless_jump_target, located_steps, unflown_items
+from autopilot.wire.items.encode import encode_mission, encode_steps, step_index
+from autopilot.wire.items.heading import turn_heading
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
-from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
+from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, handling_of
 
 __all__ = [
     "COMMAND",
     "COMMANDS",
     "FLOWN_COMMANDS",
     "Command",
-    "Fate",
+    "Handling",
     "LocatedStep",
     "MissionItemError",
     "WireItem",
     "decode_items",
     "encode_mission",
     "encode_steps",
-    "endless_from",
-    "fate",
+    "endless_jump_target",
+    "handling_of",
     "located_steps",
-    "step_of",
-    "turn_nose",
-    "unflown",
+    "step_index",
+    "turn_heading",
+    "unflown_items",
 ]

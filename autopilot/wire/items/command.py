@@ -12,7 +12,7 @@ from autopilot.trajectory.timeline import MissionState
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.fields import Field
-from autopilot.wire.items.limits import HOME_ROW_M
+from autopilot.wire.items.limits import HOME_ITEM_RADIUS_M
 from autopilot.wire.items.records import (
     ABSOLUTE_FRAMES,
     FRAME_MISSION,
@@ -21,10 +21,10 @@ from autopilot.wire.items.records import (
     WireItem,
     wrong_frame,
 )
-from missions.model import NoseAim, Step
+from missions.model import HeadingCommand, Step
 
 
-class Fate(Enum):
+class Handling(Enum):
     """What becomes of an item."""
 
     FLOWN = "flown"
@@ -39,18 +39,19 @@ class Command:
     number: int
     text: str  # what is flown, or why not
     fields: tuple[Field, ...] = ()
-    makes: type[Any] | None = None  # the record that its fields make: a step, or part of one
-    written: bool = False  # the record is written as this command
+    record_type: type[Any] | None = None  # the record that its fields make: a step, or part of one
+    is_default: bool = False  # the record is written as this command
     constants: Mapping[str, float] = field(default_factory=dict)  # written beside the fields
-    reads: Callable[[Asked], Iterable[Step]] | None = None  # None: one record of all fields
-    aims: Callable[[Asked], NoseAim] | None = None  # for a command that turns the nose: where to
+    read_steps: Callable[[ItemContext], Iterable[Step]] | None = None  # None: one record of all fields
+    # for a command that turns the vehicle
+    heading_command: Callable[[ItemContext], HeadingCommand] | None = None
     mission_frame: bool = False  # its frame must be MAV_FRAME_MISSION
     needs_load: bool = False  # refused after a release
-    fate: Fate = Fate.FLOWN
+    handling: Handling = Handling.FLOWN
 
 
 @dataclass(frozen=True)
-class Asked:
+class ItemContext:
     """An item, the row of its command, and the state after the items before it."""
 
     seq: int
@@ -61,16 +62,16 @@ class Asked:
 
     def __getitem__(self, attribute: str) -> Any:
         """The value that its parameters give for an attribute, checked against the limits."""
-        one = next(one for one in self.command.fields if attribute in one.gives)
-        return one.read(self.seq, self.item, self.home)[one.gives.index(attribute)]
+        one = next(one for one in self.command.fields if attribute in one.attributes)
+        return one.read(self.seq, self.item, self.home)[one.attributes.index(attribute)]
 
     def record(self) -> Any:
         """The record that the command makes from all its fields."""
-        assert self.command.makes is not None, self.command.number
+        assert self.command.record_type is not None, self.command.number
         values: dict[str, Any] = {}
         for one in self.command.fields:
-            values |= zip(one.gives, one.read(self.seq, self.item, self.home), strict=True)
-        return self.command.makes(**values)
+            values |= zip(one.attributes, one.read(self.seq, self.item, self.home), strict=True)
+        return self.command.record_type(**values)
 
     def expect_frame(self) -> None:
         """MissionItemError if the command requires MAV_FRAME_MISSION and the item has another frame."""
@@ -80,21 +81,21 @@ class Asked:
     def expect_load(self) -> None:
         """MissionItemError if the load is released: signals, attitude runs and the winch move a load."""
         if self.state.released:
-            raise self.refused("needs the load, which an item before it has released")
+            raise self.refusal("needs the load, which an item before it has released")
 
-    def is_placed(self) -> bool:
+    def has_position(self) -> bool:
         """Whether the item names a place."""
         return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
 
-    def is_home_row(self) -> bool:
+    def is_home_item(self) -> bool:
         """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not."""
         item = self.item
         if self.seq != 0 or item.frame not in ABSOLUTE_FRAMES:
             return False
         place = enu_from_geodetic(item.x, item.y, 0, self.home)
         height = item.z - self.home.altitude_m
-        return math.hypot(place[0], place[1]) < HOME_ROW_M and abs(height) < HOME_ROW_M
+        return math.hypot(place[0], place[1]) < HOME_ITEM_RADIUS_M and abs(height) < HOME_ITEM_RADIUS_M
 
-    def refused(self, text: str, result: int = mavlink.MAV_MISSION_INVALID) -> MissionItemError:
+    def refusal(self, text: str, result: int = mavlink.MAV_MISSION_INVALID) -> MissionItemError:
         """The error that refuses this item."""
         return MissionItemError(self.seq, text, result)

@@ -15,7 +15,9 @@ from autopilot.wire.items.table import COMMANDS
 from autopilot.wire.parameter_table import float32
 from missions.model import Mission, Signals, Step
 
-_WRITTEN: dict[type[Any], Command] = {row.makes: row for row in COMMANDS if row.makes and row.written}
+_DEFAULT_COMMAND: dict[type[Any], Command] = {
+    row.record_type: row for row in COMMANDS if row.record_type and row.is_default
+}
 
 
 def encode_mission(mission: Mission, home: Home) -> tuple[WireItem, ...]:
@@ -32,7 +34,7 @@ def encode_steps(steps: Sequence[Step], home: Home) -> tuple[WireItem, ...]:
     return tuple(items)
 
 
-def step_of(seq: int, steps: Sequence[Step]) -> int:
+def step_index(seq: int, steps: Sequence[Step]) -> int:
     """Index of the step to which item `seq` belongs, of the items that `encode_steps` makes of the steps."""
     ends = accumulate(len(tuple(_records(step))) for step in steps)
     return next((index for index, end in enumerate(ends) if seq < end), max(len(steps) - 1, 0))
@@ -49,12 +51,12 @@ def _records(step: Step) -> Iterator[Any]:
 
 def _item(record: Any, home: Home, seq: int) -> WireItem:
     """The item of a step, term or factor."""
-    row = _WRITTEN[type(record)]
+    row = _DEFAULT_COMMAND[type(record)]
     wire = {**dict.fromkeys(WIRE_FIELD, 0.0), **row.constants}
     frame = FRAME_MISSION
     for field in row.fields:
-        if all(hasattr(record, attribute) for attribute in field.gives):
-            wire |= field.write(seq, home, *(getattr(record, attribute) for attribute in field.gives))
+        if all(hasattr(record, attribute) for attribute in field.attributes):
+            wire |= field.write(seq, home, *(getattr(record, attribute) for attribute in field.attributes))
             frame = FRAME_RELATIVE if isinstance(field, Place | Height) else frame
     p1, p2, p3, p4, z = (float32(wire[name]) for name in (*WIRE_FIELD[:4], "z"))
     return WireItem(frame, row.number, 0, 1, p1, p2, p3, p4, int(wire["x"]), int(wire["y"]), z)

@@ -44,7 +44,7 @@ class Field(Protocol):
     """One or two parameters of a command."""
 
     @property
-    def gives(self) -> tuple[str, ...]:
+    def attributes(self) -> tuple[str, ...]:
         """The attributes of the record that the field holds."""
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any, ...]:
@@ -53,7 +53,7 @@ class Field(Protocol):
     def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
         """The fields of MISSION_ITEM_INT that hold these values; MissionItemError if they do not fit."""
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Parameter, name and limits, for the documentation."""
 
 
@@ -73,7 +73,7 @@ class Number:
     magnitude: bool = False  # its sign does not count
 
     @property
-    def gives(self) -> tuple[str, ...]:
+    def attributes(self) -> tuple[str, ...]:
         return (self.attribute,)
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[float | None]:
@@ -94,16 +94,16 @@ class Number:
             value = round(value * self.per_unit)
         return {WIRE_FIELD[self.param - 1]: value}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         low, high, counted = self.low, self.high, ""
         if self.param in _WHOLE:
             longest = _INT32_MAX / self.per_unit
             low, high, counted = max(low, -longest), min(high, longest), f" in {_COUNTS[self.per_unit]}"
-        absent = "" if self.none is None else f", {self.none:g} {self.none_means}"
+        none_text = "" if self.none is None else f", {self.none:g} {self.none_means}"
         return (
-            f"{_place(self.param)} {self.name} {low:.6g} ... {high:.6g} {self.unit}".rstrip()
+            f"{_label(self.param)} {self.name} {low:.6g} ... {high:.6g} {self.unit}".rstrip()
             + counted
-            + absent
+            + none_text
         )
 
 
@@ -126,7 +126,7 @@ class Choice:
     meanings: Mapping[int, Any]
 
     @property
-    def gives(self) -> tuple[str, ...]:
+    def attributes(self) -> tuple[str, ...]:
         return (self.attribute,)
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any]:
@@ -137,11 +137,11 @@ class Choice:
         (code,) = (code for code, meaning in self.meanings.items() if meaning == values[0])
         return {WIRE_FIELD[self.param - 1]: float(code)}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         listed = ", ".join(
             str(code) if code == meaning else f"{code} {meaning}" for code, meaning in self.meanings.items()
         )
-        return f"{_place(self.param)} {self.name}: {listed}"
+        return f"{_label(self.param)} {self.name}: {listed}"
 
 
 # PLUMBLINE_LOAD_SIGNAL_TERM.param1 and the sign of the amplitude; ned_from_enu of the unit vectors
@@ -153,7 +153,7 @@ _AXIS_OF_CODE: dict[int, tuple[Axis, float]] = {code: (axis, s) for axis, (code,
 class Amplitude:
     """Axis and amplitude of a term: NED on the wire, ENU in the record, so z changes its sign."""
 
-    gives: ClassVar[tuple[str, ...]] = ("axis", "amplitude_m")
+    attributes: ClassVar[tuple[str, ...]] = ("axis", "amplitude_m")
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[Axis, float]:
         axis, sign = _AXIS_OF_CODE[choice(seq, 1, "axis", item.param1, tuple(_AXIS_OF_CODE))]
@@ -163,7 +163,7 @@ class Amplitude:
         code, sign = _AXIS_CODE[values[0]]
         return {"param1": float(code), "param2": sign * values[1]}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         return f"p1 axis: 0 north, 1 east, 2 down; p2 amplitude {-FARTHEST_M:g} ... {FARTHEST_M:g} m"
 
 
@@ -171,7 +171,7 @@ class Amplitude:
 class Place:
     """A place in m from home: latitude and longitude, or north and east in MAV_FRAME_LOCAL_NED."""
 
-    gives: ClassVar[tuple[str, ...]] = ("east_m", "north_m")
+    attributes: ClassVar[tuple[str, ...]] = ("east_m", "north_m")
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[float, float]:
         if item.frame in GLOBAL_FRAMES:
@@ -192,7 +192,7 @@ class Place:
         latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
         return {"x": latitude, "y": longitude}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         return f"x, y place within {FARTHEST_M / 1e3:g} km of home"
 
 
@@ -200,7 +200,7 @@ class Place:
 class HomePlace:
     """The place of home: written for ground stations that draw the item, not read."""
 
-    gives: ClassVar[tuple[str, ...]] = ()
+    attributes: ClassVar[tuple[str, ...]] = ()
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[()]:
         return ()
@@ -209,7 +209,7 @@ class HomePlace:
         latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
         return {"x": latitude, "y": longitude}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         return "x, y not used"
 
 
@@ -217,7 +217,7 @@ class HomePlace:
 class Height:
     """Height of the load in m above home; it must be above the ground."""
 
-    gives: ClassVar[tuple[str, ...]] = ("altitude_m",)
+    attributes: ClassVar[tuple[str, ...]] = ("altitude_m",)
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[float]:
         if item.frame not in PLACE_FRAMES:
@@ -232,7 +232,7 @@ class Height:
     def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
         return {"z": values[0]}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         return "z height"
 
 
@@ -246,15 +246,15 @@ def check(seq: int, param: int, name: str, value: float, unit: str, low: float, 
 
 
 def choice(
-    seq: int, param: int, name: str, value: float, allowed: Sequence[int], shown: str | None = None
+    seq: int, param: int, name: str, value: float, allowed: Sequence[int], allowed_text: str | None = None
 ) -> int:
     """`value` as a whole number, if it is one of those allowed."""
     if value in allowed:
         return int(value)
-    wanted = shown or f"one of {', '.join(map(str, sorted(allowed)))}"
-    text = f"{name} = {value:.7g}; must be {wanted}"
+    expected = allowed_text or f"one of {', '.join(map(str, sorted(allowed)))}"
+    text = f"{name} = {value:.7g}; must be {expected}"
     raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
 
 
-def _place(param: int) -> str:
+def _label(param: int) -> str:
     return f"p{param}" if param < 5 else WIRE_FIELD[param - 1]

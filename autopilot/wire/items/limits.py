@@ -2,11 +2,11 @@
 
 from missions.limits import (
     FASTEST_REEL_M_S,
-    LEAST_REELED_M,
     LONGEST_CABLE_M,
     LOWEST_M,
-    MOST_FACTORS,
-    MOST_TERMS,
+    MAX_FACTORS,
+    MAX_TERMS,
+    MIN_REELED_HEIGHT_M,
     SHORTEST_EDGE_S,
     SHORTEST_PERIOD_S,
     SHORTEST_RUN_S,
@@ -17,18 +17,18 @@ __all__ = [
     "FARTHEST_M",
     "FASTEST_M_S",
     "FASTEST_REEL_M_S",
-    "HOME_ROW_M",
+    "HOME_ITEM_RADIUS_M",
     "LARGEST_PHASE_RAD",
-    "LEAST_REELED_M",
     "LONGEST_CABLE_M",
     "LONGEST_S",
     "LOWEST_M",
-    "MOST_FACTORS",
-    "MOST_FLOWN",
-    "MOST_JUMPS",
-    "MOST_RADIUS_M",
-    "MOST_TERMS",
-    "MOST_TURNS",
+    "MAX_FACTORS",
+    "MAX_FLOWN_ITEMS",
+    "MAX_JUMPS",
+    "MAX_RADIUS_M",
+    "MAX_TERMS",
+    "MAX_TURNS",
+    "MIN_REELED_HEIGHT_M",
     "SHORTEST_EDGE_S",
     "SHORTEST_PERIOD_S",
     "SHORTEST_RUN_S",
@@ -40,8 +40,8 @@ LONGEST_S = 86400.0
 LARGEST_PHASE_RAD = 100.0
 FARTHEST_M = 100_000.0  # from home, as far as the earth may be assumed flat
 FASTEST_M_S = 100.0
-MOST_JUMPS = 1000  # repetitions of one jump
-MOST_FLOWN = 4000  # items, each repetition by a jump counted
-MOST_TURNS, MOST_RADIUS_M = 1000.0, 1000.0
+MAX_JUMPS = 1000  # repetitions of one jump
+MAX_FLOWN_ITEMS = 4000  # items, each repetition by a jump counted
+MAX_TURNS, MAX_RADIUS_M = 1000.0, 1000.0
 TURN_ACCEL_M_S2 = 1.0  # centripetal
-HOME_ROW_M = 1.0  # distance from home within which item 0 is home
+HOME_ITEM_RADIUS_M = 1.0  # distance from home within which item 0 is home

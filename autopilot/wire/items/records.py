@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import NoseAim, Step
+from missions.model import HeadingCommand, Step
 
 FRAME_MISSION = mavlink.MAV_FRAME_MISSION
 FRAME_RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
@@ -36,7 +36,7 @@ class LocatedStep(NamedTuple):
     first: int
     last: int
     step: Step
-    aims: tuple[NoseAim, ...] = ()  # aims of the nose, taken one after the other as the step begins
+    heading_commands: tuple[HeadingCommand, ...] = ()  # given one after the other as the step begins
 
 
 class MissionItemError(ValueError):

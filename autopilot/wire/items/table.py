@@ -11,8 +11,8 @@ import math
 
 from autopilot.trajectory.timeline import SPEED_M_S
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.items import nose, readers
-from autopilot.wire.items.command import Command, Fate
+from autopilot.wire.items import heading, readers
+from autopilot.wire.items.command import Command, Handling
 from autopilot.wire.items.fields import Amplitude, Choice, Fall, Height, HomePlace, Number, Place
 from autopilot.wire.items.limits import (
     FASTEST_M_S,
@@ -20,10 +20,10 @@ from autopilot.wire.items.limits import (
     LARGEST_PHASE_RAD,
     LONGEST_CABLE_M,
     LONGEST_S,
-    MOST_FLOWN,
-    MOST_JUMPS,
-    MOST_RADIUS_M,
-    MOST_TURNS,
+    MAX_FLOWN_ITEMS,
+    MAX_JUMPS,
+    MAX_RADIUS_M,
+    MAX_TURNS,
     SHORTEST_EDGE_S,
     SHORTEST_PERIOD_S,
     SHORTEST_RUN_S,
@@ -53,13 +53,13 @@ _SPEED_TYPE = {0: "airspeed", 1: "ground speed", 2: "climb", 3: "descent"}
 _SENSE = {0: 0, 1: 1, -1: -1}  # the shorter way, clockwise, counter-clockwise
 _ROI = (Choice(1, "mode", "mode", {mode: mode for mode in (m.MAV_ROI_NONE, m.MAV_ROI_LOCATION)}), Place())
 _ROI_TEXT = "as DO_SET_ROI_LOCATION; p1 0 without a place as DO_SET_ROI_NONE"
-_ANY_OF_TWO = {0: 0, 1: 1}  # grippers, winches: there is one
+_INSTANCE = {0: 0, 1: 1}  # grippers, winches: there is one
 _GRIPPER_ACTION = {0: "release", 1: "grab", 2: "hold"}
 _BY_LENGTH = m.WINCH_RELATIVE_LENGTH_CONTROL
 _ATTITUDE_OF = {m.PLUMBLINE_CONTROL_QUAD_ATTITUDE: "vehicle", m.PLUMBLINE_CONTROL_LOAD_ATTITUDE: "load"}
-_UPRIGHT = math.pi / 2.0
+_RIGHT_ANGLE = math.pi / 2.0
 _MS, _US = 1e3, 1e6  # x and y: counts per second
-_CANNOT = "the vehicle cannot do it in a mission, and ignoring it would be unsafe"
+_NOT_SUPPORTED = "the vehicle cannot do it in a mission, and ignoring it would be unsafe"
 
 COMMANDS: tuple[Command, ...] = (
     Command(
@@ -67,24 +67,26 @@ COMMANDS: tuple[Command, ...] = (
         "the cable is pulled taut and the load lifted straight up",
         (HomePlace(), Height()),
         Takeoff,
-        written=True,
+        is_default=True,
     ),
     Command(
         m.MAV_CMD_NAV_WAYPOINT,
         "the load is carried there; home itself as item 0 is not flown",
         _HELD_POINT,
         Waypoint,
-        written=True,
-        reads=readers.waypoint,
+        is_default=True,
+        read_steps=readers.waypoint,
     ),
-    Command(m.MAV_CMD_NAV_SPLINE_WAYPOINT, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, reads=readers.waypoint),
-    Command(m.MAV_CMD_NAV_LOITER_TIME, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, reads=readers.waypoint),
-    Command(m.MAV_CMD_NAV_LOITER_TO_ALT, "as NAV_WAYPOINT", _POINT, Waypoint, reads=readers.waypoint),
+    Command(
+        m.MAV_CMD_NAV_SPLINE_WAYPOINT, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, read_steps=readers.waypoint
+    ),
+    Command(m.MAV_CMD_NAV_LOITER_TIME, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, read_steps=readers.waypoint),
+    Command(m.MAV_CMD_NAV_LOITER_TO_ALT, "as NAV_WAYPOINT", _POINT, Waypoint, read_steps=readers.waypoint),
     Command(
         m.MAV_CMD_NAV_LOITER_UNLIM,
         "as NAV_WAYPOINT, held for a day",
         _POINT,
-        reads=readers.waypoint_for_a_day,
+        read_steps=readers.loiter_unlimited,
     ),
     Command(
         m.MAV_CMD_NAV_LOITER_TURNS,
@@ -92,23 +94,23 @@ COMMANDS: tuple[Command, ...] = (
         f"along another; at the last speed that was set ({SPEED_M_S:g} m/s before any), with at most "
         f"{TURN_ACCEL_M_S2:g} m/s^2 inwards",
         (
-            Number(1, "turns", "turns", "", 0.0, MOST_TURNS),
-            Number(3, "radius_m", "radius", "m", -MOST_RADIUS_M, MOST_RADIUS_M),
+            Number(1, "turns", "turns", "", 0.0, MAX_TURNS),
+            Number(3, "radius_m", "radius", "m", -MAX_RADIUS_M, MAX_RADIUS_M),
             *_POINT,
         ),
-        reads=readers.turns,
+        read_steps=readers.loiter_turns,
     ),
     Command(
         m.MAV_CMD_CONDITION_GATE,
         "a waypoint; at the height of the waypoint before where p2 is 0",
         _POINT,
-        reads=readers.gate,
+        read_steps=readers.gate,
     ),
     Command(
         m.MAV_CMD_DO_CHANGE_ALTITUDE,
         "to the height p1 (m) where the load hangs; refused where no item before it says where",
         (Choice(2, "frame", "frame", {frame: frame for frame in GLOBAL_FRAMES}),),
-        reads=readers.change_altitude,
+        read_steps=readers.change_altitude,
     ),
     Command(
         m.MAV_CMD_DO_CHANGE_SPEED,
@@ -118,9 +120,9 @@ COMMANDS: tuple[Command, ...] = (
             Number(2, "speed_m_s", "speed", "m/s", SLOWEST_M_S, FASTEST_M_S),
         ),
         Speed,
-        written=True,
+        is_default=True,
         constants={"param1": 1.0, "param3": -1.0},
-        reads=readers.change_speed,
+        read_steps=readers.change_speed,
     ),
     Command(
         m.MAV_CMD_CONDITION_YAW,
@@ -132,51 +134,53 @@ COMMANDS: tuple[Command, ...] = (
             Choice(3, "sense", "sense", _SENSE),
             Choice(4, "relative", "from", {0: False, 1: True}),
         ),
-        aims=nose.turn,
+        heading_command=heading.condition_yaw,
     ),
     Command(
         m.MAV_CMD_DO_SET_ROI_LOCATION,
         "the nose follows the place from the next item on, until another command changes it",
         (Place(),),
-        aims=nose.look,
+        heading_command=heading.set_roi_location,
     ),
-    Command(m.MAV_CMD_DO_SET_ROI_NONE, "the nose stays as it points then", aims=nose.look_away),
-    Command(m.MAV_CMD_DO_SET_ROI, _ROI_TEXT, _ROI, aims=nose.look_or_not),
-    Command(m.MAV_CMD_NAV_ROI, _ROI_TEXT, _ROI, aims=nose.look_or_not),
+    Command(
+        m.MAV_CMD_DO_SET_ROI_NONE, "the nose stays as it points then", heading_command=heading.set_roi_none
+    ),
+    Command(m.MAV_CMD_DO_SET_ROI, _ROI_TEXT, _ROI, heading_command=heading.set_roi),
+    Command(m.MAV_CMD_NAV_ROI, _ROI_TEXT, _ROI, heading_command=heading.set_roi),
     Command(
         m.MAV_CMD_NAV_DELAY,
         "a hold",
         _DELAY,
         Delay,
-        written=True,
+        is_default=True,
         constants={"param2": -1.0, "param3": -1.0, "param4": -1.0},
     ),
     Command(m.MAV_CMD_CONDITION_DELAY, "a hold", _DELAY, Delay),
     Command(
         m.MAV_CMD_DO_JUMP,
-        f"the items from item p1 on again, p2 times (0 ... {MOST_JUMPS}) or without end (-1): then those "
+        f"the items from item p1 on again, p2 times (0 ... {MAX_JUMPS}) or without end (-1): then those "
         "behind it are never flown. A mission that comes to more than "
-        f"{MOST_FLOWN} items with all repetitions is refused",
+        f"{MAX_FLOWN_ITEMS} items with all repetitions is refused",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
         "the load is released; behind that a place to land at needs a waypoint before it, and grab is "
         "refused. Grab and hold where the load is held: nothing",
         (
-            Choice(1, "gripper", "gripper", _ANY_OF_TWO),
+            Choice(1, "gripper", "gripper", _INSTANCE),
             Choice(2, "action", "gripper action", _GRIPPER_ACTION),
         ),
         Release,
-        written=True,
+        is_default=True,
         constants={"param1": 1.0, "param2": float(m.GRIPPER_ACTION_RELEASE)},
-        reads=readers.gripper,
+        read_steps=readers.gripper,
     ),
     Command(
         m.MAV_CMD_DO_WINCH,
         "the cable gets longer, or shorter for a negative length, where the load hangs. "
         "Refused where the load's height is not known, as right behind an attitude run: a waypoint first",
         (
-            Choice(1, "winch", "winch", _ANY_OF_TWO),
+            Choice(1, "winch", "winch", _INSTANCE),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
             Number(3, "length_m", "length", "m", -LONGEST_CABLE_M, LONGEST_CABLE_M),
             Number(
@@ -192,9 +196,9 @@ COMMANDS: tuple[Command, ...] = (
             ),
         ),
         Winch,
-        written=True,
+        is_default=True,
         constants={"param1": 1.0, "param2": float(_BY_LENGTH)},
-        reads=readers.winch,
+        read_steps=readers.winch,
         needs_load=True,
     ),
     Command(
@@ -202,7 +206,7 @@ COMMANDS: tuple[Command, ...] = (
         "over home (not a rally point) at the height it has; and down where it is the last item",
         (),
         ReturnHome,
-        written=True,
+        is_default=True,
     ),
     Command(
         m.MAV_CMD_NAV_LAND,
@@ -210,8 +214,8 @@ COMMANDS: tuple[Command, ...] = (
         "there first",
         (Place(),),
         Land,
-        written=True,
-        reads=readers.land,
+        is_default=True,
+        read_steps=readers.land,
     ),
     Command(
         m.PLUMBLINE_LOAD_SIGNAL_TERM,
@@ -225,7 +229,7 @@ COMMANDS: tuple[Command, ...] = (
             Number(7, "rise_90_by_s", "rise by", "s", SHORTEST_EDGE_S, LONGEST_S, none=0.0),
         ),
         Term,
-        written=True,
+        is_default=True,
         mission_frame=True,
     ),
     Command(
@@ -237,7 +241,7 @@ COMMANDS: tuple[Command, ...] = (
             Number(6, "start_s", "start", "s", -LONGEST_S, LONGEST_S, _MS),
         ),
         Sine,
-        written=True,
+        is_default=True,
         mission_frame=True,
     ),
     Command(
@@ -245,7 +249,7 @@ COMMANDS: tuple[Command, ...] = (
         "flies the terms before it",
         (Number(5, "duration_s", "duration", "s", SHORTEST_RUN_S, LONGEST_S, _MS),),
         Signals,
-        written=True,
+        is_default=True,
         mission_frame=True,
         needs_load=True,
     ),
@@ -254,31 +258,31 @@ COMMANDS: tuple[Command, ...] = (
         "leans the thrust axis (vehicle) or the line from load to vehicle (load) out and back",
         (
             Choice(1, "controlled", "mode", _ATTITUDE_OF),
-            Number(2, "tilt_north_rad", "tilt north", "rad", -_UPRIGHT, _UPRIGHT),
-            Number(3, "tilt_east_rad", "tilt east", "rad", -_UPRIGHT, _UPRIGHT),
+            Number(2, "tilt_north_rad", "tilt north", "rad", -_RIGHT_ANGLE, _RIGHT_ANGLE),
+            Number(3, "tilt_east_rad", "tilt east", "rad", -_RIGHT_ANGLE, _RIGHT_ANGLE),
             Number(5, "duration_s", "duration", "s", SHORTEST_EDGE_S, LONGEST_S, _MS),
         ),
         AttitudeRun,
-        written=True,
+        is_default=True,
         mission_frame=True,
         needs_load=True,
     ),
-    Command(m.MAV_CMD_DO_SET_MODE, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_SET_HOME, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_PARACHUTE, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_REPOSITION, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_ORBIT, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_DO_PAUSE_CONTINUE, _CANNOT, fate=Fate.REFUSED),
-    Command(m.MAV_CMD_COMPONENT_ARM_DISARM, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_SET_MODE, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_SET_HOME, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_PARACHUTE, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_REPOSITION, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_ORBIT, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_DO_PAUSE_CONTINUE, _NOT_SUPPORTED, handling=Handling.REFUSED),
+    Command(m.MAV_CMD_COMPONENT_ARM_DISARM, _NOT_SUPPORTED, handling=Handling.REFUSED),
 )
 COMMAND: dict[int, Command] = {row.number: row for row in COMMANDS}
-FLOWN_COMMANDS = frozenset(row.number for row in COMMANDS if row.fate is Fate.FLOWN)
+FLOWN_COMMANDS = frozenset(row.number for row in COMMANDS if row.handling is Handling.FLOWN)
 
 
-def fate(command: int) -> Fate:
+def handling_of(command: int) -> Handling:
     """What becomes of an item with this command if its parameters are valid."""
     if command in COMMAND:
-        return COMMAND[command].fate
+        return COMMAND[command].handling
     known = command in m.enums["MAV_CMD"] and command != m.MAV_CMD_ENUM_END
-    return Fate.KEPT if known and command > m.MAV_CMD_NAV_LAST else Fate.REFUSED
+    return Handling.KEPT if known and command > m.MAV_CMD_NAV_LAST else Handling.REFUSED

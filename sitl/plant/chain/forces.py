@@ -118,9 +118,9 @@ def _load_moment(
     moment = axpy(-model.spin_drag * norm(omega), omega, moment)
     momentum = (inertia[0] * omega[0], inertia[1] * omega[1], inertia[2] * omega[2])
     brake = truth.slip_rate
-    most = truth.friction * normal * truth.load_radius
-    if brake * norm(momentum) > most:
-        brake = most / norm(momentum)
+    max_moment = truth.friction * normal * truth.load_radius
+    if brake * norm(momentum) > max_moment:
+        brake = max_moment / norm(momentum)
     moment = axpy(-brake, momentum, sub(moment, cross(omega, momentum)))
     return (moment[0] / inertia[0], moment[1] / inertia[1], moment[2] / inertia[2])
 

@@ -15,7 +15,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add, apply, axpy, cross, sub
 from autopilot.geometry.packed import Row, packed, unpack, with_field
 from autopilot.geometry.so3 import IDENTITY_QUAT, Quat, quat_normalise, rotation_from_quat
-from sitl.plant.attachment import attached_at, speed_beside
+from sitl.plant.attachment import attachment_position, attachment_velocity
 from sitl.plant.records import ChainModel, PlantState, Truth
 
 Floats = NDArray[np.float64]
@@ -23,9 +23,9 @@ Floats = NDArray[np.float64]
 # columns of `ChainRows.link`, one row per link: after its direction, its tension (N), whether it pulls, and
 # the stretch (m) at which a stage begins; diagonal, next element and right-hand side of the equations for the
 # tensions; diagonal and right-hand side after the elimination
-TENSION, PULLS, STRETCH_BASE, DIAGONAL, BEHIND, RIGHT, PIVOT, REDUCED = range(3, 11)
+TENSION, PULLS, STRETCH_BASE, DIAGONAL, OFF_DIAGONAL, RHS, PIVOT, REDUCED_RHS = range(3, 11)
 _COLUMNS = 11
-_SHORTEST = 0.02  # m, least length of a cable that a winch reels in
+_MIN_LENGTH = 0.02  # m, least length of a cable that a winch reels in
 
 
 class LoadBody(NamedTuple):
@@ -78,11 +78,11 @@ def hook_of(model: ChainModel) -> Vec3:
 @kernel
 def length_of(truth: Truth) -> float:
     """Length of the cable itself, m; `cable_length` is the length from the vehicle to the load's centre."""
-    return max(truth.cable_length - hook_of(truth.chain)[2], _SHORTEST)
+    return max(truth.cable_length - hook_of(truth.chain)[2], _MIN_LENGTH)
 
 
 @kernel
-def reach_of(truth: Truth) -> Truth:
+def with_gripping_reach(truth: Truth) -> Truth:
     """The truth with `cable_length` short enough that no attitude of the load would stretch the cable."""
     shorter = 2.0 * hook_of(truth.chain)[2]
     return with_field(truth, "cable_length", truth.cable_length - shorter)
@@ -96,13 +96,13 @@ def end_at_load(x_load: Vec3, v_load: Vec3, body: LoadBody, hook: Vec3) -> tuple
 
 
 @kernel
-def lay(rows: ChainRows, truth: Truth, state: PlantState) -> None:
+def lay_straight(rows: ChainRows, truth: Truth, state: PlantState) -> None:
     """Lay the cable straight from vehicle to load; its velocity is interpolated between its ends."""
     body = unpack(LoadBody, rows.body, 0)
     x_end, v_end = end_at_load(state.x_load, state.v_load, body, hook_of(truth.chain))
     R = rotation_from_quat(state.quat_wxyz)
-    x_begin = attached_at(state.x_quad, R, truth)
-    v_begin = add(state.v_quad, speed_beside(R, state.omega_body, truth))
+    x_begin = attachment_position(state.x_quad, R, truth)
+    v_begin = add(state.v_quad, attachment_velocity(R, state.omega_body, truth))
     n = rows.link.shape[0]
     for i in range(n + 1):
         put(rows.x, i, axpy(i / n, sub(x_end, x_begin), x_begin))
@@ -122,5 +122,5 @@ def new_chain(truth: Truth, state: PlantState) -> ChainRows | None:
     points = (x, v, x_begin, v_begin, x_base, v_base, free)
     rows = ChainRows(body, np.zeros(2), *points, np.zeros((n, _COLUMNS)))
     rows.held[1] = length_of(truth)
-    lay(rows, truth, state)
+    lay_straight(rows, truth, state)
     return rows

@@ -30,12 +30,12 @@ from autopilot.geometry.linear import (
     sub,
 )
 from autopilot.geometry.so3 import Quat, quat_normalise, rotation_from_quat
-from sitl.plant.attachment import attached_at, by_inertia, speed_beside, turning_arm
+from sitl.plant.attachment import attachment_position, attachment_velocity, inverse_inertia_times, moment_arm
 from sitl.plant.chain.forces import Bodies, FreeRates, free_bodies, free_points, moments_of
 from sitl.plant.chain.records import (
-    BEHIND,
     DIAGONAL,
-    RIGHT,
+    OFF_DIAGONAL,
+    RHS,
     STRETCH_BASE,
     TENSION,
     ChainRows,
@@ -48,11 +48,11 @@ from sitl.plant.chain.tension import find_tensions
 from sitl.plant.records import ChainModel, Truth
 from sitl.plant.rotors import RotorRows, Wrench
 
-_MOST_ITERATIONS = 25
+_MAX_ITERATIONS = 25
 _CONVERGED = 1e-13  # m, the most by which the last iteration moves a point
 
 
-class Length(NamedTuple):
+class CableLength(NamedTuple):
     """The length of the cable itself at one instant."""
 
     length: float  # m
@@ -60,12 +60,14 @@ class Length(NamedTuple):
 
 
 @kernel
-def later(own: Length, accel: float, t: float) -> Length:
+def length_after(cable_length: CableLength, accel: float, t: float) -> CableLength:
     """The length t seconds later, reeled with the acceleration `accel`, m/s^2."""
-    return Length(own.length + t * (own.rate + 0.5 * t * accel), own.rate + t * accel)
+    return CableLength(
+        cable_length.length + t * (cable_length.rate + 0.5 * t * accel), cable_length.rate + t * accel
+    )
 
 
-class Solved(NamedTuple):
+class StageEnd(NamedTuple):
     """The end of a stage."""
 
     at: Bodies
@@ -88,7 +90,7 @@ def _turned(base: Quat, omega: Vec3, tau: float) -> Quat:
 
 
 @kernel
-def placed(base: Bodies, speed: Bodies, tau: float) -> Bodies:
+def bodies_after(base: Bodies, speed: Bodies, tau: float) -> Bodies:
     """The bodies after the stage if they have the velocities of `speed` then."""
     return Bodies(
         axpy(tau, speed.v_quad, base.x_quad),
@@ -108,8 +110,8 @@ def _place_points(rows: ChainRows, at: Bodies, R: Mat3, hook: Vec3, truth: Truth
     for i in range(1, n):
         put(rows.x, i, axpy(tau, vector(rows.v, i), vector(rows.x_base, i)))
     R_quad = rotation_from_quat(quat_normalise(at.quat))
-    put(rows.x, 0, attached_at(at.x_quad, R_quad, truth))
-    put(rows.v, 0, add(at.v_quad, speed_beside(R_quad, at.omega, truth)))
+    put(rows.x, 0, attachment_position(at.x_quad, R_quad, truth))
+    put(rows.v, 0, add(at.v_quad, attachment_velocity(R_quad, at.omega, truth)))
     put(rows.x, n, add(at.x_load, apply(R, hook)))
     put(rows.v, n, add(at.v_load, apply(R, cross(at.load.omega, hook))))
 
@@ -122,33 +124,38 @@ def _direction(rows: ChainRows, i: int) -> Vec3:
 
 @kernel
 def _equations(
-    rows: ChainRows, model: ChainModel, lightness_quad: float, lightness_load: float, own: Length, tau: float
+    rows: ChainRows,
+    model: ChainModel,
+    lightness_quad: float,
+    lightness_load: float,
+    cable_length: CableLength,
+    tau: float,
 ) -> None:
     """Write the equations for the tensions; `rows.free` has the velocities after a stage without them."""
     link, n = rows.link, rows.link.shape[0]
-    rest, rest_rate = own.length / n, own.rate / n
+    rest, rest_rate = cable_length.length / n, cable_length.rate / n
     stiffness, damping = model.stiffness / rest, model.damping / rest
     gain = tau * (stiffness * tau + damping)
-    light = n / (model.mass * own.length) if n > 1 else 0.0
+    lightness = n / (model.mass * cable_length.length) if n > 1 else 0.0
     before = lightness_quad
     for i in range(n):
         q = _direction(rows, i)
         # the rate of the stretch without tensions, and the pull that would follow from it
         rate = dot(q, sub(vector(rows.free, i + 1), vector(rows.free, i))) - rest_rate
         pull = stiffness * (link[i, STRETCH_BASE] + tau * rate) + damping * rate
-        after = light if i + 1 < n else lightness_load
+        after = lightness if i + 1 < n else lightness_load
         link[i, DIAGONAL] = before + after + 1.0 / gain
-        link[i, RIGHT] = pull / gain
+        link[i, RHS] = pull / gain
         if i + 1 < n:
-            link[i, BEHIND] = -after * dot(q, _direction(rows, i + 1))
+            link[i, OFF_DIAGONAL] = -after * dot(q, _direction(rows, i + 1))
         before = after
     if rows.held[0] == 0.0:
         # the cable is attached to the load only: its first link connects nothing
-        link[0, RIGHT], link[0, BEHIND] = -1.0, 0.0
+        link[0, RHS], link[0, OFF_DIAGONAL] = -1.0, 0.0
 
 
 @kernel
-def _point(rows: ChainRows) -> None:
+def _update_directions(rows: ChainRows) -> None:
     """Write the directions of the links; a link of zero length keeps its direction."""
     for i in range(rows.link.shape[0]):
         along = sub(vector(rows.x, i + 1), vector(rows.x, i))
@@ -166,27 +173,27 @@ def implicit_euler(
     rotors: RotorRows,
     truth: Truth,
     wind: Vec3,
-    own: Length,
+    cable_length: CableLength,
     tau: float,
-) -> Solved:
+) -> StageEnd:
     """A stage of length tau (s) from `base` and the bases in `rows`; the result is returned and in `rows`.
 
-    `guess` and `rows.v` hold the velocities with which the iteration begins. `own` is the cable's length at
+    `guess` and `rows.v` hold the velocities with which the iteration begins. `cable_length` is that at
     the end of the stage.
     """
     model = truth.chain
     n, hook = rows.link.shape[0], hook_of(model)
-    half = 0.5 * model.mass * own.length / n
+    half = 0.5 * model.mass * cable_length.length / n
     mass_quad, mass_load = truth.quad_mass + half, truth.load_mass + half
-    light = n / (model.mass * own.length) if n > 1 else 0.0
-    turns, inertia = model.gyration > 0.0, moments_of(model, truth)
+    lightness = n / (model.mass * cable_length.length) if n > 1 else 0.0
+    load_rotates, inertia = model.gyration > 0.0, moments_of(model, truth)
     speed, converged = guess, False
-    for _ in range(_MOST_ITERATIONS):
-        at = placed(base, speed, tau)
+    for _ in range(_MAX_ITERATIONS):
+        at = bodies_after(base, speed, tau)
         R = rotation_from_quat(quat_normalise(at.load.quat))
         _place_points(rows, at, R, hook, truth, tau)
-        _point(rows)
-        drags = free_points(rows, model, truth, wind, own.length)
+        _update_directions(rows)
+        drags = free_points(rows, model, truth, wind, cable_length.length)
         free = free_bodies(at, wrench, rotors, model, truth, wind, half, drags)
         # the velocities without any tension
         v_quad, v_load = axpy(tau, free.quad, base.v_quad), axpy(tau, free.load, base.v_load)
@@ -195,40 +202,43 @@ def implicit_euler(
             put(rows.free, i, axpy(tau, vector(rows.free, i), vector(rows.v_base, i)))
         omega = axpy(tau, free.spin, base.omega)
         R_quad = rotation_from_quat(quat_normalise(at.quat))
-        put(rows.free, 0, add(v_quad, speed_beside(R_quad, omega, truth)))
-        arm = turning_arm(_direction(rows, 0), R_quad, truth)
-        turn = by_inertia(arm, truth)
+        put(rows.free, 0, add(v_quad, attachment_velocity(R_quad, omega, truth)))
+        arm = moment_arm(_direction(rows, 0), R_quad, truth)
+        quad_spin_per_pull = inverse_inertia_times(arm, truth)
         put(rows.free, n, add(v_load, apply(R, cross(spin, hook))))
         q = _direction(rows, n - 1)
         lever = cross(hook, apply_transposed(R, q))
-        answer = ZERO
-        if turns:
-            answer = (lever[0] / inertia[0], lever[1] / inertia[1], lever[2] / inertia[2])
-        light_quad, light_load = 1.0 / mass_quad + dot(arm, turn), 1.0 / mass_load + dot(lever, answer)
-        _equations(rows, model, light_quad, light_load, own, tau)
-        decided = find_tensions(rows.link)
+        load_spin_per_pull = ZERO
+        if load_rotates:
+            load_spin_per_pull = (lever[0] / inertia[0], lever[1] / inertia[1], lever[2] / inertia[2])
+        lightness_quad, lightness_load = (
+            1.0 / mass_quad + dot(arm, quad_spin_per_pull),
+            1.0 / mass_load + dot(lever, load_spin_per_pull),
+        )
+        _equations(rows, model, lightness_quad, lightness_load, cable_length, tau)
+        tensions_found = find_tensions(rows.link)
         # the velocities with the tensions
         first, last = rows.link[0, TENSION], rows.link[n - 1, TENSION]
-        omega = axpy(tau * first, turn, omega)
-        moved = norm(sub(omega, speed.omega))
+        omega = axpy(tau * first, quad_spin_per_pull, omega)
+        change = norm(sub(omega, speed.omega))
         v_quad = axpy(tau * first / mass_quad, _direction(rows, 0), v_quad)
         v_load = axpy(-tau * last / mass_load, q, v_load)
-        spin = axpy(-tau * last, answer, spin)
-        moved = max(moved, norm(sub(v_quad, speed.v_quad)), norm(sub(v_load, speed.v_load)))
-        moved = max(moved, norm(sub(spin, speed.load.omega)))
+        spin = axpy(-tau * last, load_spin_per_pull, spin)
+        change = max(change, norm(sub(v_quad, speed.v_quad)), norm(sub(v_load, speed.v_load)))
+        change = max(change, norm(sub(spin, speed.load.omega)))
         for i in range(1, n):
             pull = sub(
                 scale(rows.link[i, TENSION], _direction(rows, i)),
                 scale(rows.link[i - 1, TENSION], _direction(rows, i - 1)),
             )
-            v = axpy(tau * light, pull, vector(rows.free, i))
-            moved = max(moved, norm(sub(v, vector(rows.v, i))))
+            v = axpy(tau * lightness, pull, vector(rows.free, i))
+            change = max(change, norm(sub(v, vector(rows.v, i))))
             put(rows.v, i, v)
         speed = Bodies(at.x_quad, v_quad, at.quat, omega, at.x_load, v_load, LoadBody(at.load.quat, spin))
-        if decided and tau * moved < _CONVERGED:
+        if tensions_found and tau * change < _CONVERGED:
             converged = True
             break
-    at = placed(base, speed, tau)
+    at = bodies_after(base, speed, tau)
     R = rotation_from_quat(quat_normalise(at.load.quat))
     _place_points(rows, at, R, hook, truth, tau)
-    return Solved(at, free, converged)
+    return StageEnd(at, free, converged)

@@ -23,16 +23,16 @@ from sitl.plant.chain.records import (
     ChainRows,
     LoadBody,
     copy,
-    lay,
+    lay_straight,
     length_of,
     put,
     vector,
 )
-from sitl.plant.chain.stage import Length, Solved, implicit_euler, later
-from sitl.plant.flow import Flow
+from sitl.plant.chain.stage import CableLength, StageEnd, implicit_euler, length_after
 from sitl.plant.records import ChainModel, Motion, PlantState, Truth
-from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, keep, limit, wrenches
-from sitl.plant.step import held, resting, sound, state_of
+from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, copy_row, set_targets, wrenches
+from sitl.plant.runge_kutta import StepEnd
+from sitl.plant.step import frozen_state, is_valid, state_of, zero_tiny_components
 
 GAMMA = 1.0 - 1.0 / sqrt(2.0)
 LONGEST_STEP = 5e-4  # s, benchmarks/cable_convergence.py: docs/realism-cable.md has the table
@@ -64,13 +64,13 @@ def _normalised(at: Bodies) -> Bodies:
 
 
 @kernel
-def _hold(rows: ChainRows, state: PlantState, truth: Truth) -> None:
+def _update_hold(rows: ChainRows, state: PlantState, truth: Truth) -> None:
     """Record whether the vehicle holds the cable, and its length; a newly held cable is laid straight."""
     if truth.cable_length == inf:
         rows.held[0] = 0.0
         return
     if rows.held[0] == 0.0:
-        lay(rows, truth, state)
+        lay_straight(rows, truth, state)
     rows.held[1] = length_of(truth)
 
 
@@ -83,11 +83,11 @@ def step_length(rows: ChainRows, model: ChainModel, length: float, remaining: fl
     """
     n = rows.link.shape[0]
     if n > 1:
-        greatest = 0.0
+        max_tension = 0.0
         for i in range(n):
-            greatest = max(greatest, rows.link[i, TENSION])
+            max_tension = max(max_tension, rows.link[i, TENSION])
         link_length = length / n
-        fastest = 4.0 * greatest / (link_length * link_length * model.mass)
+        fastest = 4.0 * max_tension / (link_length * link_length * model.mass)
         if fastest * longest * longest * GAMMA * GAMMA > _CONTRACTION:
             longest = max(sqrt(_CONTRACTION / fastest) / GAMMA, _SHORTEST_STEP)
     if not remaining > longest * (1.0 + 1e-9):
@@ -135,11 +135,11 @@ def _step(
     rotors: RotorRows,
     truth: Truth,
     wind: Vec3,
-    own: Length,
+    cable_length: CableLength,
     h: float,
-) -> Solved:
-    """A step of length h (s) from `begin` and the points in `rows`, which are moved to its end. `own` is the
-    cable's length at the beginning."""
+) -> StageEnd:
+    """A step of length h (s) from `begin` and the points in `rows`, which are moved to its end.
+    `cable_length` is that at the beginning."""
     accel = truth.reel_accel
     n = rows.link.shape[0]
     copy(rows.x, rows.x_begin)
@@ -148,10 +148,12 @@ def _step(
     copy(rows.v, rows.v_base)
     for i in range(n):
         distance = norm(sub(vector(rows.x, i + 1), vector(rows.x, i)))
-        rows.link[i, STRETCH_BASE] = distance - own.length / n
+        rows.link[i, STRETCH_BASE] = distance - cable_length.length / n
     tau = GAMMA * h
     _, _, wrench = wrenches(rotors, truth, tau)
-    first = implicit_euler(begin, begin, rows, wrench, rotors, truth, wind, later(own, accel, tau), tau)
+    first = implicit_euler(
+        begin, begin, rows, wrench, rotors, truth, wind, length_after(cable_length, accel, tau), tau
+    )
     if not first.converged:
         return first
     # y + (1 - gamma) h y'_1, with y'_1 = (y_1 - y) / tau
@@ -160,28 +162,30 @@ def _step(
         put(rows.x_base, i, _along(share, vector(rows.x_begin, i), vector(rows.x, i)))
         put(rows.v_base, i, _along(share, vector(rows.v_begin, i), vector(rows.v, i)))
     for i in range(n):
-        apart = sub(vector(rows.v, i + 1), vector(rows.v, i))
-        rate = dot(vector(rows.link, i), apart) - later(own, accel, tau).rate / n
+        relative_velocity = sub(vector(rows.v, i + 1), vector(rows.v, i))
+        rate = dot(vector(rows.link, i), relative_velocity) - length_after(cable_length, accel, tau).rate / n
         rows.link[i, STRETCH_BASE] += (1.0 - GAMMA) * h * rate
     _, _, wrench = wrenches(rotors, truth, h)
     base = _bodies_along(share, begin, first.at)
-    return implicit_euler(base, first.at, rows, wrench, rotors, truth, wind, later(own, accel, h), tau)
+    return implicit_euler(
+        base, first.at, rows, wrench, rotors, truth, wind, length_after(cable_length, accel, h), tau
+    )
 
 
 @kernel
-def _least_tension(rows: ChainRows) -> float:
+def _min_tension(rows: ChainRows) -> float:
     """The least tension of all links, N."""
-    least = inf
+    min_tension = inf
     for i in range(rows.link.shape[0]):
-        least = min(least, rows.link[i, TENSION])
-    return least
+        min_tension = min(min_tension, rows.link[i, TENSION])
+    return min_tension
 
 
 @kernel
-def _closing(begin: Bodies, own: Length) -> float:
+def _closing_speed(begin: Bodies, cable_length: CableLength) -> float:
     """Speed in m/s at which vehicle and load separate, minus the rate at which the cable is let out."""
     line = sub(begin.x_load, begin.x_quad)
-    return dot(line, sub(begin.v_load, begin.v_quad)) / norm(line) - own.rate
+    return dot(line, sub(begin.v_load, begin.v_quad)) / norm(line) - cable_length.rate
 
 
 @kernel
@@ -197,49 +201,51 @@ def advance_chain(
         return state
     model = truth.chain
     half_share = 0.5 * model.mass / rows.link.shape[0]
-    _hold(rows, state, truth)
-    limit(rotors, truth)
-    keep(rotors, FORCE, BEFORE)
+    _update_hold(rows, state, truth)
+    set_targets(rotors, truth)
+    copy_row(rotors, FORCE, BEFORE)
     at = _bodies(state, unpack(LoadBody, rows.body, 0))
-    own = Length(rows.held[1], truth.reel_rate)
-    above = TAUT_SHARE * truth.load_mass * truth.gravity
+    cable_length = CableLength(rows.held[1], truth.reel_rate)
+    taut_tension = TAUT_SHARE * truth.load_mass * truth.gravity
     taut, slack_events, snap_speed = state.taut, state.slack_events, 0.0
     accel_quad, tension, quad_normal, load_normal = state.accel_quad, state.tension, 0.0, 0.0
     remaining, longest = h, LONGEST_STEP
     while remaining > 0.0:
-        t = step_length(rows, model, own.length, remaining, longest)
-        end = _step(at, rows, rotors, truth, wind, own, t)
+        t = step_length(rows, model, cable_length.length, remaining, longest)
+        end = _step(at, rows, rotors, truth, wind, cable_length, t)
         if not end.converged and t > _SHORTEST_STEP:
             copy(rows.x_begin, rows.x)
             copy(rows.v_begin, rows.v)
             longest = 0.5 * t
             continue
-        keep(rotors, END, FORCE)
-        closing = _closing(at, own)
+        copy_row(rotors, END, FORCE)
+        closing = _closing_speed(at, cable_length)
         at = _normalised(end.at)
-        own = later(own, truth.reel_accel, t)
-        tension, least = rows.link[0, TENSION], _least_tension(rows)
-        if taut > 0.0 and least < 0.5 * above:
+        cable_length = length_after(cable_length, truth.reel_accel, t)
+        tension, min_tension = rows.link[0, TENSION], _min_tension(rows)
+        if taut > 0.0 and min_tension < 0.5 * taut_tension:
             taut = 0.0
             slack_events += 1.0
-        elif taut <= 0.0 and least > above:
+        elif taut <= 0.0 and min_tension > taut_tension:
             taut = 1.0
             snap_speed = max(snap_speed, closing)
         q = vector(rows.link, 0)
-        accel_quad = axpy(tension / (truth.quad_mass + half_share * own.length), q, end.free.quad)
+        accel_quad = axpy(tension / (truth.quad_mass + half_share * cable_length.length), q, end.free.quad)
         quad_normal, load_normal = end.free.quad_normal, end.free.load_normal
         remaining -= t
-    rows.held[1] = own.length
+    rows.held[1] = cable_length.length
     cable, cable_dot = sub(at.x_load, at.x_quad), sub(at.v_load, at.v_quad)
-    motion = Motion(at.x_load, at.v_load, cable, cable_dot, at.quat, at.omega, own.length, own.rate)
-    if not sound(motion):
-        keep(rotors, BEFORE, FORCE)
-        return held(state)
-    pack(LoadBody(at.load.quat, resting(at.load.omega)), rows.body, 0)
+    motion = Motion(
+        at.x_load, at.v_load, cable, cable_dot, at.quat, at.omega, cable_length.length, cable_length.rate
+    )
+    if not is_valid(motion):
+        copy_row(rotors, BEFORE, FORCE)
+        return frozen_state(state)
+    pack(LoadBody(at.load.quat, zero_tiny_components(at.load.omega)), rows.body, 0)
     for i in range(rows.v.shape[0]):
-        put(rows.v, i, resting(vector(rows.v, i)))
-    flown = Flow(motion, 0.0, tension, accel_quad, quad_normal, load_normal)
-    return state_of(flown, state.q_cable, taut, slack_events, snap_speed, truth)
+        put(rows.v, i, zero_tiny_components(vector(rows.v, i)))
+    end_of_step = StepEnd(motion, 0.0, tension, accel_quad, quad_normal, load_normal)
+    return state_of(end_of_step, state.q_cable, taut, slack_events, snap_speed, truth)
 
 
 @kernel

@@ -27,7 +27,7 @@ that would pull is added again.
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from sitl.plant.chain.records import BEHIND, DIAGONAL, PIVOT, PULLS, REDUCED, RIGHT, TENSION, Floats
+from sitl.plant.chain.records import DIAGONAL, OFF_DIAGONAL, PIVOT, PULLS, REDUCED_RHS, RHS, TENSION, Floats
 
 _MAX_TRIALS = 20  # of sets of links that pull
 
@@ -39,34 +39,34 @@ def _solve(link: Floats) -> None:
     for i in range(n):
         pivot, right = 1.0, 0.0
         if link[i, PULLS] > 0.0:
-            pivot, right = link[i, DIAGONAL], link[i, RIGHT]
+            pivot, right = link[i, DIAGONAL], link[i, RHS]
             if i > 0 and link[i - 1, PULLS] > 0.0:
-                factor = link[i - 1, BEHIND] / link[i - 1, PIVOT]
-                pivot -= factor * link[i - 1, BEHIND]
-                right -= factor * link[i - 1, REDUCED]
-        link[i, PIVOT], link[i, REDUCED] = pivot, right
-    behind = 0.0
+                factor = link[i - 1, OFF_DIAGONAL] / link[i - 1, PIVOT]
+                pivot -= factor * link[i - 1, OFF_DIAGONAL]
+                right -= factor * link[i - 1, REDUCED_RHS]
+        link[i, PIVOT], link[i, REDUCED_RHS] = pivot, right
+    tension_behind = 0.0
     for k in range(n):
         i = n - 1 - k
-        right = link[i, REDUCED]
+        right = link[i, REDUCED_RHS]
         if link[i, PULLS] > 0.0:
-            right -= link[i, BEHIND] * behind
-        behind = right / link[i, PIVOT]
-        link[i, TENSION] = behind
+            right -= link[i, OFF_DIAGONAL] * tension_behind
+        tension_behind = right / link[i, PIVOT]
+        link[i, TENSION] = tension_behind
 
 
 @kernel
-def _mark(link: Floats) -> int:
+def _mark_pulling(link: Floats) -> int:
     """Mark again which links pull; return how many marks changed."""
     n, changed = link.shape[0], 0
     for i in range(n):
         pulls = link[i, TENSION]
         if not link[i, PULLS] > 0.0:
-            pulls = link[i, RIGHT]
+            pulls = link[i, RHS]
             if i > 0:
-                pulls -= link[i - 1, BEHIND] * link[i - 1, TENSION]
+                pulls -= link[i - 1, OFF_DIAGONAL] * link[i - 1, TENSION]
             if i + 1 < n:
-                pulls -= link[i, BEHIND] * link[i + 1, TENSION]
+                pulls -= link[i, OFF_DIAGONAL] * link[i + 1, TENSION]
         mark = 1.0 if pulls > 0.0 else 0.0
         if mark != link[i, PULLS]:
             changed += 1
@@ -79,6 +79,6 @@ def find_tensions(link: Floats) -> bool:
     """Solve for the tensions of `link`; False if the links that pull are not found."""
     for _ in range(_MAX_TRIALS):
         _solve(link)
-        if _mark(link) == 0:
+        if _mark_pulling(link) == 0:
             return True
     return False

@@ -63,7 +63,7 @@ def setpoint() -> SetpointTrack:
 def test_a_lift_from_beside_lasts_until_the_load_hangs_at_rest() -> None:
     """The items of a firmware that does not take off low: take-off 0, rest 1, waypoint 2, land 3."""
     steps = (Takeoff(2.0), Waypoint(4.0, 0.0, 2.0), Land())
-    items = firmware_items(steps, Home(), CABLE_M, STANDS_M, False, takes_off_low=False)
+    items = firmware_items(steps, Home(), CABLE_M, STANDS_M, False, accepts_low_takeoff=False)
     flown = tuple((t, max(item - 2, 0), place) for t, item, place in FLOWN)
     assert observed(items, flown).phase.tolist() == PHASES
 

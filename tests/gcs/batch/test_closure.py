@@ -56,7 +56,7 @@ def test_a_copy_of_the_sources_has_the_same_fingerprint(tree: Path, entries: tup
         ("experiment", "missions/fileformat.py", True),
         ("experiment", "missions/case-a.toml", True),
         ("experiment", "gcs/workflows/flight_loops.py", True),
-        ("experiment", "gcs/workflows/own_flight.py", True),
+        ("experiment", "gcs/workflows/started_flight.py", True),
         ("experiment", "gcs/report/plots.py", False),
         ("experiment", "gcs/analysis/metrics.py", False),
         ("experiment", "gcs/sweep/plan.py", False),

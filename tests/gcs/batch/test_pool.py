@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from gcs.batch import pool
-from gcs.batch.pool import PoolCrew
+from gcs.batch.pool import PoolBackend
 from gcs.batch.runner import fly_all
 from gcs.sweep import work
 
@@ -25,14 +25,14 @@ class Threads(ThreadPoolExecutor):
         super().__init__(1)
         self._event = recalled
 
-    def recall(self) -> None:
+    def request_stop(self) -> None:
         self._event.set()
 
 
 @pytest.fixture
 def recalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     event = threading.Event()
-    monkeypatch.setattr(pool, "RECALLED", [event])
+    monkeypatch.setattr(pool, "STOP_EVENTS", [event])
     yield event
     event.set()
 
@@ -53,7 +53,7 @@ def test_groups_and_flights_that_have_not_begun_are_recalled(recalled: threading
 
     stored: list[int] = []
     with Threads(recalled) as executor:
-        crew: PoolCrew[int, int] = PoolCrew(executor, 1, fly)
+        crew: PoolBackend[int, int] = PoolBackend(executor, 1, fly)
         whole = fly_all(GROUPS, crew, stored.extend, lambda *_: None, in_the_air.is_set)
     assert not whole
     assert stored == [0, 1, 2]

@@ -31,7 +31,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(display_module, "is_live", lambda: True)
+    monkeypatch.setattr(display_module, "stderr_is_terminal", lambda: True)
     monkeypatch.setenv("FORCE_COLOR", "1")  # with it rich, too, treats the captured output as a terminal
     monkeypatch.setenv("COLUMNS", "120")
 

@@ -47,11 +47,11 @@ def test_a_question_is_answered_once_and_its_repetition_with_the_same_bytes():
     assert turns.question(b"\xfd\xff garbage") is None
     asked = turns.question(text(vehicle, "first the news, ") + question(vehicle, 40_000_000))
     assert asked == 40_000_000
-    assert turns.repeated(asked) is None
+    assert turns.repeated_answer(asked) is None
     answer = turns.answer(asked)
-    assert turns.repeated(asked) == answer
-    assert turns.repeated(20_000_000) == b"", "a question that is older still needs no answer"
-    assert turns.repeated(60_000_000) is None
+    assert turns.repeated_answer(asked) == answer
+    assert turns.repeated_answer(20_000_000) == b"", "a question that is older still needs no answer"
+    assert turns.repeated_answer(60_000_000) is None
     assert turns.question(answer) is None, "an answer is no question"
 
 
@@ -71,6 +71,6 @@ def test_truth_of_a_later_tick_waits_for_its_window():
     world = FrameWriter(1, 26)
     early, now, late = (status(world, time_us) for time_us in (12_000, 20_000, 24_000))
     queue.put([early, now, late])
-    assert queue.until(20_000) == [early, now]
-    assert queue.until(20_000) == []
-    assert queue.until(40_000) == [late]
+    assert queue.take_until(20_000) == [early, now]
+    assert queue.take_until(20_000) == []
+    assert queue.take_until(40_000) == [late]

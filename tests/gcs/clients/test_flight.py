@@ -308,7 +308,7 @@ def test_who_ended_the_mission_is_told(world, items, mode, said, by_hand, told):
 
     world.vehicle.script = script
     if by_hand:
-        client.fly_on()
+        client.start_manual_control()
     for _ in world.ticks(client.receive, client.poll, 40.0):
         if client.outcome is not None:
             break

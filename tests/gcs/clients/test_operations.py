@@ -124,8 +124,8 @@ def test_in_progress_is_waited_for(world, run):
     in_progress = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_NAV_TAKEOFF, 5, 40, 0, 255, 190)
     operation.receive(heard(in_progress), 100_000)
     assert operation.progress == (40, 100)
-    assert operation.poll(100_000 + command.PATIENCE_US - 1) == []
-    assert len(operation.poll(100_000 + command.PATIENCE_US)) == 1
+    assert operation.poll(100_000 + command.IN_PROGRESS_TIMEOUT_US - 1) == []
+    assert len(operation.poll(100_000 + command.IN_PROGRESS_TIMEOUT_US)) == 1
 
 
 def test_an_answer_to_somebody_else_is_not_ours():

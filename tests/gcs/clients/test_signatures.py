@@ -52,8 +52,8 @@ def test_what_does_not_match_is_known(theirs, their_time, ours, heard, trouble):
         connection.sign_with(Signing(ours, NOW))
     datagram = writer.frame(HEARTBEAT, sign) + writer.frame(TEXT, sign)
     assert len(connection.receive(datagram, 0)) == heard
-    assert trouble in connection.signatures.trouble
-    assert bool(trouble) == bool(connection.signatures.trouble)
+    assert trouble in connection.signatures.problem
+    assert bool(trouble) == bool(connection.signatures.problem)
 
 
 def test_a_radio_that_cannot_sign_and_a_frame_said_twice_are_no_trouble():
@@ -61,11 +61,11 @@ def test_a_radio_that_cannot_sign_and_a_frame_said_twice_are_no_trouble():
     connection.sign_with(Signing(KEY, NOW))
     radio = FrameWriter(51, 68).frame(mavlink.MAVLink_radio_status_message(1, 1, 100, 0, 0, 0, 0))
     connection.receive(radio, 0)
-    assert connection.signatures.trouble == ""
+    assert connection.signatures.problem == ""
     signed = writer.frame(HEARTBEAT, Signing(KEY, NOW).signer(0))
     for _ in range(2):
         connection.receive(signed, 0)
-    assert connection.signatures.trouble == ""
+    assert connection.signatures.problem == ""
 
 
 def test_a_flight_that_is_not_answered_says_that_a_key_is_missing(world, items):

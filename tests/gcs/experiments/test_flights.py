@@ -8,7 +8,7 @@ from importlib.metadata import version
 import pytest
 
 from gcs.batch import reuse
-from gcs.batch.programs import ProgramCrew
+from gcs.batch.programs import ProgramBackend
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_NOT_MET, GcsError
 from gcs.experiments import run
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, experiments
@@ -26,7 +26,7 @@ def _code_of_the_test(monkeypatch):
 
 def written_by(monkeypatch, code):
     """From now on, `code` is the version of the code that flies."""
-    monkeypatch.setattr(reuse, "code_of", lambda entries: code)
+    monkeypatch.setattr(reuse, "code_fingerprint", lambda entries: code)
 
 
 class Sky:
@@ -76,7 +76,7 @@ class Flight:
     def last_line(self):
         return f"moment {self.left}"
 
-    def obituary(self):
+    def exit_report(self):
         return "gcs ended with exit code 1: no room"
 
     def terminate(self):
@@ -106,7 +106,7 @@ def leave(directory, experiment, outcome="completed", **changes):
 def fly(sky, directory, plan=None, fresh=False, stop=lambda: False, tell=lambda ended, running: None):
     """Fly; return how many flights were missing, and whether all of them were flown."""
     waiting = run.missing(experiments() if plan is None else plan, directory, fresh)
-    crew = ProgramCrew(CORES, lambda e, core: sky.start(e, directory / e.name, core), sky.pause)
+    crew = ProgramBackend(CORES, lambda e, core: sky.start(e, directory / e.name, core), sky.pause)
     return len(waiting), run.fly_missing(waiting, directory, crew, tell, stop)
 
 

@@ -13,7 +13,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.tlog import TlogWriter
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
-from gcs.commands.options import spoken
+from gcs.commands.options import display_name
 from gcs.errors import EXIT_USAGE
 from gcs.recorded.column_map import load_map
 from gcs.recorded.identification import Identified, identify_load, identify_vehicle, map_warning
@@ -162,4 +162,4 @@ def test_a_key_is_spoken_with_its_unit() -> None:
         "drag_n_s_m": "drag (N s/m)",
         "mode": "mode",
     }
-    assert {key: spoken(key) for key in told} == told
+    assert {key: display_name(key) for key in told} == told

@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from gcs.errors import GcsError
-from gcs.shell.page_server import Pages, PageServer, Site
+from gcs.shell.page_server import PageCallbacks, PageServer, Site
 
 
 class Served:
@@ -24,7 +24,7 @@ class Served:
         self.asked: list[Any] = []
         self.site = Site({"": b"<p>page</p>", "live.js": b"1;"}, report)
         self.loop = asyncio.new_event_loop()
-        pages = Pages(lambda: [{"type": "hello"}], lambda page, record: self.asked.append(record))
+        pages = PageCallbacks(lambda: [{"type": "hello"}], lambda page, record: self.asked.append(record))
         self.server = PageServer(self.site, pages, bind, None)
         self.loop.run_until_complete(self.server.__aenter__())
         self.host, self.token = self.server.address.replace(bind, "127.0.0.1").split("/")[2:4]
@@ -145,7 +145,7 @@ def test_what_is_no_json_or_too_long_is_not_heard_and_ends_nothing(served: Serve
 
 def test_a_port_that_is_taken_is_one_line_where_it_was_asked_for_and_passed_over_else(served: Served) -> None:
     port = int(served.host.rpartition(":")[2])
-    pages = Pages(list, lambda page, record: None)
+    pages = PageCallbacks(list, lambda page, record: None)
 
     async def second(asked: int | None) -> str:
         async with PageServer(served.site, pages, "127.0.0.1", asked) as other:

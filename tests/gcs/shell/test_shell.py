@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from autopilot.shell.options import ARGUMENTS_FOLLOW
+from autopilot.shell.options import ARGUMENTS_ON_STDIN
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
@@ -25,12 +25,12 @@ from gcs.clients.flight import FlightClient, Progress, Stage
 from gcs.errors import GcsError, NoVehicleError
 from gcs.shell import display as display_module
 from gcs.shell import processes as processes_module
-from gcs.shell.display import FlightDisplay, StepDisplay, say, to_reader
+from gcs.shell.display import FlightDisplay, StepDisplay, notify, write_to_stdout
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
 from gcs.workflows import flight_loops as loops_module
-from gcs.workflows.flight_loops import STANDING_LIMIT_S, Clock, run_lockstep, run_wall_clock
+from gcs.workflows.flight_loops import STALL_LIMIT_S, ClockMonitor, run_lockstep, run_wall_clock
 
 WAIT_S = 10.0  # for what takes milliseconds on an idle machine
 TICK_US = 20_000
@@ -41,12 +41,12 @@ DEAF = [*LASTING[:-1], "import signal; signal.signal(15, signal.SIG_IGN); print(
 
 
 def written(write: Callable[[str], None]) -> Callable[[str], None]:
-    return lambda text: to_reader(lambda: write(text))
+    return lambda text: write_to_stdout(lambda: write(text))
 
 
 @pytest.mark.parametrize(
     ("stream", "write"),
-    [("stdout", written(print)), ("stdout", written(Console().print)), ("stderr", say)],
+    [("stdout", written(print)), ("stdout", written(Console().print)), ("stderr", notify)],
     ids=["print", "rich", "say"],
 )
 def test_a_reader_who_has_read_enough_stops_nothing(
@@ -99,10 +99,10 @@ def test_answers_go_to_whoever_spoke():
     with UdpContext() as ours:
         theirs = open_address(parse_address(f"udpout:{ours.address}"))
         ours.send(b"to nobody yet")
-        assert not ours.waiting
+        assert not ours.has_datagram
         theirs.send(b"hello")
         wait([ours], WAIT_S)
-        assert ours.waiting
+        assert ours.has_datagram
         assert ours.drain() == [b"hello"]
         ours.send(b"hello yourself")
         wait([theirs], WAIT_S)
@@ -218,7 +218,7 @@ def fly_lockstep(new_world, items, path: Path, repeat: int, turns: int = 1_000) 
 
 
 def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monkeypatch, capsys):
-    for limit in ("SILENCE_LIMIT_S", "WORKING_S"):
+    for limit in ("SILENCE_LIMIT_S", "BUSY_CHECK_S"):
         monkeypatch.setattr(loops_module, limit, 0.05)
     looked = []
     scripted = new_world().vehicle
@@ -236,7 +236,7 @@ def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monke
             FlightDisplay("test", quiet=True),
             stop,
             lambda: None,
-            works=lambda: not looked.append(None),
+            is_busy=lambda: not looked.append(None),
         )
         ground.send(GOODBYE)
     assert client.outcome is not None and client.outcome.reason == "it has ended"
@@ -317,15 +317,15 @@ def test_ctrl_c_stops_the_flight_once_and_in_order(items, tmp_path, lockstep, ca
 
 
 def test_a_clock_that_stands_while_the_vehicle_speaks_is_told_but_not_one_that_we_did_not_look_at():
-    clock = Clock(now_s=0.0)
-    assert clock.standing(None, 1000.0) == "", "it is not known before the vehicle tells"
-    told = [clock.standing(12_500_000, 1000.0 + second) for second in range(int(STANDING_LIMIT_S) + 1)]
-    assert told[:-1] == [""] * int(STANDING_LIMIT_S)
+    clock = ClockMonitor(now_s=0.0)
+    assert clock.stall_reason(None, 1000.0) == "", "it is not known before the vehicle tells"
+    told = [clock.stall_reason(12_500_000, 1000.0 + second) for second in range(int(STALL_LIMIT_S) + 1)]
+    assert told[:-1] == [""] * int(STALL_LIMIT_S)
     assert told[-1].startswith(
         "the vehicle's clock has stood at 12.500 s for 60 s: the autopilot speaks, but"
     )
-    assert clock.standing(12_508_000, 1061.0) == ""
-    assert clock.standing(12_508_000, 5000.0) == "", "we were held up ourselves"
+    assert clock.stall_reason(12_508_000, 1061.0) == ""
+    assert clock.stall_reason(12_508_000, 5000.0) == "", "we were held up ourselves"
 
 
 # ---- processes
@@ -334,7 +334,7 @@ def test_a_clock_that_stands_while_the_vehicle_speaks_is_told_but_not_one_that_w
 def test_a_child_is_stopped_and_reaped(tmp_path):
     with Processes() as processes:
         child = processes.start("timeit", LASTING, tmp_path / "log")
-        assert processes.ended() == ""
+        assert processes.end_reason() == ""
         assert os.getpgid(child.pid) == child.pid, "Ctrl-C of the terminal must not reach it"
     assert child.exit_code == -signal.SIGTERM
 
@@ -344,10 +344,10 @@ def test_a_loaded_program_starts_with_the_arguments_that_follow_and_writes_to_it
     log.write_text("of an earlier flight")
     with Processes() as processes:
         processes.load("sitl")
-        assert processes.ended() == "", "it is none of the flight's yet"
+        assert processes.end_reason() == "", "it is none of the flight's yet"
         child = processes.start("sitl", ["--vehicle", "no such"], log)
         assert child.wait(WAIT_S)
-        assert processes.ended().startswith("sitl ended with exit code 2: unknown vehicle 'no such'")
+        assert processes.end_reason().startswith("sitl ended with exit code 2: unknown vehicle 'no such'")
     assert log.read_text().startswith("sitl: unknown vehicle 'no such'")
 
 
@@ -357,14 +357,14 @@ def test_a_loaded_program_that_has_ended_is_started_anew(tmp_path):
         assert waiting.wait(WAIT_S)
         child = processes.start("no_such_module", [], tmp_path / "log")
         assert child is not waiting and child.wait(WAIT_S)
-        assert processes.ended().endswith("No module named no_such_module")
+        assert processes.end_reason().endswith("No module named no_such_module")
 
 
 def test_a_loaded_program_that_is_never_started_is_stopped():
     with Processes() as processes:
         waiting = processes.load("sitl")
     assert waiting.exit_code == -signal.SIGTERM
-    command = [sys.executable, "-m", "sitl", ARGUMENTS_FOLLOW]
+    command = [sys.executable, "-m", "sitl", ARGUMENTS_ON_STDIN]
     ended = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT_S)
     assert (ended.stdout, ended.stderr) == (b"", b""), "nobody is there any more to start it"
 
@@ -382,38 +382,38 @@ def test_an_early_end_is_one_line_with_the_last_words(tmp_path):
     with Processes() as processes:
         child = processes.start("timeit", ["--no-such-option"], tmp_path / "log")
         assert child.wait(WAIT_S)
-        line = processes.ended()
+        line = processes.end_reason()
     assert line.startswith("timeit ended with exit code 2: ")
     assert "\n" not in line
 
 
 def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes_module, "STOPPED_LIMIT_S", 0.2)
-    monkeypatch.setattr(processes_module, "LOOK_S", 0.02)
+    monkeypatch.setattr(processes_module, "CHECK_INTERVAL_S", 0.02)
     with Processes() as processes:
         child = processes.start("timeit", LASTING, tmp_path / "log")
-        assert processes.ended() == processes.stopped() == ""
+        assert processes.end_reason() == processes.stopped_children() == ""
         os.kill(child.pid, signal.SIGSTOP)
         said = []
-        poll_until(lambda: said.append(processes.stopped()) or said[-1], child)
+        poll_until(lambda: said.append(processes.stopped_children()) or said[-1], child)
         assert said[-1] == f"timeit (process {child.pid}) stopped by a signal"
-        poll_until(lambda: said.append(processes.ended()) or said[-1], child)
+        poll_until(lambda: said.append(processes.end_reason()) or said[-1], child)
         assert said[-1].startswith(f"timeit (process {child.pid}) has been stopped by a signal for ")
         waiting = f"gcs: timeit (process {child.pid}) is stopped by a signal: waiting for it\n"
         assert capsys.readouterr().err == waiting, "at once, and once"
         os.kill(child.pid, signal.SIGCONT)
-        poll_until(lambda: not processes.stopped(), child)
+        poll_until(lambda: not processes.stopped_children(), child)
 
 
 def test_a_child_that_computes_works_and_one_that_waits_does_not(tmp_path, monkeypatch):
-    monkeypatch.setattr(processes_module, "LOOK_S", 0.1)
+    monkeypatch.setattr(processes_module, "CHECK_INTERVAL_S", 0.1)
     with Processes() as processes:
         child = processes.start("timeit", ["-n", "1", "-r", "1", "while True: pass"], tmp_path / "log")
-        poll_until(processes.works, child)
+        poll_until(processes.are_busy, child)
     with Processes() as processes:
         child = processes.start("timeit", DEAF, tmp_path / "log")
         poll_until(child.log.read_bytes, child)  # it has begun to wait
-        poll_until(lambda: not processes.works(), child)
+        poll_until(lambda: not processes.are_busy(), child)
 
 
 def test_the_prefix_of_the_program_is_said_once(tmp_path):
@@ -421,9 +421,9 @@ def test_the_prefix_of_the_program_is_said_once(tmp_path):
         child = processes.start("timeit", LASTING, tmp_path / "log")
         child.log.write_text("warning\ntimeit: cannot listen on 127.0.0.1:1\n\n")
         child.exit_code = 1
-        assert child.obituary() == "timeit ended with exit code 1: cannot listen on 127.0.0.1:1"
+        assert child.exit_report() == "timeit ended with exit code 1: cannot listen on 127.0.0.1:1"
         child.exit_code = -9
-        assert child.obituary().startswith("timeit was killed by SIGKILL: ")
+        assert child.exit_report().startswith("timeit was killed by SIGKILL: ")
 
 
 @pytest.mark.parametrize("cores", [1, 2])

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from autopilot.shell.options import LastingStream, stop_signals
+from autopilot.shell.options import CloseSafeStream, stop_signals
 from gcs.shell.stopping import StopRequest
 
 
@@ -53,7 +53,7 @@ def test_what_was_begun_to_outlive_its_terminal_does() -> None:
 def test_what_is_said_to_a_closed_terminal_is_lost() -> None:
     ours, theirs = pty.openpty()
     with os.fdopen(theirs, "w") as terminal:
-        stream = LastingStream(terminal)
+        stream = CloseSafeStream(terminal)
         stream.write("heard\n")
         stream.flush()
         assert os.read(ours, 100) == b"heard\r\n"

@@ -10,7 +10,7 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.shell import vehicle_socket
 from gcs.shell.link import Address, UdpSocket, free_port, parse_address, wait
-from gcs.shell.vehicle_socket import GONE_US, VehicleSocket
+from gcs.shell.vehicle_socket import REPLACEMENT_US, VehicleSocket
 
 WAIT_S = 5.0
 
@@ -65,7 +65,7 @@ def heard(ground: VehicleSocket, sender: UdpSocket, *datagrams: bytes) -> list[b
     for datagram in datagrams:
         sender.send(datagram)
         wait([ground], WAIT_S)
-        assert ground.waiting
+        assert ground.has_datagram
         found += ground.drain()
     return found
 
@@ -82,7 +82,7 @@ def test_of_two_vehicles_the_first_is_heard_and_answered(
     ground.send(b"answer")
     wait([first], WAIT_S)
     assert first.drain() == [b"answer"]
-    assert not second.waiting
+    assert not second.has_datagram
 
 
 def test_another_autopilot_is_named_by_any_message_of_it(
@@ -113,9 +113,9 @@ def test_a_vehicle_that_starts_again_is_heard_at_its_new_port(
 ) -> None:
     before, after = two
     heard(ground, before, heartbeat())
-    clock.now_us = GONE_US - 1
+    clock.now_us = REPLACEMENT_US - 1
     assert heard(ground, after, heartbeat()) == []
-    clock.now_us = GONE_US
+    clock.now_us = REPLACEMENT_US
     assert heard(ground, after, heartbeat(), b"here") == [heartbeat(), b"here"]
     ground.send(b"answer")
     wait([after], WAIT_S)

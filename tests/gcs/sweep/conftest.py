@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gcs.sweep.plan import SweepPlan, Varied
+from gcs.sweep.plan import SweepPlan, VariedParameter
 
 SHORT = """
 title = "Up, aside and down"
@@ -99,7 +99,7 @@ def swung(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture
 def plan(short: str) -> SweepPlan:
     """Six flights, of which those with the long delay are lost."""
-    delays = Varied("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
+    delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
     return SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
 
 

@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
-from autopilot.own.chosen import Own
+from autopilot.own.own_code import OwnCode
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.sweep.flight import TRACE_COLUMNS, Flown, boarding, fly
+from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
 from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
@@ -32,7 +32,7 @@ class NoLog:
         pass
 
 
-def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]]:
+def flown(name: str, conditions: Conditions) -> tuple[FlightResult, NDArray[np.float64]]:
     """Fly both ways and compare every true state; return the sweep's result and the states."""
     mission = load_mission(name)
     real = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
@@ -45,7 +45,7 @@ def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]
 
     outcome = fly_with_wire(mission, conditions, NoLog(), watch)
     fused = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
-    found = fly(mission, conditions, boarding(mission, conditions), fused)
+    found = fly(mission, conditions, start_times(mission, conditions), fused)
     assert (found.outcome, found.reason) == (outcome.name, outcome.reason)
     # the ground station continues to listen for a moment
     ticks = int(np.isfinite(fused[:, 0]).sum())
@@ -61,13 +61,13 @@ def test_same_bits_with_each_law(short: str, law: float) -> None:
 
 @pytest.mark.parametrize("law", ["load_pid:LoadPid", "geometric:Geometric"])
 def test_same_bits_with_a_law_of_ones_own(short: str, law: str) -> None:
-    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=Own(f"plumbline.examples.{law}")))
+    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=OwnCode(f"plumbline.examples.{law}")))
     assert found.outcome == "completed"
 
 
 @pytest.mark.parametrize("law", ["", "plumbline.examples.geometric:Geometric"])
 def test_same_bits_with_an_estimator_of_ones_own(short: str, law: str) -> None:
-    own = Own(law, estimator="plumbline.examples.luenberger:Luenberger")
+    own = OwnCode(law, estimator="plumbline.examples.luenberger:Luenberger")
     found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN if law else PLUMBLINE}, own=own))
     assert found.outcome == "completed"
 
@@ -82,7 +82,7 @@ class Failing:
 
 
 def test_same_bits_with_a_law_that_fails(short: str) -> None:
-    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=Own(f"{__file__}:Failing")))
+    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=OwnCode(f"{__file__}:Failing")))
     assert found.outcome == "diverged"
     assert found.reason.startswith("Law Failing failed: ZeroDivisionError: float division by zero")
 
@@ -151,17 +151,17 @@ def test_same_end_at_the_fence(swung: str, action: float, outcome: str) -> None:
 
 def test_a_refusal_names_the_item_of_the_mission_and_not_of_the_upload() -> None:
     mission = load_mission("case-c")
-    found = fly(mission, Conditions(settings={"GF_MAX_HOR_DIST": 10.0}), boarding(mission, Conditions()))
+    found = fly(mission, Conditions(settings={"GF_MAX_HOR_DIST": 10.0}), start_times(mission, Conditions()))
     assert "item 7 (items[2] of the mission) leads beyond the fence" in found.reason
 
 
 def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
     mission = load_mission(short)
-    arms = boarding(mission, Conditions())
+    arms = start_times(mission, Conditions())
     fenced = Conditions(settings={"GF_MAX_HOR_DIST": FENCE_M})
     found = fly(mission, fenced, arms)
     assert found.outcome == "refused"
     assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST 0.3 m from home" in found.reason
     with pytest.raises(ValueError, match="does not start under the conditions of the sweep") as refusal:
-        boarding(mission, fenced)
+        start_times(mission, fenced)
     assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST" in str(refusal.value)

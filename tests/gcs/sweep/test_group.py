@@ -14,9 +14,9 @@ from autopilot.shell.compiling import Part
 from gcs.closed_loop import Conditions
 from gcs.sweep import work
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import Flown, SweptFlight, boarding, fly
-from gcs.sweep.group import Group, suits
-from gcs.sweep.plan import SweepPlan, Varied
+from gcs.sweep.flight import FlightResult, SweepFlight, fly, start_times
+from gcs.sweep.group import LaneGroup, fits_in_lanes
+from gcs.sweep.plan import SweepPlan, VariedParameter
 from gcs.sweep.work import Work, fly_cases
 from missions.fileformat import load_mission
 
@@ -36,18 +36,18 @@ def both_ways(
     seeds: Sequence[int],
     sensors: str = "lab",
     vehicle: str = "bebop",
-) -> tuple[list[Flown], float]:
+) -> tuple[list[FlightResult], float]:
     """Fly the seeds alone and together; return the results and the share of ticks flown in lanes."""
     mission = load_mission(name)
     conditions = Conditions(vehicle, sensors, settings=settings)
-    start = boarding(mission, conditions)
+    start = start_times(mission, conditions)
     alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
-    flights = [SweptFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
-    group = Group(flights)
+    flights = [SweepFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    group = LaneGroup(flights)
     group.run()
     # repr: NaN is not equal to itself
-    assert [repr(flight.flown) for flight in flights] == [repr(flown) for flown in alone]
-    return alone, group.in_lanes / sum(flight.tick for flight in flights)
+    assert [repr(flight.result) for flight in flights] == [repr(flown) for flown in alone]
+    return alone, group.lane_ticks / sum(flight.tick for flight in flights)
 
 
 def test_same_bits_with_eight(short: str) -> None:
@@ -110,7 +110,7 @@ def test_an_attachment_that_is_told_is_flown_better(short: str) -> None:
 
     def error(settings: Mapping[str, float]) -> float:
         mission, conditions = load_mission(short), Conditions(settings=settings)
-        return fly(mission, conditions, boarding(mission, conditions)).load_error_max_m
+        return fly(mission, conditions, start_times(mission, conditions)).load_error_max_m
 
     assert error({**offset, **known}) < 0.8 * error(offset)
 
@@ -130,9 +130,9 @@ def test_while_the_winch_works_each_flies_alone(winched: str) -> None:
 def test_readings_that_get_lost_do_not_suit(short: str) -> None:
     mission = load_mission(short)
     lossy = Conditions(settings={"CTL_LAW": PLUMBLINE, "SIM_DROP_PCT": 5.0})
-    start = boarding(mission, Conditions(settings={"CTL_LAW": PLUMBLINE}))
-    assert suits(SweptFlight(cell_of(mission, Conditions()), 1, start))
-    assert not suits(SweptFlight(cell_of(mission, lossy), 1, start))
+    start = start_times(mission, Conditions(settings={"CTL_LAW": PLUMBLINE}))
+    assert fits_in_lanes(SweepFlight(cell_of(mission, Conditions()), 1, start))
+    assert not fits_in_lanes(SweepFlight(cell_of(mission, lossy), 1, start))
     for name, sensors in (
         ("SIM_SENS_JIT_MS", "lab"),
         ("SIM_OCC_LOAD", "lab"),
@@ -140,17 +140,17 @@ def test_readings_that_get_lost_do_not_suit(short: str) -> None:
         ("SIM_GPS_LOST", "rtk"),
     ):
         late = Conditions(sensors=sensors, settings={"CTL_LAW": PLUMBLINE, name: 3.0})
-        assert not suits(SweptFlight(cell_of(mission, late), 1, start)), name
+        assert not fits_in_lanes(SweepFlight(cell_of(mission, late), 1, start)), name
 
 
 def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:
     """Five seeds of two settings, of which one loses readings."""
-    lost = Varied("SIM_DROP_PCT", (0.0, 5.0), False)
+    lost = VariedParameter("SIM_DROP_PCT", (0.0, 5.0), False)
     plan = SweepPlan(short, "bebop", "lab", ("plumbline",), (1, 2, 3, 4, 5), (lost,), ())
     prepared = work.prepare(plan, as_needed)
     cases, clock = list(plan.cases()), partial(next, count(1.0))
-    without = fly_cases(replace(prepared, in_lanes=frozenset()), cases, clock)
-    lanes: Work = replace(prepared, in_lanes=frozenset({"plumbline"}))
+    without = fly_cases(replace(prepared, lane_laws=frozenset()), cases, clock)
+    lanes: Work = replace(prepared, lane_laws=frozenset({"plumbline"}))
     found = fly_cases(lanes, cases, clock)
     assert [{**row, "wall_s": 0.0} for row in found] == [{**row, "wall_s": 0.0} for row in without]
     assert all(row["wall_s"] > 0.0 for row in found)
@@ -166,12 +166,12 @@ def test_lanes_are_compiled_where_many_flights_differ_by_their_seeds(
         compiled.extend(part.mark for part in parts)
 
     monkeypatch.setattr(Part, "ready", property(lambda part: part.mark in compiled))
-    assert work.prepare(plan, warm).in_lanes == frozenset()
+    assert work.prepare(plan, warm).lane_laws == frozenset()
     assert "alone" in compiled and "lanes-plumbline" not in compiled
-    monkeypatch.setattr(work, "LANES_PAY", 20)
-    assert work.prepare(plan, warm).in_lanes == {"plumbline"}
+    monkeypatch.setattr(work, "MIN_FLIGHTS_FOR_LANES", 20)
+    assert work.prepare(plan, warm).lane_laws == {"plumbline"}
     assert compiled.count("lanes-plumbline") == 1
     # once they are compiled, fewer flights suffice if there are enough seeds
-    monkeypatch.setattr(work, "LANES_PAY", 1000)
-    assert work.prepare(plan, warm).in_lanes == {"plumbline"}
-    assert work.prepare(replace(plan, seeds=(1, 2)), warm).in_lanes == frozenset()
+    monkeypatch.setattr(work, "MIN_FLIGHTS_FOR_LANES", 1000)
+    assert work.prepare(plan, warm).lane_laws == {"plumbline"}
+    assert work.prepare(replace(plan, seeds=(1, 2)), warm).lane_laws == frozenset()

@@ -11,19 +11,21 @@ from gcs.batch.reuse import Origin
 from gcs.sweep.plan import (
     PlanError,
     SweepPlan,
-    Varied,
+    VariedParameter,
     from_json,
     make_plan,
-    read_varied,
+    parse_varied,
 )
 from gcs.sweep.plan_file import default_directory, load_command, load_plan, store_plan, sweep_origin
 
 
 def test_ranges_and_lists() -> None:
-    assert read_varied("sim_noise_scale=0.5:4:8", False).values == (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
-    assert read_varied("SIM_DROP_PCT=0:0.3:4", False).values == (0.0, 0.1, 0.2, 0.3)
-    assert read_varied("SIM_SENS_LAT_MS=0,5,10", False) == Varied("SIM_SENS_LAT_MS", (0.0, 5.0, 10.0), False)
-    assert read_varied("SIM_SENS_LAT_MS=0:10", True) == Varied("SIM_SENS_LAT_MS", (0.0, 10.0), True)
+    assert parse_varied("sim_noise_scale=0.5:4:8", False).values == (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+    assert parse_varied("SIM_DROP_PCT=0:0.3:4", False).values == (0.0, 0.1, 0.2, 0.3)
+    assert parse_varied("SIM_SENS_LAT_MS=0,5,10", False) == VariedParameter(
+        "SIM_SENS_LAT_MS", (0.0, 5.0, 10.0), False
+    )
+    assert parse_varied("SIM_SENS_LAT_MS=0:10", True) == VariedParameter("SIM_SENS_LAT_MS", (0.0, 10.0), True)
 
 
 @pytest.mark.parametrize(
@@ -45,17 +47,19 @@ def test_ranges_and_lists() -> None:
 )
 def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
     with pytest.raises(PlanError, match=f"--vary {text}") as caught:
-        read_varied(text, False)
+        parse_varied(text, False)
     assert caught.value.exit_code == 2
 
 
 def test_a_count_where_values_are_drawn_is_refused_with_what_to_give() -> None:
     with pytest.raises(PlanError, match=r"without a count; give SIM_WIND_E=0:4$") as caught:
-        read_varied("SIM_WIND_E=0:4:3", True)
+        parse_varied("SIM_WIND_E=0:4:3", True)
     assert caught.value.exit_code == 2
 
 
-def planned(short: str, varied: list[Varied], settings: dict[str, float], sample: int = 0) -> SweepPlan:
+def planned(
+    short: str, varied: list[VariedParameter], settings: dict[str, float], sample: int = 0
+) -> SweepPlan:
     return make_plan(short, "bebop", "lab", ["thesis"], [1], varied, settings, sample)
 
 
@@ -72,13 +76,13 @@ def planned(short: str, varied: list[Varied], settings: dict[str, float], sample
 )
 def test_wrong_parameters_are_refused(short: str, name: str, value: float, says: str) -> None:
     with pytest.raises(PlanError, match=says):
-        planned(short, [Varied(name, (value,), False)], {})
+        planned(short, [VariedParameter(name, (value,), False)], {})
     with pytest.raises(PlanError, match=says):
         planned(short, [], {name: value})
 
 
 def test_wrong_combinations_are_refused(short: str) -> None:
-    wind = Varied("SIM_WIND_E", (1.0, 2.0), False)
+    wind = VariedParameter("SIM_WIND_E", (1.0, 2.0), False)
     with pytest.raises(PlanError, match="twice"):
         planned(short, [wind, wind], {})
     with pytest.raises(PlanError, match="varied and set"):
@@ -90,7 +94,10 @@ def test_wrong_combinations_are_refused(short: str) -> None:
 
 
 def test_every_setting_is_flown_with_every_law_and_seed(short: str) -> None:
-    varied = [Varied("SIM_WIND_E", (1.0, 2.0), False), Varied("NGC_KX", (5.0, 6.0, 7.0), False)]
+    varied = [
+        VariedParameter("SIM_WIND_E", (1.0, 2.0), False),
+        VariedParameter("NGC_KX", (5.0, 6.0, 7.0), False),
+    ]
     plan = make_plan(short, "bebop", "lab", ["thesis", "lqr"], [1, 2], varied, {"SIM_WIND_N": 1.0}, 0)
     cases = list(plan.cases())
     assert [case.index for case in cases] == list(range(plan.flights)) and plan.flights == 24
@@ -101,7 +108,10 @@ def test_every_setting_is_flown_with_every_law_and_seed(short: str) -> None:
 
 
 def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) -> None:
-    varied = [Varied("SIM_WIND_E", (1.0, 3.0), True), Varied("SIM_DROP_PCT", (0.0, 10.0), False)]
+    varied = [
+        VariedParameter("SIM_WIND_E", (1.0, 3.0), True),
+        VariedParameter("SIM_DROP_PCT", (0.0, 10.0), False),
+    ]
     plan = planned(short, varied, {}, sample=40)
     cases = list(plan.cases())
     wind = sorted(case.varied[0] for case in cases)

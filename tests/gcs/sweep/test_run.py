@@ -23,14 +23,14 @@ from gcs.sweep import run, work
 from gcs.sweep.plan import PlanError, SweepPlan
 from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
-from gcs.sweep.results import cells, flights_of, reach
-from gcs.sweep.standouts import command_of, stored_standouts
+from gcs.sweep.results import cells, completion_range, flights_by_law
+from gcs.sweep.standouts import repeat_command, stored_standouts
 from gcs.sweep.store import Store, columns
 from tests.doubles.browser import Browser
 from tests.gcs.sweep.conftest import AtOnce
 
 
-def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.Swept:
+def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.SweepResult:
     workers = nullcontext((AtOnce(), 1))
     return run.sweep(plan, directory, "gcs sweep", workers, lambda: bool(stopped), quiet=True, fresh=False)
 
@@ -53,18 +53,18 @@ def without_clock(path: Path) -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="module")
-def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path, run.Swept]:
-    from gcs.sweep.plan import Varied
+def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path, run.SweepResult]:
+    from gcs.sweep.plan import VariedParameter
 
-    delays = Varied("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
+    delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
     plan = SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
     directory = tmp_path_factory.mktemp("whole")
     return plan, directory, swept(plan, directory)
 
 
-def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.SweepResult]) -> None:
     plan, directory, done = whole
-    assert (done.flights, done.flown, done.completed, done.whole) == (6, 6, 4, True)
+    assert (done.flights, done.flown, done.completed, done.is_complete) == (6, 6, 4, True)
     table = pq.read_table(directory / "flights.parquet")
     assert tuple(table.column_names) == columns(plan)
     assert table.column("index").to_pylist() == list(range(6))
@@ -78,19 +78,21 @@ def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Swept
 
 
 def test_a_sweep_that_was_stopped_goes_on(
-    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, complete, _ = whole
     monkeypatch.setattr(work, "batch_size", lambda flights, workers: 1)
     first = swept(plan, tmp_path, AfterOne())
-    assert not first.whole and 0 < first.flights < 6
+    assert not first.is_complete and 0 < first.flights < 6
     rest = swept(plan, tmp_path)
-    assert rest.whole and rest.flown == 6 - first.flights
+    assert rest.is_complete and rest.flown == 6 - first.flights
     assert without_clock(tmp_path) == without_clock(complete)
     assert swept(plan, tmp_path).flown == 0
 
 
-def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+def test_a_sweep_that_was_killed_goes_on(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path
+) -> None:
     plan, complete, _ = whole
     rows = pq.read_table(complete / "flights.parquet").to_pylist()
     store = Store(tmp_path, plan)
@@ -99,14 +101,14 @@ def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept
     # killed after merging, before the parts were removed; and while a part was being written
     store.add(rows[1:3])
     (tmp_path / "parts" / "000000005-1.99.unfinished").write_bytes(b"PAR1")
-    assert store.done() == {0, 1, 2}
+    assert store.stored_indices() == {0, 1, 2}
     done = swept(plan, tmp_path)
     assert (done.flights, done.flown) == (6, 3)
     assert without_clock(tmp_path) == without_clock(complete)
 
 
 def test_flights_are_stored_without_what_imports_pandas(
-    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, complete, _ = whole
     rows = pq.read_table(complete / "flights.parquet").to_pylist()
@@ -118,34 +120,36 @@ def test_flights_are_stored_without_what_imports_pandas(
     assert str(store.merge().to_pylist()) == str(rows)  # nan is not equal to itself
 
 
-def test_a_report_without_flights_says_so(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+def test_a_report_without_flights_says_so(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path
+) -> None:
     plan, _, _ = whole
     assert swept(plan, tmp_path, lambda: True).flights == 0
     page = write_report(tmp_path, plan).read_text(encoding="utf-8")
     assert "No flight has ended yet." in page and "<h2>" not in page
 
 
-def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.SweepResult]) -> None:
     plan, directory, _ = whole
     page = write_report(directory, plan).read_text(encoding="utf-8")
     assert (directory / "curve-sim_act_delay_ms.png").stat().st_size > 5000
     assert "SIM_ACT_DELAY_MS" in page and "0 … 4" in page and "data:image/png" in page
 
 
-def test_shares_and_reach(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+def test_shares_and_reach(whole: tuple[SweepPlan, Path, run.SweepResult]) -> None:
     plan, directory, _ = whole
-    (flights,) = flights_of(Store(directory, plan).read(), plan)
+    (flights,) = flights_by_law(Store(directory, plan).read(), plan)
     found = cells(flights, plan, ("SIM_ACT_DELAY_MS",))
     assert found.success.tolist() == [1.0, 1.0, 0.0]
     assert found.flown.tolist() == [2.0, 2.0, 2.0]
     assert found.error_worst_m[0] >= found.error_median_m[0] > 0.0
     assert found.error_worst_m[2] != found.error_worst_m[2]
-    reached = reach(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
+    reached = completion_range(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
     assert (reached.all_from, reached.all_to) == (reached.some_from, reached.some_to) == (0.0, 4.0)
 
 
 def test_no_range_is_claimed_of_what_was_not_flown(
-    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path
 ) -> None:
     """Stopped after the first of two seeds at 4 ms, with nothing flown at 60 ms."""
     plan, complete, _ = whole
@@ -153,8 +157,8 @@ def test_no_range_is_claimed_of_what_was_not_flown(
     store = Store(tmp_path, plan)
     store.add(rows[:3])
     store.merge()
-    (flights,) = flights_of(store.read(), plan)
-    reached = reach(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
+    (flights,) = flights_by_law(store.read(), plan)
+    reached = completion_range(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
     assert (reached.all_from, reached.all_to) == (reached.some_from, reached.some_to) == (0.0, 0.0)
     store_plan(tmp_path, plan, "gcs sweep", sweep_origin(plan))
     page = write_report(tmp_path, plan).read_text(encoding="utf-8")
@@ -163,7 +167,9 @@ def test_no_range_is_claimed_of_what_was_not_flown(
     assert "<td>0 … 4</td><td>0</td><td>0</td>" in cells, "flown, all complete, all seeds complete"
 
 
-def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+def test_flights_that_stand_out_are_those_of_the_table(
+    whole: tuple[SweepPlan, Path, run.SweepResult],
+) -> None:
     plan, directory, _ = whole
     rows = pq.read_table(directory / "flights.parquet").to_pylist()
     completed = sorted((row["load_error_max_m"], row["index"]) for row in rows[:4])
@@ -173,14 +179,14 @@ def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, P
         "median": completed[1][1],
         "lost": 4,
     }
-    words = shlex.split(command_of(plan, found["lost"], directory))
+    words = shlex.split(repeat_command(plan, found["lost"], directory))
     assert words[:3] == ["gcs", "fly", plan.mission]
     assert words[words.index("--seed") + 1] == "1"
     assert "SIM_ACT_DELAY_MS=60.0" in words
     assert {"--force", "--overwrite"} <= set(words), "it flies whatever it is, and as often as it is given"
 
 
-def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width: int) -> None:
+def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult], width: int) -> None:
     """Open the page of the sweep and wait until its maps are drawn."""
     plan, directory, _ = whole
     browser.open(write_report(directory, plan).as_uri(), width, 844)
@@ -188,7 +194,7 @@ def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width:
 
 
 def test_a_click_on_a_cell_gives_the_command_of_its_flight(
-    browser: Browser, whole: tuple[SweepPlan, Path, run.Swept]
+    browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult]
 ) -> None:
     plan, directory, _ = whole
     open_page(browser, whole, 1280)
@@ -196,7 +202,7 @@ def test_a_click_on_a_cell_gives_the_command_of_its_flight(
     browser.find("rect.cell[data-cell='2']").click()
     assert "SIM_ACT_DELAY_MS 60 ms: 2 flights, 0 % completed" in browser.find(".said").text
     lost = next(one for one in stored_standouts(directory, plan) if one.kind == "lost")
-    whole_command = shlex.split(command_of(plan, lost, directory))
+    whole_command = shlex.split(repeat_command(plan, lost, directory))
     assert shlex.split(browser.find("#chosen code").text) == whole_command[: whole_command.index("--out")]
     browser.listen()
     assert browser.errors == []
@@ -205,7 +211,7 @@ def test_a_click_on_a_cell_gives_the_command_of_its_flight(
 
 @pytest.mark.parametrize("width", [360, 390, 800, 1280])
 def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
-    browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width: int
+    browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult], width: int
 ) -> None:
     open_page(browser, whole, width)
     browser.find("rect.cell[data-cell='2']").click()
@@ -225,7 +231,7 @@ def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
 
 
 def test_the_map_is_drawn_anew_in_a_window_of_another_width(
-    browser: Browser, whole: tuple[SweepPlan, Path, run.Swept]
+    browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult]
 ) -> None:
     open_page(browser, whole, 1280)
     browser.find("rect.cell[data-cell='2']").click()
@@ -306,7 +312,9 @@ def test_a_cluster_that_does_not_answer_changes_nothing(
     assert [path.name for path in sorted(tmp_path.rglob("*"))] == ["flown", "plan.json"]
 
 
-def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+def test_a_dask_cluster_flies_the_same(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path
+) -> None:
     distributed = pytest.importorskip("distributed")
     plan, complete, _ = whole
 
@@ -321,7 +329,7 @@ def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept],
             yield workers
 
     done = run.sweep(plan, tmp_path, "gcs sweep", cluster(), lambda: False, quiet=True, fresh=False)
-    assert done.whole and done.flown == 6
+    assert done.is_complete and done.flown == 6
     assert without_clock(tmp_path) == without_clock(complete)
 
 
@@ -366,7 +374,7 @@ def test_a_sweep_with_a_part_that_is_not_compiled_says_that_it_compiles(
         raise PlanError("not flown")
 
     monkeypatch.setattr(Part, "ready", property(lambda part: part.mark in made))
-    monkeypatch.setattr(Part, "done", lambda part: made.append(part.mark))
+    monkeypatch.setattr(Part, "mark_done", lambda part: made.append(part.mark))
     monkeypatch.setattr(run, "prepare", prepare)
     words = ["sweep", short, "--law", "thesis", "--seeds", "1", "--out", str(tmp_path / "out")]
     result = CliRunner().invoke(gcs, [*words, *(["--quiet"] if quiet else [])], prog_name="gcs")

@@ -100,7 +100,7 @@ def test_each_new_frame_is_a_tick(simulator: HilSimulator) -> None:
     exchange = Exchange(simulator)
     for number in range(5):
         reply = exchange.receive(read_servo_packet(packet(number)), 0.0)
-        assert reply.moved and not reply.news
+        assert reply.advanced and not reply.notice
         assert simulator.now_us == (number + 1) * 1250
         assert as_the_firmware_reads(reply.answer)["timestamp"][0] == pytest.approx(simulator.now_us * 1e-6)
 
@@ -115,7 +115,7 @@ def test_a_repeated_frame_moves_nothing_and_is_answered_when_the_answer_was_lost
     assert exchange.receive(read_servo_packet(packet(0, 1900)), 11.1) == (first.answer, False, "")
     assert exchange.receive(read_servo_packet(packet(0, 1900)), 11.2) == (b"", False, "")
     assert simulator.now_us == now_us
-    assert exchange.receive(read_servo_packet(packet(1)), 11.3).moved
+    assert exchange.receive(read_servo_packet(packet(1)), 11.3).advanced
 
 
 def test_a_firmware_that_begins_anew_begins_the_world_anew(simulator: HilSimulator) -> None:
@@ -124,7 +124,7 @@ def test_a_firmware_that_begins_anew_begins_the_world_anew(simulator: HilSimulat
     for n in range(3, 200):
         exchange.receive(read_servo_packet(packet(n, 1900)), 0.0)
     again = exchange.receive(read_servo_packet(packet(0)), 1.0)
-    assert "restarted at t = 0.250 s" in again.news
+    assert "restarted at t = 0.250 s" in again.notice
     assert [
         again.answer,
         *(exchange.receive(read_servo_packet(packet(n)), 1.0).answer for n in (1, 2)),
@@ -133,7 +133,7 @@ def test_a_firmware_that_begins_anew_begins_the_world_anew(simulator: HilSimulat
 
 def test_a_firmware_that_flies_already_is_told_of(simulator: HilSimulator) -> None:
     reply = Exchange(simulator).receive(read_servo_packet(LATER), 0.0)
-    assert reply.moved and "flown for 3999 frames" in reply.news and simulator.now_us == 1250
+    assert reply.advanced and "flown for 3999 frames" in reply.notice and simulator.now_us == 1250
 
 
 def test_the_same_packets_give_the_same_bytes() -> None:

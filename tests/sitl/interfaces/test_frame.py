@@ -31,7 +31,7 @@ def test_each_motor_is_where_the_firmware_has_it(name: str) -> None:
         forces = frame.forces(throttles)
         driven = [rotor for rotor, force in zip(vehicle.layout, forces, strict=True) if force > 0.0]
         assert len(driven) == 1
-        x, y, _ = frame.felt((driven[0].x, driven[0].y, 0.0))
+        x, y, _ = frame.to_controller_axes((driven[0].x, driven[0].y, 0.0))
         assert x * forward == pytest.approx(sqrt(0.5)) and y * left == pytest.approx(sqrt(0.5))
         assert (driven[0].yaw < 0.0) == counterclockwise
         assert max(forces) == pytest.approx(vehicle.rotor_max_n)
@@ -44,7 +44,7 @@ def test_axes_and_attitude_of_the_flight_controller_agree(name: str) -> None:
     quat = (cos(0.5 * heading), 0.0, 0.0, sin(0.5 * heading))
     R, R_mounted = rotation_from_quat(quat), rotation_from_quat(frame.attitude(quat))
     v = (0.2, -0.7, 1.1)
-    felt = frame.felt(v)
+    felt = frame.to_controller_axes(v)
     for row, mounted in zip(R, R_mounted, strict=True):
         ours = sum(a * b for a, b in zip(row, v, strict=True))
         theirs = sum(a * b for a, b in zip(mounted, felt, strict=True))
@@ -52,8 +52,8 @@ def test_axes_and_attitude_of_the_flight_controller_agree(name: str) -> None:
 
 
 def test_a_plus_is_an_x_turned_by_half_a_right_angle() -> None:
-    assert framed(load_vehicle("iris")).turn == 0.0
-    assert framed(load_vehicle("bebop")).turn == pytest.approx(0.25 * pi)
+    assert framed(load_vehicle("iris")).mounting_yaw == 0.0
+    assert framed(load_vehicle("bebop")).mounting_yaw == pytest.approx(0.25 * pi)
 
 
 def test_throttle_gives_what_the_firmwares_thrust_curve_undoes() -> None:

@@ -67,8 +67,8 @@ def test_each_tick_ends_with_what_sets_its_clock_and_has_nothing_of_our_dialect(
 def test_until_its_first_answer_it_is_not_in_step(simulator: HilSimulator) -> None:
     exchange = Exchange(simulator)
     simulator.advance()
-    assert not exchange.receive(HEARTBEAT) and not exchange.in_step
-    assert exchange.receive(answer(0)) and exchange.in_step  # of the tick before
+    assert not exchange.receive(HEARTBEAT) and not exchange.in_lockstep
+    assert exchange.receive(answer(0)) and exchange.in_lockstep  # of the tick before
     simulator.advance()
     assert not exchange.receive(answer(simulator.now_us - 4000))
     assert exchange.receive(answer(simulator.now_us))

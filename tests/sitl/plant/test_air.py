@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sitl.plant.air import felt_by_rotors, ground_gain
+from sitl.plant.air import ground_gain, rotor_air_wrench
 from sitl.plant.by_value import advance_many, rotors_of
 from sitl.plant.rotors import FORCE
 
@@ -18,7 +18,7 @@ EXACT = 1e-12
 
 
 def felt(truth, force, v=CALM, omega=CALM, wind=CALM, place=HIGH, R=LEVEL):
-    return felt_by_rotors(rotors_of(force, force), FORCE, place, v, R, omega, wind, truth)
+    return rotor_air_wrench(rotors_of(force, force), FORCE, place, v, R, omega, wind, truth)
 
 
 @pytest.fixture

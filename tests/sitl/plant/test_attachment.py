@@ -8,7 +8,7 @@ import pytest
 
 from sitl.plant.attachment import effective_mass
 from sitl.plant.by_value import advance_many
-from sitl.plant.impact import stretched
+from sitl.plant.impact import at_cable_length
 from sitl.plant.records import Motion
 
 CALM = (0.0, 0.0, 0.0)
@@ -81,7 +81,7 @@ def test_the_impact_is_that_of_two_bodies_on_a_rigid_bar(bebop, rotation_of, tum
         truth.cable_length,
         0.3,
     )
-    after = stretched(motion, truth)
+    after = at_cable_length(motion, truth)
     mass = np.diag([*[truth.load_mass] * 3, *[truth.quad_mass] * 3, *truth.inertia])
     # q . (v_L - v_Q - R (Omega x rho)) as a row over these velocities
     row = np.concatenate((q, -q, -np.cross(RHO, R.T @ q)))
@@ -90,7 +90,7 @@ def test_the_impact_is_that_of_two_bodies_on_a_rigid_bar(bebop, rotation_of, tum
     solved = np.linalg.solve(system, np.concatenate((mass @ before, [0.3])))
     assert after.v_load == pytest.approx(solved[:3], abs=EXACT)
     assert after.omega == pytest.approx(solved[6:9], abs=EXACT)
-    assert after.apart_dot == pytest.approx(solved[:3] - solved[3:6], abs=EXACT)
+    assert after.separation_dot == pytest.approx(solved[:3] - solved[3:6], abs=EXACT)
     # the impulse, as reported in CABLE_SNAP
     impulse = effective_mass(tumble.q_cable, tuple(map(tuple, R.tolist())), truth) * (row @ before - 0.3)
     assert impulse == pytest.approx(-solved[9], abs=EXACT)

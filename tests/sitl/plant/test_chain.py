@@ -25,7 +25,7 @@ from benchmarks.cable_convergence import (
     swinging_plant,
     without_drag,
 )
-from sitl.plant.chain.records import lay
+from sitl.plant.chain.records import lay_straight
 from sitl.plant.gripper import without_cable
 from sitl.plant.records import Truth
 from sitl.plant.step import initial_state
@@ -207,7 +207,7 @@ def test_a_load_that_turns_swings_as_a_double_pendulum(bebop: Truth) -> None:
     x_load = (down[0], float(down[1]), float(3.0 + down[2]))
     plant = ChainPlant(truth, suspended(truth, x_quad=(0.0, 0.0, 3.0), x_load=x_load), hover(truth))
     plant.rows.body[:2] = np.cos(0.5 * theta), np.sin(0.5 * theta)
-    lay(plant.rows, truth, plant.state)
+    lay_straight(plant.rows, truth, plant.state)
     tilts = np.array([plant.rows.body[1] for _ in range(4000) if plant.fly(1e-3, 1e-3)])
     before = np.flatnonzero(tilts[:-1] * tilts[1:] < 0.0)
     zeros = 1e-3 * (before + tilts[before] / (tilts[before] - tilts[before + 1]))

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from autopilot.vehicle.battery import ELECTRONICS_W, Battery, drawn_current, open_voltage, terminal_voltage
 from sitl.plant.by_value import rotors_of
-from sitl.plant.drive import FULL, drained, driven_force, is_driven, throttle_of, thrust_share
+from sitl.plant.drive import FULL, discharged, driven_force, is_driven, throttle_of, thrust_share
 from sitl.plant.records import Drive
-from sitl.plant.rotors import TARGET, limit
+from sitl.plant.rotors import TARGET, set_targets
 
 SHARES = st.floats(0.0, 1.0)
 
@@ -67,7 +67,7 @@ def test_each_rotor_is_driven_within_its_own_limits(bebop):
         drive=Drive(thrust_curve=1.0, known_curve=1.0, battery=1.0, esc_steps=4.0), supply=0.5
     )
     rotors = rotors_of((0.0,) * 4, (0.0, 0.25 * 1.96, 1.96, 9.0))
-    limit(rotors, truth)
+    set_targets(rotors, truth)
     assert rotors.rows[TARGET, :4] == pytest.approx([0.0, 1.96 / 16.0, 1.96 / 4.0, 1.96 / 4.0], abs=1e-14)
 
 
@@ -96,13 +96,13 @@ def test_hover_empties_the_battery_in_the_time_that_its_power_says(bebop):
     forces = rows[3]
     supply, energy, seconds = FULL, 0.0, 0
     while supply.used_as < drive.capacity_as and seconds < 3600:
-        supply = drained(supply, forces, 4, truth, 1.0)
+        supply = discharged(supply, forces, 4, truth, 1.0)
         energy += supply.current * supply.voltage
         assert supply.share == pytest.approx(supply.voltage / 12.6, rel=1e-12)
         seconds += 1
     assert energy / seconds == pytest.approx(68.0, rel=1e-9)
     assert 600 < seconds < 760
-    half = drained(FULL, forces, 4, truth._replace(drive=drive._replace(charge=0.5)), 1.0)
+    half = discharged(FULL, forces, 4, truth._replace(drive=drive._replace(charge=0.5)), 1.0)
     assert half.voltage == pytest.approx(3.0 * 3.82 - 0.06 * half.current, rel=1e-12)
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sitl.plant.by_value import advance, initial_state
-from sitl.plant.gripper import dropped, takes_hold, without_cable
+from sitl.plant.gripper import can_grip, with_cable_released, without_cable
 
 CALM = (0.0, 0.0, 0.0)
 WIND = (3.0, -1.0, 0.5)
@@ -23,7 +23,7 @@ STEP = 4e-3
 
 def test_the_load_falls_as_drag_and_gravity_alone_have_it(bebop, aloft):
     """Compared with SciPy's integration of one point in the wind."""
-    start = dropped(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
+    start = with_cable_released(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
     state, truth = start, without_cable(bebop)
     for _ in range(500):
         state = advance(state, truth, HOVER, WIND, STEP)
@@ -42,7 +42,7 @@ def test_the_load_falls_as_drag_and_gravity_alone_have_it(bebop, aloft):
 def test_the_vehicle_flies_as_one_that_never_had_a_load(bebop, aloft):
     """Compared with the same vehicle whose load is elsewhere: equal to the bit, because the load has no
     effect on it."""
-    start = dropped(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
+    start = with_cable_released(aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0)))
     alone = start._replace(x_load=(50.0, 0.0, 90.0), v_load=CALM)
     truth = without_cable(bebop)
     command = (1.2, 1.0, 0.9, 1.1)
@@ -57,14 +57,14 @@ def test_the_vehicle_flies_as_one_that_never_had_a_load(bebop, aloft):
 
 def test_letting_go_changes_no_position_and_no_velocity(bebop, aloft):
     hung = aloft(bebop, (0.4, 0.1, -1.0), (0.0, 1.5, 0.3), v_load=(2.0, -1.0, 1.0))._replace(tension=1.2)
-    free = dropped(hung)
+    free = with_cable_released(hung)
     assert (free.taut, free.tension) == (0.0, 0.0)
     assert free == hung._replace(taut=0.0, tension=0.0)
 
 
 def test_the_dropped_load_comes_to_rest_on_the_ground(bebop, aloft):
     """From 2 m it strikes at sqrt(2 g h) = 6.2 m/s and slides 0.5 m/s: within 3 s it lies still."""
-    state = dropped(aloft(bebop, height=2.0, v_load=(0.5, 0.0, 0.0)))
+    state = with_cable_released(aloft(bebop, height=2.0, v_load=(0.5, 0.0, 0.0)))
     truth = without_cable(bebop)
     fastest = 0.0
     for _ in range(750):
@@ -81,9 +81,9 @@ def test_the_dropped_load_comes_to_rest_on_the_ground(bebop, aloft):
 
 def test_hold_is_taken_of_a_load_on_the_ground_within_reach_only(bebop, aloft):
     standing = advance(initial_state(bebop), bebop, OFF, CALM, STEP)
-    assert takes_hold(standing, bebop)
+    assert can_grip(standing, bebop)
     x = standing.x_load
     beyond = standing._replace(x_load=(x[0] + 0.5, x[1], x[2]))
     assert math.dist(beyond.x_load, beyond.x_quad) > bebop.cable_length
-    assert not takes_hold(beyond, bebop)
-    assert not takes_hold(aloft(bebop), bebop)
+    assert not can_grip(beyond, bebop)
+    assert not can_grip(aloft(bebop), bebop)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from autopilot.vehicle.layout import Rotor
 from sitl.plant.by_value import advance, advance_many, rotors_of
-from sitl.plant.rotors import SHARE, TARGET, decay, limit, wrenches
+from sitl.plant.rotors import SHARE, TARGET, decay, set_targets, wrenches
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 
@@ -32,7 +32,7 @@ def test_geometry_is_that_of_2_13(bebop):
     )
     force = (1.1, 0.7, 0.4, 1.9)
     rotors = rotors_of(force, force)
-    limit(rotors, bebop)
+    set_targets(rotors, bebop)
     for wrench in wrenches(rotors, bebop, 0.004):
         assert [wrench.thrust, *wrench.moment] == pytest.approx(matrix @ np.array(force), abs=EXACT)
 
@@ -65,7 +65,7 @@ def followed(command, truth, share=(1.0,) * 4):
     """The forces that whole rotors, or failing ones, go to."""
     rotors = rotors_of((0.0,) * 4, command)
     rotors.rows[SHARE, :4] = share
-    limit(rotors, truth)
+    set_targets(rotors, truth)
     return tuple(rotors.rows[TARGET, :4].tolist())
 
 
@@ -114,7 +114,7 @@ def test_each_rotor_has_a_place_a_lag_and_a_strength_of_its_own(bebop, aloft):
     left = np.array([math.exp(-n * h / lag) if lag else 0.0 for lag in lags])
     assert end.rotor_force == pytest.approx(goes_to + left * (np.array(before) - goes_to), abs=n * EXACT)
     rotors = rotors_of(end.rotor_force, end.rotor_force, layout)
-    limit(rotors, bebop)
+    set_targets(rotors, bebop)
     now = wrenches(rotors, bebop, h)[0]
     at = [(bebop.arm * r.x, bebop.arm * r.y, 0.0) for r in layout]
     pull = [np.array([0.0, 0.0, force]) for force in end.rotor_force]

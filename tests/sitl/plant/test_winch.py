@@ -10,7 +10,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from sitl.plant.by_value import advance, initial_state
-from sitl.plant.winch import GREATEST_ACCEL, GREATEST_RATE, SHORTEST, later, reeling
+from sitl.plant.winch import MAX_ACCEL, MAX_RATE, MIN_LENGTH, truth_after, with_commanded_rate
 
 CALM = (0.0, 0.0, 0.0)
 WIND = (2.0, -1.0, 0.3)
@@ -24,7 +24,7 @@ def flown(state, truth, seconds, h, wind=WIND, force=FORCE):
     """The state and the truth after a time at constant reel acceleration."""
     for _ in range(round(seconds / h)):
         state = advance(state, truth, (force,) * 4, wind, h)
-        truth = later(truth, h)
+        truth = truth_after(truth, h)
     return state, truth
 
 
@@ -124,11 +124,11 @@ def test_what_the_winch_does_is_the_work_of_the_tension(thesis, aloft):
 
     h, work, powers = 1e-3, 0.0, []
     # the first step finds the tension at the start
-    state, truth = advance(state, truth, (FORCE,) * 4, CALM, h), later(truth, h)
+    state, truth = advance(state, truth, (FORCE,) * 4, CALM, h), truth_after(truth, h)
     before, pushed = energy(state), momentum(state)
     for _ in range(1000):
         powers.append(4 * FORCE * state.v_quad[2] - state.tension * truth.reel_rate)
-        state, truth = advance(state, truth, (FORCE,) * 4, CALM, h), later(truth, h)
+        state, truth = advance(state, truth, (FORCE,) * 4, CALM, h), truth_after(truth, h)
     powers.append(4 * FORCE * state.v_quad[2] - state.tension * truth.reel_rate)
     work = h * (sum(powers) - 0.5 * (powers[0] + powers[-1]))
     # the trapezoidal rule over 1 s in 1 ms: h^2 / 12 of the power's slope, some 5 W/s; measured 2e-7
@@ -147,7 +147,7 @@ def test_a_slack_cable_is_reeled_in_until_it_pulls(thesis, aloft):
     times = []
     for step in range(100):
         state = advance(state, truth, (0.0,) * 4, CALM, STEP)
-        truth = later(truth, STEP)
+        truth = truth_after(truth, STEP)
         if state.snap_speed > 0.0:
             times.append((step, state.snap_speed))
     (only,) = times
@@ -169,22 +169,22 @@ def test_out_faster_than_the_load_falls_the_cable_is_slack(bebop, aloft):
 def test_the_drum_obeys_within_its_limits(bebop):
     truth = bebop
     for _ in range(100):
-        truth = later(reeling(truth, 0.3, STEP), STEP)
-        assert abs(truth.reel_accel) <= GREATEST_ACCEL
+        truth = truth_after(with_commanded_rate(truth, 0.3, STEP), STEP)
+        assert abs(truth.reel_accel) <= MAX_ACCEL
     assert truth.reel_rate == pytest.approx(0.3, abs=1e-12)
-    assert truth.cable_length == pytest.approx(0.7 + 0.3 * 0.4 - 0.3**2 / (2 * GREATEST_ACCEL), abs=2e-4)
+    assert truth.cable_length == pytest.approx(0.7 + 0.3 * 0.4 - 0.3**2 / (2 * MAX_ACCEL), abs=2e-4)
     for _ in range(50):
-        truth = later(reeling(truth, 0.0, STEP), STEP)
+        truth = truth_after(with_commanded_rate(truth, 0.0, STEP), STEP)
     assert (truth.reel_rate, truth.reel_accel) == (0.0, 0.0)
     for _ in range(2000):
-        truth = later(reeling(truth, -math.inf, STEP), STEP)
-        assert truth.reel_rate >= -GREATEST_RATE - 1e-12
-    assert truth.cable_length == pytest.approx(SHORTEST, abs=1e-3)
-    assert reeling(truth, math.nan, STEP).reel_accel == 0.0
+        truth = truth_after(with_commanded_rate(truth, -math.inf, STEP), STEP)
+        assert truth.reel_rate >= -MAX_RATE - 1e-12
+    assert truth.cable_length == pytest.approx(MIN_LENGTH, abs=1e-3)
+    assert with_commanded_rate(truth, math.nan, STEP).reel_accel == 0.0
 
 
 def test_a_cable_that_rests_gives_the_same_bits(bebop):
     start = initial_state(bebop)
-    assert advance(start, later(bebop, STEP), (1.4,) * 4, WIND, STEP) == advance(
+    assert advance(start, truth_after(bebop, STEP), (1.4,) * 4, WIND, STEP) == advance(
         start, bebop, (1.4,) * 4, WIND, STEP
     )

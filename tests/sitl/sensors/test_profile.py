@@ -7,7 +7,7 @@ from math import isnan, sqrt
 import pytest
 
 from sitl.sensors.files import load_profile, parse_profile
-from sitl.sensors.profile import stated_of
+from sitl.sensors.profile import reported_std
 from sitl.sensors.shipped import PROFILES, ProfileError
 
 GOOD = """
@@ -121,11 +121,11 @@ def test_unknown_name_lists_the_known() -> None:
 
 def test_stated_deviations() -> None:
     ideal, rtk = load_profile("ideal"), load_profile("rtk")
-    perfect = stated_of(ideal, 1.0)
+    perfect = reported_std(ideal, 1.0)
     assert 0.0 < perfect.mocap_position <= 1e-4
     assert 0.0 < perfect.load_velocity <= 1e-3
     assert isnan(perfect.gnss_horizontal)
     assert rtk.gnss is not None
     expected = sqrt(rtk.gnss.horizontal_noise_m**2 + rtk.gnss.horizontal_correlated_m**2)
-    assert stated_of(rtk, 3.0).gnss_horizontal == pytest.approx(3.0 * expected)
-    assert stated_of(rtk, 0.0).gnss_horizontal > 0.0
+    assert reported_std(rtk, 3.0).gnss_horizontal == pytest.approx(3.0 * expected)
+    assert reported_std(rtk, 0.0).gnss_horizontal > 0.0

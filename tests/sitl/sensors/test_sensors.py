@@ -90,7 +90,7 @@ def test_imu_noise() -> None:
 
 def test_imu_is_cut_at_full_scale() -> None:
     config = IMU._replace(accel_range=1.0, gyro_range=0.15)
-    reading = imu.cut(silent(imu, config), config)
+    reading = imu.clip_reading(silent(imu, config), config)
     assert np.array_equal(reading.accel_body, np.clip(FORCE, -1.0, 1.0))
     assert reading.gyro_body == (0.1, -0.15, 0.15)
 
@@ -163,20 +163,20 @@ def test_cable_sensor_noise_is_an_angle() -> None:
 def test_camera_sees_within_its_cone(margin_deg: float) -> None:
     off_axis = np.arccos(-DIRECTION[2]) + radians(margin_deg)
     reading = silent(cable_sensor, CAMERA._replace(cone_cosine=float(np.cos(off_axis))))
-    assert reading.seen == (1.0 if margin_deg > 0 else 0.0)
+    assert reading.detected == (1.0 if margin_deg > 0 else 0.0)
 
 
 def test_encoder_reads_a_taut_cable_only() -> None:
     encoder = CAMERA._replace(cone_cosine=-1.0, taut_only=1.0)
-    assert silent(cable_sensor, encoder).seen == 1.0
+    assert silent(cable_sensor, encoder).detected == 1.0
     slack = STATE._replace(taut=0.0)
-    assert cable_sensor.sample(slack, cable_sensor.start(encoder, SILENT), encoder, SILENT)[0].seen == 0.0
+    assert cable_sensor.sample(slack, cable_sensor.start(encoder, SILENT), encoder, SILENT)[0].detected == 0.0
 
 
 def test_cable_sensor_survives_a_load_at_the_vehicle() -> None:
     together = STATE._replace(x_load=STATE.x_quad)
     reading = cable_sensor.sample(together, cable_sensor.start(CAMERA, SILENT), CAMERA, SILENT)[0]
-    assert reading.seen == 0.0
+    assert reading.detected == 0.0
     assert np.isfinite(reading.direction_body).all()
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from autopilot.vehicle.layout import PLUS, Layout
-from autopilot.wire.convert.simulator import speed_rpm
+from autopilot.wire.convert.simulator import rotor_speed_rpm
 from sitl.plant.rotors import FORCE, RotorRows, rotor_table, rotors_at_rest
 from sitl.sensors.noise import Noise
-from sitl.sensors.vibration import VibrationConfig, draw_phases, hover_force, shaking
+from sitl.sensors.vibration import VibrationConfig, draw_phases, hover_force, rotor_vibration
 from sitl.vehicles.truth import load_truth
 
 TRUTH = load_truth("bebop")
@@ -36,7 +36,7 @@ def shaken(rotors: RotorRows, config: VibrationConfig, seed: int = 1, scale: flo
     phases = np.zeros(14)
     count = len(rotors.table)
     draw_phases(phases, count, Noise(seed, 1, 0, scale))
-    out = [shaking(rotors, TRUTH, phases, config, Noise(seed, 1, k, scale)) for k in range(SAMPLES)]
+    out = [rotor_vibration(rotors, TRUTH, phases, config, Noise(seed, 1, k, scale)) for k in range(SAMPLES)]
     return np.array([a for a, _ in out]), np.array([w for _, w in out])
 
 
@@ -60,7 +60,7 @@ def aliased(hz: float) -> float:
 
 
 def speed_hz(force: float) -> float:
-    return speed_rpm(force, TRUTH.rotor_max) / 60.0
+    return rotor_speed_rpm(force, TRUTH.rotor_max) / 60.0
 
 
 def test_at_hover_it_is_as_large_as_stated_on_every_axis() -> None:

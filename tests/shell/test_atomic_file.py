@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from autopilot.services.mission_store import StoredMission
+from autopilot.shell.atomic_file import DamagedError, keep_copy, seal, unseal, write_atomically
 from autopilot.shell.storage import Storage
-from autopilot.shell.whole_file import DamagedError, keep_copy, seal, unseal, write_whole
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
@@ -63,7 +63,7 @@ def parameters(directory: Path) -> Any:
 
 
 def world(directory: Path) -> Any:
-    return Storage(directory).load_world()
+    return Storage(directory).load_simulator_parameters()
 
 
 def key(directory: Path) -> Any:
@@ -73,58 +73,60 @@ def key(directory: Path) -> Any:
 
 WRITES = {
     "mission": (
-        lambda storage: storage.keep_mission(StoredMission(encode_steps(load_mission("hover").steps, HOME))),
-        lambda storage: storage.keep_mission(StoredMission(encode_steps(load_mission("case-b").steps, HOME))),
+        lambda storage: storage.store_mission(StoredMission(encode_steps(load_mission("hover").steps, HOME))),
+        lambda storage: storage.store_mission(
+            StoredMission(encode_steps(load_mission("case-b").steps, HOME))
+        ),
         missions,
     ),
     "mission cleared": (
-        lambda storage: storage.keep_mission(StoredMission(encode_steps(load_mission("hover").steps, HOME))),
-        lambda storage: storage.keep_mission(StoredMission()),
+        lambda storage: storage.store_mission(StoredMission(encode_steps(load_mission("hover").steps, HOME))),
+        lambda storage: storage.store_mission(StoredMission()),
         missions,
     ),
     "fence": (
-        lambda storage: storage.keep_areas(FENCE, fence(20.0)),
-        lambda storage: storage.keep_areas(FENCE, fence(30.0)),
+        lambda storage: storage.store_areas(FENCE, fence(20.0)),
+        lambda storage: storage.store_areas(FENCE, fence(30.0)),
         areas,
     ),
     "fence cleared": (
-        lambda storage: storage.keep_areas(FENCE, fence(20.0)),
-        lambda storage: storage.keep_areas(FENCE, ()),
+        lambda storage: storage.store_areas(FENCE, fence(20.0)),
+        lambda storage: storage.store_areas(FENCE, ()),
         areas,
     ),
     "rally points": (
-        lambda storage: storage.keep_areas(RALLY, rally(20.0)),
-        lambda storage: storage.keep_areas(RALLY, rally(30.0)),
+        lambda storage: storage.store_areas(RALLY, rally(20.0)),
+        lambda storage: storage.store_areas(RALLY, rally(30.0)),
         areas,
     ),
     "rally points cleared": (
-        lambda storage: storage.keep_areas(RALLY, rally(20.0)),
-        lambda storage: storage.keep_areas(RALLY, ()),
+        lambda storage: storage.store_areas(RALLY, rally(20.0)),
+        lambda storage: storage.store_areas(RALLY, ()),
         areas,
     ),
     "parameters": (
-        lambda storage: storage.keep_parameter("NGC_KX", 5.0),
-        lambda storage: storage.keep_parameter("NGC_KX", 5.5),
+        lambda storage: storage.store_parameter("NGC_KX", 5.0),
+        lambda storage: storage.store_parameter("NGC_KX", 5.5),
         parameters,
     ),
     "world": (
-        lambda storage: storage.keep_world({"SIM_WIND_E": 3.0}),
-        lambda storage: storage.keep_world({"SIM_WIND_E": 4.0}),
+        lambda storage: storage.store_simulator_parameters({"SIM_WIND_E": 3.0}),
+        lambda storage: storage.store_simulator_parameters({"SIM_WIND_E": 4.0}),
         world,
     ),
     "world cleared": (
-        lambda storage: storage.keep_world({"SIM_WIND_E": 3.0}),
-        lambda storage: storage.keep_world({}),
+        lambda storage: storage.store_simulator_parameters({"SIM_WIND_E": 3.0}),
+        lambda storage: storage.store_simulator_parameters({}),
         world,
     ),
     "key taken away": (
-        lambda storage: storage.keep_signing(bytes(range(32)), 5),
-        lambda storage: storage.keep_signing(None, 0),
+        lambda storage: storage.store_signing(bytes(range(32)), 5),
+        lambda storage: storage.store_signing(None, 0),
         key,
     ),
     "key": (
-        lambda storage: storage.keep_signing(bytes(range(32)), 5),
-        lambda storage: storage.keep_signing(bytes(range(32)), 7),
+        lambda storage: storage.store_signing(bytes(range(32)), 5),
+        lambda storage: storage.store_signing(bytes(range(32)), 7),
         key,
     ),
 }
@@ -157,13 +159,16 @@ def test_a_process_killed_at_any_system_call_leaves_the_old_or_the_new(tmp_path:
 # stored files, and how each is read and replaced; a start finds a damaged one for as long as it is there
 REPLACED = {
     "mission.bin": lambda storage: storage.load_mission(HOME),
-    "fence.bin": lambda storage: (storage.load_areas(HOME), storage.keep_areas(FENCE, fence(30.0))),
-    "rally.bin": lambda storage: (storage.load_areas(HOME), storage.keep_areas(RALLY, ())),
+    "fence.bin": lambda storage: (storage.load_areas(HOME), storage.store_areas(FENCE, fence(30.0))),
+    "rally.bin": lambda storage: (storage.load_areas(HOME), storage.store_areas(RALLY, ())),
     "parameters.txt": lambda storage: (
         storage.load_parameters(autopilot_parameters(load_vehicle("bebop"))),
-        storage.keep_parameter("NGC_KX", 5.0),
+        storage.store_parameter("NGC_KX", 5.0),
     ),
-    "world.txt": lambda storage: (storage.load_world(), storage.keep_world({"SIM_WIND_E": 4.0})),
+    "world.txt": lambda storage: (
+        storage.load_simulator_parameters(),
+        storage.store_simulator_parameters({"SIM_WIND_E": 4.0}),
+    ),
 }
 
 
@@ -222,5 +227,5 @@ def test_the_directory_is_brought_to_the_disk_after_the_new_name(tmp_path: Path,
         lambda handle: (done.append(f"fsync {Path(f'/proc/self/fd/{handle}').readlink()}"), fsync(handle)),
     )
     monkeypatch.setattr(os, "replace", lambda a, b: (done.append("replace"), replace(a, b)))
-    write_whole(tmp_path / "a", b"1")
+    write_atomically(tmp_path / "a", b"1")
     assert done == [f"fsync {tmp_path / 'a.new'}", "replace", f"fsync {tmp_path}"]

@@ -24,16 +24,16 @@ from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_inputs import split_settings
 from gcs.workflows.flight_loops import run_wall_clock
-from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, setting_of
-from gcs.workflows.own_vehicle import FIRMWARE_LOG, SIMULATOR_LOG, OwnVehicle
+from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, parse_setting
 from gcs.workflows.stopwatch import Stopwatch
+from gcs.workflows.vehicle_processes import FIRMWARE_LOG, SIMULATOR_LOG, VehicleProcesses
 from missions.model import Mission
 from missions.nearest import nearest
 
 if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
 
-FOLDER = "firmware"  # in the directory of the flight: the firmware's own files
+FIRMWARE_FOLDER = "firmware"  # in the directory of the flight: the firmware's own files
 _PX4_PHYSICS = 4560  # TCP; PX4's startup script supports no other
 
 
@@ -43,8 +43,8 @@ def firmware_program(text: str) -> FirmwareProgram:
     program = Path(path).expanduser()
     if kind not in FIRMWARES or not path:
         known = " or ".join(f"{name}=PATH" for name in FIRMWARES)
-        near = nearest(kind, FIRMWARES)
-        hint = f"; did you mean {near}?" if near != kind and near else ""
+        similar = nearest(kind, FIRMWARES)
+        hint = f"; did you mean {similar}?" if similar != kind and similar else ""
         raise InputError(f"--autopilot {text}: must be {known}{hint}")
     if not (program.is_file() and os.access(program, os.X_OK)):
         raise InputError(f"--autopilot {text}: no program there; see docs/autopilots.md on where to get one")
@@ -62,24 +62,26 @@ def firmware_client(
             home,
             vehicle.cable_length_m,
             vehicle.gear_height_m,
-            firmware.begins_with_home,
-            firmware.takes_off_low,
+            firmware.item_0_is_home,
+            firmware.accepts_low_takeoff,
         )
     except FirmwareMissionError as error:
         raise GcsError(f"{options.mission}: {error}") from None
-    slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
+    time_stretch = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     expected_s = expected_duration_s(mission)
-    return FirmwareFlight(firmware, items, expected_s, options.limit_s, round(LINK_TIMEOUT_US * slow))
+    return FirmwareFlight(firmware, items, expected_s, options.limit_s, round(LINK_TIMEOUT_US * time_stretch))
 
 
 @contextmanager
-def own_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) -> Iterator[OwnVehicle]:
+def start_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) -> Iterator[VehicleProcesses]:
     """Start simulator and firmware, and end them afterwards. The files of the firmware stay in `out`."""
-    ours, theirs = split_settings(options.vehicle, options.sensors, map(setting_of, options.settings))
-    folder = (out / FOLDER).resolve()
+    simulator_settings, firmware_settings = split_settings(
+        options.vehicle, options.sensors, map(parse_setting, options.settings)
+    )
+    folder = (out / FIRMWARE_FOLDER).resolve()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    begin = _BEGINNINGS[program.kind]
+    command_of = _COMMANDS[program.kind]
     port = DEFAULT_PORT if program.kind == "px4" else 0  # to which the firmware sends for the ground station
     with (
         Processes() as processes,
@@ -87,13 +89,13 @@ def own_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) ->
         closing(UdpSocket()) as truth,
     ):
         physics = _PX4_PHYSICS if program.kind == "px4" else free_port()
-        _start_simulator(processes, program.kind, options, ours, out, physics, truth.address)
-        command, environment = begin(
-            program.path, folder, _parameters(program.kind, theirs), physics, vehicle
+        _start_simulator(processes, program.kind, options, simulator_settings, out, physics, truth.address)
+        command, environment = command_of(
+            program.path, folder, _parameters(program.kind, firmware_settings), physics, vehicle
         )
         title = FIRMWARES[program.kind].title
         processes.start_program(title, command, out / FIRMWARE_LOG, folder, environment)
-        yield OwnVehicle(processes, vehicle, truth)
+        yield VehicleProcesses(processes, vehicle, truth)
 
 
 def _ardupilot(
@@ -126,8 +128,8 @@ def _px4(
     return command, {"PATH": f"{folder}:{os.environ.get('PATH', '')}", "PX4_SIM_MODEL": "none_iris"}
 
 
-_BEGINNINGS = {"ardupilot": _ardupilot, "px4": _px4}
-_IN_TURN = ("ardupilot",)  # these fly in one thread, which waits while the simulator works
+_COMMANDS = {"ardupilot": _ardupilot, "px4": _px4}
+_SINGLE_THREADED = ("ardupilot",)  # these fly in one thread, which waits while the simulator works
 
 
 def fly_firmware(
@@ -135,7 +137,7 @@ def fly_firmware(
     options: FlightOptions,
     program: FirmwareProgram,
     log: FrameLog,
-    own: OwnVehicle,
+    started: VehicleProcesses,
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,
@@ -143,17 +145,27 @@ def fly_firmware(
     """Fly with the simulator and the firmware that were started for it."""
     client = firmware_client(mission, options, FIRMWARES[program.kind], Home())
 
-    def begun() -> None:
+    def on_first_message() -> None:
         watch.start()
-        if options.speed is None and program.kind in _IN_TURN:
-            own.processes.share_one_core()
+        if options.speed is None and program.kind in _SINGLE_THREADED:
+            started.processes.share_one_core()
 
     with FlightDisplay(mission.name, options.quiet) as display:
         capture = Capture(log, unix_us())
         run_wall_clock(
-            *(client, capture, own.vehicle, own.truth, own.processes.ended, display, stop, begun, page)
+            *(
+                client,
+                capture,
+                started.vehicle,
+                started.truth,
+                started.processes.end_reason,
+                display,
+                stop,
+                on_first_message,
+                page,
+            )
         )
-        client.explain_silence(own.processes.stopped())
+        client.explain_silence(started.processes.stopped_children())
         watch.stop()
     return client
 

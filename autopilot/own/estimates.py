@@ -79,7 +79,7 @@ def _estimated(
     horizontal_std: Any = nan,
     vertical_std: Any = nan,
 ) -> Any:
-    def made(
+    def implement(
         x_load: Any,
         v_load: Any,
         q_cable: Any,
@@ -96,12 +96,12 @@ def _estimated(
         state = State(x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, R, omega_body, a_quad)
         return Estimate(True, state, tension, horizontal_std, vertical_std)
 
-    return made
+    return implement
 
 
 @overload(no_estimate, jit_options=INLINED)
 def _no_estimate() -> Any:
-    def made() -> Any:
+    def implement() -> Any:
         return NO_ESTIMATE
 
-    return made
+    return implement

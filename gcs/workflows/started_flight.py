@@ -16,8 +16,8 @@ from gcs.shell.processes import STOPPED_LIMIT_S
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
-from gcs.workflows.own_vehicle import OwnVehicle
 from gcs.workflows.stopwatch import Stopwatch
+from gcs.workflows.vehicle_processes import VehicleProcesses
 from missions.model import Mission
 
 if TYPE_CHECKING:
@@ -25,43 +25,52 @@ if TYPE_CHECKING:
 
 
 def flight_client(
-    mission: Mission, options: FlightOptions, home: Home, silence_us: int = LINK_TIMEOUT_US
+    mission: Mission, options: FlightOptions, home: Home, link_timeout_us: int = LINK_TIMEOUT_US
 ) -> FlightClient:
-    """The ground station's side of a flight; `home` is the vehicle's, `silence_us` its longest silence."""
-    slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
+    """The ground station's side of a flight; `home` is the vehicle's, `link_timeout_us` its longest
+    silence."""
+    time_stretch = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     return FlightClient(
         items_of(mission, home),
         expected_duration_s(mission),
         options.limit_s,
-        round(silence_us * slow),
+        round(link_timeout_us * time_stretch),
     )
 
 
-def fly_own(
+def fly_started_vehicle(
     mission: Mission,
     options: FlightOptions,
     log: FrameLog,
-    own: OwnVehicle,
+    started: VehicleProcesses,
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,
 ) -> FlightClient:
     """Fly with the simulator and the autopilot that were started for it."""
     # this long, so that a program that was stopped (SIGSTOP) is reported before the vehicle counts as lost
-    silence_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
-    client = flight_client(mission, options, Home(), silence_us)
+    link_timeout_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
+    client = flight_client(mission, options, Home(), link_timeout_us)
 
-    def begun() -> None:
+    def on_first_message() -> None:
         watch.start()
         if options.speed is None:
-            own.processes.share_one_core()
+            started.processes.share_one_core()
 
     with FlightDisplay(mission.name, options.quiet) as display:
-        link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page
+        link = (
+            started.vehicle,
+            started.truth,
+            started.processes.end_reason,
+            display,
+            stop,
+            on_first_message,
+            page,
+        )
         if options.speed is None:
-            run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link, own.processes.works)
+            run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link, started.processes.are_busy)
         else:
             run_wall_clock(client, Capture(log, unix_us()), *link)
-            client.explain_silence(own.processes.stopped())
+            client.explain_silence(started.processes.stopped_children())
         watch.stop()
     return client

@@ -9,10 +9,10 @@ from inspect import getsourcelines, signature
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from autopilot.own.source import OwnError, digest_of, file_of
+from autopilot.own.source import OwnError, source_digest, source_file
 from autopilot.wire import parameter_table as table
 
-_NAME = re.compile(r"[A-Za-z][\w-]{0,31}")
+_VALID_NAME = re.compile(r"[A-Za-z][\w-]{0,31}")
 
 
 class Parameter(NamedTuple):
@@ -26,10 +26,10 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Brought:
+class LoadedClass:
     """A loaded custom class."""
 
-    what: ClassVar[str] = ""  # its kind in messages, with a capital letter
+    role: ClassVar[str] = ""  # its kind in messages, with a capital letter
 
     reference: str  # as the user named it
     name: str
@@ -39,30 +39,30 @@ class Brought:
     @property
     def path(self) -> Path | None:
         """The file in which it is written."""
-        return file_of(self.kind)
+        return source_file(self.kind)
 
     @property
     def digest(self) -> str:
         """A hash of its source."""
-        return digest_of(self.kind)
+        return source_digest(self.kind)
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """Its kind and name, for messages."""
-        return f"{self.what} {self.name}"
+        return f"{self.role} {self.name}"
 
-    def made(self, parameters: Mapping[str, float]) -> Any:
+    def new_instance(self, parameters: Mapping[str, float]) -> Any:
         """An instance with these parameters."""
         build = getattr(self.kind, "build", None)
         if build is not None:
             return build(parameters)
         return self.kind(parameters) if signature(self.kind).parameters else self.kind()
 
-    def line(self, method: str) -> str:
+    def location(self, method: str) -> str:
         """File and line of a method; of the class if the method is not in the file of the class."""
-        found = getattr(self.kind, method, None)
-        found = getattr(found, "py_func", getattr(found, "__func__", found))
-        code = getattr(found, "__code__", None)
+        method_object = getattr(self.kind, method, None)
+        method_object = getattr(method_object, "py_func", getattr(method_object, "__func__", method_object))
+        code = getattr(method_object, "__code__", None)
         path = self.path
         if path is None:
             return f"{self.reference}:{code.co_firstlineno if code else '?'}"
@@ -74,13 +74,13 @@ class Brought:
             return path.name
 
     @property
-    def making(self) -> str:
+    def constructor_location(self) -> str:
         """File and line of the method that makes an instance."""
-        return self.line("build" if hasattr(self.kind, "build") else "__init__")
+        return self.location("build" if hasattr(self.kind, "build") else "__init__")
 
 
-class Named(NamedTuple):
-    """What every custom class must have: the arguments of `Brought`."""
+class ClassFields(NamedTuple):
+    """What every custom class must have: the arguments of `LoadedClass`."""
 
     reference: str
     name: str
@@ -88,30 +88,30 @@ class Named(NamedTuple):
     parameters: tuple[table.Parameter, ...]
 
 
-def named(kind: type, reference: str, shipped: Sequence[str] = ()) -> Named:
+def checked_fields(kind: type, reference: str, shipped: Sequence[str] = ()) -> ClassFields:
     """The class with its name and parameters. OwnError if these are invalid; `shipped` are the names of
     shipped laws, which it must not have."""
-    told = f"{reference}: {kind.__name__}"
+    label = f"{reference}: {kind.__name__}"
     name = getattr(kind, "name", kind.__name__)
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise OwnError(f"{told}.name = {name!r}; must be letters, digits, - and _, beginning with a letter")
+    if not isinstance(name, str) or not _VALID_NAME.fullmatch(name):
+        raise OwnError(f"{label}.name = {name!r}; must be letters, digits, - and _, beginning with a letter")
     if name in shipped:
-        raise OwnError(f"{told}.name = {name!r} is that of a shipped law")
+        raise OwnError(f"{label}.name = {name!r} is that of a shipped law")
     if hasattr(kind, "_fields") and kind._fields and not hasattr(kind, "build"):
-        raise OwnError(f"{told} is a NamedTuple; must have a classmethod build(cls, parameters)")
-    brought = getattr(kind, "parameters", {})
-    if not isinstance(brought, Mapping):
-        raise OwnError(f"{told}.parameters must be a dictionary of Parameter by name")
-    return Named(reference, name, kind, tuple(_parameter(told, *one) for one in brought.items()))
+        raise OwnError(f"{label} is a NamedTuple; must have a classmethod build(cls, parameters)")
+    defined = getattr(kind, "parameters", {})
+    if not isinstance(defined, Mapping):
+        raise OwnError(f"{label}.parameters must be a dictionary of Parameter by name")
+    return ClassFields(reference, name, kind, tuple(_parameter(label, *item) for item in defined.items()))
 
 
-def _parameter(told: str, name: object, brought: object) -> table.Parameter:
-    if not isinstance(brought, Parameter) or not isinstance(name, str):
-        raise OwnError(f"{told}.parameters[{name!r}] must be Parameter(default, low, high, unit, text)")
+def _parameter(label: str, name: object, defined: object) -> table.Parameter:
+    if not isinstance(defined, Parameter) or not isinstance(name, str):
+        raise OwnError(f"{label}.parameters[{name!r}] must be Parameter(default, low, high, unit, text)")
     if name.startswith("SIM_"):
-        raise OwnError(f"{told}.parameters: {name} would be the simulator's; must not begin with SIM_")
+        raise OwnError(f"{label}.parameters: {name} would be the simulator's; must not begin with SIM_")
     try:
-        numbers = (float(brought.default), float(brought.low), float(brought.high))
-        return table.Parameter(name, *numbers, str(brought.unit), str(brought.text))
+        numbers = (float(defined.default), float(defined.low), float(defined.high))
+        return table.Parameter(name, *numbers, str(defined.unit), str(defined.text))
     except (TypeError, ValueError) as error:
-        raise OwnError(f"{told}.parameters: {error}") from None
+        raise OwnError(f"{label}.parameters: {error}") from None

@@ -19,8 +19,8 @@ def wrench(thrust: float, moment: Sequence[float]) -> Asked:
 
 
 def force(F: Sequence[float]) -> Asked:
-    """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, and the nose
-    to the direction of the reference."""
+    """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, and the
+    heading to the direction of the reference."""
     return Asked(FORCE, 0.0, three_numbers(F, "the force"), IDENTITY)
 
 
@@ -40,31 +40,31 @@ def rates(thrust: float, omega_d: Sequence[float]) -> Asked:
 
 @overload(wrench, jit_options=INLINED)
 def _wrench(thrust: Any, moment: Any) -> Any:
-    def made(thrust: Any, moment: Any) -> Any:
+    def implement(thrust: Any, moment: Any) -> Any:
         return Asked(WRENCH, thrust, moment, IDENTITY)
 
-    return made
+    return implement
 
 
 @overload(force, jit_options=INLINED)
 def _force(F: Any) -> Any:
-    def made(F: Any) -> Any:
+    def implement(F: Any) -> Any:
         return Asked(FORCE, 0.0, F, IDENTITY)
 
-    return made
+    return implement
 
 
 @overload(attitude, jit_options=INLINED)
 def _attitude(R_d: Any, thrust: Any) -> Any:
-    def made(R_d: Any, thrust: Any) -> Any:
+    def implement(R_d: Any, thrust: Any) -> Any:
         return Asked(ATTITUDE, thrust, ZERO, R_d)
 
-    return made
+    return implement
 
 
 @overload(rates, jit_options=INLINED)
 def _rates(thrust: Any, omega_d: Any) -> Any:
-    def made(thrust: Any, omega_d: Any) -> Any:
+    def implement(thrust: Any, omega_d: Any) -> Any:
         return Asked(RATES, thrust, omega_d, IDENTITY)
 
-    return made
+    return implement

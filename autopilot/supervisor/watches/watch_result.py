@@ -9,7 +9,7 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Event, Flight, Text, View
 
 
-class Watched(NamedTuple):
+class WatchResult(NamedTuple):
     """What a watch found: the flight with its notes, and an event with texts, or nothing.
 
     Texts without an event are sent, and the phase continues. A watch that found something ends the tick: the
@@ -27,4 +27,4 @@ class Watched(NamedTuple):
         return self.event is not None or bool(self.texts)
 
 
-Watch = Callable[[Flight, View, Settings], Watched]
+Watch = Callable[[Flight, View, Settings], WatchResult]

@@ -23,7 +23,7 @@ class _Key(NamedTuple):
     factor: float = 1.0
 
 
-REPLACED: Mapping[str, tuple[_Key, ...]] = {
+OVERRIDDEN_KEYS: Mapping[str, tuple[_Key, ...]] = {
     "SIM_ACC_NOISE": (_Key(("imu",), "accel_noise_m_s2"),),
     "SIM_GYR_NOISE": (_Key(("imu",), "gyro_noise_rad_s"),),
     "SIM_VIB_ACC": (_Key(("imu",), "vibration_m_s2"),),
@@ -51,20 +51,20 @@ REPLACED: Mapping[str, tuple[_Key, ...]] = {
     "SIM_MAG_MOT": (_Key(("magnetometer",), "motor_field_gauss"),),
 }
 
-Chosen = tuple[tuple[str, float], ...]
+Overrides = tuple[tuple[str, float], ...]
 
 
-def chosen_in(value_of: Callable[[str], float]) -> Chosen:
+def overrides_in(value_of: Callable[[str], float]) -> Overrides:
     """The parameters that replace a value of the profile, with their values."""
-    values = ((name, value_of(name)) for name in REPLACED)
+    values = ((name, value_of(name)) for name in OVERRIDDEN_KEYS)
     return tuple((name, value) for name, value in values if value >= 0.0)
 
 
-def with_chosen(profile: Profile, chosen: Chosen) -> Profile:
+def with_overrides(profile: Profile, overrides: Overrides) -> Profile:
     """The profile with these values."""
     found: dict[str, dict[str, Any]] = {}
-    for name, value in chosen:
-        for one in REPLACED[name]:
+    for name, value in overrides:
+        for one in OVERRIDDEN_KEYS[name]:
             for table in one.tables:
                 found.setdefault(table, {})[one.key] = value * one.factor
     fitted = {name: getattr(profile, name) for name in found}

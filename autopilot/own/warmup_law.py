@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from autopilot.control.law_exchange import Asked, Now
-from autopilot.own.asking import force
+from autopilot.own.law_commands import force
 
-REFERENCE = f"{__name__}:Rehearsal"
+WARMUP_LAW = f"{__name__}:WarmupLaw"
 
 
-class Rehearsal:
+class WarmupLaw:
     """A law that only carries the weight."""
 
     def load_position(self, memory: None, now: Now) -> tuple[None, Asked]:

@@ -11,25 +11,25 @@ from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
 from gcs.shell.display import FlightDisplay
-from gcs.workflows.before_flight import check_mission, check_options, planner_doubts
-from gcs.workflows.flight_options import FlightOptions, setting_of
-from gcs.workflows.own_flight import flight_client
-from gcs.workflows.warmup import parts_here, warm_up
+from gcs.workflows.before_flight import check_mission, check_options, planner_warnings
+from gcs.workflows.flight_options import FlightOptions, parse_setting
+from gcs.workflows.started_flight import flight_client
+from gcs.workflows.warmup import in_process_parts, warm_up
 from missions.model import Mission
 
 
-def fly_here(
-    mission: Mission, options: FlightOptions, log: FrameLog, doubt: Callable[[str], None] = lambda _: None
+def fly_in_process(
+    mission: Mission, options: FlightOptions, log: FrameLog, warn: Callable[[str], None] = lambda _: None
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `doubt` is called with a line for each option that may be unintended.
+    `warn` is called with a line for each option that may be unintended.
     """
-    for line in (*check_options(options), *planner_doubts(options.planner, mission)):
-        doubt(line)
-    warm_up(parts_here((options.law,)), options.quiet)
+    for line in (*check_options(options), *planner_warnings(options.planner, mission)):
+        warn(line)
+    warm_up(in_process_parts((options.law,)), options.quiet)
     check_mission(mission, options)
-    settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(setting_of, options.settings))}
+    settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(parse_setting, options.settings))}
     client = flight_client(mission, options, Home())
     with FlightDisplay(mission.name, options.quiet) as display, watched_calls():
 
@@ -42,5 +42,5 @@ def fly_here(
             Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
             log,
             client=client,
-            shown=show,
+            on_turn=show,
         )

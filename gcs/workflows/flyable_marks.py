@@ -17,20 +17,20 @@ from missions.toml_files import FileError
 _CHECK = ROOT / "gcs" / "workflows" / "check_mission.py"  # imports all code that determines the result
 
 
-def known_flyable(mission: Mission, vehicle: str, shaped: bool) -> bool:
+def is_known_flyable(mission: Mission, vehicle: str, shaped: bool) -> bool:
     """True if a check of this mission for this vehicle, with paths shaped or not, has found no problem."""
     try:
-        return is_marked(_CHECK, _part(mission, vehicle, shaped))
+        return is_marked(_CHECK, _mark_name(mission, vehicle, shaped))
     except FileError:  # of the vehicle's file, which the check will report
         return False
 
 
-def note_flyable(mission: Mission, vehicle: str, shaped: bool) -> None:
+def mark_flyable(mission: Mission, vehicle: str, shaped: bool) -> None:
     """Store for later flights that the check has found no problem."""
-    mark_ready(_CHECK, (_part(mission, vehicle, shaped),))
+    mark_ready(_CHECK, (_mark_name(mission, vehicle, shaped),))
 
 
-def _part(mission: Mission, vehicle: str, shaped: bool) -> str:
+def _mark_name(mission: Mission, vehicle: str, shaped: bool) -> str:
     texts = [VEHICLES.read(one).text for one in (vehicle, belief_of(vehicle))]
-    what = (mission.steps, texts, shaped)
-    return f"flies-{hashlib.sha256(repr(what).encode()).hexdigest()[:16]}"
+    inputs = (mission.steps, texts, shaped)
+    return f"flies-{hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]}"

@@ -16,16 +16,16 @@ from pathlib import Path
 
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_options import WORLD, FlightOptions, own_words
+from gcs.workflows.flight_options import SIMULATOR_PREFIX, FlightOptions, own_part_options
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
 LOGS = (ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG)
-_WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
+_OTHER_STATIONS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 
 
 @dataclass(frozen=True)
-class OwnVehicle:
+class VehicleProcesses:
     """The running programs, and the sockets to which they send."""
 
     processes: Processes
@@ -34,26 +34,26 @@ class OwnVehicle:
 
 
 @contextmanager
-def own_vehicle(
+def start_vehicle(
     options: FlightOptions, out: Path, processes: Processes | None = None
-) -> Iterator[OwnVehicle]:
+) -> Iterator[VehicleProcesses]:
     """Start both programs in `processes`, which may have loaded them already, and end them afterwards.
 
     Their logs, and the autopilot's own log of the flight, stay in `out`.
     """
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
-        _log_kept(Path(storage), out),
-        processes or Processes() as ours,
+        _keep_log(Path(storage), out),
+        processes or Processes() as running,
         closing(UdpSocket()) as vehicle,
         closing(UdpSocket()) as truth,
     ):
-        _start(ours, options, out, Path(storage), vehicle.address, truth.address)
-        yield OwnVehicle(ours, vehicle, truth)
+        _start(running, options, out, Path(storage), vehicle.address, truth.address)
+        yield VehicleProcesses(running, vehicle, truth)
 
 
 @contextmanager
-def _log_kept(storage: Path, out: Path) -> Iterator[None]:
+def _keep_log(storage: Path, out: Path) -> Iterator[None]:
     """Afterwards, copy the autopilot's own log of the flight to `out`, if it has written one."""
     try:
         yield
@@ -70,9 +70,9 @@ def _start(
     pace += ["--real-time"] if options.real_time else []
     both = ["--vehicle", options.vehicle]
     given = [("--set", setting) for setting in options.settings]
-    theirs = [word for words in given if words[1].startswith(WORLD) for word in words]
-    told = ["--set", "MIS_INFEASIBLE=0"] if options.force else []
-    told += [
+    simulator_settings = [word for words in given if words[1].startswith(SIMULATOR_PREFIX) for word in words]
+    autopilot_settings = ["--set", "MIS_INFEASIBLE=0"] if options.force else []
+    autopilot_settings += [
         word for words in given for word in words
     ]  # those of the simulator too: the autopilot assumes them as if they had been measured
     world = [
@@ -85,8 +85,10 @@ def _start(
         "--truth",
         truth,
     ]
-    processes.start("sitl", [*world, *pace, *both, *theirs, "--quiet"], out / SIMULATOR_LOG)
-    link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_WATCHERS]
+    processes.start("sitl", [*world, *pace, *both, *simulator_settings, "--quiet"], out / SIMULATOR_LOG)
+    link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_OTHER_STATIONS]
     home = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
-    own = own_words(options.estimator, options.planner)
-    processes.start("autopilot", [*home, *own, *link, *both, *told, "--quiet"], out / AUTOPILOT_LOG)
+    own = own_part_options(options.estimator, options.planner)
+    processes.start(
+        "autopilot", [*home, *own, *link, *both, *autopilot_settings, "--quiet"], out / AUTOPILOT_LOG
+    )

@@ -8,7 +8,7 @@ from importlib.resources import files
 import pytest
 
 from gcs.workflows.check_mission import violations
-from gcs.workflows.checked import known_flyable
+from gcs.workflows.flyable_marks import is_known_flyable
 from missions.fileformat import load_mission
 from missions.model import Waypoint
 
@@ -23,29 +23,29 @@ def nothing_known(tmp_path, monkeypatch):
 
 def test_what_was_found_flyable_is_known_with_its_vehicle_and_its_shaping():
     hover = load_mission("hover")
-    assert not known_flyable(hover, "bebop", True)
+    assert not is_known_flyable(hover, "bebop", True)
     assert violations(hover, "bebop", True) == []
-    assert known_flyable(hover, "bebop", True)
-    assert known_flyable(replace(hover, title="another"), "bebop", True)
-    assert not known_flyable(hover, "bebop", False)
-    assert not known_flyable(hover, "heavy", True)
+    assert is_known_flyable(hover, "bebop", True)
+    assert is_known_flyable(replace(hover, title="another"), "bebop", True)
+    assert not is_known_flyable(hover, "bebop", False)
+    assert not is_known_flyable(hover, "heavy", True)
     higher = (*hover.steps[:-1], Waypoint(0.0, 0.0, 3.0), hover.steps[-1])
-    assert not known_flyable(replace(hover, steps=higher), "bebop", True)
+    assert not is_known_flyable(replace(hover, steps=higher), "bebop", True)
 
 
 def test_a_vehicle_file_is_known_by_what_stands_in_it(tmp_path):
     hover, path = load_mission("hover"), tmp_path / "mine.toml"
     path.write_text(BEBOP, encoding="utf-8")
     assert violations(hover, str(path), True) == []
-    assert known_flyable(hover, str(path), True)
+    assert is_known_flyable(hover, str(path), True)
     path.write_text(BEBOP.replace("load_mass_kg = 0.1", "load_mass_kg = 0.2"), encoding="utf-8")
-    assert not known_flyable(hover, str(path), True)
+    assert not is_known_flyable(hover, str(path), True)
     path.unlink()
-    assert not known_flyable(hover, str(path), True)
+    assert not is_known_flyable(hover, str(path), True)
 
 
 def test_what_cannot_be_flown_is_never_known():
     hover = load_mission("hover")
     too_low = replace(hover, steps=(hover.steps[0], Waypoint(1.0, 0.0, 0.05), hover.steps[-1]))
     assert violations(too_low, "bebop", True)
-    assert not known_flyable(too_low, "bebop", True)
+    assert not is_known_flyable(too_low, "bebop", True)

@@ -12,55 +12,57 @@ from functools import partial
 from queue import SimpleQueue
 from threading import Thread
 
-Failed = Callable[[OSError], None]
+FailureCallback = Callable[[OSError], None]
 
 
-class Storing:
-    """Stores in the order of the requests; `aside`: in a thread, else immediately."""
+class StorageWorker:
+    """Stores in the order of the requests; `threaded`: in a thread, else immediately."""
 
-    def __init__(self, aside: bool) -> None:
-        self._asked = 0
-        self._done = 0  # counted up by the thread alone
+    def __init__(self, threaded: bool) -> None:
+        self._requested = 0
+        self._finished = 0  # counted up by the thread alone
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._outcomes: deque[Callable[[], None]] = deque()
         self._thread: Thread | None = None
-        if aside:
+        if threaded:
             self._thread = Thread(target=self._work, name="storing", daemon=True)
             self._thread.start()
 
-    def ask(self, store: Callable[[], None], failed: Failed, stored: Callable[[], None]) -> None:
-        """Request that something is stored; `attend` then calls `failed` or `stored`."""
+    def request(
+        self, store: Callable[[], None], on_failed: FailureCallback, on_stored: Callable[[], None]
+    ) -> None:
+        """Request that something is stored; `report_results` then calls `on_failed` or `on_stored`."""
 
         def job() -> None:
             try:
                 store()
             except OSError as error:
-                self._outcomes.append(partial(failed, error))
+                self._outcomes.append(partial(on_failed, error))
             else:
-                self._outcomes.append(stored)
-            self._done += 1
+                self._outcomes.append(on_stored)
+            self._finished += 1
 
-        self._asked += 1
+        self._requested += 1
         if self._thread is None:
             job()
-            self.attend()
+            self.report_results()
         else:
             self._jobs.put(job)
 
-    def attend(self) -> None:
+    def report_results(self) -> None:
         """Report the results of finished requests."""
         while self._outcomes:
             self._outcomes.popleft()()
 
     @property
-    def asked(self) -> int:
+    def requested(self) -> int:
         """Number of requests so far."""
-        return self._asked
+        return self._requested
 
     @property
-    def done(self) -> int:
+    def finished(self) -> int:
         """Number of finished requests, which are executed in their order."""
-        return self._done
+        return self._finished
 
     def close(self) -> None:
         """Return when all is stored."""
@@ -68,7 +70,7 @@ class Storing:
             self._jobs.put(None)
             self._thread.join()
             self._thread = None
-        self.attend()
+        self.report_results()
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:

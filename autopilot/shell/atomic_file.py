@@ -21,7 +21,7 @@ class DamagedError(ValueError):
 def seal(text: str) -> bytes:
     """The bytes of a text with its checksum as the last line, a comment in parameter files."""
     body = text.encode()
-    return body + _MARK + _digits(body)
+    return body + _MARK + _checksum_text(body)
 
 
 def unseal(data: bytes) -> str:
@@ -29,51 +29,51 @@ def unseal(data: bytes) -> str:
     body, mark, check = data.rpartition(_MARK)
     if not mark:
         raise DamagedError("it has no checksum")
-    if check != _digits(body):
+    if check != _checksum_text(body):
         raise DamagedError("its checksum is wrong")
     return body.decode()
 
 
-def _digits(body: bytes) -> bytes:
+def _checksum_text(body: bytes) -> bytes:
     return b"%08x\n" % zlib.crc32(body)
 
 
-def write_whole(path: Path, data: bytes, private: bool = False) -> None:
+def write_atomically(path: Path, data: bytes, private: bool = False) -> None:
     """Replace a file by this content; OSError leaves the old one. `private`: readable by this user only."""
     new = path.with_suffix(".new")
     new.unlink(missing_ok=True)  # it may be readable by others
-    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
+    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
     try:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(handle, rest) :]
-        os.fsync(handle)
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[os.write(descriptor, remaining) :]
+        os.fsync(descriptor)
     finally:
-        os.close(handle)
+        os.close(descriptor)
     new.replace(path)
-    _bring_to_disk(path.parent)
+    _sync_directory(path.parent)
 
 
 def remove(path: Path) -> None:
     """Remove a file permanently if it exists."""
     path.unlink(missing_ok=True)
-    _bring_to_disk(path.parent)
+    _sync_directory(path.parent)
 
 
 def keep_copy(path: Path) -> Path:
     """Copy a damaged file, which may be repairable, to an unused name; return the new name."""
-    aside = path.with_suffix(".corrupt")
+    copy = path.with_suffix(".corrupt")
     number = 1
-    while aside.exists():
+    while copy.exists():
         number += 1
-        aside = path.with_suffix(f".corrupt{number}")
-    write_whole(aside, path.read_bytes(), private=True)
-    return aside
+        copy = path.with_suffix(f".corrupt{number}")
+    write_atomically(copy, path.read_bytes(), private=True)
+    return copy
 
 
-def _bring_to_disk(directory: Path) -> None:
-    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+def _sync_directory(directory: Path) -> None:
+    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        os.fsync(handle)
+        os.fsync(descriptor)
     finally:
-        os.close(handle)
+        os.close(descriptor)

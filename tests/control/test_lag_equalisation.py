@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from autopilot.control.actuators.lag_equalisation import equalise_lags, with_lag_columns
 from autopilot.control.actuators.mixer import FORCE, new_rotors
 from autopilot.control.actuators.rotor_model import actuation_constants
-from autopilot.control.actuators.unlike_rotors import make_alike, with_lags
 from autopilot.vehicle.layout import PLUS
-from autopilot.vehicle.rotors import allocate
+from autopilot.vehicle.rotors import mixer_table
 
 PERIOD, TAU = 4e-3, 0.03
 FACTORS = (1.0, 2.0, 0.5, 0.0)
@@ -21,11 +21,15 @@ ACTUATION = actuation_constants(0.0, TAU, PERIOD)
 
 def flown(layout, wanted, limited, vehicle):
     """Forces that rotors with their own lags give, tick by tick, and the commanded forces."""
-    table, rotors, gives = with_lags(allocate(layout), layout, ACTUATION), new_rotors(), np.zeros(len(layout))
+    table, rotors, gives = (
+        with_lag_columns(mixer_table(layout), layout, ACTUATION),
+        new_rotors(),
+        np.zeros(len(layout)),
+    )
     found, asked = [], []
     for force in wanted:
         rotors[FORCE, : len(layout)] = force
-        make_alike(rotors, table, vehicle, limited)
+        equalise_lags(rotors, table, vehicle, limited)
         command = rotors[FORCE, : len(layout)].copy()
         kept = np.array([math.exp(-PERIOD / (r.lag * TAU)) if r.lag else 0.0 for r in layout])
         gives = command + kept * (gives - command)
