@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from autopilot.core.sensor_inbox import Tick
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.kernel import kernel
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.tick_batch import (
@@ -139,5 +139,7 @@ class ClosedTicks:
             self._entry(self._onboard.warmup_batch(), world_batch)
 
     def _entry(self, autopilot_batch: AutopilotBatch, world_batch: WorldBatch) -> Any:
-        self._compiled = self._compiled or entry_of(fly_ticks, self._exchange, autopilot_batch, world_batch)
+        self._compiled = self._compiled or entry_point_of(
+            fly_ticks, self._exchange, autopilot_batch, world_batch
+        )
         return self._compiled

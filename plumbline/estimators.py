@@ -6,7 +6,7 @@ World ENU, body FLU, SI.
 from __future__ import annotations
 
 from autopilot.control.records import Cable, State
-from autopilot.estimation.desk import (
+from autopilot.estimation.estimator_exchange import (
     DirectionSample,
     Driven,
     Estimate,

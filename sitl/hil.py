@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, packed, unpack
 from autopilot.geometry.so3 import rotation_from_quat
@@ -241,7 +241,7 @@ class HilSimulator:
         In real time a late command is still the newest one, and is used.
         """
         if self._answer_in is None:
-            self._answer_in = entry_of(read_answer, datagram, VEHICLE_SYSTEM, self._payload)
+            self._answer_in = entry_point_of(read_answer, datagram, VEHICLE_SYSTEM, self._payload)
         answer = self._answer_in(datagram, VEHICLE_SYSTEM, self._payload)
         if answer[0]:
             self._apply_answer(*answer[1:])
@@ -426,7 +426,7 @@ class HilSimulator:
         buffers = (self._buffer, self._payload)
         arguments = (core.rows, core.now_us, self._latest, self._constants, *buffers, writer.sequence)
         if self._put_sensors is None:
-            self._put_sensors = entry_of(put_sensors, *arguments)
+            self._put_sensors = entry_point_of(put_sensors, *arguments)
         length, writer.sequence = self._put_sensors(*arguments)
         frames = self._written[:length].tobytes()
         return message_frames + frames if message_frames else frames
@@ -444,7 +444,9 @@ class HilSimulator:
             buffers = (self._buffer, self._payload)
             rows = (core.rows.world, core.rows.model, rotors_of(core.rows), self._constants)
             if self._put_truth is None:
-                self._put_truth = entry_of(put_truth, *rows, *buffers, writer.sequence, dialect.sequence)
+                self._put_truth = entry_point_of(
+                    put_truth, *rows, *buffers, writer.sequence, dialect.sequence
+                )
             length = self._put_truth(*rows, *buffers, writer.sequence, dialect.sequence)
             writer.sequence = (writer.sequence + 1) & 0xFF
             dialect.sequence = (dialect.sequence + DIALECT_FRAMES) & 0xFF

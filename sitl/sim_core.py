@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.vehicle.layout import PLUS, Layout
@@ -127,7 +127,7 @@ class SimCore:
         requested[:] = 0.0
         requested[: len(command)] = command
         if self._tick is None:
-            self._tick = entry_of(world_tick, self.rows, requested, gripper_open, reel_rate, self.chain)
+            self._tick = entry_point_of(world_tick, self.rows, requested, gripper_open, reel_rate, self.chain)
         self._tick(self.rows, requested, gripper_open, reel_rate, self.chain)
         self._world = None
         self.now_us += self.settings.tick_us

@@ -14,8 +14,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from autopilot.geometry.addresses import kernel_giving
-from autopilot.geometry.entry import native_address_of
+from autopilot.geometry.addresses import call_kernel_returning
+from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.packed import Row
 from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.codec import FrameWriter
@@ -35,7 +35,7 @@ TICKS_RUN = 9  # ticks that were run in this call
 ARMED, GRIPPER_OPEN = 10, 11  # of the last answer
 _NUMBERS = 12
 
-call_read_answer: Any = kernel_giving(
+call_read_answer: Any = call_kernel_returning(
     types.boolean,
     types.int64,
     types.UniTuple(types.float64, MAX_ROTORS),
@@ -43,7 +43,7 @@ call_read_answer: Any = kernel_giving(
     types.boolean,
     types.float64,
 )
-call_put_sensors: Any = kernel_giving(types.int64, types.int64)
+call_put_sensors: Any = call_kernel_returning(types.int64, types.int64)
 
 
 class KernelAddresses(NamedTuple):
@@ -141,8 +141,8 @@ def kernel_addresses(rows: WorldRows, chain: Any, buffers: FrameBuffers) -> Kern
     latest, constants, buffer, payload = buffers
     truth_rows = (rows.world, rows.model, rotors_of(rows), constants)
     return KernelAddresses(
-        native_address_of(read_answer, b"", VEHICLE_SYSTEM, payload),
-        native_address_of(world_tick, rows, rows.rotors[REQUESTED], False, 0.0, chain),
-        native_address_of(put_sensors, rows, 0, latest, constants, buffer, payload, 0),
-        native_address_of(put_truth, *truth_rows, buffer, payload, 0, 0),
+        kernel_address_of(read_answer, b"", VEHICLE_SYSTEM, payload),
+        kernel_address_of(world_tick, rows, rows.rotors[REQUESTED], False, 0.0, chain),
+        kernel_address_of(put_sensors, rows, 0, latest, constants, buffer, payload, 0),
+        kernel_address_of(put_truth, *truth_rows, buffer, payload, 0, 0),
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from autopilot.geometry.addresses import ask_kernel_at, bytes_at, call_kernel_at
+from autopilot.geometry.addresses import bytes_at, call_int_kernel_at, call_kernel_at
 from autopilot.geometry.kernel import kernel
 from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.compiled import MAX_FRAME_BYTES, Bytes
@@ -81,7 +81,9 @@ def put_truth_if_due(batch: TickBatch, buffer: Bytes) -> int:
     if numbers[TICKS] % numbers[TRUTH_EVERY] != 0:
         return 0
     truth = (rows.world, rows.model, rotors_of(rows), batch.constants, buffer, batch.payload)
-    length = ask_kernel_at(batch.code.put_truth, (*truth, numbers[TRUTH_SEQUENCE], numbers[DIALECT_SEQUENCE]))
+    length = call_int_kernel_at(
+        batch.code.put_truth, (*truth, numbers[TRUTH_SEQUENCE], numbers[DIALECT_SEQUENCE])
+    )
     numbers[TRUTH_SEQUENCE] = (numbers[TRUTH_SEQUENCE] + 1) & 0xFF
     numbers[DIALECT_SEQUENCE] = (numbers[DIALECT_SEQUENCE] + DIALECT_FRAMES) & 0xFF
     return int(length)

@@ -20,21 +20,21 @@ import numpy as np
 from autopilot.control.actuators.mixer import FORCE
 from autopilot.control.records import State
 from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary, Winch
-from autopilot.estimation.desk import (
-    FORGOTTEN,
-    GIVEN,
-    OWN,
-    SOUND,
+from autopilot.estimation.estimator_exchange import (
+    ESTIMATE_OFFSET,
+    ESTIMATOR_OFFSET,
+    LOST,
+    VALID,
     Driven,
     Estimate,
     Sensed,
-    flaw,
+    estimate_fault,
     with_readings,
 )
 from autopilot.estimation.inbox import COLUMNS
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.addresses import call_at, numbers_at
-from autopilot.geometry.entry import address_of
+from autopilot.geometry.entry import c_function_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, pack, unpack, width, with_field
 from autopilot.geometry.so3 import quat_from_rotation
@@ -95,17 +95,17 @@ def write_estimate(estimate: Estimate, summary_row: Row, reported: Row) -> None:
         state = with_field(state, "a_quad", summary.state.a_quad)
     pack(with_field(summary, "state", state), summary_row, 0)
     estimator_state = unpack(EstimatorState, reported, 0)
-    vehicle, load, doubt = estimator_state.vehicle, estimator_state.load, estimator_state.doubt
+    vehicle, load, uncertainty = estimator_state.vehicle, estimator_state.load, estimator_state.uncertainty
     vehicle = with_field(vehicle, "quat_wxyz", quat_from_rotation(state.R))
     vehicle = with_field(vehicle, "accel_quad", state.a_quad)
     if not isnan(estimate.tension):
         load = with_field(load, "tension", estimate.tension)
     if not isnan(estimate.horizontal_std):
-        doubt = with_field(doubt, "horizontal", estimate.horizontal_std)
+        uncertainty = with_field(uncertainty, "horizontal", estimate.horizontal_std)
     if not isnan(estimate.vertical_std):
-        doubt = with_field(doubt, "vertical", estimate.vertical_std)
+        uncertainty = with_field(uncertainty, "vertical", estimate.vertical_std)
     estimator_state = with_field(
-        with_field(with_field(estimator_state, "vehicle", vehicle), "load", load), "doubt", doubt
+        with_field(with_field(estimator_state, "vehicle", vehicle), "load", load), "uncertainty", uncertainty
     )
     pack(estimator_state, reported, 0)
 
@@ -115,7 +115,7 @@ def run_estimator(address: int) -> None:
     """Run the estimator in a tick, given the address of its `EstimatorCall`."""
     call = unpack(EstimatorCall, numbers_at(address, _CALL_WIDTH), 0)
     inbox = numbers_at(call.inbox, call.readings * COLUMNS).reshape((call.readings, COLUMNS))
-    summary, exchange = numbers_at(call.summary, _SUMMARY_WIDTH), numbers_at(call.exchange, OWN)
+    summary, exchange = numbers_at(call.summary, _SUMMARY_WIDTH), numbers_at(call.exchange, ESTIMATOR_OFFSET)
     estimator, reported = (
         numbers_at(call.estimator, _ESTIMATOR_WIDTH),
         numbers_at(call.reported, _ESTIMATOR_WIDTH),
@@ -123,19 +123,19 @@ def run_estimator(address: int) -> None:
     write_sensed(
         call, inbox, numbers_at(call.forces, MAX_ROTORS), unpack(EstimateSummary, summary, 0), exchange
     )
-    was_known = unpack(Estimate, exchange, GIVEN).known and exchange[0] == 0.0
-    pack(UNSET_ESTIMATE, exchange, GIVEN)
+    was_known = unpack(Estimate, exchange, ESTIMATE_OFFSET).known and exchange[0] == 0.0
+    pack(UNSET_ESTIMATE, exchange, ESTIMATE_OFFSET)
     call_at(call.estimate, call.exchange)
     exchange[0] = 0.0  # `Sensed.begins`: the first tick has passed
-    estimate = unpack(Estimate, exchange, GIVEN)
+    estimate = unpack(Estimate, exchange, ESTIMATE_OFFSET)
     for i in range(_ESTIMATOR_WIDTH):
         reported[i] = estimator[i]
-    problem = FORGOTTEN if was_known else SOUND
+    problem = LOST if was_known else VALID
     if estimate.known:
-        problem = flaw(estimate)
-        if problem == SOUND:
+        problem = estimate_fault(estimate)
+        if problem == VALID:
             write_estimate(estimate, summary, reported)
-    if problem != SOUND:
+    if problem != VALID:
         call_at(call.alarm, call.exchange)
 
 
@@ -195,7 +195,11 @@ class EstimatorSlot:
 
 def _entry_point() -> Any:
     """The C function that the tick calls."""
-    return address_of(run_estimator, 0) if hasattr(run_estimator, "overloads") else _FUNCTION(run_estimator)
+    return (
+        c_function_address_of(run_estimator, 0)
+        if hasattr(run_estimator, "overloads")
+        else _FUNCTION(run_estimator)
+    )
 
 
 def _address(function: Any) -> int:

@@ -37,7 +37,7 @@ from autopilot.core.tick import (
     fly_tick,
     placeholder_law,
 )
-from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints, loss
+from autopilot.estimation.filter import NO_LOAD, NO_POSE, estimate_loss, estimate_problems
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import (
     Array,
@@ -47,11 +47,11 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
-from autopilot.geometry.entry import entry_of, native_address_of
+from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
-from autopilot.geometry.packed import pack, packed, place_of, unpack
-from autopilot.guidance.layout import COLUMNS, jets_ahead
-from autopilot.guidance.legs import Brake, Catch, Leg, Slow, least_move_s, top_of
+from autopilot.geometry.packed import field_offset, pack, packed, unpack
+from autopilot.guidance.jet_table import COLUMNS, jets_ahead
+from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, min_move_duration, winch_hold_height
 from autopilot.own.estimator import load_estimator
 from autopilot.own.host import Host
 from autopilot.own.law import load_law
@@ -209,7 +209,7 @@ class FlightCore:
         """Whether the present leg moves the winch."""
         legs = self.flight.legs
         if legs is not self._reeling[0]:
-            self._reeling = (legs, bool(legs) and top_of(legs[0]) is not None)
+            self._reeling = (legs, bool(legs) and winch_hold_height(legs[0]) is not None)
         return self._reeling[1]
 
     def view(self, now_us: int, with_pull: bool = False) -> View:
@@ -221,8 +221,8 @@ class FlightCore:
         if summary.vehicle_problem or (carries_load and summary.load_problem):
             estimator, silent_s = self.estimator, summary.inertial_age
             oldest_s = self.settings.failsafe.sensor_age_limit_s
-            problems = complaints(estimator, oldest_s, carries_load, silent_s)
-            loss_text = loss(estimator, silent_s)
+            problems = estimate_problems(estimator, oldest_s, carries_load, silent_s)
+            loss_text = estimate_loss(estimator, silent_s)
         slot = self._estimator_slot
         if slot is not None and not slot.fault and not slot.host.has_estimate:
             problems += (f"no estimate of {slot.host.estimator.label}",)
@@ -272,7 +272,7 @@ class FlightCore:
 
     def compile(self) -> Callable[..., int]:
         """Prepare the machine code of a tick that is the same with all laws."""
-        self._fly = entry_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
+        self._fly = entry_point_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
         return self._fly
 
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
@@ -303,7 +303,7 @@ class FlightCore:
         """The address of `fly_tick`, compiled or loaded if necessary; 0 where nothing is compiled."""
         if not hasattr(fly_tick, "overloads"):
             return 0
-        return native_address_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
+        return kernel_address_of(fly_tick, self.rows, placeholder_law(self.law_rows), 0, 0, 0, 0.0, False)
 
     def raise_interruption(self) -> None:
         """Raise what interrupted law or estimator during the tick without being their fault, such as
@@ -378,7 +378,7 @@ class FlightCore:
         self._cable_m = self.flight.cable.length_m
         length, settings = self._cable_m, self.setup.settings
         if length is not None:
-            min_move_s = least_move_s(length, settings.gravity_m_s2)
+            min_move_s = min_move_duration(length, settings.gravity_m_s2)
             settings = replace(settings, cable_length_m=length, min_move_s=min_move_s)
         self.settings = settings
 
@@ -391,15 +391,15 @@ class FlightCore:
             pack(stretch, self.rows.stretch, 0)
             return
         leg = flight.legs[0]
-        if isinstance(leg, Catch):
+        if isinstance(leg, CatchLoad):
             state = self.state
-            jet = leg.meeting(
+            jet = leg.falling_motion(
                 state.x_quad, state.v_quad, state.x_load, state.v_load, self.setup.vehicle.gravity
             )
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
         else:
             legs = (*flight.legs, *flight.following)
-            max_ticks = SETPOINTS_BRAKING if isinstance(leg, Brake | Slow) else self._setpoints_per_call
+            max_ticks = SETPOINTS_BRAKING if isinstance(leg, Brake | PathStop) else self._setpoints_per_call
             ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
@@ -511,7 +511,7 @@ class FlightCore:
 
 def with_cable_now(flight: Flight, now_us: int) -> Flight:
     """The flight with its cable as reeled at this instant: L, L' and L'' of the leg that reels."""
-    top = top_of(flight.legs[0]) if flight.legs else None
+    top = winch_hold_height(flight.legs[0]) if flight.legs else None
     if top is None:
         if flight.cable.reel_rate == 0.0 and flight.cable.reel_accel == 0.0:
             return flight
@@ -531,12 +531,12 @@ def with_cable_now(flight: Flight, now_us: int) -> Flight:
 
 def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
     """Rate in m/s that the winch is to reach by the end of a period."""
-    if not flight.legs or top_of(flight.legs[0]) is None:
+    if not flight.legs or winch_hold_height(flight.legs[0]) is None:
         return 0.0
     return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
 
 
-_LOAD_AGE = place_of(EstimatorState, "load") + place_of(LoadEstimate, "age_s")
+_LOAD_AGE = field_offset(EstimatorState, "load") + field_offset(LoadEstimate, "age_s")
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 # before the first reading
 _NO_ESTIMATE_YET = EstimateSummary(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import NamedTuple
 
-from autopilot.estimation.inbox import is_sane
+from autopilot.estimation.inbox import is_valid_imu
 from autopilot.estimation.records import ImuReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
@@ -94,7 +94,7 @@ def update_condition(
         _updated_time(before.last_received_us[3], now_us, fields, PRESSURE),
     )
     mean, square = before.mean, before.square
-    if is_sane(sample) and dt > 0.0:
+    if is_valid_imu(sample) and dt > 0.0:
         slow, fast = dt / (dt + 0.5 / (pi * _MEAN_HZ)), dt / (dt + 0.5 / (pi * _SQUARE_HZ))
         a = sample.accel
         if before.last_received_us[0] < 0:

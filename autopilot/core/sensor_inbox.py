@@ -16,12 +16,12 @@ from autopilot.estimation.inbox import (
     IMU,
     KIND,
     LOAD,
-    LONG_AGO,
     NOT_MEASURED,
     POSE,
     READING,
-    SHOWS,
-    SPEEDS,
+    REPEATED_SAMPLE,
+    ROTOR_SPEEDS,
+    SAMPLE_TIME_US,
     new_inbox,
 )
 from autopilot.estimation.records import (
@@ -35,7 +35,7 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
-from autopilot.geometry.entry import entry_of, native_address_of
+from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
@@ -98,7 +98,7 @@ class Tick(NamedTuple):
 def _put(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> int:
     """Write a reading's record into a row, if there is one left; returns the next row."""
     if at < inbox.shape[0]:
-        inbox[at, KIND], inbox[at, SHOWS] = kind, shows_us
+        inbox[at, KIND], inbox[at, SAMPLE_TIME_US] = kind, shows_us
         pack(reading, inbox[at], READING)
     return at + 1
 
@@ -146,7 +146,7 @@ def _put_speeds(inbox: Array, at: int, m: Any) -> int:
     """Write the speeds that the controllers of four rotors report into a row, if there is one left; returns
     the next row."""
     if at < inbox.shape[0]:
-        inbox[at, KIND], inbox[at, READING] = SPEEDS, m.index
+        inbox[at, KIND], inbox[at, READING] = ROTOR_SPEEDS, m.index
         for i in range(4):
             inbox[at, READING + 1 + i] = m.rpm[i]
     return at + 1
@@ -196,7 +196,7 @@ def _read(
     now_us = sensor.time_us
     sample = ImuReading(sensor.gyro_body, sensor.accel_body)
     new = sensor.fields & INERTIAL == INERTIAL
-    count = _put(inbox, count, IMU, now_us if new else LONG_AGO, sample)
+    count = _put(inbox, count, IMU, now_us if new else REPEATED_SAMPLE, sample)
     if has_fix and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
         count = _put_fix(inbox, count, gps)
     if sensor.fields & PRESSURE:
@@ -220,7 +220,7 @@ def _read(
 
 def address_of_read(inbox: SensorInbox) -> int:
     """The address of the kernel that reads datagrams for this inbox, compiled or loaded if necessary."""
-    return native_address_of(_read, b"", *inbox.arguments(0))
+    return kernel_address_of(_read, b"", *inbox.arguments(0))
 
 
 class SensorInbox:
@@ -251,7 +251,7 @@ class SensorInbox:
         other_messages: tuple[Any, ...] = ()
         arguments = self.arguments(since_us)
         if self._entry is None:
-            self._entry = entry_of(_read, datagram, *arguments)
+            self._entry = entry_point_of(_read, datagram, *arguments)
         count, now_us, fields, has_fix = self._entry(datagram, *arguments)
         if count == _OTHER_CONTENT:
             messages = [one.message for one in decode(datagram)[0]]

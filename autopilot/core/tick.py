@@ -60,7 +60,7 @@ from autopilot.estimation.filter import (
     load_problem,
     vehicle_problem,
 )
-from autopilot.estimation.inbox import IMU, KIND, READING, SHOWS, SPEEDS, is_sane
+from autopilot.estimation.inbox import IMU, KIND, READING, ROTOR_SPEEDS, SAMPLE_TIME_US, is_valid_imu
 from autopilot.estimation.records import (
     RECEIVER,
     Array,
@@ -69,14 +69,14 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
-from autopilot.estimation.vibration import accel_shown
+from autopilot.estimation.vibration import measured_accel_noise
 from autopilot.geometry.addresses import call_at, call_kernel_at, numbers_at
-from autopilot.geometry.compiler import INSIDE
-from autopilot.geometry.entry import native_address_of
+from autopilot.geometry.compiler import INNER_OPTIONS
+from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import if_above, rows_in, taken
+from autopilot.geometry.lanes import if_above, row_count, table_value
 from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, neg, norm, scale, sub
-from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
+from autopilot.geometry.packed import IntPerLane, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
 from autopilot.supervisor.quiescence import UNCONTROLLED, Stretch, may_need_decision
@@ -131,7 +131,7 @@ class ControlMemory(NamedTuple):
     moment: Vec3  # N m
     observed: DisturbanceEstimate
     control_mode: int  # for which the law's memory was made; UNCONTROLLED: there is no memory
-    slack_events: Each
+    slack_events: IntPerLane
     was_taut: bool
 
 
@@ -184,7 +184,11 @@ def row_at(stretch: Stretch, now_us: int) -> int:
 @kernel
 def vector_at(table: Array, at: int, first: int) -> Vec3:
     """Three numbers of a row of setpoints."""
-    return (taken(table, at, first), taken(table, at, first + 1), taken(table, at, first + 2))
+    return (
+        table_value(table, at, first),
+        table_value(table, at, first + 1),
+        table_value(table, at, first + 2),
+    )
 
 
 @kernel
@@ -218,7 +222,7 @@ def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
     commands, and those that are known to be lost."""
     table, rotors = rows.table, rows.rotors
     for i in range(count):
-        if rows.inbox[i, KIND] != SPEEDS:
+        if rows.inbox[i, KIND] != ROTOR_SPEEDS:
             continue
         first = int(rows.inbox[i, READING])
         for j in range(first, min(first + 4, table.shape[0] - 1)):
@@ -276,8 +280,8 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
     state = control_state(estimator, winch.cable)
     silent_s = unpack(EstimateSummary, rows.summary, 0).inertial_age + dt
     for i in range(count):
-        new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SHOWS] == now_us
-        if new and is_sane(unpack(ImuReading, rows.inbox[i], READING)):
+        new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SAMPLE_TIME_US] == now_us
+        if new and is_valid_imu(unpack(ImuReading, rows.inbox[i], READING)):
             silent_s = 0.0
     lost = rotors_lost(rows, count, constants.vehicle)
     problem = inertial_problem(silent_s)
@@ -288,7 +292,7 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
         measured_pull(control, state, constants),
-        estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
+        estimator.uncertainty.vertical if estimator.vehicle.source == RECEIVER else 0.0,
         problem,
         load_problem(estimator, constants.sensor_age_s),
         silent_s,
@@ -377,12 +381,12 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         1.0 if summary.taut else 0.0,
         control.thrust,
         control.moment,
-        slowed_by_noise(constants.observer, control.observed, accel_shown(estimator.vibration)),
+        slowed_by_noise(constants.observer, control.observed, measured_accel_noise(estimator.vibration)),
         constants.drag,
         with_cable_length(vehicle, cable.length),
     )
     air = estimator.air
-    load_accel = axpy(air.load_drag, state.v_load, (air.load[0], air.load[1], 0.0))
+    load_accel = axpy(air.load_drag, state.v_load, (air.load_accel[0], air.load_accel[1], 0.0))
     observed = with_wind_on_load(
         observed, (load_accel[0], load_accel[1], 0.0), air.load_drag, constants.observer
     )
@@ -448,7 +452,7 @@ def compiled_law(rows: CoreRows, law_rows: Any) -> Any:
     nothing is compiled, the rows themselves."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
-    control = native_address_of(control_tick, rows, law_rows, 0)
+    control = kernel_address_of(control_tick, rows, law_rows, 0)
     return CompiledLaw(law_rows.constants, law_rows.memory, control)
 
 
@@ -464,7 +468,7 @@ def call_control(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     control_tick(rows, law_rows, now_us)
 
 
-@overload(call_control, jit_options=INSIDE)
+@overload(call_control, jit_options=INNER_OPTIONS)
 def _control_by(rows: Any, law_rows: Any, now_us: Any) -> Any:
     def called(rows: Any, law_rows: Any, now_us: Any) -> None:
         call_kernel_at(law_rows.control, (rows, law_rows.constants, law_rows.memory, now_us))
@@ -482,7 +486,7 @@ def _must_decide(rows: CoreRows, now_us: int) -> bool:
         return True
     at = row_at(stretch, now_us)
     target = ZERO
-    if stretch.mode != UNCONTROLLED and 0 <= at < rows_in(rows.targets):
+    if stretch.mode != UNCONTROLLED and 0 <= at < row_count(rows.targets):
         target = vector_at(rows.targets, at, 0)
     known = summary.vehicle_problem == 0 and (not stretch.load_required or summary.load_problem == 0)
     return may_need_decision(

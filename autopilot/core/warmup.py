@@ -9,9 +9,18 @@ from autopilot.core.tick import compiled_law
 from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
-from autopilot.guidance.layout import jets_ahead
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Pass, Run, transfer_leg
-from autopilot.guidance.setpoint_follower import begin_following
+from autopilot.guidance.jet_table import jets_ahead
+from autopilot.guidance.legs import (
+    LOAD_POSITION,
+    QUAD_POSITION,
+    Creep,
+    Hold,
+    Leg,
+    PathStretch,
+    SignalRun,
+    transfer_leg,
+)
+from autopilot.guidance.setpoint_follower import start_following
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
@@ -42,9 +51,9 @@ def warm_up_paths(setup: Setup) -> None:
         Hold(load),
         transfer_leg(load, above_load, 1.0, 1.0, LOAD_POSITION),
         Creep(above_load, ZERO, QUAD_POSITION),
-        Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
-        Pass(PathSegment(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),
-        begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
+        SignalRun(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
+        PathStretch(PathSegment(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),
+        start_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
     enu_from_ned(ZERO)  # for setpoints of a companion computer

@@ -10,17 +10,17 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.control.drag import GUST_RANDOM_WALK
-from autopilot.estimation.covariance import kept
+from autopilot.estimation.covariance import decay_factor
 from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
 
-DRAG_TIME_S = 0.15  # for which a change of drag lasts
+DRAG_CHANGE_TIME_S = 0.15  # for which a change of drag lasts
 # m/s^2, by a wind that a camera cannot distinguish from its own mounting and the slow error of a receiver
-HIDDEN = 0.17
+HIDDEN_WIND_ACCEL = 0.17
 LEARNING_S = 4.0
-# drag is learned from motion faster than SLOW, m/s, and is at most GREATEST_DRAG, 1/s
-SLOW, GREATEST_DRAG = 0.2, 2.0
+# drag is learned from motion faster than MIN_LEARNING_SPEED, m/s, and is at most MAX_DRAG, 1/s
+MIN_LEARNING_SPEED, MAX_DRAG = 0.2, 2.0
 
 
 @kernel
@@ -32,17 +32,23 @@ def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: Est
     the speed, 2 c u times the acceleration, where u^2 includes the wind that the acceleration c u^2
     indicates.
     """
-    still, c = tuning.air_walk, tuning.load_drag
-    wind2 = air.load[0] * air.load[0] + air.load[1] * air.load[1]
+    configured_walk, c = tuning.air_walk, tuning.load_drag
+    wind2 = air.load_accel[0] * air.load_accel[0] + air.load_accel[1] * air.load_accel[1]
     speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
     gusts = (
-        GUST_RANDOM_WALK * GUST_RANDOM_WALK * (wind2 if load.source == TRACKER else wind2 + HIDDEN * HIDDEN)
+        GUST_RANDOM_WALK
+        * GUST_RANDOM_WALK
+        * (wind2 if load.source == TRACKER else wind2 + HIDDEN_WIND_ACCEL * HIDDEN_WIND_ACCEL)
     )
-    return sqrt(still * still + gusts + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
+    return sqrt(
+        configured_walk * configured_walk
+        + gusts
+        + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_CHANGE_TIME_S
+    )
 
 
 @kernel
-def _nearer(mean: tuple[float, float], to: tuple[float, float], share: float) -> tuple[float, float]:
+def _moved_towards(mean: tuple[float, float], to: tuple[float, float], share: float) -> tuple[float, float]:
     return mean[0] + share * (to[0] - mean[0]), mean[1] + share * (to[1] - mean[1])
 
 
@@ -51,17 +57,38 @@ def predict_air(
     air: AirEstimate, before: LoadEstimate, load: LoadEstimate, tuning: EstimatorTuning, dt: float
 ) -> AirEstimate:
     """The accelerations by the air dt seconds later; `load` is the load at that time."""
-    calm, still = kept(tuning.air_std, tuning.air_walk, dt), kept(tuning.push_std, tuning.push_walk, dt)
-    pushed = (still * air.vehicle[0], still * air.vehicle[1])
-    d = (calm * air.load[0], calm * air.load[1])
+    load_decay, vehicle_decay = (
+        decay_factor(tuning.air_std, tuning.air_walk, dt),
+        decay_factor(tuning.push_std, tuning.push_walk, dt),
+    )
+    vehicle_accel = (vehicle_decay * air.vehicle_accel[0], vehicle_decay * air.vehicle_accel[1])
+    d = (load_decay * air.load_accel[0], load_decay * air.load_accel[1])
     if load.taut == 0.0 or before.taut == 0.0:
-        return AirEstimate(d, pushed, air.load_drag, air.mean_speed, air.mean_load, air.together, air.alone)
+        return AirEstimate(
+            d,
+            vehicle_accel,
+            air.load_drag,
+            air.mean_velocity,
+            air.mean_accel,
+            air.velocity_accel_covariance,
+            air.velocity_variance,
+        )
     v, c = load.v_load, air.load_drag
     d = (d[0] - c * (v[0] - before.v_load[0]), d[1] - c * (v[1] - before.v_load[1]))
     share = dt / (LEARNING_S + dt)
-    mean_speed, mean_load = _nearer(air.mean_speed, (v[0], v[1]), share), _nearer(air.mean_load, d, share)
-    s0, s1 = v[0] - mean_speed[0], v[1] - mean_speed[1]
-    together = air.together + share * (s0 * (d[0] - mean_load[0]) + s1 * (d[1] - mean_load[1]) - air.together)
-    alone = air.alone + share * (s0 * s0 + s1 * s1 - air.alone)
-    drag = min(GREATEST_DRAG, max(0.0, -together / (alone + SLOW * SLOW)))
-    return AirEstimate(d, pushed, drag, mean_speed, mean_load, together, alone)
+    mean_velocity, mean_accel = (
+        _moved_towards(air.mean_velocity, (v[0], v[1]), share),
+        _moved_towards(air.mean_accel, d, share),
+    )
+    s0, s1 = v[0] - mean_velocity[0], v[1] - mean_velocity[1]
+    velocity_accel_covariance = air.velocity_accel_covariance + share * (
+        s0 * (d[0] - mean_accel[0]) + s1 * (d[1] - mean_accel[1]) - air.velocity_accel_covariance
+    )
+    velocity_variance = air.velocity_variance + share * (s0 * s0 + s1 * s1 - air.velocity_variance)
+    drag = min(
+        MAX_DRAG,
+        max(0.0, -velocity_accel_covariance / (velocity_variance + MIN_LEARNING_SPEED * MIN_LEARNING_SPEED)),
+    )
+    return AirEstimate(
+        d, vehicle_accel, drag, mean_velocity, mean_accel, velocity_accel_covariance, velocity_variance
+    )

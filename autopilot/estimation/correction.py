@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.estimation.covariance import enter
-from autopilot.estimation.history import carry_back, past3, past4, row_before
+from autopilot.estimation.covariance import add_jacobian_entry
+from autopilot.estimation.history import correct_past_states, interpolate3, interpolate4, row_before
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     ACROSS,
@@ -44,11 +44,11 @@ from autopilot.estimation.records import (
     V_QUAD,
     VELOCITY,
     X_QUAD,
-    AidEstimate,
     EstimatorState,
     EstimatorTuning,
     History,
     LoadEstimate,
+    SensorErrors,
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
@@ -58,7 +58,7 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 
-class Past(NamedTuple):
+class PastState(NamedTuple):
     """The state when a reading was taken, and the relation of its errors to those of now."""
 
     age: float
@@ -70,93 +70,93 @@ class Past(NamedTuple):
     along: Vec3
     q_cable_dot: Vec3
     R: Mat3  # of now
-    gained: Vec3  # S, m/s
-    moved: Vec3  # D, m
-    bend: float  # 1 + age^2 k / 2
+    velocity_gain: Vec3  # S, m/s
+    displacement: Vec3  # D, m
+    direction_growth: float  # 1 + age^2 k / 2
 
 
 @kernel
-def look_back(state: EstimatorState, history: History, tuning: EstimatorTuning, age: float) -> Past:
+def past_state(state: EstimatorState, history: History, tuning: EstimatorTuning, age: float) -> PastState:
     """The state `age` seconds ago."""
     ring = history.ring
     row, share = row_before(state.head, ring, state.time_s - age)
     vehicle, load = state.vehicle, state.load
-    x, v = past3(ring, row, share, X_QUAD), past3(ring, row, share, V_QUAD)
-    q = normalise(past3(ring, row, share, Q_CABLE))
-    across = normalise(tangent(q, past3(ring, row, share, ACROSS)))
+    x, v = interpolate3(ring, row, share, X_QUAD), interpolate3(ring, row, share, V_QUAD)
+    q = normalise(interpolate3(ring, row, share, Q_CABLE))
+    across = normalise(tangent(q, interpolate3(ring, row, share, ACROSS)))
     g = tuning.gravity
-    gained = sub(vehicle.v_quad, v)
-    gained = (gained[0], gained[1], gained[2] + g * age)
-    moved = axpy(age, vehicle.v_quad, sub(x, vehicle.x_quad))
-    moved = (moved[0], moved[1], moved[2] + 0.5 * g * age * age)
+    velocity_gain = sub(vehicle.v_quad, v)
+    velocity_gain = (velocity_gain[0], velocity_gain[1], velocity_gain[2] + g * age)
+    displacement = axpy(age, vehicle.v_quad, sub(x, vehicle.x_quad))
+    displacement = (displacement[0], displacement[1], displacement[2] + 0.5 * g * age * age)
     a = vehicle.accel_quad
     k = dot(q, (a[0], a[1], a[2] + g)) / load.length
-    return Past(
+    return PastState(
         age,
         x,
         v,
-        quat_normalise(past4(ring, row, share, QUAT)),
+        quat_normalise(interpolate4(ring, row, share, QUAT)),
         q,
         across,
         cross(q, across),
-        past3(ring, row, share, Q_RATE),
+        interpolate3(ring, row, share, Q_RATE),
         rotation_from_quat(vehicle.quat_wxyz),
-        gained,
-        moved,
+        velocity_gain,
+        displacement,
         1.0 + 0.5 * age * age * k,
     )
 
 
 @kernel
-def _attitude_cross(history: History, k: int, i: int, s: float, v: Vec3) -> None:
+def _add_attitude_cross_jacobian(history: History, k: int, i: int, s: float, v: Vec3) -> None:
     """Enter s (attitude x v)_i."""
     if i == 0:
-        enter(history, k, ATTITUDE + 1, s * v[2])
-        enter(history, k, ATTITUDE + 2, -s * v[1])
+        add_jacobian_entry(history, k, ATTITUDE + 1, s * v[2])
+        add_jacobian_entry(history, k, ATTITUDE + 2, -s * v[1])
     elif i == 1:
-        enter(history, k, ATTITUDE + 2, s * v[0])
-        enter(history, k, ATTITUDE, -s * v[2])
+        add_jacobian_entry(history, k, ATTITUDE + 2, s * v[0])
+        add_jacobian_entry(history, k, ATTITUDE, -s * v[2])
     else:
-        enter(history, k, ATTITUDE, s * v[1])
-        enter(history, k, ATTITUDE + 1, -s * v[0])
+        add_jacobian_entry(history, k, ATTITUDE, s * v[1])
+        add_jacobian_entry(history, k, ATTITUDE + 1, -s * v[0])
 
 
 @kernel
-def enter_position(history: History, k: int, past: Past, i: int) -> None:
+def add_position_jacobian(history: History, k: int, past: PastState, i: int) -> None:
     """Enter component i of the vehicle's position then."""
-    enter(history, k, POSITION + i, 1.0)
-    enter(history, k, VELOCITY + i, -past.age)
-    _attitude_cross(history, k, i, 1.0, past.moved)
+    add_jacobian_entry(history, k, POSITION + i, 1.0)
+    add_jacobian_entry(history, k, VELOCITY + i, -past.age)
+    _add_attitude_cross_jacobian(history, k, i, 1.0, past.displacement)
     s = -0.5 * past.age * past.age
     for j in range(3):
-        enter(history, k, ACCEL_BIAS + j, s * past.R[i][j])
+        add_jacobian_entry(history, k, ACCEL_BIAS + j, s * past.R[i][j])
 
 
 @kernel
-def enter_velocity(history: History, k: int, past: Past, i: int) -> None:
+def add_velocity_jacobian(history: History, k: int, past: PastState, i: int) -> None:
     """Enter component i of the vehicle's velocity then."""
-    enter(history, k, VELOCITY + i, 1.0)
-    _attitude_cross(history, k, i, -1.0, past.gained)
+    add_jacobian_entry(history, k, VELOCITY + i, 1.0)
+    _add_attitude_cross_jacobian(history, k, i, -1.0, past.velocity_gain)
     for j in range(3):
-        enter(history, k, ACCEL_BIAS + j, past.age * past.R[i][j])
+        add_jacobian_entry(history, k, ACCEL_BIAS + j, past.age * past.R[i][j])
 
 
 @kernel
-def enter_attitude(history: History, k: int, past: Past, axis: Vec3) -> None:
+def add_attitude_jacobian(history: History, k: int, past: PastState, axis: Vec3) -> None:
     """Enter the attitude error then about a world axis."""
     for i in range(3):
-        enter(history, k, ATTITUDE + i, axis[i])
-        about = axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
-        enter(history, k, GYRO_BIAS + i, past.age * about)
+        add_jacobian_entry(history, k, ATTITUDE + i, axis[i])
+        bias_share = axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
+        add_jacobian_entry(history, k, GYRO_BIAS + i, past.age * bias_share)
 
 
 @kernel
-def enter_direction(history: History, k: int, past: Past, first: float, second: float) -> None:
+def add_direction_jacobian(history: History, k: int, past: PastState, first: float, second: float) -> None:
     """Enter `first` and `second` times the two components of the cable's direction then."""
-    enter(history, k, DIRECTION, past.bend * first)
-    enter(history, k, DIRECTION + 1, past.bend * second)
-    enter(history, k, RATE, -past.age * first)
-    enter(history, k, RATE + 1, -past.age * second)
+    add_jacobian_entry(history, k, DIRECTION, past.direction_growth * first)
+    add_jacobian_entry(history, k, DIRECTION + 1, past.direction_growth * second)
+    add_jacobian_entry(history, k, RATE, -past.age * first)
+    add_jacobian_entry(history, k, RATE + 1, -past.age * second)
 
 
 @kernel
@@ -172,13 +172,13 @@ def with_load(state: EstimatorState, load: LoadEstimate, resets: float) -> Estim
 
 
 @kernel
-def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
-    """The state with its aids replaced."""
-    return with_field(state, "aids", aids)
+def with_sensor_errors(state: EstimatorState, sensor_errors: SensorErrors) -> EstimatorState:
+    """The state with its sensor errors replaced."""
+    return with_field(state, "sensor_errors", sensor_errors)
 
 
 @kernel
-def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
+def with_capacity(state: EstimatorState, age: float, size: int) -> EstimatorState:
     """The state whose ring is corrected at least as far back as `age` from now on, with at least `size`
     errors in use."""
     state = with_field(state, "memory_s", max(state.memory_s, age))
@@ -186,8 +186,8 @@ def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
 
 
 @kernel
-def vehicle_at(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEstimate:
-    """The vehicle with another age and count of refusals."""
+def vehicle_with_status(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEstimate:
+    """The vehicle with another age and count of rejections."""
     return VehicleEstimate(
         v.x_quad,
         v.v_quad,
@@ -203,8 +203,8 @@ def vehicle_at(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEsti
 
 
 @kernel
-def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) -> LoadEstimate:
-    """The load with another age, count of refusals and source."""
+def load_with_status(load: LoadEstimate, age_s: float, rejected: float, source: float) -> LoadEstimate:
+    """The load with another age, count of rejections and source."""
     return LoadEstimate(
         load.x_load,
         load.v_load,
@@ -216,8 +216,8 @@ def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) ->
         load.taut,
         load.tension,
         load.pull,
-        load.pulled_s,
-        load.held_s,
+        load.pull_duration_s,
+        load.tautness_age_s,
         age_s,
         rejected,
         source,
@@ -225,21 +225,23 @@ def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) ->
 
 
 @kernel
-def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, plain: float) -> LoadEstimate:
+def corrected_load(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, plain_gnss: float
+) -> LoadEstimate:
     """The load and its cable corrected by `error`; while the cable is taut, the load is at its end."""
     e = history.error[0]
     along = cross(load.q_cable, load.across)
-    off = add(scale(e[DIRECTION], load.across), scale(e[DIRECTION + 1], along))
-    turned = add(scale(e[RATE], load.across), scale(e[RATE + 1], along))
-    q = normalise(add(load.q_cable, off))
+    direction_change = add(scale(e[DIRECTION], load.across), scale(e[DIRECTION + 1], along))
+    rate_change = add(scale(e[RATE], load.across), scale(e[RATE + 1], along))
+    q = normalise(add(load.q_cable, direction_change))
     across = normalise(tangent(q, load.across))
-    q_dot = tangent(q, add(load.q_cable_dot, turned))
+    q_dot = tangent(q, add(load.q_cable_dot, rate_change))
     length = load.length + e[LENGTH]
     x_load, v_load = load.x_load, load.v_load
     if load.taut > 0.0:
         x_load = axpy(length, q, vehicle.x_quad)
         v_load = axpy(length, q_dot, vehicle.v_quad)
-    elif load.source == CAMERA and plain > 0.0:
+    elif load.source == CAMERA and plain_gnss > 0.0:
         # the load's position is known relative to the vehicle, whose position a plain receiver measures no
         # better
         x_load = add(x_load, (e[POSITION], e[POSITION + 1], 0.0))
@@ -254,8 +256,8 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, p
         load.taut,
         load.tension,
         load.pull,
-        load.pulled_s,
-        load.held_s,
+        load.pull_duration_s,
+        load.tautness_age_s,
         load.age_s,
         load.rejected,
         load.source,
@@ -263,47 +265,47 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, p
 
 
 @kernel
-def inject(state: EstimatorState, history: History) -> EstimatorState:
+def inject_error(state: EstimatorState, history: History) -> EstimatorState:
     """The state corrected by `error`, and the ring with it."""
-    e, v, a = history.error[0], state.vehicle, state.aids
-    turned = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
-    moved = (e[POSITION], e[POSITION + 1], e[POSITION + 2])
-    shift = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])
+    e, v, a = history.error[0], state.vehicle, state.sensor_errors
+    rotation = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
+    position_change = (e[POSITION], e[POSITION + 1], e[POSITION + 2])
+    gyro_bias_change = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])
     vehicle = VehicleEstimate(
-        add(v.x_quad, moved),
+        add(v.x_quad, position_change),
         add(v.v_quad, (e[VELOCITY], e[VELOCITY + 1], e[VELOCITY + 2])),
-        quat_normalise(quat_multiply(turned, v.quat_wxyz)),
-        sub(v.omega_body, shift),
-        add(v.gyro_bias, shift),
+        quat_normalise(quat_multiply(rotation, v.quat_wxyz)),
+        sub(v.omega_body, gyro_bias_change),
+        add(v.gyro_bias, gyro_bias_change),
         add(v.accel_bias, (e[ACCEL_BIAS], e[ACCEL_BIAS + 1], e[ACCEL_BIAS + 2])),
         v.accel_quad,
         v.age_s,
         v.rejected,
         v.source,
     )
-    aids = a
+    sensor_errors = a
     if state.size >= AIDED_SIZE:
-        aids = AidEstimate(
+        sensor_errors = SensorErrors(
             (a.mounting[0] + e[MOUNTING], a.mounting[1] + e[MOUNTING + 1]),
             a.heading + e[HEADING],
             a.barometer + e[BAROMETER],
             add(a.gnss, (e[GNSS], e[GNSS + 1], e[GNSS + 2])),
-            a.horizontal_slow,
-            a.vertical_slow,
+            a.horizontal_slow_std,
+            a.vertical_slow_std,
             a.reversion,
-            add(a.debt, moved) if a.reversion < 1.0 else a.debt,
+            add(a.pending_correction, position_change) if a.reversion < 1.0 else a.pending_correction,
             a.field,
             a.magnetic_age,
             a.barometer_age,
             a.rejected,
         )
     air = state.air
-    pushed = air.vehicle
+    vehicle_accel = air.vehicle_accel
     if state.size == SIZE:
-        pushed = (pushed[0] + e[PUSH], pushed[1] + e[PUSH + 1])
-    air = with_field(air, "load", (air.load[0] + e[AIR], air.load[1] + e[AIR + 1]))
-    air = with_field(air, "vehicle", pushed)
-    carry_back(state.head, history, state.memory_s)
-    load = moved_load(state.load, vehicle, history, 1.0 if a.reversion < 1.0 else 0.0)
-    state = with_vehicle(with_aids(state, aids), vehicle, state.resets)
+        vehicle_accel = (vehicle_accel[0] + e[PUSH], vehicle_accel[1] + e[PUSH + 1])
+    air = with_field(air, "load_accel", (air.load_accel[0] + e[AIR], air.load_accel[1] + e[AIR + 1]))
+    air = with_field(air, "vehicle_accel", vehicle_accel)
+    correct_past_states(state.head, history, state.memory_s)
+    load = corrected_load(state.load, vehicle, history, 1.0 if a.reversion < 1.0 else 0.0)
+    state = with_vehicle(with_sensor_errors(state, sensor_errors), vehicle, state.resets)
     return with_load(with_field(state, "air", air), load, state.resets)

@@ -1,7 +1,7 @@
 """The estimator as the core uses it: one call for each tick's readings.
 
-`control_state` is the state passed to the control laws; `complaints` states why the estimate is not good
-enough for flight, `loss` why it is not even good enough for a landing.
+`control_state` is the state passed to the control laws; `estimate_problems` states why the estimate
+is not good enough for flight, `estimate_loss` why it is not even good enough for a landing.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from autopilot.estimation.inbox import (
     POSE,
     READING,
     age_of,
-    direction_in,
-    fix_in,
-    is_sane,
-    load_in,
-    pose_in,
-    vector_in,
+    is_valid_imu,
+    read_direction,
+    read_fix,
+    read_load,
+    read_pose,
+    read_vector,
 )
 from autopilot.estimation.measurements.barometer import correct_barometer
 from autopilot.estimation.measurements.direction import correct_direction
-from autopilot.estimation.measurements.gnss import correct_gnss, found_load
+from autopilot.estimation.measurements.gnss import correct_gnss, initial_load
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.magnetic import correct_magnetic
 from autopilot.estimation.measurements.pose import correct_pose
-from autopilot.estimation.measurements.pull import correct_pull, unseen
-from autopilot.estimation.measurements.standing import correct_standing
-from autopilot.estimation.measurements.tautened import correct_tautened
+from autopilot.estimation.measurements.pull import correct_pull, is_never_observed
+from autopilot.estimation.measurements.tautening import correct_tautening
+from autopilot.estimation.measurements.zero_velocity import correct_zero_velocity
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
-    NOBODY,
+    NO_SENSOR,
     RECEIVER,
     TRACKER,
     Array,
@@ -49,7 +49,7 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
-from autopilot.estimation.release import parted
+from autopilot.estimation.release import release_load
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.geometry.packed import unpack, with_field
@@ -61,19 +61,20 @@ FIX_STD_TO_FLY = 0.15  # m, beyond the deviation that a receiver states: margin 
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 LOAD_STD_TO_FLY = 0.1  # m relative to the vehicle, of a load that a camera sees
-PROMISE = 1.2  # times the deviation that the receiver states
-COASTING_S = 2.0  # for which the IMU bridges a gap between fixes
-SWINGING_S = 1.0  # for which the pendulum bridges a gap between sights of the load
+STATED_STD_FACTOR = 1.2  # times the deviation that the receiver states
+MAX_FIX_AGE_S = 2.0  # for which the IMU bridges a gap between fixes
+MAX_DIRECTION_AGE_S = 1.0  # for which the pendulum bridges a gap between directions to the load
 # For which the pendulum bridges a gap between a tracker's readings, whose velocity starts it better: a load
 # hidden for 5 s is 2 mm off in calm air and 8 mm in wind of 5 m/s with gusts of 1 m/s, as its covariance
-# states. For the same time, a load whose cable is slack is assumed to lie still.
-HIDDEN_S = 2.0
-FRESH_S = 0.1  # up to this age of a tracker's reading, the accuracy of a load on a slack cable is checked
+# states. For the same time, a load whose cable is slack is assumed to rest.
+MAX_LOAD_AGE_S = 2.0
+# up to this age of a tracker's reading, the accuracy of a load on a slack cable is checked
+FRESH_READING_S = 0.1
 TILT_STD_TO_LAND = 0.2  # rad
 POSITION_STD_TO_LAND = 10.0  # m
-UNSEEN_S = 0.5  # after this time without a tracker reading, the load is assumed to have no tracker
-TELLING_S = 1.0  # in which the pull of a cable that came taut shows its direction
-INERTIAL_S = 0.1  # for which an inertial sample replaces missing ones
+LOAD_TRACKER_WAIT_S = 0.5  # after this time without a tracker reading, the load is assumed to have no tracker
+PULL_SETTLING_S = 1.0  # in which the pull of a cable that came taut shows its direction
+MAX_IMU_AGE_S = 0.1  # for which an inertial sample replaces missing ones
 
 
 def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
@@ -117,18 +118,18 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         mounting_std=table["EST_CAM_BIAS"],
         gear_height=table["EST_GEAR_H"] + table["VEH_ATT_Z"],
         load_height=table["EST_LOAD_H"],
-        laid_forward=table["EST_LAID_FWD"] * length,
-        laid_std=table["EST_LAID_STD"] * length,
+        initial_load_forward=table["EST_LAID_FWD"] * length,
+        initial_load_std=table["EST_LAID_STD"] * length,
     )
 
 
 @kernel
-def lengthened(state: EstimatorState, grown: float) -> EstimatorState:
-    """The estimate with a cable that has grown by `grown` metres; unchanged while the cable is slack."""
+def with_length_change(state: EstimatorState, length_change: float) -> EstimatorState:
+    """The estimate with a cable longer by `length_change` (m); unchanged while the cable is slack."""
     load = state.load
-    if grown == 0.0 or load.taut == 0.0:
+    if length_change == 0.0 or load.taut == 0.0:
         return state
-    return with_field(state, "load", with_field(load, "length", load.length + grown))
+    return with_field(state, "load", with_field(load, "length", load.length + length_change))
 
 
 @kernel
@@ -140,7 +141,7 @@ def estimate(
     now_us: int,
     tuning: EstimatorTuning,
     cable: Cable,
-    grown: float,
+    length_change: float,
     dt: float,
     thrust: float,
     moment: Vec3,
@@ -148,61 +149,66 @@ def estimate(
     """The state after `dt` seconds and the first `count` readings of the inbox. `history` is written in
     place.
 
-    `thrust` (N) and `moment` (N m, body) are those that the rotors are assumed to give; the cable has grown
-    by `grown` (m) since the last tick. The estimator models a cable of constant length: the winch's speed is
-    subtracted from the velocity that the load tracker measures, v_L = v_Q + L q' + L' q.
+    `thrust` (N) and `moment` (N m, body) are those that the rotors are assumed to give; the cable's
+    length has changed by `length_change` (m) since the last tick. The estimator models a cable of constant
+    length: the winch's speed is subtracted from the velocity that the load tracker measures,
+    v_L = v_Q + L q' + L' q.
     """
-    state = lengthened(state, grown)
+    state = with_length_change(state, length_change)
     tuning = with_field(tuning, "cable_length", cable.length)
-    reeled, along = cable.rate != 0.0 and state.load.taut != 0.0, state.load.q_cable
+    reeling, along = cable.rate != 0.0 and state.load.taut != 0.0, state.load.q_cable
     if isinf(cable.length):
-        state = parted(state, history, tuning)
-    used = state.last_imu
+        state = release_load(state, history, tuning)
+    latest_imu = state.last_imu
     for i in range(count):
         if inbox[i, KIND] == IMU:
             imu = unpack(ImuReading, inbox[i], READING)
-            if is_sane(imu):
-                used = imu
+            if is_valid_imu(imu):
+                latest_imu = imu
     load = state.load
-    state = predict(state, history, used, tuning, dt, thrust, moment)
-    state = correct_tautened(state, history, load, tuning, dt)
+    state = predict(state, history, latest_imu, tuning, dt, thrust, moment)
+    state = correct_tautening(state, history, load, tuning, dt)
     state = correct_pull(state, history, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == POSE:
-            believed, pose = pose_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if believed:
+            valid, pose = read_pose(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if valid:
                 state = correct_pose(state, history, pose, tuning)
     for i in range(count):
         if inbox[i, KIND] == FIELD:
-            field = vector_in(inbox[i])
-            size = norm(field)
-            if isfinite(size) and size > 0.0:
+            field = read_vector(inbox[i])
+            strength = norm(field)
+            if isfinite(strength) and strength > 0.0:
                 state = correct_magnetic(state, history, field, tuning.magnetic_age, tuning)
     for i in range(count):
         if inbox[i, KIND] == FIX:
-            believed, fix = fix_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if believed:
+            valid, fix = read_fix(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if valid:
                 state = correct_gnss(state, history, fix, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == HEIGHT and isfinite(inbox[i, READING]):
             state = correct_barometer(state, history, inbox[i, READING], tuning.barometer_age, tuning)
-    accepted = state.vehicle.rejected == 0.0
+    vehicle_accepted = state.vehicle.rejected == 0.0
     for i in range(count):
         if inbox[i, KIND] == LOAD:
-            believed, reading = load_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if reeled:
+            valid, reading = read_load(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if reeling:
                 reading = with_field(reading, "v_load", axpy(-cable.rate, along, reading.v_load))
-            if believed and accepted:
+            if valid and vehicle_accepted:
                 state = correct_load(state, history, reading, tuning)
     for i in range(count):
         if inbox[i, KIND] == DIRECTION:
-            believed, sight = direction_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if believed:
-                state = correct_direction(state, history, sight, tuning)
+            valid, direction = read_direction(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if valid:
+                state = correct_direction(state, history, direction, tuning)
     if state.vehicle.source == RECEIVER:
-        state = correct_standing(state, history, tuning, thrust)
-    if state.vehicle.source == TRACKER and state.load.source == NOBODY and state.time_s > UNSEEN_S:
-        state = with_field(state, "load", found_load(state, history, tuning, thrust))
+        state = correct_zero_velocity(state, history, tuning, thrust)
+    if (
+        state.vehicle.source == TRACKER
+        and state.load.source == NO_SENSOR
+        and state.time_s > LOAD_TRACKER_WAIT_S
+    ):
+        state = with_field(state, "load", initial_load(state, history, tuning, thrust))
     return state
 
 
@@ -214,16 +220,16 @@ def control_state(state: EstimatorState, cable: Cable) -> State:
     position by decimetres at once. These corrections are passed on over seconds, so that the laws do not make
     the load follow them.
     """
-    vehicle, load, debt = state.vehicle, state.load, state.aids.debt
+    vehicle, load, pending_correction = state.vehicle, state.load, state.sensor_errors.pending_correction
     v_load = load.v_load
     if cable.rate != 0.0 and load.taut != 0.0:
         v_load = axpy(cable.rate, load.q_cable, v_load)
     return State(
-        sub(load.x_load, debt),
+        sub(load.x_load, pending_correction),
         v_load,
         load.q_cable,
         load.q_cable_dot,
-        sub(vehicle.x_quad, debt),
+        sub(vehicle.x_quad, pending_correction),
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,
@@ -232,19 +238,19 @@ def control_state(state: EstimatorState, cable: Cable) -> State:
 
 
 # why the estimate is not good enough for flight; 0: it is
-NO_POSE, NO_FIX, POSITION_VAGUE, FIX_VAGUE, ATTITUDE_VAGUE, HEADING_VAGUE = 1, 2, 3, 4, 5, 6
-NO_LOAD, NO_SIGHT, LOAD_VAGUE = 7, 8, 9
+NO_POSE, NO_FIX, POSITION_UNSETTLED, FIX_UNSETTLED, ATTITUDE_UNSETTLED, HEADING_UNSETTLED = 1, 2, 3, 4, 5, 6
+NO_LOAD, NO_LOAD_DIRECTION, LOAD_UNSETTLED = 7, 8, 9
 NO_INERTIAL = 10
-_COMPLAINTS = {
+_PROBLEM_TEXTS = {
     NO_POSE: "no vehicle pose from a tracker",
     NO_FIX: "no position from the receiver",
-    POSITION_VAGUE: "vehicle position not settled",
-    FIX_VAGUE: "vehicle position not settled, good to {:.1f} m",
-    ATTITUDE_VAGUE: "vehicle attitude not settled",
-    HEADING_VAGUE: "vehicle heading not settled",
+    POSITION_UNSETTLED: "vehicle position not settled",
+    FIX_UNSETTLED: "vehicle position not settled, good to {:.1f} m",
+    ATTITUDE_UNSETTLED: "vehicle attitude not settled",
+    HEADING_UNSETTLED: "vehicle heading not settled",
     NO_LOAD: "no load position from a tracker",
-    NO_SIGHT: "no direction to the load from the camera",
-    LOAD_VAGUE: "load position not settled",
+    NO_LOAD_DIRECTION: "no direction to the load from the camera",
+    LOAD_UNSETTLED: "load position not settled",
     NO_INERTIAL: "no reading of the inertial unit",
 }
 
@@ -252,75 +258,80 @@ _COMPLAINTS = {
 @kernel
 def inertial_problem(silent_s: float) -> int:
     """What is wrong with the inertial unit, whose last new sample is `silent_s` old; 0 if nothing is."""
-    return 0 if silent_s <= INERTIAL_S else NO_INERTIAL
+    return 0 if silent_s <= MAX_IMU_AGE_S else NO_INERTIAL
 
 
 @kernel
-def vehicle_problem(state: EstimatorState, oldest_s: float) -> int:
+def vehicle_problem(state: EstimatorState, max_age_s: float) -> int:
     """What is wrong with the estimate of the vehicle; 0 if nothing is. The comparisons are written so that
-    NaN is a complaint."""
-    vehicle, doubt = state.vehicle, state.doubt
+    NaN is a problem."""
+    vehicle, uncertainty = state.vehicle, state.uncertainty
     if vehicle.source == RECEIVER:
-        level = FIX_STD_TO_FLY + PROMISE * state.aids.horizontal_slow
-        if not vehicle.age_s <= max(oldest_s, COASTING_S):
+        std_limit = FIX_STD_TO_FLY + STATED_STD_FACTOR * state.sensor_errors.horizontal_slow_std
+        if not vehicle.age_s <= max(max_age_s, MAX_FIX_AGE_S):
             return NO_FIX
-        if not (doubt.horizontal <= level and doubt.relative <= level):
-            return FIX_VAGUE
-        if not doubt.tilt <= ATTITUDE_STD_TO_FLY:
-            return ATTITUDE_VAGUE
-        return 0 if doubt.heading <= HEADING_STD_TO_FLY else HEADING_VAGUE
-    if not vehicle.age_s <= oldest_s:
+        if not (uncertainty.horizontal <= std_limit and uncertainty.relative <= std_limit):
+            return FIX_UNSETTLED
+        if not uncertainty.tilt <= ATTITUDE_STD_TO_FLY:
+            return ATTITUDE_UNSETTLED
+        return 0 if uncertainty.heading <= HEADING_STD_TO_FLY else HEADING_UNSETTLED
+    if not vehicle.age_s <= max_age_s:
         return NO_POSE
-    if not (doubt.horizontal <= POSITION_STD_TO_FLY and doubt.vertical <= POSITION_STD_TO_FLY):
-        return POSITION_VAGUE
-    if not (doubt.tilt <= ATTITUDE_STD_TO_FLY and doubt.heading <= ATTITUDE_STD_TO_FLY):
-        return ATTITUDE_VAGUE
+    if not (uncertainty.horizontal <= POSITION_STD_TO_FLY and uncertainty.vertical <= POSITION_STD_TO_FLY):
+        return POSITION_UNSETTLED
+    if not (uncertainty.tilt <= ATTITUDE_STD_TO_FLY and uncertainty.heading <= ATTITUDE_STD_TO_FLY):
+        return ATTITUDE_UNSETTLED
     return 0
 
 
 @kernel
-def load_problem(state: EstimatorState, oldest_s: float) -> int:
+def load_problem(state: EstimatorState, max_age_s: float) -> int:
     """What is wrong with the estimate of the load; 0 if nothing is."""
-    load, doubt = state.load, state.doubt
+    load, uncertainty = state.load, state.uncertainty
     if load.source == CAMERA:
-        if load.taut == 0.0:  # it lies where it was laid, seen or not
+        if load.taut == 0.0:  # it stays where it is on the ground, observed or not
             return 0
-        if unseen(load):
-            return 0 if load.held_s < TELLING_S or doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
-        if not load.age_s <= max(oldest_s, SWINGING_S):
-            return NO_SIGHT
-        return 0 if doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
-    if not load.age_s <= max(oldest_s, HIDDEN_S):
+        if is_never_observed(load):
+            return (
+                0
+                if load.tautness_age_s < PULL_SETTLING_S or uncertainty.load <= LOAD_STD_TO_FLY
+                else LOAD_UNSETTLED
+            )
+        if not load.age_s <= max(max_age_s, MAX_DIRECTION_AGE_S):
+            return NO_LOAD_DIRECTION
+        return 0 if uncertainty.load <= LOAD_STD_TO_FLY else LOAD_UNSETTLED
+    if not load.age_s <= max(max_age_s, MAX_LOAD_AGE_S):
         return NO_LOAD
     if load.taut == 0.0:
-        # what the load may do unseen (fall, be kicked) is no reason to land: the limit of its age covers that
-        seen = load.age_s <= FRESH_S
-        return LOAD_VAGUE if seen and not sqrt(load.covariance[0]) <= POSITION_STD_TO_FLY else 0
-    return 0 if doubt.load <= POSITION_STD_TO_FLY else LOAD_VAGUE
+        # what the load may do while it is not observed (fall, be kicked) is no reason to land: the limit of
+        # its age covers that
+        fresh = load.age_s <= FRESH_READING_S
+        return LOAD_UNSETTLED if fresh and not sqrt(load.covariance[0]) <= POSITION_STD_TO_FLY else 0
+    return 0 if uncertainty.load <= POSITION_STD_TO_FLY else LOAD_UNSETTLED
 
 
-def complaints(
-    state: EstimatorState, oldest_s: float, carries: bool = True, silent_s: float = 0.0
+def estimate_problems(
+    state: EstimatorState, max_age_s: float, carries_load: bool = True, silent_s: float = 0.0
 ) -> tuple[str, ...]:
     """Why the estimate is not good enough for flight, in words for the operator; empty if it is.
 
     Where no load is carried, it need not be known. `silent_s`: age of the last new inertial sample.
     """
-    found = [inertial_problem(silent_s) or vehicle_problem(state, oldest_s)]
-    if carries:
-        found.append(load_problem(state, oldest_s))
-    return tuple(_COMPLAINTS[code].format(state.doubt.horizontal) for code in found if code)
+    problems = [inertial_problem(silent_s) or vehicle_problem(state, max_age_s)]
+    if carries_load:
+        problems.append(load_problem(state, max_age_s))
+    return tuple(_PROBLEM_TEXTS[code].format(state.uncertainty.horizontal) for code in problems if code)
 
 
-def loss(state: EstimatorState, silent_s: float) -> str:
+def estimate_loss(state: EstimatorState, silent_s: float) -> str:
     """Why the estimate is not even good enough for a landing, in words; empty if it is. Written so that NaN
     is a loss."""
-    doubt = state.doubt
+    uncertainty = state.uncertainty
     if inertial_problem(silent_s):
-        return _COMPLAINTS[NO_INERTIAL]
-    if state.vehicle.source == NOBODY or not doubt.tilt <= TILT_STD_TO_LAND:
-        return _COMPLAINTS[ATTITUDE_VAGUE]
-    slow = state.aids.horizontal_slow if state.vehicle.source == RECEIVER else 0.0
-    if not (doubt.horizontal <= POSITION_STD_TO_LAND + PROMISE * slow):
-        return _COMPLAINTS[FIX_VAGUE].format(doubt.horizontal)
+        return _PROBLEM_TEXTS[NO_INERTIAL]
+    if state.vehicle.source == NO_SENSOR or not uncertainty.tilt <= TILT_STD_TO_LAND:
+        return _PROBLEM_TEXTS[ATTITUDE_UNSETTLED]
+    slow_std = state.sensor_errors.horizontal_slow_std if state.vehicle.source == RECEIVER else 0.0
+    if not (uncertainty.horizontal <= POSITION_STD_TO_LAND + STATED_STD_FACTOR * slow_std):
+        return _PROBLEM_TEXTS[FIX_UNSETTLED].format(uncertainty.horizontal)
     return ""

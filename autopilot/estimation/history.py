@@ -41,7 +41,7 @@ def reading_age(elapsed_us: float, imu_age: float) -> float:
 
 
 @kernel
-def remember(state: EstimatorState, history: History) -> None:
+def store_state(state: EstimatorState, history: History) -> None:
     """Write the state into its row of the ring."""
     row = history.ring[state.head]
     vehicle, load = state.vehicle, state.load
@@ -74,7 +74,7 @@ def row_before(head: int, ring: Array, time_s: float) -> tuple[int, float]:
 
 
 @kernel
-def past3(ring: Array, row: int, share: float, first: int) -> Vec3:
+def interpolate3(ring: Array, row: int, share: float, first: int) -> Vec3:
     """Columns first ... first+2 at `share` of the way from `row` to the next, linearly."""
     later = (row + 1) % RING_LENGTH if share > 0.0 else row
     rest = 1.0 - share
@@ -86,8 +86,8 @@ def past3(ring: Array, row: int, share: float, first: int) -> Vec3:
 
 
 @kernel
-def past4(ring: Array, row: int, share: float, first: int) -> Quat:
-    """Columns first ... first+3, as `past3`."""
+def interpolate4(ring: Array, row: int, share: float, first: int) -> Quat:
+    """Columns first ... first+3, as `interpolate3`."""
     later = (row + 1) % RING_LENGTH if share > 0.0 else row
     rest = 1.0 - share
     return (
@@ -99,7 +99,7 @@ def past4(ring: Array, row: int, share: float, first: int) -> Quat:
 
 
 @kernel
-def carry_back(head: int, history: History, memory_s: float) -> None:
+def correct_past_states(head: int, history: History, memory_s: float) -> None:
     """Apply the correction in `error` to every row back to `memory_s` before now, and to the row before
     that."""
     ring, e = history.ring, history.error[0]
@@ -132,7 +132,7 @@ def carry_back(head: int, history: History, memory_s: float) -> None:
 
 
 @kernel
-def renew(history: History, first: int, count: int, value: Quat) -> None:
+def reset_past_states(history: History, first: int, count: int, value: Quat) -> None:
     """Set `count` columns of every row: at a new start, all past estimates are forgotten.
 
     Otherwise readings older than the start would be compared with them, for as long as the sensor's latency.

@@ -27,49 +27,51 @@ from autopilot.geometry.linear import ZERO, Vec3, norm, scale
 from autopilot.geometry.packed import pack, unpack
 from autopilot.geometry.so3 import Quat
 
-KIND, SHOWS, READING = 0, 1, 2  # columns
+KIND, SAMPLE_TIME_US, READING = 0, 1, 2  # columns
 COLUMNS = 16
-IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION, SPEEDS = range(8)  # the last: of rotors, not for the estimate
-ROOM = 16  # rows of a new inbox
+IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION, ROTOR_SPEEDS = range(
+    8
+)  # the last: of rotors, not for the estimate
+INBOX_ROWS = 16  # rows of a new inbox
 
 # so that the filter stays well conditioned
-LEAST_POSITION_STD_M = 2e-5
-LEAST_ANGLE_STD_RAD = 2e-5
-LEAST_VELOCITY_STD_M_S = 2e-4
-LEAST_FIX_STD_M = 2e-3
-LEAST_DIRECTION_STD_RAD = 1e-4
-OLDEST_READING_S = 0.3  # older ones are dropped: corrections go back no further in the ring of past states
+MIN_POSITION_STD_M = 2e-5
+MIN_ANGLE_STD_RAD = 2e-5
+MIN_VELOCITY_STD_M_S = 2e-4
+MIN_FIX_STD_M = 2e-3
+MIN_DIRECTION_STD_RAD = 1e-4
+MAX_READING_AGE_S = 0.3  # older ones are dropped: corrections go back no further in the ring of past states
 # beyond any sensor's range
-GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
-FARTHEST_M, FASTEST_M_S = 1e6, 1e4
-GREATEST_STD = 1e4  # m, m/s, rad: a sensor that states more has measured nothing
+MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 2000.0, 500.0
+MAX_POSITION_M, MAX_SPEED_M_S = 1e6, 1e4
+MAX_STD = 1e4  # m, m/s, rad: a sensor that states more has measured nothing
 UNIT_TOLERANCE = 0.02  # of the square of a quaternion's length
 NOT_MEASURED = -1.0  # deviation of a velocity that was not measured
-LONG_AGO = -1  # instant of an inertial sample that only repeats the last one
+REPEATED_SAMPLE = -1  # instant of an inertial sample that only repeats the last one
 
 
-def new_inbox(rows: int = ROOM) -> Array:
+def new_inbox(rows: int = INBOX_ROWS) -> Array:
     """An inbox with room for this many readings."""
     return np.zeros((rows, COLUMNS))
 
 
-def put_reading(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> None:
+def put_reading(inbox: Array, row: int, kind: int, sample_time_us: int, reading: Any) -> None:
     """Write a record of a reading into a row; its age is not used."""
-    inbox[at, KIND] = kind
-    inbox[at, SHOWS] = shows_us
-    pack(reading, inbox[at], READING)
+    inbox[row, KIND] = kind
+    inbox[row, SAMPLE_TIME_US] = sample_time_us
+    pack(reading, inbox[row], READING)
 
 
-def put_vector(inbox: Array, at: int, kind: int, vector: tuple[float, ...]) -> None:
+def put_vector(inbox: Array, row: int, kind: int, vector: tuple[float, ...]) -> None:
     """Write a reading that is a number or a vector, and of this instant."""
-    inbox[at, KIND] = kind
-    inbox[at, READING : READING + len(vector)] = vector
+    inbox[row, KIND] = kind
+    inbox[row, READING : READING + len(vector)] = vector
 
 
 @kernel
-def within(v: Vec3, most: float) -> bool:
-    """Whether a vector is shorter than `most`; False for NaN."""
-    return norm(v) < most
+def within(v: Vec3, limit: float) -> bool:
+    """Whether a vector is shorter than `limit`; False for NaN."""
+    return norm(v) < limit
 
 
 @kernel
@@ -79,94 +81,94 @@ def is_unit(q: Quat) -> bool:
 
 
 @kernel
-def at_least(value: float, least: float) -> float:
-    """`value`, but no less than `least`; also for NaN."""
-    return value if value > least else least
+def at_least(value: float, minimum: float) -> float:
+    """`value`, but no less than `minimum`; also for NaN."""
+    return value if value > minimum else minimum
 
 
 @kernel
-def is_sane(imu: ImuReading) -> bool:
+def is_valid_imu(imu: ImuReading) -> bool:
     """Whether an inertial sample is a number and within any sensor's range."""
-    return norm(imu.accel) < GREATEST_ACCEL_M_S2 and norm(imu.gyro) < GREATEST_RATE_RAD_S
+    return norm(imu.accel) < MAX_ACCEL_M_S2 and norm(imu.gyro) < MAX_RATE_RAD_S
 
 
 @kernel
 def age_of(row: Array, now_us: int, imu_age: float) -> float:
     """Age of a reading, s; NaN if it is from the future or too old."""
-    age = reading_age(now_us - row[SHOWS], imu_age)
-    if row[SHOWS] <= now_us and age <= OLDEST_READING_S:
+    age = reading_age(now_us - row[SAMPLE_TIME_US], imu_age)
+    if row[SAMPLE_TIME_US] <= now_us and age <= MAX_READING_AGE_S:
         return age
     return np.nan
 
 
 @kernel
-def pose_in(row: Array, age_s: float) -> tuple[bool, PoseReading]:
+def read_pose(row: Array, age_s: float) -> tuple[bool, PoseReading]:
     """Whether the row's pose is accepted, and the pose."""
     raw = unpack(PoseReading, row, READING)
-    measured = not raw.velocity_std < 0.0
+    velocity_measured = not raw.velocity_std < 0.0
     q = raw.quat_wxyz
     pose = PoseReading(
         age_s,
         raw.x_quad,
         q,
-        raw.v_quad if measured else ZERO,
-        at_least(raw.position_std, LEAST_POSITION_STD_M),
-        at_least(raw.attitude_std, LEAST_ANGLE_STD_RAD),
-        at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
+        raw.v_quad if velocity_measured else ZERO,
+        at_least(raw.position_std, MIN_POSITION_STD_M),
+        at_least(raw.attitude_std, MIN_ANGLE_STD_RAD),
+        at_least(raw.velocity_std, MIN_VELOCITY_STD_M_S) if velocity_measured else NOT_MEASURED,
     )
-    stated = max(pose.position_std, pose.attitude_std, pose.velocity_std) < GREATEST_STD
-    placed = within(pose.x_quad, FARTHEST_M) and within(pose.v_quad, FASTEST_M_S)
-    return isfinite(age_s) and placed and is_unit(q) and stated, pose
+    std_valid = max(pose.position_std, pose.attitude_std, pose.velocity_std) < MAX_STD
+    in_range = within(pose.x_quad, MAX_POSITION_M) and within(pose.v_quad, MAX_SPEED_M_S)
+    return isfinite(age_s) and in_range and is_unit(q) and std_valid, pose
 
 
 @kernel
-def load_in(row: Array, age_s: float) -> tuple[bool, LoadReading]:
+def read_load(row: Array, age_s: float) -> tuple[bool, LoadReading]:
     """Whether the row's position of the load is accepted, and the reading."""
     raw = unpack(LoadReading, row, READING)
-    measured = not raw.velocity_std < 0.0
+    velocity_measured = not raw.velocity_std < 0.0
     load = LoadReading(
         age_s,
         raw.x_load,
-        raw.v_load if measured else ZERO,
-        at_least(raw.position_std, LEAST_POSITION_STD_M),
-        at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
+        raw.v_load if velocity_measured else ZERO,
+        at_least(raw.position_std, MIN_POSITION_STD_M),
+        at_least(raw.velocity_std, MIN_VELOCITY_STD_M_S) if velocity_measured else NOT_MEASURED,
     )
-    stated = max(load.position_std, load.velocity_std) < GREATEST_STD
-    placed = within(load.x_load, FARTHEST_M) and within(load.v_load, FASTEST_M_S)
-    return isfinite(age_s) and placed and stated, load
+    std_valid = max(load.position_std, load.velocity_std) < MAX_STD
+    in_range = within(load.x_load, MAX_POSITION_M) and within(load.v_load, MAX_SPEED_M_S)
+    return isfinite(age_s) and in_range and std_valid, load
 
 
 @kernel
-def fix_in(row: Array, age_s: float) -> tuple[bool, GnssReading]:
+def read_fix(row: Array, age_s: float) -> tuple[bool, GnssReading]:
     """Whether the row's fix is accepted, and the fix."""
     raw = unpack(GnssReading, row, READING)
     fix = GnssReading(
         age_s,
         raw.position,
         raw.velocity,
-        at_least(raw.horizontal_std, LEAST_FIX_STD_M),
-        at_least(raw.vertical_std, LEAST_FIX_STD_M),
+        at_least(raw.horizontal_std, MIN_FIX_STD_M),
+        at_least(raw.vertical_std, MIN_FIX_STD_M),
         raw.rtk,
     )
-    stated = abs(raw.horizontal_std) < GREATEST_STD and abs(raw.vertical_std) < GREATEST_STD
-    placed = within(fix.position, FARTHEST_M) and within(fix.velocity, FASTEST_M_S)
-    return isfinite(age_s) and placed and stated, fix
+    std_valid = abs(raw.horizontal_std) < MAX_STD and abs(raw.vertical_std) < MAX_STD
+    in_range = within(fix.position, MAX_POSITION_M) and within(fix.velocity, MAX_SPEED_M_S)
+    return isfinite(age_s) and in_range and std_valid, fix
 
 
 @kernel
-def direction_in(row: Array, age_s: float) -> tuple[bool, DirectionReading]:
+def read_direction(row: Array, age_s: float) -> tuple[bool, DirectionReading]:
     """Whether the row's direction to the load is accepted, and the reading."""
     raw = unpack(DirectionReading, row, READING)
     length = norm(raw.direction_body)
-    sight = DirectionReading(
+    direction = DirectionReading(
         age_s,
         scale(1.0 / length, raw.direction_body),
-        at_least(raw.direction_std, LEAST_DIRECTION_STD_RAD),
+        at_least(raw.direction_std, MIN_DIRECTION_STD_RAD),
     )
-    return isfinite(age_s) and 0.5 < length < 2.0 and sight.direction_std < GREATEST_STD, sight
+    return isfinite(age_s) and 0.5 < length < 2.0 and direction.direction_std < MAX_STD, direction
 
 
 @kernel
-def vector_in(row: Array) -> Vec3:
+def read_vector(row: Array) -> Vec3:
     """Three numbers of a row."""
     return (row[READING], row[READING + 1], row[READING + 2])

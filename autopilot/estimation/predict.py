@@ -14,8 +14,8 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.estimation.air import air_walk, predict_air
-from autopilot.estimation.covariance import Transit, transit
-from autopilot.estimation.history import remember
+from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
+from autopilot.estimation.history import store_state
 from autopilot.estimation.records import (
     AIDED_SIZE,
     ATTITUDE,
@@ -26,19 +26,25 @@ from autopilot.estimation.records import (
     RING_LENGTH,
     TRACKER,
     VELOCITY,
-    AidEstimate,
     AirEstimate,
     Covariance2,
-    Doubt,
     EstimatorState,
     EstimatorTuning,
     History,
     ImuReading,
     LoadEstimate,
+    SensorErrors,
+    Uncertainty,
     VehicleEstimate,
 )
-from autopilot.estimation.tautness import frame, jerked, loosely_tied, unfelt_pull, watch
-from autopilot.estimation.vibration import accel_noise, gyro_noise, shaken
+from autopilot.estimation.tautness import (
+    add_snatch_uncertainty,
+    averaged_missing_pull,
+    cable_is_unloaded,
+    detect_tautness,
+    orthogonal_axis,
+)
+from autopilot.estimation.vibration import accel_noise, gyro_noise, update_vibration
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub, times
 from autopilot.geometry.s2 import normalise, tangent
@@ -47,14 +53,15 @@ from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rota
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a tracked load: whether it falls freely or rests on the ground is unknown
 # rad/s^2, error of the pendulum model of a cable that does not carry its load; the same of a tracked load
 LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.5
-PARTING_STD = 0.3  # m/s, speed at which a tracked load and the vehicle move apart until the cable carries
-DEBT_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on
-SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
-LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
+# m/s, speed at which a tracked load and the vehicle move apart until the cable carries
+SEPARATION_SPEED_STD = 0.3
+PENDING_CORRECTION_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on
+SPEED_ERROR_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
+LOAD_ON_GROUND_WALK = 0.01  # m per square root of a second, of a load that stays where it is on the ground
 
 
 @kernel
-def grow2(cov: Covariance2, dt: float, rate_std: float) -> Covariance2:
+def propagate_covariance2(cov: Covariance2, dt: float, rate_std: float) -> Covariance2:
     """Covariance of (value, rate) after dt with white noise of `rate_std` dt on the rate."""
     aa, ab, bb = cov
     return (aa + 2.0 * dt * ab + dt * dt * bb, ab + dt * bb, bb + rate_std * rate_std * dt * dt)
@@ -66,18 +73,18 @@ def _mean(a: Vec3, b: Vec3) -> Vec3:
 
 
 @kernel
-def turn_rate(
+def filtered_body_rate(
     vehicle: VehicleEstimate, gyro: Vec3, moment: Vec3, gyro_var: float, tuning: EstimatorTuning, dt: float
 ) -> Vec3:
     """Body rate (rad/s): propagated by the rotors' moment (N m), and corrected by the gyroscope as far as its
     noise is small beside the error of this propagation."""
     W, J = vehicle.omega_body, tuning.inertia
     torque = sub(moment, cross(W, times(J, W)))
-    ahead = axpy(dt, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), W)
-    unknown = tuning.turn_std * dt
-    ratio = unknown * unknown / gyro_var
+    predicted = axpy(dt, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), W)
+    model_std = tuning.turn_std * dt
+    ratio = model_std * model_std / gyro_var
     share = 0.5 * (sqrt(ratio * ratio + 4.0 * ratio) - ratio)
-    return axpy(share, sub(sub(gyro, vehicle.gyro_bias), ahead), ahead)
+    return axpy(share, sub(sub(gyro, vehicle.gyro_bias), predicted), predicted)
 
 
 @kernel
@@ -96,11 +103,11 @@ def predict_vehicle(
     R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
     force = apply(R, accel)  # specific force, ENU
     accel_quad = (force[0], force[1], force[2] - tuning.gravity)
-    moved = VehicleEstimate(
+    predicted = VehicleEstimate(
         axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
         axpy(dt, accel_quad, vehicle.v_quad),
         quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
-        turn_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt),
+        filtered_body_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt),
         vehicle.gyro_bias,
         vehicle.accel_bias,
         accel_quad,
@@ -108,7 +115,7 @@ def predict_vehicle(
         vehicle.rejected,
         vehicle.source,
     )
-    return moved, R
+    return predicted, R
 
 
 @kernel
@@ -116,7 +123,7 @@ def predict_taut(
     load: LoadEstimate, vehicle: VehicleEstimate, air: AirEstimate, tuning: EstimatorTuning, dt: float
 ) -> LoadEstimate:
     """The pendulum; `vehicle` is already at the new time."""
-    q, q_dot, d = load.q_cable, load.q_cable_dot, air.load
+    q, q_dot, d = load.q_cable, load.q_cable_dot, air.load_accel
     accel_quad = vehicle.accel_quad
     force = (accel_quad[0] - d[0], accel_quad[1] - d[1], accel_quad[2] + tuning.gravity)
     half = normalise(axpy(0.5 * dt, q_dot, q))  # since `force` is that of half a step
@@ -135,8 +142,8 @@ def predict_taut(
         load.taut,
         tension,
         load.pull,
-        load.pulled_s,
-        load.held_s + dt,
+        load.pull_duration_s,
+        load.tautness_age_s + dt,
         load.age_s + dt,
         load.rejected,
         load.source,
@@ -145,27 +152,31 @@ def predict_taut(
 
 @kernel
 def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History, dt: float) -> LoadEstimate:
-    """A load on a slack cable: a tracked load continues at its velocity, any other lies where it was laid.
+    """A load on a slack cable: a tracked load continues at its velocity, any other stays where it is.
 
-    The covariance of a lying load is that of its position relative to the vehicle, which the error of the
-    vehicle's velocity shifts.
+    The covariance of a load on the ground is that of its position relative to the vehicle, which the error
+    of the vehicle's velocity shifts.
     """
     x_load, v_load, covariance = load.x_load, load.v_load, load.covariance
     if load.source == TRACKER:
         x_load = axpy(dt, v_load, x_load)
-        covariance = grow2(covariance, dt, SLACK_ACCEL_STD)
+        covariance = propagate_covariance2(covariance, dt, SLACK_ACCEL_STD)
     else:
         aa, ab, bb = covariance
         P = history.covariance
         speed_var = 0.5 * (P[VELOCITY, VELOCITY] + P[VELOCITY + 1, VELOCITY + 1])
-        covariance = (aa + (LAID_WALK * LAID_WALK + SPEED_TIME_S * speed_var) * dt, ab, bb)
+        covariance = (
+            aa + (LOAD_ON_GROUND_WALK * LOAD_ON_GROUND_WALK + SPEED_ERROR_TIME_S * speed_var) * dt,
+            ab,
+            bb,
+        )
     separation = sub(x_load, vehicle.x_quad)
     distance = norm(separation)
     q, across, q_dot = load.q_cable, load.across, load.q_cable_dot
     # the estimates of load and vehicle may coincide: the direction is then kept
     if distance > 0.01:
         q = scale(1.0 / distance, separation)
-        across = frame(q, across)
+        across = orthogonal_axis(q, across)
         q_dot = scale(1.0 / distance, tangent(q, sub(v_load, vehicle.v_quad)))
     return LoadEstimate(
         x_load,
@@ -178,8 +189,8 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
         load.taut,
         0.0,
         load.pull,
-        load.pulled_s,
-        load.held_s + dt,
+        load.pull_duration_s,
+        load.tautness_age_s + dt,
         load.age_s + dt,
         load.rejected,
         load.source,
@@ -187,34 +198,34 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
 
 
 @kernel
-def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
+def state_uncertainty(history: History, load: LoadEstimate, size: int) -> Uncertainty:
     """Standard deviations by the covariance."""
     P = history.covariance
-    level = 0.5 * (P[POSITION, POSITION] + P[POSITION + 1, POSITION + 1])
-    relative = level
-    if n >= AIDED_SIZE:
-        relative += P[POSITION, GNSS] + P[POSITION + 1, GNSS + 1]
-        relative += 0.5 * (P[GNSS, GNSS] + P[GNSS + 1, GNSS + 1])
-    of_load = load.covariance[0]
+    horizontal_var = 0.5 * (P[POSITION, POSITION] + P[POSITION + 1, POSITION + 1])
+    relative_var = horizontal_var
+    if size >= AIDED_SIZE:
+        relative_var += P[POSITION, GNSS] + P[POSITION + 1, GNSS + 1]
+        relative_var += 0.5 * (P[GNSS, GNSS] + P[GNSS + 1, GNSS + 1])
+    load_var = load.covariance[0]
     if load.taut > 0.0:
         L = load.length
-        of_load = L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1]) + P[LENGTH, LENGTH]
+        load_var = L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1]) + P[LENGTH, LENGTH]
         if load.source == TRACKER:
             a, b = load.across, cross(load.q_cable, load.across)
             for i in range(3):
-                of_load += P[POSITION + i, POSITION + i]
-                of_load += (
+                load_var += P[POSITION + i, POSITION + i]
+                load_var += (
                     2.0 * L * (a[i] * P[POSITION + i, DIRECTION] + b[i] * P[POSITION + i, DIRECTION + 1])
                 )
-                of_load += 2.0 * load.q_cable[i] * P[POSITION + i, LENGTH]
-        of_load /= 3.0
-    return Doubt(
-        sqrt(level),
+                load_var += 2.0 * load.q_cable[i] * P[POSITION + i, LENGTH]
+        load_var /= 3.0
+    return Uncertainty(
+        sqrt(horizontal_var),
         sqrt(P[POSITION + 2, POSITION + 2]),
         sqrt(0.5 * (P[ATTITUDE, ATTITUDE] + P[ATTITUDE + 1, ATTITUDE + 1])),
         sqrt(P[ATTITUDE + 2, ATTITUDE + 2]),
-        sqrt(of_load),
-        sqrt(relative),
+        sqrt(load_var),
+        sqrt(relative_var),
     )
 
 
@@ -229,18 +240,18 @@ def predict(
     moment: Vec3,
 ) -> EstimatorState:
     """The state dt seconds later; the rotors are assumed to give `thrust` (N) and `moment` (N m, body)."""
-    load, aids, air = state.load, state.aids, state.air
-    vibration = shaken(state.vibration, imu, state.last_imu, tuning, dt)
+    load, sensor_errors, air = state.load, state.sensor_errors, state.air
+    vibration = update_vibration(state.vibration, imu, state.last_imu, tuning, dt)
     accel_var = accel_noise(vibration, tuning)
     gyro_var = gyro_noise(vibration, tuning)
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
     a = vehicle.accel_quad
-    swaying, parting = tuning.cable_accel_std, 0.0
-    if load.taut > 0.0 and loosely_tied(load, state.memory_s, state.unfelt):
+    cable_accel_std, separation_std = tuning.cable_accel_std, 0.0
+    if load.taut > 0.0 and cable_is_unloaded(load, state.memory_s, state.missing_pull):
         tracked = load.source == TRACKER
-        swaying = LIFTING_TRACKED_ACCEL_STD if tracked else LIFTING_ACCEL_STD
-        parting = PARTING_STD if tracked else 0.0
-    motion = Transit(
+        cable_accel_std = LIFTING_TRACKED_ACCEL_STD if tracked else LIFTING_ACCEL_STD
+        separation_std = SEPARATION_SPEED_STD if tracked else 0.0
+    inputs = PropagationInputs(
         (a[0], a[1], a[2] + tuning.gravity),
         R,
         load.q_cable,
@@ -249,50 +260,50 @@ def predict(
         load.q_cable_dot,
         load.length,
         load.taut,
-        aids.horizontal_slow,
-        aids.vertical_slow,
-        aids.reversion,
+        sensor_errors.horizontal_slow_std,
+        sensor_errors.vertical_slow_std,
+        sensor_errors.reversion,
         accel_var,
         gyro_var,
         air_walk(load, air, a, tuning),
-        swaying,
-        parting,
+        cable_accel_std,
+        separation_std,
     )
     if vehicle.source > 0.0:
-        transit(history, motion, tuning, dt, state.size)
+        propagate_covariance(history, inputs, tuning, dt, state.size)
     if load.taut > 0.0:
-        at_end = predict_taut(load, vehicle, air, tuning, dt)
+        predicted_load = predict_taut(load, vehicle, air, tuning, dt)
     else:
-        at_end = predict_slack(load, vehicle, history, dt)
-    load = watch(at_end, vehicle, history, imu, thrust, state.unfelt, tuning, dt)
-    jerked(load, state.load.pull, history, tuning)
+        predicted_load = predict_slack(load, vehicle, history, dt)
+    load = detect_tautness(predicted_load, vehicle, history, imu, thrust, state.missing_pull, tuning, dt)
+    add_snatch_uncertainty(load, state.load.pull, history, tuning)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
         load,
-        AidEstimate(
-            aids.mounting,
-            aids.heading,
-            aids.barometer,
-            aids.gnss,
-            aids.horizontal_slow,
-            aids.vertical_slow,
-            aids.reversion,
-            scale(1.0 - dt / DEBT_TIME_S, aids.debt),
-            aids.field,
-            aids.magnetic_age + dt,
-            aids.barometer_age + dt,
-            aids.rejected,
+        SensorErrors(
+            sensor_errors.mounting,
+            sensor_errors.heading,
+            sensor_errors.barometer,
+            sensor_errors.gnss,
+            sensor_errors.horizontal_slow_std,
+            sensor_errors.vertical_slow_std,
+            sensor_errors.reversion,
+            scale(1.0 - dt / PENDING_CORRECTION_TIME_S, sensor_errors.pending_correction),
+            sensor_errors.field,
+            sensor_errors.magnetic_age + dt,
+            sensor_errors.barometer_age + dt,
+            sensor_errors.rejected,
         ),
         predict_air(air, state.load, load, tuning, dt),
-        doubt(history, load, state.size),
+        state_uncertainty(history, load, state.size),
         imu,
         vibration,
-        unfelt_pull(load, vehicle, state.unfelt, tuning, dt),
+        averaged_missing_pull(load, vehicle, state.missing_pull, tuning, dt),
         state.resets,
         state.memory_s,
         (state.head + 1) % RING_LENGTH,
         state.size,
     )
-    remember(predicted, history)
+    store_state(predicted, history)
     return predicted

@@ -28,7 +28,7 @@ AIDED_SIZE = 29
 PUSH = 29
 SIZE = 31
 
-ROOM = 32  # a multiple of eight
+PADDED_SIZE = 32  # a multiple of eight
 SCALARS, ENTRIES = 9, 13  # of one reading; of a scalar's Jacobian, with their number in column 0
 INNOVATION, VARIANCE = 0, 1  # columns of `History.scalars`
 
@@ -38,13 +38,13 @@ X_QUAD, V_QUAD, QUAT, Q_CABLE, ACROSS, Q_RATE = 1, 4, 7, 11, 14, 17
 RING_COLUMNS = 20
 
 # sensors, as rows of `History.consistency`
-POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST, PULL = 0, 1, 2, 3, 4, 5, 6, 7
+POSE, LOAD, FIX, PRESSURE, MAGNETIC, LINE_OF_SIGHT, ZERO_VELOCITY, PULL = 0, 1, 2, 3, 4, 5, 6, 7
 SENSORS = 8
-TEST_RATIO = 2  # column: normalised innovation squared over the gate's limit; above 1 it is refused
+TEST_RATIO = 2  # column: normalised innovation squared over the gate's limit; above 1 it is rejected
 
-NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what measures the position of the vehicle
+NO_SENSOR, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what measures the position of the vehicle
 PLAIN, RTK_FLOAT, RTK_FIXED = 0.0, 1.0, 2.0  # GnssReading.rtk: what is known of the carrier's whole waves
-# what measures the position of the load, beside NOBODY and TRACKER: a camera, or the load's pull on the
+# what measures the position of the load, beside NO_SENSOR and TRACKER: a camera, or the load's pull on the
 # vehicle
 CAMERA = 2.0
 
@@ -55,11 +55,12 @@ class History(NamedTuple):
     """The arrays of the filter, written in place: too large for tuples."""
 
     ring: Array  # past states, RING_LENGTH x RING_COLUMNS
-    covariance: Array  # of the error state, symmetric to the bit; ROOM x ROOM, of which SIZE x SIZE are used
-    error: Array  # 1 x ROOM: the correction being collected
+    # of the error state, symmetric to the bit; PADDED_SIZE x PADDED_SIZE, of which SIZE x SIZE are used
+    covariance: Array
+    error: Array  # 1 x PADDED_SIZE: the correction being collected
     columns: NDArray[np.int64]  # SCALARS x ENTRIES: how many entries its Jacobian has, then their columns
-    shares: Array  # SCALARS x ENTRIES: the entries, from column 1 on
-    gain: Array  # SCALARS x ROOM: Jacobian times covariance
+    jacobian: Array  # SCALARS x ENTRIES: the entries, from column 1 on
+    gain: Array  # SCALARS x PADDED_SIZE: Jacobian times covariance
     scalars: Array  # SCALARS x 2: innovation and variance
     consistency: Array  # SENSORS x 3: readings absorbed, the sum of their NIS, and the last TEST_RATIO
 
@@ -154,10 +155,10 @@ class EstimatorTuning(NamedTuple):
     magnetic_age: float  # s
     declination: float  # rad, east of north
     mounting_std: float  # rad, of the camera
-    gear_height: float  # m, height of the standing vehicle at the point where its cable is attached
-    load_height: float  # m, height of the centre of the lying load
-    laid_forward: float  # m ahead of the standing vehicle: where the load was laid
-    laid_std: float  # m
+    gear_height: float  # m, height of the vehicle on the ground at the point where its cable is attached
+    load_height: float  # m, height of the centre of the load on the ground
+    initial_load_forward: float  # m ahead of the vehicle on the ground: where the load is at first
+    initial_load_std: float  # m
 
 
 class VehicleEstimate(NamedTuple):
@@ -172,7 +173,7 @@ class VehicleEstimate(NamedTuple):
     accel_quad: Vec3  # inertial acceleration, ENU
     age_s: float  # of the last accepted pose or fix; infinite before the first
     rejected: float  # poses or fixes in a row that failed the gate
-    source: float  # NOBODY, TRACKER or RECEIVER
+    source: float  # NO_SENSOR, TRACKER or RECEIVER
 
 
 class LoadEstimate(NamedTuple):
@@ -189,41 +190,43 @@ class LoadEstimate(NamedTuple):
     taut: float
     tension: float
     pull: float  # N along the cable: what the vehicle's acceleration shows beyond assumed thrust, smoothed
-    pulled_s: float  # s, how long the pull has contradicted `taut`; how long a tracked load has been carried
-    held_s: float  # since the cable came taut or slack
+    pull_duration_s: (
+        float  # s, how long the pull has contradicted `taut`; how long a tracked load has been carried
+    )
+    tautness_age_s: float  # since the cable came taut or slack
     age_s: float
     rejected: float
-    source: float  # NOBODY, TRACKER or CAMERA
+    source: float  # NO_SENSOR, TRACKER or CAMERA
 
 
-class AidEstimate(NamedTuple):
+class SensorErrors(NamedTuple):
     """Errors of the aiding sensors, and the age of the last reading of each."""
 
     mounting: tuple[float, float]  # of the camera, rad about the body's forward and left axes
     heading: float  # of the magnetometer, rad
     barometer: float  # m
     gnss: Vec3  # m, the slow error of the receiver
-    horizontal_slow: float  # m, its standard deviation as last stated
-    vertical_slow: float
+    horizontal_slow_std: float  # m, its standard deviation as last stated
+    vertical_slow_std: float
     reversion: float  # 1 with carrier phase, else less: see `correct_gnss`
-    debt: Vec3  # m, recent corrections of the position that are not yet passed on to the laws
+    pending_correction: Vec3  # m, recent corrections of the position that are not yet passed on to the laws
     field: Vec3  # the magnetometer's last reading, body
     magnetic_age: float
     barometer_age: float
-    rejected: float  # sights of the load in a row that failed the gate
+    rejected: float  # directions to the load in a row that failed the gate
 
 
 class AirEstimate(NamedTuple):
     """Horizontal accelerations by the air that the models leave out, m/s^2: of the load beyond the pendulum,
     of the vehicle beyond its assumed drag."""
 
-    load: tuple[float, float]
-    vehicle: tuple[float, float]
+    load_accel: tuple[float, float]
+    vehicle_accel: tuple[float, float]
     load_drag: float  # 1/s: how the load's acceleration by the air changes with the load's speed
-    mean_speed: tuple[float, float]  # m/s, horizontal, of the load: over some seconds
-    mean_load: tuple[float, float]  # m/s^2, the same of the load's acceleration by the air
-    together: float  # m^2/s^3, mean product of both, each less its mean
-    alone: float  # m^2/s^2, mean square of the speed less its mean
+    mean_velocity: tuple[float, float]  # m/s, horizontal, of the load: over some seconds
+    mean_accel: tuple[float, float]  # m/s^2, the same of the load's acceleration by the air
+    velocity_accel_covariance: float  # m^2/s^3, mean product of both, each less its mean
+    velocity_variance: float  # m^2/s^2, mean square of the speed less its mean
 
 
 class Vibration(NamedTuple):
@@ -232,12 +235,12 @@ class Vibration(NamedTuple):
     accel_var: float  # (m/s^2)^2, of one sample and axis
     accel_band_var: float  # (m/s^2)^2, of white noise that is as strong in the band below the rotors' speeds
     gyro_var: float  # (rad/s)^2
-    turning: float  # rad^2/s, growth of the attitude's variance by the gyroscope's noise
-    step: ImuReading  # change from the last sample but one to the last
-    low: tuple[Vec3, Vec3, Vec3, Vec3]  # m/s^2, the accelerometer through one to four low-passes
+    attitude_var_rate: float  # rad^2/s, growth of the attitude's variance by the gyroscope's noise
+    last_difference: ImuReading  # change from the last sample but one to the last
+    low_passed: tuple[Vec3, Vec3, Vec3, Vec3]  # m/s^2, the accelerometer through one to four low-passes
 
 
-class Doubt(NamedTuple):
+class Uncertainty(NamedTuple):
     """Standard deviations of the estimate, as of the last prediction."""
 
     horizontal: float  # m, each axis
@@ -254,12 +257,12 @@ class EstimatorState(NamedTuple):
     time_s: float
     vehicle: VehicleEstimate
     load: LoadEstimate
-    aids: AidEstimate
+    sensor_errors: SensorErrors
     air: AirEstimate
-    doubt: Doubt
+    uncertainty: Uncertainty
     last_imu: ImuReading
     vibration: Vibration
-    unfelt: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
+    missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
     resets: float
     memory_s: float  # s, age of the oldest reading so far: corrections go back this far in the ring
     head: int  # row of the ring that holds this state
@@ -272,11 +275,11 @@ def new_history() -> History:
     ring[:, 0] = -np.inf  # the time: long ago
     return History(
         ring,
-        np.zeros((ROOM, ROOM)),
-        np.zeros((1, ROOM)),
+        np.zeros((PADDED_SIZE, PADDED_SIZE)),
+        np.zeros((1, PADDED_SIZE)),
         np.zeros((SCALARS, ENTRIES), np.int64),
         np.zeros((SCALARS, ENTRIES)),
-        np.zeros((SCALARS, ROOM)),
+        np.zeros((SCALARS, PADDED_SIZE)),
         np.zeros((SCALARS, 2)),
         np.zeros((SENSORS, 3)),
     )
@@ -296,7 +299,7 @@ def blank_state() -> EstimatorState:
             accel_quad=ZERO,
             age_s=inf,
             rejected=0.0,
-            source=NOBODY,
+            source=NO_SENSOR,
         ),
         load=LoadEstimate(
             x_load=ZERO,
@@ -309,18 +312,18 @@ def blank_state() -> EstimatorState:
             taut=0.0,
             tension=0.0,
             pull=0.0,
-            pulled_s=0.0,
-            held_s=0.0,
+            pull_duration_s=0.0,
+            tautness_age_s=0.0,
             age_s=inf,
             rejected=0.0,
-            source=NOBODY,
+            source=NO_SENSOR,
         ),
-        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
+        sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0),
-        doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+        uncertainty=Uncertainty(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
-        unfelt=0.0,
+        missing_pull=0.0,
         resets=0.0,
         memory_s=0.0,
         head=0,

@@ -1,14 +1,14 @@
 """Whether the cable is taut, and how the error state changes when it comes taut or slack.
 
 While the cable is taut, the load is at its end, and the load's error is that of vehicle and cable. While it
-is slack, the load is tracked separately or lies where it is. The distance of a tracked load decides; without
-a tracker, the pull decides: the force along the cable that the vehicle's acceleration shows beyond the
-assumed thrust, m_Q (R a) - f R e3.
+is slack, the load is tracked separately or stays where it is on the ground. The distance of a
+tracked load decides; without a tracker, the pull decides: the force along the cable that the vehicle's
+acceleration shows beyond the assumed thrust, m_Q (R a) - f R e3.
 """
 
 from __future__ import annotations
 
-from autopilot.estimation.covariance import forget
+from autopilot.estimation.covariance import zero_covariance
 from autopilot.estimation.records import (
     AIR,
     DIRECTION,
@@ -27,41 +27,42 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, column, cross, norm, sub
-from autopilot.geometry.s2 import normalise, pull_of, tangent
+from autopilot.geometry.s2 import force_along_cable, normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length above which a tracked load's slack cable counts as taut
 SLACK_BELOW = 0.965  # and below which a taut one counts as slack
 # The cable of a tracked load counts as taut only once the load's speed relative to the vehicle is known to
-# SPEED_KNOWN (m/s), or KNOWN_S (s) after it came slack: the filter is linear in the direction, which a wrong
-# speed would soon turn far.
-SPEED_KNOWN, KNOWN_S = 0.2, 1.0
+# KNOWN_SPEED_STD (m/s), or SPEED_KNOWN_AFTER_S (s) after it came slack: the filter is linear in the
+# direction, which a wrong speed would soon turn far.
+KNOWN_SPEED_STD, SPEED_KNOWN_AFTER_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2  # shares of the load's weight: more pull means taut, less means slack
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which a pull does not count
 PULL_TIME_S = 0.04  # time constant that smooths the measured pull
-# For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a hanging
-# load is assumed to lie: pendulum and length then get little weight.
+# For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a
+# suspended load is assumed to be on the ground: pendulum and length then get little weight.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
-REFUSED_LOOSE = 4.0  # rejected readings in a row that show the same
+REJECTIONS_UNLOADED = 4.0  # rejected readings in a row that show the same
 # The taut cable of a tracked load does not carry, whatever its length, if its measured pull is less than this
 # share of the pendulum's.
-LOOSE_PULL = 0.4
-UNFELT_S = 2.0  # time constant with which the missing part of the pull is learned
-# A cable that begins to pull, at JERK_PULL of the load's weight, stops vehicle and load along it at once;
-# before, its ends moved apart at about JERK_SPEED (m/s). This happens between two samples of the
+UNLOADED_PULL = 0.4
+MISSING_PULL_TIME_S = 2.0  # time constant with which the missing part of the pull is learned
+# A cable that begins to pull, at SNATCH_PULL of the load's weight, stops vehicle and load along it at once;
+# before, its ends moved apart at about SNATCH_SPEED (m/s). This happens between two samples of the
 # accelerometer.
-JERK_PULL, JERK_SPEED = 0.3, 0.2
-JERK_FELT_S = 0.015  # time after which the measured pull shows it
+SNATCH_PULL, SNATCH_SPEED = 0.3, 0.2
+SNATCH_DELAY_S = 0.015  # time after which the measured pull shows it
 # share of the air's deviation with which a tracked load begins: wind soon shows, and the law that lifts the
 # load is not disturbed while the filter searches for it
-STILL_SHARE = 0.1
-HOP_SPEED = 0.02  # m/s, across the cable, of a load that the cable has begun to pull
-SEEN_S = 1.0  # no cable comes taut while the last sight of the load is older, unless it was never seen
+INITIAL_AIR_SHARE = 0.1
+LIFT_OFF_SPEED_STD = 0.02  # m/s, across the cable, of a load that the cable has begun to pull
+# no cable comes taut while the last direction to the load is older, unless there never was one
+MAX_DIRECTION_AGE_S = 1.0
 
 
 @kernel
-def frame(q: Vec3, across: Vec3) -> Vec3:
+def orthogonal_axis(q: Vec3, across: Vec3) -> Vec3:
     """A unit vector orthogonal to q, near `across` if that is possible."""
     flat = tangent(q, across)
     if norm(flat) < 0.1:
@@ -70,35 +71,36 @@ def frame(q: Vec3, across: Vec3) -> Vec3:
 
 
 @kernel
-def felt_pull(
-    load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, mass: float
+def measured_pull(
+    load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, quad_mass: float
 ) -> float:
     """Force of the cable on the vehicle along q, N, from one sample, by its component along the rotors' axis:
     across this axis, the drag of rotors and frame can be as large as the load's weight."""
     axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
-    left = mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
-    return pull_of(left, load.q_cable, axis)
+    cable_force = quad_mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
+    return force_along_cable(cable_force, load.q_cable, axis)
 
 
 @kernel
-def loosely_tied(load: LoadEstimate, memory_s: float, unfelt: float) -> bool:
+def cable_is_unloaded(load: LoadEstimate, memory_s: float, missing_pull: float) -> bool:
     """Whether a cable that counts as taut does not carry its load yet.
 
     The cable of a tracked load counts as taut some per cent of its length before it is, and readings up to
-    `memory_s` old still show that; the same holds for this time after the load has come to lie. `unfelt` (N)
-    is the part of the pull that has been missing for long, because the assumed thrust or mass is wrong.
+    `memory_s` old still show that; the same holds for this time after the load has come to the ground.
+    `missing_pull` (N) is the part of the pull that has been missing for long, because the assumed thrust or
+    mass is wrong.
     """
-    if load.source == TRACKER and load.pull + unfelt < LOOSE_PULL * load.tension:
+    if load.source == TRACKER and load.pull + missing_pull < UNLOADED_PULL * load.tension:
         return True
-    if load.held_s > LIFTING_S:
+    if load.tautness_age_s > LIFTING_S:
         return False
     if load.source == TRACKER:
-        return not load.pulled_s > memory_s or load.rejected >= REFUSED_LOOSE
-    return load.pull + unfelt < LIFTING_PULL * load.tension
+        return not load.pull_duration_s > memory_s or load.rejected >= REJECTIONS_UNLOADED
+    return load.pull + missing_pull < LIFTING_PULL * load.tension
 
 
 @kernel
-def unfelt_pull(
+def averaged_missing_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, before: float, tuning: EstimatorTuning, dt: float
 ) -> float:
     """Part of the pull that has been missing for long, N: negative where rotors that give less than assumed
@@ -109,32 +111,36 @@ def unfelt_pull(
     elif load.taut == 0.0:
         if norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length:
             return before
-        return min(before - dt / UNFELT_S * (load.pull + before), 0.0)
-    elif load.held_s <= LIFTING_S:
+        return min(before - dt / MISSING_PULL_TIME_S * (load.pull + before), 0.0)
+    elif load.tautness_age_s <= LIFTING_S:
         return before
-    return before + dt / UNFELT_S * (load.tension - load.pull - before)
+    return before + dt / MISSING_PULL_TIME_S * (load.tension - load.pull - before)
 
 
 @kernel
-def jerked(load: LoadEstimate, pull_before: float, history: History, tuning: EstimatorTuning) -> None:
+def add_snatch_uncertainty(
+    load: LoadEstimate, pull_before: float, history: History, tuning: EstimatorTuning
+) -> None:
     """Where the cable has begun to pull since the pull was `pull_before` (N), make the vehicle's velocity
     along it less certain."""
-    begins = JERK_PULL * tuning.load_mass * tuning.gravity
-    if pull_before >= begins or load.pull < begins:
+    snatch_pull = SNATCH_PULL * tuning.load_mass * tuning.gravity
+    if pull_before >= snatch_pull or load.pull < snatch_pull:
         return
     P, q = history.covariance, load.q_cable
-    std = JERK_SPEED * tuning.load_mass / (tuning.load_mass + tuning.quad_mass)
+    std = SNATCH_SPEED * tuning.load_mass / (tuning.load_mass + tuning.quad_mass)
     for i in range(3):
         for j in range(3):
             variance = std * std * q[i] * q[j]
             P[VELOCITY + i, VELOCITY + j] += variance
-            P[POSITION + i, VELOCITY + j] += JERK_FELT_S * variance
-            P[VELOCITY + j, POSITION + i] += JERK_FELT_S * variance
-            P[POSITION + i, POSITION + j] += 2.0 * JERK_FELT_S * JERK_FELT_S * variance
+            P[POSITION + i, VELOCITY + j] += SNATCH_DELAY_S * variance
+            P[VELOCITY + j, POSITION + i] += SNATCH_DELAY_S * variance
+            P[POSITION + i, POSITION + j] += 2.0 * SNATCH_DELAY_S * SNATCH_DELAY_S * variance
 
 
 @kernel
-def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s: float) -> LoadEstimate:
+def _with_tautness(
+    load: LoadEstimate, taut: float, length: float, pull: float, pull_duration_s: float
+) -> LoadEstimate:
     return LoadEstimate(
         load.x_load,
         load.v_load,
@@ -146,8 +152,8 @@ def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s:
         taut,
         load.tension,
         pull,
-        pulled_s,
-        load.held_s if taut == load.taut else 0.0,
+        pull_duration_s,
+        load.tautness_age_s if taut == load.taut else 0.0,
         load.age_s,
         load.rejected,
         load.source,
@@ -155,51 +161,56 @@ def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s:
 
 
 @kernel
-def _tie(P: Array, first: int, of: int, across: Vec3, along: Vec3, d: float) -> None:
+def _set_relative_rows(
+    P: Array, cable_row: int, vehicle_row: int, across: Vec3, along: Vec3, distance: float
+) -> None:
     """Set the rows of b_i . (load - vehicle) / d for a load whose error is uncorrelated with the rest: only
-    the part of the vehicle. `of` lies before `first`, so that the block of these rows uses values already
-    set."""
+    the part of the vehicle. `vehicle_row` is before `cable_row`, so that the block of these rows uses
+    values already set."""
     for j in range(SIZE):
-        p0, p1, p2 = P[of, j], P[of + 1, j], P[of + 2, j]
-        one = -(across[0] * p0 + across[1] * p1 + across[2] * p2) / d
-        two = -(along[0] * p0 + along[1] * p1 + along[2] * p2) / d
-        P[first, j], P[j, first] = one, one
-        P[first + 1, j], P[j, first + 1] = two, two
+        p0, p1, p2 = P[vehicle_row, j], P[vehicle_row + 1, j], P[vehicle_row + 2, j]
+        first_value = -(across[0] * p0 + across[1] * p1 + across[2] * p2) / distance
+        second_value = -(along[0] * p0 + along[1] * p1 + along[2] * p2) / distance
+        P[cable_row, j], P[j, cable_row] = first_value, first_value
+        P[cable_row + 1, j], P[j, cable_row + 1] = second_value, second_value
 
 
 @kernel
 def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length: float) -> LoadEstimate:
     """The load on a taut cable: direction and rate of the cable replace its own position and velocity."""
     P = history.covariance
-    forget(P, DIRECTION, 5)
+    zero_covariance(P, DIRECTION, 5)
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
     across, along = load.across, cross(load.q_cable, load.across)
     aa, ab, bb = load.covariance
     if load.source != TRACKER:
-        bb += HOP_SPEED * HOP_SPEED
+        bb += LIFT_OFF_SPEED_STD * LIFT_OFF_SPEED_STD
     else:
-        doubt = STILL_SHARE * tuning.air_std
-        forget(P, AIR, 2)
-        P[AIR, AIR], P[AIR + 1, AIR + 1] = doubt * doubt, doubt * doubt
-        _tie(P, DIRECTION, POSITION, across, along, length)
-    _tie(P, RATE, VELOCITY, across, along, length)
+        initial_air_std = INITIAL_AIR_SHARE * tuning.air_std
+        zero_covariance(P, AIR, 2)
+        P[AIR, AIR], P[AIR + 1, AIR + 1] = (
+            initial_air_std * initial_air_std,
+            initial_air_std * initial_air_std,
+        )
+        _set_relative_rows(P, DIRECTION, POSITION, across, along, length)
+    _set_relative_rows(P, RATE, VELOCITY, across, along, length)
     s = 1.0 / length
     for i in range(2):
         P[DIRECTION + i, DIRECTION + i] += s * s * aa
         P[DIRECTION + i, RATE + i] += s * s * ab
         P[RATE + i, DIRECTION + i] += s * s * ab
         P[RATE + i, RATE + i] += s * s * bb
-    return _with(load, 1.0, length, load.pull, 0.0)
+    return _with_tautness(load, 1.0, length, load.pull, 0.0)
 
 
 @kernel
 def slacken(load: LoadEstimate, history: History, position_var: float, velocity_var: float) -> LoadEstimate:
     """The load tracked separately from now on, with these variances; the cable's errors are dropped."""
-    forget(history.covariance, DIRECTION, 5)
-    resting = (0.0, 0.0, 0.0)
+    zero_covariance(history.covariance, DIRECTION, 5)
+    at_rest = (0.0, 0.0, 0.0)
     return LoadEstimate(
         load.x_load,
-        load.v_load if load.source == TRACKER else resting,
+        load.v_load if load.source == TRACKER else at_rest,
         load.q_cable,
         load.q_cable_dot,
         load.across,
@@ -217,41 +228,52 @@ def slacken(load: LoadEstimate, history: History, position_var: float, velocity_
 
 
 @kernel
-def watch(
+def detect_tautness(
     load: LoadEstimate,
     vehicle: VehicleEstimate,
     history: History,
     imu: ImuReading,
     thrust: float,
-    unfelt: float,
+    missing_pull: float,
     tuning: EstimatorTuning,
     dt: float,
 ) -> LoadEstimate:
-    """The load after the decision whether its cable is taut or slack; `unfelt` (N) is from `unfelt_pull`."""
+    """The load after the decision whether its cable is taut or slack.
+
+    `missing_pull` (N) is from `averaged_missing_pull`.
+    """
     share = dt / (PULL_TIME_S + dt)
-    felt = felt_pull(load, vehicle, imu, thrust, tuning.quad_mass)
-    pull = load.pull + share * (felt - load.pull)
+    measured = measured_pull(load, vehicle, imu, thrust, tuning.quad_mass)
+    pull = load.pull + share * (measured - load.pull)
     distance = norm(sub(load.x_load, vehicle.x_quad))
     if load.source == TRACKER:
-        carries = load.taut > 0.0 and pull >= LIFTING_PULL * load.tension
-        load = _with(load, load.taut, load.length, pull, load.pulled_s + dt if carries else 0.0)
+        carries_load = load.taut > 0.0 and pull >= LIFTING_PULL * load.tension
+        load = _with_tautness(
+            load, load.taut, load.length, pull, load.pull_duration_s + dt if carries_load else 0.0
+        )
         speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
-        known = speed_var < SPEED_KNOWN * SPEED_KNOWN or load.held_s > KNOWN_S
-        if load.taut == 0.0 and known and distance > TAUT_ABOVE * tuning.cable_length:
+        speed_known = (
+            speed_var < KNOWN_SPEED_STD * KNOWN_SPEED_STD or load.tautness_age_s > SPEED_KNOWN_AFTER_S
+        )
+        if load.taut == 0.0 and speed_known and distance > TAUT_ABOVE * tuning.cable_length:
             return tauten(load, history, tuning, distance)
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
-        pulled = pull + unfelt > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
-        load = _with(load, 0.0, load.length, pull, load.pulled_s + dt if pulled else 0.0)
-        if load.pulled_s > PULL_TAUT_S and (load.age_s < SEEN_S or load.age_s == float("inf")):
+        is_pulling = (
+            pull + missing_pull > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
+        )
+        load = _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt if is_pulling else 0.0)
+        if load.pull_duration_s > PULL_TAUT_S and (
+            load.age_s < MAX_DIRECTION_AGE_S or load.age_s == float("inf")
+        ):
             load = tauten(load, history, tuning, tuning.cable_length)
             x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
-            return moved(load, x_load)
+            return with_load_position(load, x_load)
         return load
-    lost = pull + unfelt < PULL_SLACK * weight
-    load = _with(load, 1.0, load.length, pull, load.pulled_s + dt if lost else 0.0)
-    if load.pulled_s > PULL_SLACK_S:
+    is_slack = pull + missing_pull < PULL_SLACK * weight
+    load = _with_tautness(load, 1.0, load.length, pull, load.pull_duration_s + dt if is_slack else 0.0)
+    if load.pull_duration_s > PULL_SLACK_S:
         P = history.covariance
         L = load.length
         var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
@@ -260,7 +282,7 @@ def watch(
 
 
 @kernel
-def moved(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
+def with_load_position(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
     """The load at `x_load`."""
     return LoadEstimate(
         x_load,
@@ -273,8 +295,8 @@ def moved(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
         load.taut,
         load.tension,
         load.pull,
-        load.pulled_s,
-        load.held_s,
+        load.pull_duration_s,
+        load.tautness_age_s,
         load.age_s,
         load.rejected,
         load.source,

@@ -12,7 +12,7 @@ above the vehicle's motion, in the band
     H(s) = (s tau)^2 / (1 + s tau)^4,    1 / tau = 2 pi 20 Hz,
 
 which is computed by four low-passes in a row as y_2 - 2 y_3 + y_4. Of white noise of variance s^2 it lets
-through `_passed` s^2. The smaller of the two results is the noise that counts.
+through `_band_variance` s^2. The smaller of the two results is the noise that counts.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ def gyro_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
 @kernel
 def accel_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
     """Variance of a sample of the accelerometer, (m/s^2)^2: the configured or the measured one if greater."""
-    return max(tuning.accel_std * tuning.accel_std, accel_shown(vibration))
+    return max(tuning.accel_std * tuning.accel_std, measured_accel_noise(vibration))
 
 
 @kernel
-def accel_shown(vibration: Vibration) -> float:
+def measured_accel_noise(vibration: Vibration) -> float:
     """Measured variance of a sample of the accelerometer, (m/s^2)^2, without the lines of the rotors."""
     return min(vibration.accel_var, vibration.accel_band_var)
 
 
 @kernel
-def _passed(share: float) -> float:
-    """Variance that white noise of variance 1 leaves in the band, divided by `share`, the weight of a sample
-    in the low-passes.
+def _band_variance(sample_weight: float) -> float:
+    """Variance that white noise of variance 1 leaves in the band, divided by `sample_weight`, the
+    weight of a sample in the low-passes.
 
     It is the sum of the squares of the band's response to an impulse.
     """
-    p = 1.0 - share
+    p = 1.0 - sample_weight
     return 2.0 * p * p * p * p * (3.0 * p * p - 4.0 * p + 3.0) / (1.0 + p) ** 7
 
 
@@ -61,27 +61,30 @@ def _low_passed(to: Vec3, last: Vec3, share: float) -> Vec3:
 
 
 @kernel
-def shaken(
+def update_vibration(
     vibration: Vibration, imu: ImuReading, last: ImuReading, tuning: EstimatorTuning, dt: float
 ) -> Vibration:
     """The measured noise after another sample."""
-    step = ImuReading(sub(imu.gyro, last.gyro), sub(imu.accel, last.accel))
-    gyro, accel = sub(step.gyro, vibration.step.gyro), sub(step.accel, vibration.step.accel)
+    difference = ImuReading(sub(imu.gyro, last.gyro), sub(imu.accel, last.accel))
+    gyro, accel = (
+        sub(difference.gyro, vibration.last_difference.gyro),
+        sub(difference.accel, vibration.last_difference.accel),
+    )
     share = dt / (LEARNING_S + dt)
     smooth = dt / (_BAND_S + dt)
-    y1 = _low_passed(imu.accel, vibration.low[0], smooth)
-    y2 = _low_passed(y1, vibration.low[1], smooth)
-    y3 = _low_passed(y2, vibration.low[2], smooth)
-    y4 = _low_passed(y3, vibration.low[3], smooth)
+    y1 = _low_passed(imu.accel, vibration.low_passed[0], smooth)
+    y2 = _low_passed(y1, vibration.low_passed[1], smooth)
+    y3 = _low_passed(y2, vibration.low_passed[2], smooth)
+    y4 = _low_passed(y3, vibration.low_passed[3], smooth)
     band = sub(sub(y2, y3), sub(y3, y4))
     # share / smooth written as one quotient, since both are zero at the first sample
-    passed = 3.0 * _passed(smooth) * (LEARNING_S + dt) / (_BAND_S + dt)
+    band_gain = 3.0 * _band_variance(smooth) * (LEARNING_S + dt) / (_BAND_S + dt)
     each = 1.0 / (3.0 * _SECOND_DIFFERENCE)
     return Vibration(
         vibration.accel_var + share * (each * dot(accel, accel) - vibration.accel_var),
-        vibration.accel_band_var * (1.0 - share) + dot(band, band) / passed,
+        vibration.accel_band_var * (1.0 - share) + dot(band, band) / band_gain,
         vibration.gyro_var + share * (each * dot(gyro, gyro) - vibration.gyro_var),
         gyro_noise(vibration, tuning) * dt,
-        step,
+        difference,
         (y1, y2, y3, y4),
     )

@@ -77,14 +77,14 @@ class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
         """0: none of its functions has an address."""
         return 0
 
-    def alone(self) -> Any:
+    def own_module(self) -> Any:
         """Its own functions, without the functions that they call."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
         """Its functions with all functions that they call, for code that numba compiles in its usual way."""
-        whole = self.alone().clone()
-        for library in _needed(self._linking_libraries):
+        whole = self.own_module().clone()
+        for library in _required_libraries(self._linking_libraries):
             _link_in(whole, library)
         return whole
 
@@ -94,7 +94,7 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     def finalize(self) -> None:
         """Link everything in, optimise, and make machine code."""
-        for library in _needed(self._linking_libraries):
+        for library in _required_libraries(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             _link_in(self._final_module, library)
         self._optimize_final_module()
@@ -114,7 +114,7 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
         builder.getModulePassManager().run(self._final_module, builder)
 
 
-def _needed(libraries: list[Any]) -> list[Any]:
+def _required_libraries(libraries: list[Any]) -> list[Any]:
     """These libraries and those that they need, each once and before the libraries that it needs: when LLVM
     links a library, it leaves out the functions that no code linked so far calls."""
     found: dict[Any, None] = {}
@@ -133,8 +133,8 @@ def _needed(libraries: list[Any]) -> list[Any]:
 
 
 def _link_in(module: Any, library: Any) -> None:
-    inside = isinstance(library, _InnerLibrary)
-    module.link_in(library.alone() if inside else library._get_module_for_linking(), preserve=True)
+    is_inner = isinstance(library, _InnerLibrary)
+    module.link_in(library.own_module() if is_inner else library._get_module_for_linking(), preserve=True)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -163,12 +163,12 @@ class _InnerLowering(NativeLowering):  # type: ignore[misc]
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]
-        described = lowered.fndesc
+        descriptor = lowered.fndesc
         # a function without an address, because numba looks functions up by an object of this kind
         key = _dynfunc.make_function(
-            described.lookup_module(), described.qualname, "", 0, lowered.env, (state.library,)
+            descriptor.lookup_module(), descriptor.qualname, "", 0, lowered.env, (state.library,)
         )
-        context.insert_user_function(key, described, [state.library])
+        context.insert_user_function(key, descriptor, [state.library])
         state["cr"] = lowered._replace(cfunc=key)
         return True
 
@@ -197,10 +197,10 @@ class _InnerCompiler(_Compiler):
 
 
 _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
-# `INSIDE` is for functions that only kernels call, `INLINED` for those that are always inlined
-_UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-INSIDE: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler, **_UNWRAPPED}
-INLINED: Any = {**INSIDE, "forceinline": True}
+# `INNER_OPTIONS` is for functions that only kernels call, `INLINE_OPTIONS` for those that are always inlined
+_NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INNER_OPTIONS: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler, **_NO_WRAPPERS}
+INLINE_OPTIONS: Any = {**INNER_OPTIONS, "forceinline": True}
 
 
 def intrinsic(function: Callable[..., Any]) -> Any:
@@ -223,7 +223,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     other kernels. Python never calls most kernels: their cache is then not looked up."""
 
     def __init__(self, function: Any, cache_of: Callable[[Any], Any], nogil: bool = False) -> None:
-        self._kept: Any = None
+        self._disk_cache: Any = None
         self._cache_of = cache_of
         options = dict(_OPTIONS, nogil=nogil)
         super().__init__(function, targetoptions=options, pipeline_class=_OuterCompiler)
@@ -231,24 +231,24 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     @cached_property
     def _inner(self) -> _Inner:
         """The interface for other kernels, made only when something is compiled: a few hundred are slow."""
-        inner = dict(_OPTIONS, **_UNWRAPPED)
+        inner = dict(_OPTIONS, **_NO_WRAPPERS)
         return _Inner(self.py_func, targetoptions=inner, pipeline_class=_InnerCompiler)
 
     def compile(self, sig: Any) -> Any:
         """As numba's own, but without garbage collection meanwhile, which takes a tenth of the time."""
-        collecting = gc.isenabled()
+        gc_was_enabled = gc.isenabled()
         gc.disable()
         try:
             return super().compile(sig)
         finally:
-            if collecting:
+            if gc_was_enabled:
                 gc.enable()
 
     @property
     def _cache(self) -> Any:
-        if self._kept is None:
-            self._kept = self._cache_of(self.py_func)
-        return self._kept
+        if self._disk_cache is None:
+            self._disk_cache = self._cache_of(self.py_func)
+        return self._disk_cache
 
     @_cache.setter
     def _cache(self, blank: Any) -> None:

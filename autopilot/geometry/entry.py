@@ -15,7 +15,7 @@ from numba import typeof
 T = TypeVar("T")
 
 
-def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
+def entry_point_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
     """The machine code of a kernel for arguments of the same types as these, compiled or loaded if necessary.
 
     It must be called with arguments of exactly these types, which are not checked. A plain Python function is
@@ -29,7 +29,7 @@ def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
     return entry
 
 
-def native_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
+def kernel_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
     """The address by which `autopilot.geometry.addresses.call_kernel_at` calls a kernel with arguments of the
     same types as these, compiled or loaded if necessary; it is valid as long as the kernel exists."""
     types = tuple(map(typeof, arguments))
@@ -38,7 +38,7 @@ def native_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
-def address_of(kernel: Callable[..., T], *arguments: Any) -> int:
+def c_function_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
     """The address of a kernel as a C function of arguments like these, compiled or loaded if necessary."""
     types = tuple(map(typeof, arguments))
     kernel.compile(types)  # type: ignore[attr-defined]

@@ -10,21 +10,21 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_marked: list[Callable[..., Any]] = []  # until numba is loaded
-_register: list[Callable[[Any], Any]] = []  # numba's own decorator, once numba is loaded
+_pending: list[Callable[..., Any]] = []  # until numba is loaded
+_register_jitable: list[Callable[[Any], Any]] = []  # numba's own decorator, once numba is loaded
 
 
 def jitable(function: F) -> F:
     """Mark a function that kernels may call; it stays a plain function."""
-    if _register:
-        _register[0](function)
+    if _register_jitable:
+        _register_jitable[0](function)
     else:
-        _marked.append(function)
+        _pending.append(function)
     return function
 
 
 def register_with(register: Callable[[Any], Any]) -> None:
     """Pass all functions marked so far, and all marked later, to numba's `register_jitable`."""
-    _register[:] = [register]
-    while _marked:
-        register(_marked.pop())
+    _register_jitable[:] = [register]
+    while _pending:
+        register(_pending.pop())

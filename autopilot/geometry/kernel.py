@@ -19,9 +19,9 @@ from numba.extending import register_jitable
 
 from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.jitable import register_with
-from autopilot.geometry.machine_code import ROOT, folder_of, note_use, sources_hash
+from autopilot.geometry.machine_code import ROOT, kernel_folder, record_use, sources_hash
 
-_LONGEST_S = 600.0  # longest wait for another process; then this process compiles the kernel itself
+_MAX_LOCK_WAIT_S = 600.0  # longest wait for another process; then this process compiles the kernel itself
 
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # the address of a function that is an argument
 
@@ -29,7 +29,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def _is_ours(file: str) -> bool:
+def _is_project_file(file: str) -> bool:
     return Path(file).resolve().is_relative_to(ROOT)
 
 
@@ -46,7 +46,7 @@ class _ContentLocator:
     @classmethod
     def from_function(cls, function: Any, file: str) -> _ContentLocator | None:
         """A locator for a function of this project; None for others, and if the cache cannot be written."""
-        if not Path(file).is_file() or not _is_ours(file):
+        if not Path(file).is_file() or not _is_project_file(file):
             return None
         locator = cls(function, file)
         try:
@@ -59,11 +59,11 @@ class _ContentLocator:
         """Create the directory, and note that it is used."""
         path = self.get_cache_path()
         path.mkdir(parents=True, exist_ok=True)
-        note_use(path.parent)
+        record_use(path.parent)
 
     def get_cache_path(self) -> Path:
         """Directory of the machine code."""
-        return folder_of(self._path) / self._path.stem
+        return kernel_folder(self._path) / self._path.stem
 
     def get_source_stamp(self) -> str:
         """What must be unchanged for the machine code to be valid."""
@@ -77,7 +77,7 @@ class _ContentLocator:
 caching.CacheImpl._locator_classes.insert(0, _ContentLocator)
 
 # caches of the functions being compiled in this process, outermost first, and their locks (None: no lock)
-_held: list[tuple[_SharedCache, Any]] = []
+_compiling: list[tuple[_SharedCache, Any]] = []
 
 
 class _SharedCache(caching.FunctionCache):
@@ -98,7 +98,7 @@ class _SharedCache(caching.FunctionCache):
         lock = self._lock(f"{self._impl.filename_base}-{types}")
         found = self._load(sig, target_context)
         if found is None:
-            _held.append((self, lock))
+            _compiling.append((self, lock))
         elif lock is not None:
             lock.release()
         return found
@@ -129,7 +129,7 @@ class _SharedCache(caching.FunctionCache):
     def _lock(self, name: str) -> Any:
         from filelock import FileLock, Timeout
 
-        lock = FileLock(Path(self._cache_path) / f"{name}.lock", timeout=_LONGEST_S, is_singleton=True)
+        lock = FileLock(Path(self._cache_path) / f"{name}.lock", timeout=_MAX_LOCK_WAIT_S, is_singleton=True)
         try:
             lock.acquire()
         except (OSError, Timeout):
@@ -141,20 +141,20 @@ def _cache_of(function: Any) -> Any:
     """The cache of a kernel: for kernels of this project only the cache by content, or none where it cannot
     be written. numba would store them beside the sources, and load them even after a change of these."""
     file = function.__code__.co_filename
-    if _is_ours(file) and _ContentLocator.from_function(function, file) is None:
+    if _is_project_file(file) and _ContentLocator.from_function(function, file) is None:
         return caching.NullCache()
     return _SharedCache(function)
 
 
 def _release(cache: Any) -> None:
     """Release the lock on the function with this cache if it is the innermost one being compiled."""
-    if _held and _held[-1][0] is cache:
-        lock = _held.pop()[1]
+    if _compiling and _compiling[-1][0] is cache:
+        lock = _compiling.pop()[1]
         if lock is not None:
             lock.release()
 
 
-class _Failures(event.Listener):
+class _FailureListener(event.Listener):
     """Releases the lock on a function that cannot be compiled for these types; numba then tries others."""
 
     def on_start(self, event: Any) -> None:
@@ -167,7 +167,7 @@ class _Failures(event.Listener):
             _release(dispatcher._cache)
 
 
-event.register("numba:compile", _Failures())
+event.register("numba:compile", _FailureListener())
 register_with(register_jitable)
 
 
@@ -183,10 +183,10 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     return compiled
 
 
-def threaded(function: Callable[P, T]) -> Callable[P, T]:
+def nogil_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """A kernel that lets other threads run meanwhile (it releases the GIL), for kernels with long calls.
 
-    It must not fly flights in lanes: all threads share one record of the lanes that have parted.
+    It must not fly flights in lanes: all threads share one record of the lanes that have diverged.
     """
     if config.DISABLE_JIT:
         return function

@@ -1,12 +1,12 @@
 """Numbers of eight flights at once, as types of the compiler: kernels compile for them as for single numbers.
 
-`WIDE` is a vector of eight doubles, one for each flight, `WHOLE` one of eight integers. Sums, products,
+`WIDE` is a vector of eight doubles, one for each flight, `WIDE_INT` one of eight integers. Sums, products,
 roots and the like are computed lane by lane with the same rounding as for single numbers, so that each flight
 gets the same bits as alone. A number that is the same for all flights can be mixed with them.
 
 A kernel takes one branch for all lanes. So whatever decides on a branch (a comparison, `int`, `isfinite`)
-returns one result, that of lane 0. Lanes whose own result differs are recorded, and `lanes.parted` returns
-them: what has been computed since then is right only for the other lanes.
+returns one result, that of lane 0. Lanes whose own result differs are recorded, and `lanes.diverged_lanes`
+returns them: what has been computed since then is right only for the other lanes.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ _FLAG = "plumbline_lanes_parted"
 class _LaneType(types.Type):
     """Eight numbers; a single number is converted to eight copies of it."""
 
-    taken: tuple[Any, ...] = ()
+    convertible_types: tuple[Any, ...] = ()
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
         """How numba may convert another type to this one."""
-        return Conversion.safe if isinstance(other, self.taken) else None
+        return Conversion.safe if isinstance(other, self.convertible_types) else None
 
 
-class _WholeType(_LaneType):
-    taken = (types.Integer, types.Boolean)
+class _WideIntType(_LaneType):
+    convertible_types = (types.Integer, types.Boolean)
 
 
 class _WideType(_LaneType):
-    taken = (types.Integer, types.Boolean, types.Float, _WholeType)
+    convertible_types = (types.Integer, types.Boolean, types.Float, _WideIntType)
 
 
 WIDE: Any = _WideType("Wide")
-WHOLE: Any = _WholeType("Whole")
+WIDE_INT: Any = _WideIntType("Whole")
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-WHOLES = ir.VectorType(ir.IntType(64), LANES)
-INDEX, BITS = ir.IntType(32), ir.IntType(LANES)
+INT_VECTOR = ir.VectorType(ir.IntType(64), LANES)
+INDEX, LANE_BITS = ir.IntType(32), ir.IntType(LANES)
 
 
 @register_model(_WideType)
@@ -60,61 +60,61 @@ class _WideModel(models.PrimitiveModel):
         super().__init__(manager, kind, VECTOR)  # type: ignore[no-untyped-call]
 
 
-@register_model(_WholeType)
-class _WholeModel(models.PrimitiveModel):
+@register_model(_WideIntType)
+class _WideIntModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, WHOLES)  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, INT_VECTOR)  # type: ignore[no-untyped-call]
 
 
 # ---- one branch for all
 
 
-def flag_of(builder: Any) -> Any:
-    """The variable that records which lanes have parted."""
+def divergence_flag(builder: Any) -> Any:
+    """The variable that records which lanes have diverged."""
     module = builder.module
     if _FLAG in module.globals:
         return module.globals[_FLAG]
-    flag = ir.GlobalVariable(module, BITS, _FLAG)
-    flag.linkage, flag.initializer = "linkonce_odr", ir.Constant(BITS, 0)
+    flag = ir.GlobalVariable(module, LANE_BITS, _FLAG)
+    flag.linkage, flag.initializer = "linkonce_odr", ir.Constant(LANE_BITS, 0)
     return flag
 
 
-def _agreed(builder: Any, answers: Any) -> Any:
+def _lane_zero_branch(builder: Any, answers: Any) -> Any:
     """Lane 0's of eight truth values; the lanes whose value differs are recorded."""
-    bits = builder.bitcast(answers, BITS)
-    first = builder.and_(bits, ir.Constant(BITS, 1))
+    bits = builder.bitcast(answers, LANE_BITS)
+    first = builder.and_(bits, ir.Constant(LANE_BITS, 1))
     others = builder.xor(bits, builder.neg(first))  # from lane 0's value in all eight bits
-    flag = flag_of(builder)
+    flag = divergence_flag(builder)
     builder.store(builder.or_(builder.load(flag), others), flag)
     return builder.extract_element(answers, ir.Constant(INDEX, 0))
 
 
 # ---- arithmetic
 
-Made = Callable[[Any, Any, Any, Any], Any]  # (context, builder, signature, values) -> value
+Lowering = Callable[[Any, Any, Any, Any], Any]  # (context, builder, signature, values) -> value
 
 
-def define(function: Any, made: Made, *signatures: Any) -> None:
+def define_for_lanes(function: Any, codegen: Lowering, *signatures: Any) -> None:
     """Make `function` callable in kernels with these types."""
     template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": signatures})
     infer_global(function, types.Function(template))  # functions of NumPy 1 do not name their module
     for one in signatures:
-        lower_builtin(function, *one.args)(made)
+        lower_builtin(function, *one.args)(codegen)
 
 
-def _by(name: str) -> Made:
-    return lambda context, builder, signature, given: getattr(builder, name)(*given)
+def _builder_method(name: str) -> Lowering:
+    return lambda context, builder, signature, args: getattr(builder, name)(*args)
 
 
-def _compared(sign: str, how: str) -> Made:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        return _agreed(builder, getattr(builder, how)(sign, *given))
+def _comparison(sign: str, how: str) -> Lowering:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _lane_zero_branch(builder, getattr(builder, how)(sign, *args))
 
-    return made
+    return codegen
 
 
-_WIDES, _TWOWHOLES = signature(WIDE, WIDE, WIDE), signature(WHOLE, WHOLE, WHOLE)
-for plain, in_place, floats, wholes in (
+_BINARY, _INT_BINARY = signature(WIDE, WIDE, WIDE), signature(WIDE_INT, WIDE_INT, WIDE_INT)
+for plain, in_place, floats, ints in (
     (operator.add, operator.iadd, "fadd", "add"),
     (operator.sub, operator.isub, "fsub", "sub"),
     (operator.mul, operator.imul, "fmul", "mul"),
@@ -126,13 +126,13 @@ for plain, in_place, floats, wholes in (
     (operator.lshift, operator.ilshift, "", "shl"),
 ):
     for function in (plain, in_place):
-        cases = [_WIDES] * bool(floats) + [_TWOWHOLES] * bool(wholes)
+        cases = [_BINARY] * bool(floats) + [_INT_BINARY] * bool(ints)
         template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": cases})
         infer_global(function)(template)
         if floats:
-            lower_builtin(function, WIDE, WIDE)(_by(floats))
-        if wholes:
-            lower_builtin(function, WHOLE, WHOLE)(_by(wholes))
+            lower_builtin(function, WIDE, WIDE)(_builder_method(floats))
+        if ints:
+            lower_builtin(function, WIDE_INT, WIDE_INT)(_builder_method(ints))
 
 for function, sign, ordered in (
     (operator.lt, "<", "fcmp_ordered"),
@@ -142,76 +142,76 @@ for function, sign, ordered in (
     (operator.eq, "==", "fcmp_ordered"),
     (operator.ne, "!=", "fcmp_unordered"),
 ):
-    cases = [signature(types.boolean, WIDE, WIDE), signature(types.boolean, WHOLE, WHOLE)]
+    cases = [signature(types.boolean, WIDE, WIDE), signature(types.boolean, WIDE_INT, WIDE_INT)]
     template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": cases})
     infer_global(function)(template)
-    lower_builtin(function, WIDE, WIDE)(_compared(sign, ordered))
-    lower_builtin(function, WHOLE, WHOLE)(_compared(sign, "icmp_signed"))
+    lower_builtin(function, WIDE, WIDE)(_comparison(sign, ordered))
+    lower_builtin(function, WIDE_INT, WIDE_INT)(_comparison(sign, "icmp_signed"))
 
 
-def _floor_divided(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-    a, b = given
+def _floor_divided(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, b = args
     quotient, rest = builder.sdiv(a, b), builder.srem(a, b)
-    zero = ir.Constant(WHOLES, None)
+    zero = ir.Constant(INT_VECTOR, None)
     down = builder.and_(
         builder.icmp_signed("!=", rest, zero), builder.icmp_signed("<", builder.xor(a, b), zero)
     )
-    return builder.add(quotient, builder.sext(down, WHOLES))
+    return builder.add(quotient, builder.sext(down, INT_VECTOR))
 
 
-def _rest_of(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-    whole = _floor_divided(context, builder, signature, given)
-    return builder.sub(given[0], builder.mul(whole, given[1]))
+def _modulo(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    quotient = _floor_divided(context, builder, signature, args)
+    return builder.sub(args[0], builder.mul(quotient, args[1]))
 
 
-define(operator.floordiv, _floor_divided, _TWOWHOLES)
-define(operator.mod, _rest_of, _TWOWHOLES)
-define(operator.neg, _by("fneg"), signature(WIDE, WIDE))
+define_for_lanes(operator.floordiv, _floor_divided, _INT_BINARY)
+define_for_lanes(operator.mod, _modulo, _INT_BINARY)
+define_for_lanes(operator.neg, _builder_method("fneg"), signature(WIDE, WIDE))
 
 
-def _vector_intrinsic(name: str) -> Made:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+def _vector_intrinsic(name: str) -> Lowering:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(VECTOR, [VECTOR])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v8f64"), given)
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v8f64"), args)
 
-    return made
-
-
-_ONE = signature(WIDE, WIDE)
-define(abs, _vector_intrinsic("fabs"), _ONE)
-define(math.sqrt, _vector_intrinsic("sqrt"), _ONE)
-define(np.rint, _vector_intrinsic("rint"), _ONE)
+    return codegen
 
 
-def _lane_by_lane(function: Any) -> Made:
+_UNARY = signature(WIDE, WIDE)
+define_for_lanes(abs, _vector_intrinsic("fabs"), _UNARY)
+define_for_lanes(math.sqrt, _vector_intrinsic("sqrt"), _UNARY)
+define_for_lanes(np.rint, _vector_intrinsic("rint"), _UNARY)
+
+
+def _lane_by_lane(function: Any) -> Lowering:
     """Implementation of a function that the library has for single numbers only."""
 
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        one = signature(types.float64, *[types.float64] * len(given))
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        one = signature(types.float64, *[types.float64] * len(args))
         call = context.get_function(function, one)
         found = ir.Constant(VECTOR, ir.Undefined)
         for lane in range(LANES):
             at = ir.Constant(INDEX, lane)
-            value = call(builder, [builder.extract_element(vector, at) for vector in given])
+            value = call(builder, [builder.extract_element(vector, at) for vector in args])
             found = builder.insert_element(found, value, at)
         return found
 
-    return made
+    return codegen
 
 
 for known in (math.sin, math.cos, math.acos, math.asin, math.log, math.exp):
-    define(known, _lane_by_lane(known), _ONE)
-define(math.atan2, _lane_by_lane(math.atan2), _WIDES)
+    define_for_lanes(known, _lane_by_lane(known), _UNARY)
+define_for_lanes(math.atan2, _lane_by_lane(math.atan2), _BINARY)
 
 
-def _answered(test: Callable[[Any, Any], Any]) -> Made:
-    return lambda context, builder, signature, given: _agreed(builder, test(builder, given[0]))
+def _predicate(test: Callable[[Any, Any], Any]) -> Lowering:
+    return lambda context, builder, signature, args: _lane_zero_branch(builder, test(builder, args[0]))
 
 
 def _is_finite(builder: Any, value: Any) -> Any:
     # x - x is 0, or nan
-    gone = builder.fsub(value, value)
-    return builder.fcmp_ordered("==", gone, gone)
+    difference = builder.fsub(value, value)
+    return builder.fcmp_ordered("==", difference, difference)
 
 
 def _is_inf(builder: Any, value: Any) -> Any:
@@ -225,45 +225,47 @@ def _splat_constant(value: float) -> Any:
 
 
 _PREDICATE = signature(types.boolean, WIDE)
-define(math.isnan, _answered(lambda builder, value: builder.fcmp_unordered("uno", value, value)), _PREDICATE)
-define(math.isfinite, _answered(_is_finite), _PREDICATE)
-define(math.isinf, _answered(_is_inf), _PREDICATE)
+define_for_lanes(
+    math.isnan, _predicate(lambda builder, value: builder.fcmp_unordered("uno", value, value)), _PREDICATE
+)
+define_for_lanes(math.isfinite, _predicate(_is_finite), _PREDICATE)
+define_for_lanes(math.isinf, _predicate(_is_inf), _PREDICATE)
 
 
-def _common(builder: Any, wholes: Any) -> Any:
+def _lane_zero_int(builder: Any, ints: Any) -> Any:
     """Lane 0's of eight integers; the lanes that differ are recorded."""
-    first = builder.extract_element(wholes, ir.Constant(INDEX, 0))
-    _agreed(builder, builder.icmp_signed("==", wholes, _splat(builder, first, WHOLES)))
+    first = builder.extract_element(ints, ir.Constant(INDEX, 0))
+    _lane_zero_branch(builder, builder.icmp_signed("==", ints, _splat(builder, first, INT_VECTOR)))
     return first
 
 
-def _to_int(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-    wholes = given[0] if sig.args[0] == WHOLE else builder.fptosi(given[0], WHOLES)
-    return _common(builder, wholes)
+def _to_int(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    ints = args[0] if sig.args[0] == WIDE_INT else builder.fptosi(args[0], INT_VECTOR)
+    return _lane_zero_int(builder, ints)
 
 
-define(int, _to_int, signature(types.int64, WIDE), signature(types.int64, WHOLE))
-define(float, lambda context, builder, sig, given: given[0], signature(WIDE, WIDE))
+define_for_lanes(int, _to_int, signature(types.int64, WIDE), signature(types.int64, WIDE_INT))
+define_for_lanes(float, lambda context, builder, sig, args: args[0], signature(WIDE, WIDE))
 
 
-def _to_ceil(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-    up = _vector_intrinsic("ceil")(context, builder, sig, given)
-    return _common(builder, builder.fptosi(up, WHOLES))
+def _to_ceil(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    up = _vector_intrinsic("ceil")(context, builder, sig, args)
+    return _lane_zero_int(builder, builder.fptosi(up, INT_VECTOR))
 
 
-define(math.ceil, _to_ceil, signature(types.int64, WIDE))
+define_for_lanes(math.ceil, _to_ceil, signature(types.int64, WIDE))
 
 
-def _extreme(sign: str) -> Made:
+def _extreme(sign: str) -> Lowering:
     """As in Python: of two numbers the first, unless the second is beyond it."""
 
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        found = given[0]
-        for value in given[1:]:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        found = args[0]
+        for value in args[1:]:
             found = builder.select(builder.fcmp_ordered(sign, value, found), value, found)
         return found
 
-    return made
+    return codegen
 
 
 for function, sign in ((max, ">"), (min, "<")):
@@ -295,27 +297,27 @@ def _widened(context: Any, builder: Any, source: Any, target: Any, value: Any) -
     return _splat(builder, context.cast(builder, value, source, types.float64), VECTOR)
 
 
-def _widened_whole(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
-    return _splat(builder, context.cast(builder, value, source, types.int64), WHOLES)
+def _widened_int(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
+    return _splat(builder, context.cast(builder, value, source, types.int64), INT_VECTOR)
 
 
-def _as_wide(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
+def _int_to_wide(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
     return builder.sitofp(value, VECTOR)
 
 
 for single in (types.Float, types.Integer, types.Boolean):
     lower_cast(single, WIDE)(_widened)
 for single in (types.Integer, types.Boolean):
-    lower_cast(single, WHOLE)(_widened_whole)
-lower_cast(WHOLE, WIDE)(_as_wide)
+    lower_cast(single, WIDE_INT)(_widened_int)
+lower_cast(WIDE_INT, WIDE)(_int_to_wide)
 
 
-def _lifted(kind: Any) -> Any:
+def _with_lanes(kind: Any) -> Any:
     """The type with each of its floats replaced by eight lanes."""
     if isinstance(kind, types.Float):
         return WIDE
     if isinstance(kind, types.UniTuple):
-        return types.UniTuple(_lifted(kind.dtype), kind.count)
+        return types.UniTuple(_with_lanes(kind.dtype), kind.count)
     return kind
 
 
@@ -331,7 +333,7 @@ def _tuple_of(cls: Any, kinds: Sequence[Any]) -> Any:
     """numba's type of a tuple; single numbers beside numbers of eight lanes become eight lanes too, so that
     the tuple can be indexed."""
     if any(_has_lanes(kind) for kind in kinds):
-        lifted = [_lifted(kind) for kind in kinds]
+        lifted = [_with_lanes(kind) for kind in kinds]
         if all(kind == lifted[0] for kind in lifted):
             return types.UniTuple(lifted[0], len(lifted))
     return _new_tuple(cls, kinds)

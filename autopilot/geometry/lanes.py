@@ -15,49 +15,58 @@ from numba.core import cgutils
 from numba.extending import overload
 from numba.np.arrayobj import populate_array
 
-from autopilot.geometry.compiler import INLINED, intrinsic
-from autopilot.geometry.lane_numbers import BITS, INDEX, LANES, VECTOR, WHOLE, WHOLES, WIDE, flag_of
+from autopilot.geometry.compiler import INLINE_OPTIONS, intrinsic
+from autopilot.geometry.lane_numbers import (
+    INDEX,
+    INT_VECTOR,
+    LANE_BITS,
+    LANES,
+    VECTOR,
+    WIDE,
+    WIDE_INT,
+    divergence_flag,
+)
 
 _SINGLES = ir.VectorType(ir.FloatType(), LANES)
 
 
 @intrinsic
-def parted(_: Any) -> Any:
-    """In a kernel: the lanes that have parted from lane 0 since the last call, one bit each."""
+def diverged_lanes(_: Any) -> Any:
+    """In a kernel: the lanes that have diverged from lane 0 since the last call, one bit each."""
 
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        flag = flag_of(builder)
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        flag = divergence_flag(builder)
         found = builder.zext(builder.load(flag), ir.IntType(64))
-        builder.store(ir.Constant(BITS, 0), flag)
+        builder.store(ir.Constant(LANE_BITS, 0), flag)
         return found
 
-    return types.int64(), made
+    return types.int64(), codegen
 
 
-def _retyped(kind: Any) -> Any:
-    known: dict[Any, Any] = {types.float64: WIDE, types.int64: WHOLE}
+def _lane_type(kind: Any) -> Any:
+    known: dict[Any, Any] = {types.float64: WIDE, types.int64: WIDE_INT}
     return known.get(getattr(kind, "dtype", None))
 
 
 @intrinsic
-def in_lanes(_: Any, array: Any) -> Any:
+def as_lane_array(_: Any, array: Any) -> Any:
     """In a kernel: an array whose last axis is the lanes, and which is aligned to 64 bytes, as an array of
-    `Wide` or `Whole`."""
-    lane = _retyped(array)
+    `WIDE` or `WIDE_INT`."""
+    lane = _lane_type(array)
     if lane is None or array.layout != "C":
         return None
     target = types.Array(lane, array.ndim - 1, "C")
 
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        held = context.make_array(sig.args[0])(context, builder, given[0])
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        source = context.make_array(sig.args[0])(context, builder, args[0])
         found = context.make_array(target)(context, builder)
-        shape = cgutils.unpack_tuple(builder, held.shape)[:-1]
-        strides = cgutils.unpack_tuple(builder, held.strides)[:-1]
+        shape = cgutils.unpack_tuple(builder, source.shape)[:-1]
+        strides = cgutils.unpack_tuple(builder, source.strides)[:-1]
         itemsize = context.get_constant(types.intp, 8 * LANES)
-        vector = VECTOR if lane == WIDE else WHOLES
+        vector = VECTOR if lane == WIDE else INT_VECTOR
         populate_array(
             found,
-            data=builder.bitcast(held.data, vector.as_pointer()),
+            data=builder.bitcast(source.data, vector.as_pointer()),
             shape=shape,
             strides=strides,
             itemsize=itemsize,
@@ -66,24 +75,24 @@ def in_lanes(_: Any, array: Any) -> Any:
         )
         return found._getvalue()
 
-    return target(array), made
+    return target(array), codegen
 
 
-def single(value: float) -> float:
+def to_single(value: float) -> float:
     """`value` rounded to single precision."""
     return float(np.float32(value))
 
 
 @intrinsic
 def _single_lanes(_: Any, value: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        return builder.fpext(builder.fptrunc(given[0], _SINGLES), VECTOR)
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fpext(builder.fptrunc(args[0], _SINGLES), VECTOR)
 
-    return WIDE(WIDE), made
+    return WIDE(WIDE), codegen
 
 
-@overload(single, jit_options=INLINED)
-def _single(value: Any) -> Any:
+@overload(to_single, jit_options=INLINE_OPTIONS)
+def _to_single(value: Any) -> Any:
     def of_lanes(value: Any) -> Any:
         return _single_lanes(value)
 
@@ -99,18 +108,18 @@ def if_above(value: float, limit: float, then: float, otherwise: float) -> float
 
 
 @intrinsic
-def _chosen_lanes(_: Any, value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        wide = [context.cast(builder, one, kind, WIDE) for one, kind in zip(given, sig.args, strict=True)]
+def _select_lanes(_: Any, value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        wide = [context.cast(builder, one, kind, WIDE) for one, kind in zip(args, sig.args, strict=True)]
         return builder.select(builder.fcmp_ordered(">", wide[0], wide[1]), wide[2], wide[3])
 
-    return WIDE(value, limit, then, otherwise), made
+    return WIDE(value, limit, then, otherwise), codegen
 
 
-@overload(if_above, jit_options=INLINED)
+@overload(if_above, jit_options=INLINE_OPTIONS)
 def _if_above(value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     def of_lanes(value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-        return _chosen_lanes(value, limit, then, otherwise)
+        return _select_lanes(value, limit, then, otherwise)
 
     def of_one(value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
         return then if value > limit else otherwise
@@ -118,23 +127,23 @@ def _if_above(value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return of_lanes if WIDE in (value, limit, then, otherwise) else of_one
 
 
-def each(value: float) -> int:
+def int_per_lane(value: float) -> int:
     """`value` as an integer; in lanes each flight has its own."""
     return int(value)
 
 
 @intrinsic
-def _each_lane(_: Any, value: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        return builder.fptosi(given[0], WHOLES)
+def _int_lanes(_: Any, value: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fptosi(args[0], INT_VECTOR)
 
-    return WHOLE(WIDE), made
+    return WIDE_INT(WIDE), codegen
 
 
-@overload(each, jit_options=INLINED)
-def _each(value: Any) -> Any:
+@overload(int_per_lane, jit_options=INLINE_OPTIONS)
+def _int_per_lane(value: Any) -> Any:
     def of_lanes(value: Any) -> Any:
-        return _each_lane(value)
+        return _int_lanes(value)
 
     def of_one(value: Any) -> Any:
         return int(value)
@@ -142,74 +151,74 @@ def _each(value: Any) -> Any:
     return of_lanes if value == WIDE else of_one
 
 
-def rows_in(table: Any) -> int:
+def row_count(table: Any) -> int:
     """Number of rows of a table; in lanes each flight has its own table."""
     return len(table)
 
 
-def taken(table: Any, at: int, column: int) -> float:
+def table_value(table: Any, at: int, column: int) -> float:
     """The number at a row and column of a table; in lanes each flight has its own row and its own table."""
     return float(table[at, column])
 
 
-def _are_tables(kind: Any) -> bool:
+def _is_table_per_lane(kind: Any) -> bool:
     return isinstance(kind, types.UniTuple) and kind.count == LANES and isinstance(kind.dtype, types.Array)
 
 
-def _tables(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
+def _arrays_per_lane(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
     parts = [builder.extract_value(value, lane) for lane in range(LANES)]
     return [context.make_array(kind.dtype)(context, builder, part) for part in parts]
 
 
 @intrinsic
-def _rows_each(_: Any, tables: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        found = ir.Constant(WHOLES, ir.Undefined)
-        for lane, held in enumerate(_tables(context, builder, sig.args[0], given[0])):
-            rows = cgutils.unpack_tuple(builder, held.shape)[0]
+def _row_count_lanes(_: Any, tables: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        found = ir.Constant(INT_VECTOR, ir.Undefined)
+        for lane, table in enumerate(_arrays_per_lane(context, builder, sig.args[0], args[0])):
+            rows = cgutils.unpack_tuple(builder, table.shape)[0]
             found = builder.insert_element(found, rows, ir.Constant(INDEX, lane))
         return found
 
-    return WHOLE(tables), made
+    return WIDE_INT(tables), codegen
 
 
 @intrinsic
-def _taken_each(_: Any, tables: Any, at: Any, column: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+def _table_value_lanes(_: Any, tables: Any, at: Any, column: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         found = ir.Constant(VECTOR, ir.Undefined)
-        for lane, held in enumerate(_tables(context, builder, sig.args[0], given[0])):
+        for lane, table in enumerate(_arrays_per_lane(context, builder, sig.args[0], args[0])):
             where = ir.Constant(INDEX, lane)
-            rows, columns = cgutils.unpack_tuple(builder, held.shape)
-            row = builder.extract_element(given[1], where)
-            # a lane that has parted from the others may request a row that does not exist
+            rows, columns = cgutils.unpack_tuple(builder, table.shape)
+            row = builder.extract_element(args[1], where)
+            # a lane that has diverged from the others may request a row that does not exist
             row = builder.select(builder.icmp_unsigned("<", row, rows), row, ir.Constant(row.type, 0))
-            place = builder.gep(held.data, [builder.add(builder.mul(row, columns), given[2])])
+            place = builder.gep(table.data, [builder.add(builder.mul(row, columns), args[2])])
             found = builder.insert_element(found, builder.load(place), where)
         return found
 
-    return WIDE(tables, WHOLE, types.intp), made
+    return WIDE(tables, WIDE_INT, types.intp), codegen
 
 
-@overload(rows_in, jit_options=INLINED)
-def _rows_in(table: Any) -> Any:
+@overload(row_count, jit_options=INLINE_OPTIONS)
+def _row_count(table: Any) -> Any:
     def of_lanes(table: Any) -> Any:
-        return _rows_each(table)
+        return _row_count_lanes(table)
 
     def of_one(table: Any) -> Any:
         return table.shape[0]
 
-    return of_lanes if _are_tables(table) else of_one
+    return of_lanes if _is_table_per_lane(table) else of_one
 
 
-@overload(taken, jit_options=INLINED)
-def _taken(table: Any, at: Any, column: Any) -> Any:
+@overload(table_value, jit_options=INLINE_OPTIONS)
+def _table_value(table: Any, at: Any, column: Any) -> Any:
     def of_lanes(table: Any, at: Any, column: Any) -> Any:
-        return _taken_each(table, at, column)
+        return _table_value_lanes(table, at, column)
 
     def of_one(table: Any, at: Any, column: Any) -> Any:
         return table[at, column]
 
-    return of_lanes if _are_tables(table) else of_one
+    return of_lanes if _is_table_per_lane(table) else of_one
 
 
 def bits_of(value: float) -> int:
@@ -217,41 +226,41 @@ def bits_of(value: float) -> int:
     return int(np.float64(value).view(np.int64))
 
 
-def of_bits(bits: int) -> float:
+def float_from_bits(bits: int) -> float:
     """The double with these 64 bits."""
     return float(np.int64(bits).view(np.float64))
 
 
-def _reinterpreting(before: Any, after: Any, before_lanes: Any, after_lanes: Any) -> Any:
+def _bitcast(source: Any, target: Any, source_lanes: Any, target_lanes: Any) -> Any:
     @intrinsic
     def done(_: Any, value: Any) -> Any:
-        result = after_lanes if value == before_lanes else after
+        result = target_lanes if value == source_lanes else target
 
-        def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-            return builder.bitcast(given[0], context.get_value_type(result))
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return builder.bitcast(args[0], context.get_value_type(result))
 
-        return result(before_lanes if value == before_lanes else before), made
+        return result(source_lanes if value == source_lanes else source), codegen
 
     return done
 
 
 _bits, _value = (
-    _reinterpreting(types.float64, types.int64, WIDE, WHOLE),
-    _reinterpreting(types.int64, types.float64, WHOLE, WIDE),
+    _bitcast(types.float64, types.int64, WIDE, WIDE_INT),
+    _bitcast(types.int64, types.float64, WIDE_INT, WIDE),
 )
 
 
-@overload(bits_of, jit_options=INLINED)
+@overload(bits_of, jit_options=INLINE_OPTIONS)
 def _bits_of(value: Any) -> Any:
-    def made(value: Any) -> Any:
+    def implementation(value: Any) -> Any:
         return _bits(value)
 
-    return made
+    return implementation
 
 
-@overload(of_bits, jit_options=INLINED)
-def _of_bits(bits: Any) -> Any:
-    def made(bits: Any) -> Any:
+@overload(float_from_bits, jit_options=INLINE_OPTIONS)
+def _float_from_bits(bits: Any) -> Any:
+    def implementation(bits: Any) -> Any:
         return _value(bits)
 
-    return made
+    return implementation

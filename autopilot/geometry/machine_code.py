@@ -26,9 +26,9 @@ from platformdirs import user_cache_path
 
 ROOT = Path(__file__).resolve().parents[2]
 _DAY_S = 86400.0
-KEPT_S = 90.0 * _DAY_S  # how long unused machine code is kept
+RETENTION_S = 90.0 * _DAY_S  # how long unused machine code is kept
 _MARKS = "ready"
-CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
+USER_CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")
 _PACKAGES = ("autopilot", "sitl", "missions", "gcs", "plumbline")
 # begins with literal letters, which are searched fast; matches inside a text do no harm
 _IMPORT = re.compile(
@@ -60,24 +60,28 @@ def _files(root: str) -> frozenset[str]:
 
 
 @cache
-def _named(module: str, root: str) -> frozenset[str]:
+def _module_files(module: str, root: str) -> frozenset[str]:
     """The file of a module, and the `__init__.py` files of the packages that contain it."""
     base = module.replace(".", os.sep)
     packages = (
-        f"{base[:end]}{os.sep}__init__.py" for end, sign in enumerate(base + os.sep) if sign == os.sep
+        f"{base[:end]}{os.sep}__init__.py"
+        for end, character in enumerate(base + os.sep)
+        if character == os.sep
     )
     return _files(root) & {f"{base}.py", *packages}
 
 
 @cache
-def _imported(file: str, root: str) -> frozenset[str]:
+def _imported_files(file: str, root: str) -> frozenset[str]:
     """The files below `root` that a file imports directly."""
     found: set[str] = set()
     for module, names in _IMPORT.findall(_source(file, root)):
-        base = module.decode()
-        found |= _named(base, root)
-        if f"{base.replace('.', os.sep)}.py" not in found:  # a package: the names may be its modules
-            found.update(*(_named(f"{base}.{name.decode()}", root) for name in _NAME.findall(names)))
+        module_path = module.decode()
+        found |= _module_files(module_path, root)
+        if f"{module_path.replace('.', os.sep)}.py" not in found:  # a package: the names may be its modules
+            found.update(
+                *(_module_files(f"{module_path}.{name.decode()}", root) for name in _NAME.findall(names))
+            )
     if b"iter_modules(__path__)" in _source(file, root):  # a package that finds its modules itself
         folder = file.rpartition(os.sep)[0]
         found.update(other for other in _files(root) if other.rpartition(os.sep)[0] == folder)
@@ -88,47 +92,47 @@ def _imported(file: str, root: str) -> frozenset[str]:
 def sources_hash(path: Path, root: Path = ROOT) -> str:
     """Hash of a source file and all files of the project at `root` that it imports, directly or not."""
     first, top = os.path.relpath(path, root), str(root)
-    seen, ahead = {first}, [first]
-    while ahead:
-        fresh = _imported(ahead.pop(), top) - seen
-        seen |= fresh
-        ahead += fresh
+    visited, pending = {first}, [first]
+    while pending:
+        new_files = _imported_files(pending.pop(), top) - visited
+        visited |= new_files
+        pending += new_files
     digest = hashlib.sha256()
-    for file in sorted(seen):
+    for file in sorted(visited):
         digest.update(file.encode() + b"\0" + _digest(file, top))
     return digest.hexdigest()[:16]
 
 
 def _kernels() -> Path:
     """The folder of all machine code, in the user's cache or in the folder that NUMBA_CACHE_DIR names."""
-    cache = Path(CHOSEN_BY_USER) / "plumbline" if CHOSEN_BY_USER else user_cache_path("plumbline")
+    cache = Path(USER_CACHE_DIR) / "plumbline" if USER_CACHE_DIR else user_cache_path("plumbline")
     return cache / "kernels"
 
 
-def folder_of(path: Path) -> Path:
+def kernel_folder(path: Path) -> Path:
     """The folder in which the machine code of the kernels in this source file is stored."""
     return _kernels() / sources_hash(path)
 
 
 @cache
-def note_use(folder: Path) -> None:
+def record_use(folder: Path) -> None:
     """Record, once per program, that the content of this folder is in use."""
     with suppress(OSError):
         os.utime(folder)
 
 
 def drop_unused(now_s: float) -> None:
-    """Delete what has not been used for `KEPT_S`: mostly code of sources that have changed since.
+    """Delete what has not been used for `RETENTION_S`: mostly code of sources that have changed since.
 
     `now_s` is the time of the clock that dates files. A mark is deleted before the code that it vouches for,
     which is kept a day longer: no flight finds a mark without the code.
     """
     with suppress(OSError):
         for mark in (_kernels() / _MARKS).iterdir():
-            if now_s - mark.stat().st_mtime > KEPT_S:
+            if now_s - mark.stat().st_mtime > RETENTION_S:
                 mark.unlink()
         for folder in _kernels().iterdir():
-            if folder.name != _MARKS and now_s - folder.stat().st_mtime > KEPT_S + _DAY_S:
+            if folder.name != _MARKS and now_s - folder.stat().st_mtime > RETENTION_S + _DAY_S:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -151,7 +155,7 @@ def _mark(source: Path, part: str) -> Path:
     return _marks() / f"{sources_hash(source)}-{_machine()}-{part}"
 
 
-def why_not_kept() -> str:
+def storage_problem() -> str:
     """Why machine code cannot be stored, so that each program compiles again; empty if it can be stored."""
     try:
         _marks().mkdir(parents=True, exist_ok=True)

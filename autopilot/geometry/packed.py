@@ -22,18 +22,20 @@ from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from autopilot.geometry.compiler import INLINED
-from autopilot.geometry.lanes import each
+from autopilot.geometry.compiler import INLINE_OPTIONS
+from autopilot.geometry.lanes import int_per_lane
 from autopilot.geometry.row_moves import is_numbers, is_row, numbers_at, put_numbers
 
 Row = NDArray[np.float64]
 R = TypeVar("R")
-Each = Annotated[int, "each"]  # an int that differs from flight to flight when flights are flown in lanes
-_NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", Each: "each({})", bool: "{} != 0.0"}
+IntPerLane = Annotated[
+    int, "each"
+]  # an int that differs from flight to flight when flights are flown in lanes
+_NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", IntPerLane: "int_per_lane({})", bool: "{} != 0.0"}
 _COMPILED: dict[Any, Any] = {
     float: types.float64,
     int: types.int64,
-    Each: types.int64,
+    IntPerLane: types.int64,
     bool: types.boolean,
 }  # for one flight
 
@@ -64,20 +66,20 @@ def width(kind: Any) -> int:
     return 1 if kind in _NUMBERS else sum(map(width, _parts(kind)))
 
 
-def place_of(record: Any, name: str) -> int:
+def field_offset(record: Any, name: str) -> int:
     """Index of a field's first number in the row of a record."""
     names = record._fields[: record._fields.index(name)]
     kinds = dict(_fields(record))
     return sum(width(kinds[before]) for before in names)
 
 
-def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
+def _unpack_source(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
     """Source of the expression that takes a `kind` from `row[at + first]`, and the place of the next one."""
     if kind in _NUMBERS:
         return _NUMBERS[kind].format(f"row[first + {at}]"), at + 1
     parts = []
     for part in _parts(kind):
-        text, at = _taken(part, at, known)
+        text, at = _unpack_source(part, at, known)
         parts.append(text)
     if not _is_record(kind):
         return f"({', '.join(parts)},)", at
@@ -86,24 +88,24 @@ def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
     return f"{name}({', '.join(parts)})", at
 
 
-def _put(kind: Any, value: str, at: int) -> Iterator[tuple[int, str]]:
+def _pack_source(kind: Any, value: str, at: int) -> Iterator[tuple[int, str]]:
     """(place, source of the value) for each number of the `kind` that the expression `value` names."""
     if kind in _NUMBERS:
         yield at, value
     elif _is_record(kind):
         for name, part in _fields(kind):
-            yield from _put(part, f"{value}.{name}", at)
+            yield from _pack_source(part, f"{value}.{name}", at)
             at += width(part)
     else:
         for i, part in enumerate(get_args(kind)):
-            yield from _put(part, f"{value}[{i}]", at)
+            yield from _pack_source(part, f"{value}[{i}]", at)
             at += width(part)
 
 
 @cache
 def _unpacker(kind: Any) -> Any:
-    known: dict[str, Any] = {"each": each}
-    text, _ = _taken(kind, 0, known)
+    known: dict[str, Any] = {"int_per_lane": int_per_lane}
+    text, _ = _unpack_source(kind, 0, known)
     exec(f"def take(kind: Any, row: Any, first: Any) -> Any:\n    return {text}\n", known)
     return known["take"]
 
@@ -111,10 +113,10 @@ def _unpacker(kind: Any) -> Any:
 @cache
 def _packer(kind: Any) -> Any:
     width(kind)
-    lines = "".join(f"    row[first + {i}] = {text}\n" for i, text in _put(kind, "record", 0))
-    made: dict[str, Any] = {}
-    exec(f"def put(record: Any, row: Any, first: Any) -> Any:\n{lines or '    pass'}\n", made)
-    return made["put"]
+    lines = "".join(f"    row[first + {i}] = {text}\n" for i, text in _pack_source(kind, "record", 0))
+    namespace: dict[str, Any] = {}
+    exec(f"def put(record: Any, row: Any, first: Any) -> Any:\n{lines or '    pass'}\n", namespace)
+    return namespace["put"]
 
 
 def unpack(kind: type[R], row: Row, first: int) -> R:
@@ -151,22 +153,22 @@ def _compiled_type(kind: Any) -> Any:
     return types.BaseTuple.from_types(parts, kind if _is_record(kind) else None)
 
 
-@overload(unpack, jit_options=INLINED)
+@overload(unpack, jit_options=INLINE_OPTIONS)
 def _unpack(kind: Any, row: Any, first: Any) -> Any:
     if not isinstance(kind, types.NamedTupleClass):
         return None
     record: Any = kind.instance_class
     if not is_row(row):
         return _unpacker(record)
-    taken = _compiled_type(record)
+    compiled_type = _compiled_type(record)
 
     def take(kind: Any, row: Any, first: Any) -> Any:
-        return numbers_at(taken, row, first)
+        return numbers_at(compiled_type, row, first)
 
     return take
 
 
-@overload(pack, jit_options=INLINED)
+@overload(pack, jit_options=INLINE_OPTIONS)
 def _pack(record: Any, row: Any, first: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
     if not _is_record(kind):
@@ -181,7 +183,7 @@ def _pack(record: Any, row: Any, first: Any) -> Any:
     return put
 
 
-@overload(with_field, jit_options=INLINED, prefer_literal=True)
+@overload(with_field, jit_options=INLINE_OPTIONS, prefer_literal=True)
 def _with_field(record: Any, name: Any, value: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
     if not _is_record(kind) or not isinstance(name, types.StringLiteral):
@@ -189,6 +191,6 @@ def _with_field(record: Any, name: Any, value: Any) -> Any:
     if name.literal_value not in kind._fields:
         return None
     parts = ", ".join("value" if part == name.literal_value else f"record.{part}" for part in kind._fields)
-    made: dict[str, Any] = {"kind": kind}
-    exec(f"def put(record: Any, name: Any, value: Any) -> Any:\n    return kind({parts})\n", made)
-    return made["put"]
+    namespace: dict[str, Any] = {"kind": kind}
+    exec(f"def put(record: Any, name: Any, value: Any) -> Any:\n    return kind({parts})\n", namespace)
+    return namespace["put"]

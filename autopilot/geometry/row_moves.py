@@ -43,10 +43,10 @@ def _numbers_of(context: Any, builder: Any, value: Any, kind: Any) -> Iterator[t
         yield (value if plain == kind else context.cast(builder, value, kind, plain)), plain
 
 
-def _made_of(context: Any, builder: Any, numbers: Iterator[tuple[Any, Any]], kind: Any) -> Any:
+def _value_from(context: Any, builder: Any, numbers: Iterator[tuple[Any, Any]], kind: Any) -> Any:
     """The value of this type made from the next numbers of an iterator, each given with its own type."""
     if isinstance(kind, types.BaseTuple):
-        parts = [_made_of(context, builder, numbers, part) for part in _parts(kind)]
+        parts = [_value_from(context, builder, numbers, part) for part in _parts(kind)]
         return context.make_tuple(builder, kind, parts)
     number, plain = next(numbers)
     return context.cast(builder, number, plain, kind)
@@ -59,7 +59,7 @@ def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:
 # ---- rows of float64
 
 
-def _places(builder: Any, data: Any, first: Any) -> Iterator[Any]:
+def _pointers(builder: Any, data: Any, first: Any) -> Iterator[Any]:
     i = 0
     while True:
         yield builder.gep(data, [builder.add(first, ir.Constant(first.type, i))])
@@ -72,14 +72,14 @@ def put_numbers(_: Any, record: Any, row: Any, first: Any) -> Any:
     if not (is_row(row) and is_numbers(record)):
         return None
 
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind, row_type, _ = signature.args
-        places = _places(builder, _data(context, builder, row_type, given[1]), given[2])
-        for number, plain in _numbers_of(context, builder, given[0], kind):
+        places = _pointers(builder, _data(context, builder, row_type, args[1]), args[2])
+        for number, plain in _numbers_of(context, builder, args[0], kind):
             builder.store(context.cast(builder, number, plain, types.float64), next(places))
         return context.get_dummy_value()
 
-    return types.none(record, row, types.intp), made
+    return types.none(record, row, types.intp), codegen
 
 
 @intrinsic
@@ -88,14 +88,14 @@ def numbers_at(_: Any, kind: Any, row: Any, first: Any) -> Any:
     negative."""
     if not (is_row(row) and isinstance(kind, types.TypeRef) and is_numbers(kind.instance_type)):
         return None
-    whole = kind.instance_type
+    record_type = kind.instance_type
 
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        places = _places(builder, _data(context, builder, signature.args[1], given[1]), given[2])
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        places = _pointers(builder, _data(context, builder, signature.args[1], args[1]), args[2])
         numbers = ((builder.load(place), types.float64) for place in places)
-        return _made_of(context, builder, numbers, whole)
+        return _value_from(context, builder, numbers, record_type)
 
-    return whole(kind, row, types.intp), made
+    return record_type(kind, row, types.intp), codegen
 
 
 # ---- bytes
@@ -123,29 +123,29 @@ def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
 
     @intrinsic
     def put(_: Any, values: Any, payload: Any) -> Any:
-        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            data = _data(context, builder, signature.args[1], given[1])
-            numbers = _numbers_of(context, builder, given[0], signature.args[0])
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            data = _data(context, builder, signature.args[1], args[1])
+            numbers = _numbers_of(context, builder, args[0], signature.args[0])
             for (number, plain), (place, kind) in zip(numbers, _fields(builder, data, layout), strict=True):
                 builder.store(context.cast(builder, number, plain, kind), place, align=1)
             return context.get_dummy_value()
 
-        return types.none(values, payload), made
+        return types.none(values, payload), codegen
 
     return put
 
 
-def field_taker(layout: Sequence[tuple[int, str]], whole: Any) -> Any:
-    """For kernels: take(payload) reads the tuple of the numba type `whole` from bytes in this layout."""
+def field_taker(layout: Sequence[tuple[int, str]], record_type: Any) -> Any:
+    """For kernels: take(payload) reads a tuple of the numba type `record_type` from bytes in this layout."""
 
     @intrinsic
     def take(_: Any, payload: Any) -> Any:
-        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            data = _data(context, builder, signature.args[0], given[0])
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            data = _data(context, builder, signature.args[0], args[0])
             fields = _fields(builder, data, layout)
             numbers = ((builder.load(place, align=1), kind) for place, kind in fields)
-            return _made_of(context, builder, numbers, whole)
+            return _value_from(context, builder, numbers, record_type)
 
-        return whole(payload), made
+        return record_type(payload), codegen
 
     return take

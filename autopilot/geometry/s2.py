@@ -7,7 +7,7 @@ from math import sqrt
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, cross, dot, norm, scale, sub
 
-_LEAST_ALONG = 0.5  # least share of the pull along the axis: a larger slant of the cable counts as this one
+_MIN_ALONG = 0.5  # least share of the pull along the axis: a larger slant of the cable counts as this one
 
 
 @kernel
@@ -23,9 +23,9 @@ def tangent(q_cable: Vec3, v: Vec3) -> Vec3:
 
 
 @kernel
-def pull_of(felt: float, q_cable: Vec3, axis: Vec3) -> float:
-    """The force along q_cable whose component along `axis`, which points away from the cable, is `felt`."""
-    return felt / min(dot(q_cable, axis), -_LEAST_ALONG)
+def force_along_cable(component: float, q_cable: Vec3, axis: Vec3) -> float:
+    """The force along q_cable that has this component along `axis`, which points away from the cable."""
+    return component / min(dot(q_cable, axis), -_MIN_ALONG)
 
 
 @kernel

@@ -23,8 +23,8 @@ from numba.extending import intrinsic, lower_builtin, models, overload, register
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
-from autopilot.geometry.compiler import INLINED
-from autopilot.geometry.lane_numbers import VECTOR, WIDE, define
+from autopilot.geometry.compiler import INLINE_OPTIONS
+from autopilot.geometry.lane_numbers import VECTOR, WIDE, define_for_lanes
 
 WIDTH = 8
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def put_eight(array: Array, i: int, j: int, eight: Wide) -> None:
     put_wide(array, i, j, eight)
 
 
-def turned(array: Array) -> Array:
+def transposed(array: Array) -> Array:
     """The array after `transpose_blocks`; an array in lanes, in which that function moves nothing, as a
     transposed view."""
     return array
@@ -115,7 +115,7 @@ def _shuffled(builder: Any, a: Any, b: Any, lanes: list[int]) -> Any:
     return builder.shuffle_vector(a, b, mask)
 
 
-def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+def _transposed_vectors(builder: Any, rows: list[Any]) -> list[Any]:
     """The columns of eight given rows as eight vectors: blocks of 4, 2 and 1 are exchanged."""
     rows = list(rows)
     for size in (4, 2, 1):
@@ -144,66 +144,66 @@ def _store(builder: Any, rows: list[Any], places: list[Any]) -> None:
         builder.store(row, place, align=8)
 
 
-def _of_lanes(array: Any) -> bool:
+def _has_lane_elements(array: Any) -> bool:
     return bool(array.dtype == WIDE)
 
 
-def _known(array: Any) -> bool:
-    layouts = "CF" if _of_lanes(array) else "C"
+def _is_supported(array: Any) -> bool:
+    layouts = "CF" if _has_lane_elements(array) else "C"
     return isinstance(array, types.Array) and array.ndim == 2 and array.layout in layouts
 
 
-@overload(columns_at_once, jit_options=INLINED)
+@overload(columns_at_once, jit_options=INLINE_OPTIONS)
 def _columns_at_once(array: Any) -> Any:
-    count = 1 if _of_lanes(array) else WIDTH
+    count = 1 if _has_lane_elements(array) else WIDTH
 
-    def made(array: Any) -> Any:
+    def implementation(array: Any) -> Any:
         return count
 
-    return made if _known(array) else None
+    return implementation if _is_supported(array) else None
 
 
 @intrinsic
-def _taken(_: Any, array: Any, i: Any, j: Any) -> Any:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        place = _pointer(context, builder, signature.args[0], *given)
+def _load_wide(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = _pointer(context, builder, signature.args[0], *args)
         return builder.load(place, align=8)
 
-    return WIDE(array, types.intp, types.intp), made
+    return WIDE(array, types.intp, types.intp), codegen
 
 
 @intrinsic
-def _given(_: Any, array: Any, i: Any, j: Any, wide: Any) -> Any:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        place = _pointer(context, builder, signature.args[0], *given[:3])
-        builder.store(given[3], place, align=8)
+def _store_wide(_: Any, array: Any, i: Any, j: Any, wide: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = _pointer(context, builder, signature.args[0], *args[:3])
+        builder.store(args[3], place, align=8)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, types.intp, WIDE), made
+    return types.void(array, types.intp, types.intp, WIDE), codegen
 
 
 @intrinsic
-def _exchanged(_: Any, array: Any, i: Any, j: Any) -> Any:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        kind, (held, first, second) = signature.args[0], given
+def _exchange_blocks(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind, (held, first, second) = signature.args[0], args
         upper = _block(context, builder, kind, held, first, second)
         lower = _block(context, builder, kind, held, second, first)
-        above, below = (_transposed(builder, _load(builder, places)) for places in (upper, lower))
+        above, below = (_transposed_vectors(builder, _load(builder, places)) for places in (upper, lower))
         _store(builder, below, upper)
         _store(builder, above, lower)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, types.intp), made
+    return types.void(array, types.intp, types.intp), codegen
 
 
 @intrinsic
-def _mirrored(_: Any, array: Any, i: Any, j: Any) -> Any:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        kind, (held, first, second) = signature.args[0], given
+def _mirror_lanes(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind, (held, first, second) = signature.args[0], args
         upper = _block(context, builder, kind, held, first, second)
         lower = _block(context, builder, kind, held, second, first)
         rows = _load(builder, upper)
-        columns = _transposed(builder, rows)
+        columns = _transposed_vectors(builder, rows)
         on_diagonal = builder.icmp_signed("==", first, second)
         for k in range(WIDTH):
             kept = [WIDTH + lane if lane < k else lane for lane in range(WIDTH)]
@@ -211,84 +211,84 @@ def _mirrored(_: Any, array: Any, i: Any, j: Any) -> Any:
             builder.store(builder.select(on_diagonal, half, columns[k]), lower[k], align=8)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, types.intp), made
+    return types.void(array, types.intp, types.intp), codegen
 
 
-@overload(wide_at, jit_options=INLINED)
+@overload(wide_at, jit_options=INLINE_OPTIONS)
 def _wide_at(array: Any, i: Any, j: Any) -> Any:
-    def made(array: Any, i: Any, j: Any) -> Any:
-        return _taken(array, i, j)
+    def implementation(array: Any, i: Any, j: Any) -> Any:
+        return _load_wide(array, i, j)
 
-    return made if _known(array) else None
+    return implementation if _is_supported(array) else None
 
 
-@overload(put_wide, jit_options=INLINED)
+@overload(put_wide, jit_options=INLINE_OPTIONS)
 def _put_wide(array: Any, i: Any, j: Any, wide: Any) -> Any:
-    def made(array: Any, i: Any, j: Any, wide: Any) -> Any:
-        return _given(array, i, j, wide)
+    def implementation(array: Any, i: Any, j: Any, wide: Any) -> Any:
+        return _store_wide(array, i, j, wide)
 
-    return made if _known(array) else None
+    return implementation if _is_supported(array) else None
 
 
-@overload(transpose_blocks, jit_options=INLINED)
+@overload(transpose_blocks, jit_options=INLINE_OPTIONS)
 def _transpose_blocks(array: Any, i: Any, j: Any) -> Any:
-    def made(array: Any, i: Any, j: Any) -> Any:
-        return _exchanged(array, i, j)
+    def implementation(array: Any, i: Any, j: Any) -> Any:
+        return _exchange_blocks(array, i, j)
 
     def of_lanes(array: Any, i: Any, j: Any) -> None:
         pass
 
-    if not _known(array):
+    if not _is_supported(array):
         return None
-    return of_lanes if _of_lanes(array) else made
+    return of_lanes if _has_lane_elements(array) else implementation
 
 
-@overload(mirror_block, jit_options=INLINED)
+@overload(mirror_block, jit_options=INLINE_OPTIONS)
 def _mirror_block(array: Any, i: Any, j: Any) -> Any:
-    def made(array: Any, i: Any, j: Any) -> Any:
-        return _mirrored(array, i, j)
+    def implementation(array: Any, i: Any, j: Any) -> Any:
+        return _mirror_lanes(array, i, j)
 
     def of_lanes(array: Any, i: Any, j: Any) -> Any:
-        _given(array, j, i, _taken(array, i, j))
+        _store_wide(array, j, i, _load_wide(array, i, j))
 
-    if not _known(array):
+    if not _is_supported(array):
         return None
-    return of_lanes if _of_lanes(array) else made
+    return of_lanes if _has_lane_elements(array) else implementation
 
 
 # ---- a transposed view of an array in lanes
 
 
-@infer_global(turned)
-class _Turned(AbstractTemplate):
-    key = turned
+@infer_global(transposed)
+class _TransposedTemplate(AbstractTemplate):
+    key = transposed
 
     def generic(self, args: Any, kws: Any) -> Any:
         """The type of the view."""
         (array,) = args
-        if not _known(array):
+        if not _is_supported(array):
             return None
-        return signature(array.copy(layout="F") if _of_lanes(array) else array, array)
+        return signature(array.copy(layout="F") if _has_lane_elements(array) else array, array)
 
 
-def _lower_turned(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+def _lower_transposed(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     if sig.return_type == sig.args[0]:
-        return given[0]
-    held = context.make_array(sig.args[0])(context, builder, given[0])
+        return args[0]
+    source = context.make_array(sig.args[0])(context, builder, args[0])
     found = context.make_array(sig.return_type)(context, builder)
     populate_array(
         found,
-        data=held.data,
-        shape=cgutils.unpack_tuple(builder, held.shape)[::-1],
-        strides=cgutils.unpack_tuple(builder, held.strides)[::-1],
-        itemsize=held.itemsize,
+        data=source.data,
+        shape=cgutils.unpack_tuple(builder, source.shape)[::-1],
+        strides=cgutils.unpack_tuple(builder, source.strides)[::-1],
+        itemsize=source.itemsize,
         meminfo=None,
         parent=None,
     )
     return found._getvalue()
 
 
-lower_builtin(turned, types.Array)(_lower_turned)
+lower_builtin(transposed, types.Array)(_lower_transposed)
 
 
 # ---- eight neighbours in an array in lanes
@@ -322,61 +322,61 @@ def _joined(builder: Any, vectors: list[Any]) -> Any:
 
 
 def _one_by_one(name: str) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         def part(k: int, value: Any, kind: Any) -> Any:
             return builder.extract_value(value, k) if kind == EIGHT else value
 
-        pairs = list(zip(given, sig.args, strict=True))
+        pairs = list(zip(args, sig.args, strict=True))
         done = [getattr(builder, name)(*(part(k, *one) for one in pairs)) for k in range(WIDTH)]
         return _joined(builder, done)
 
-    return made
+    return codegen
 
 
-define(operator.add, _one_by_one("fadd"), signature(EIGHT, EIGHT, EIGHT))
-define(operator.sub, _one_by_one("fsub"), signature(EIGHT, EIGHT, EIGHT))
-define(operator.mul, _one_by_one("fmul"), signature(EIGHT, WIDE, EIGHT))
-
-
-@intrinsic
-def _eight_taken(_: Any, array: Any, i: Any, j: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        return _joined(builder, _load(builder, _neighbours(context, builder, sig.args[0], *given)))
-
-    return EIGHT(array, types.intp, types.intp), made
+define_for_lanes(operator.add, _one_by_one("fadd"), signature(EIGHT, EIGHT, EIGHT))
+define_for_lanes(operator.sub, _one_by_one("fsub"), signature(EIGHT, EIGHT, EIGHT))
+define_for_lanes(operator.mul, _one_by_one("fmul"), signature(EIGHT, WIDE, EIGHT))
 
 
 @intrinsic
-def _eight_given(_: Any, array: Any, i: Any, j: Any, eight: Any) -> Any:
-    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        vectors = [builder.extract_value(given[3], k) for k in range(WIDTH)]
-        _store(builder, vectors, _neighbours(context, builder, sig.args[0], *given[:3]))
+def _load_eight(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _joined(builder, _load(builder, _neighbours(context, builder, sig.args[0], *args)))
+
+    return EIGHT(array, types.intp, types.intp), codegen
+
+
+@intrinsic
+def _store_eight(_: Any, array: Any, i: Any, j: Any, eight: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vectors = [builder.extract_value(args[3], k) for k in range(WIDTH)]
+        _store(builder, vectors, _neighbours(context, builder, sig.args[0], *args[:3]))
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, types.intp, EIGHT), made
+    return types.void(array, types.intp, types.intp, EIGHT), codegen
 
 
-@overload(eight_at, jit_options=INLINED)
+@overload(eight_at, jit_options=INLINE_OPTIONS)
 def _eight_at(array: Any, i: Any, j: Any) -> Any:
-    def made(array: Any, i: Any, j: Any) -> Any:
-        return _taken(array, i, j)
+    def implementation(array: Any, i: Any, j: Any) -> Any:
+        return _load_wide(array, i, j)
 
     def of_lanes(array: Any, i: Any, j: Any) -> Any:
-        return _eight_taken(array, i, j)
+        return _load_eight(array, i, j)
 
-    if not _known(array):
+    if not _is_supported(array):
         return None
-    return of_lanes if _of_lanes(array) else made
+    return of_lanes if _has_lane_elements(array) else implementation
 
 
-@overload(put_eight, jit_options=INLINED)
+@overload(put_eight, jit_options=INLINE_OPTIONS)
 def _put_eight(array: Any, i: Any, j: Any, eight: Any) -> Any:
-    def made(array: Any, i: Any, j: Any, eight: Any) -> Any:
-        return _given(array, i, j, eight)
+    def implementation(array: Any, i: Any, j: Any, eight: Any) -> Any:
+        return _store_wide(array, i, j, eight)
 
     def of_lanes(array: Any, i: Any, j: Any, eight: Any) -> Any:
-        return _eight_given(array, i, j, eight)
+        return _store_eight(array, i, j, eight)
 
-    if not _known(array):
+    if not _is_supported(array):
         return None
-    return of_lanes if _of_lanes(array) else made
+    return of_lanes if _has_lane_elements(array) else implementation

@@ -43,24 +43,24 @@ def combine(into: Array, k: int, array: Array, rows: Any, shares: Array, n: int)
 
 
 @kernel
-def take_row(array: Array, k: int, share: float, other: int, n: int) -> None:
+def subtract_row(array: Array, k: int, share: float, other: int, n: int) -> None:
     """Subtract from row k, of n numbers, `share` times row `other`."""
     for j in range(0, n, WIDTH):
         put_eight(array, k, j, eight_at(array, k, j) - share * eight_at(array, other, j))
 
 
 @kernel
-def take_rows(array: Array, k: int, shares: Array, n: int) -> None:
+def subtract_rows(array: Array, k: int, shares: Array, n: int) -> None:
     """Subtract from row k, of n numbers, shares[i, 0] times row i, for each row i before it."""
     for j in range(0, n, WIDTH):
-        left = eight_at(array, k, j)
+        remainder = eight_at(array, k, j)
         for i in range(k):
-            left = left - shares[i, 0] * eight_at(array, i, j)
-        put_eight(array, k, j, left)
+            remainder = remainder - shares[i, 0] * eight_at(array, i, j)
+        put_eight(array, k, j, remainder)
 
 
 @kernel
-def weigh(into: Array, array: Array, factors: Array, count: int, n: int) -> None:
+def accumulate_and_scale(into: Array, array: Array, factors: Array, count: int, n: int) -> None:
     """Add to the only row of `into` the first `count` rows of `array`, of n numbers, times factors[k, 0];
     then multiply each of these rows by factors[k, 1]."""
     for j in range(0, n, WIDTH):
@@ -91,19 +91,19 @@ def symmetrise(array: Array, n: int) -> None:
 
 
 @kernel
-def take_squares(array: Array, of: Array, count: int, n: int) -> None:
+def subtract_squares(array: Array, of: Array, count: int, n: int) -> None:
     """Subtract the squares of `count` rows, a multiple of three, from the first n x n numbers of `array`:
     array[i, j] -= of[k, i] of[k, j], from the diagonal on. The part below is its mirror image, as the product
     is symmetric."""
     if columns_at_once(array) == 1:
-        _take_squares_of_lanes(array, of, count, n)
+        _subtract_squares_in_lanes(array, of, count, n)
         return
     for first in range(0, count, 3):
         for i in range(n):
             a, b, c = of[first, i], of[first + 1, i], of[first + 2, i]
             for j in range(i - i % WIDTH, n, WIDTH):
-                left = wide_at(array, i, j) - a * wide_at(of, first, j) - b * wide_at(of, first + 1, j)
-                put_wide(array, i, j, left - c * wide_at(of, first + 2, j))
+                remainder = wide_at(array, i, j) - a * wide_at(of, first, j) - b * wide_at(of, first + 1, j)
+                put_wide(array, i, j, remainder - c * wide_at(of, first + 2, j))
     symmetrise(array, n)
 
 
@@ -111,19 +111,19 @@ def take_squares(array: Array, of: Array, count: int, n: int) -> None:
 
 
 @kernel
-def _take_squares_of_lanes(array: Array, of: Array, count: int, n: int) -> None:
+def _subtract_squares_in_lanes(array: Array, of: Array, count: int, n: int) -> None:
     for i in range(0, n - 1, 2):
         first = 0
         while first < count:
             if count - first >= 6:
-                _take_six(array, of, first, i, n)
+                _subtract_six(array, of, first, i, n)
                 first += 6
             else:
-                _take_three(array, of, first, i, n)
+                _subtract_three(array, of, first, i, n)
                 first += 3
     if n % 2 != 0:
         for i in range(n):
-            _take_one(array, of, count, i, n - 1)
+            _subtract_one(array, of, count, i, n - 1)
 
 
 @kernel
@@ -142,17 +142,17 @@ def _put_square(array: Array, i: int, j: int, square: Any) -> None:
 
 
 @kernel
-def _take_one(array: Array, of: Array, count: int, i: int, j: int) -> None:
-    left = wide_at(array, i, j)
+def _subtract_one(array: Array, of: Array, count: int, i: int, j: int) -> None:
+    remainder = wide_at(array, i, j)
     for k in range(count):
-        own: Any = wide_at(of, k, i)
-        left = left - own * wide_at(of, k, j)
-    put_wide(array, i, j, left)
-    put_wide(array, j, i, left)
+        lane_i: Any = wide_at(of, k, i)
+        remainder = remainder - lane_i * wide_at(of, k, j)
+    put_wide(array, i, j, remainder)
+    put_wide(array, j, i, remainder)
 
 
 @kernel
-def _three_from(square: Any, of: Array, first: int, j: int, a: Any, b: Any) -> Any:
+def _minus_three(square: Any, of: Array, first: int, j: int, a: Any, b: Any) -> Any:
     """A square of two by two minus what three rows of `of` contribute; `a` and `b` are the numbers of these
     rows that belong to the two rows of the square."""
     p, q, r, s = square
@@ -176,16 +176,16 @@ def _square_at(array: Array, i: int, j: int) -> Any:
 
 
 @kernel
-def _take_three(array: Array, of: Array, first: int, i: int, n: int) -> None:
+def _subtract_three(array: Array, of: Array, first: int, i: int, n: int) -> None:
     a, b = _three_at(of, first, i), _three_at(of, first, i + 1)
     for j in range(i, n - 1, 2):
-        _put_square(array, i, j, _three_from(_square_at(array, i, j), of, first, j, a, b))
+        _put_square(array, i, j, _minus_three(_square_at(array, i, j), of, first, j, a, b))
 
 
 @kernel
-def _take_six(array: Array, of: Array, first: int, i: int, n: int) -> None:
+def _subtract_six(array: Array, of: Array, first: int, i: int, n: int) -> None:
     a, b = _three_at(of, first, i), _three_at(of, first, i + 1)
     c, d = _three_at(of, first + 3, i), _three_at(of, first + 3, i + 1)
     for j in range(i, n - 1, 2):
-        square = _three_from(_square_at(array, i, j), of, first, j, a, b)
-        _put_square(array, i, j, _three_from(square, of, first + 3, j, c, d))
+        square = _minus_three(_square_at(array, i, j), of, first, j, a, b)
+        _put_square(array, i, j, _minus_three(square, of, first + 3, j, c, d))

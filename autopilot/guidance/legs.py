@@ -10,7 +10,7 @@ from math import comb, inf, pi, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
-from autopilot.guidance.setpoint_follower import Follow, Posture
+from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
 from autopilot.trajectory.shaping import ShapedSignals
 from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
@@ -22,11 +22,13 @@ LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
 LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 
-LEAST_SWINGS = 1.2  # a move of the load takes at least this many periods of its pendulum, however short it is
+MIN_MOVE_PERIODS = (
+    1.2  # a move of the load takes at least this many periods of its pendulum, however short it is
+)
 CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
-CALM_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
-SHORTEST_RAMP_S = 0.3  # in which the winch comes to its rate
-STEEPEST_LEAN = 0.7  # sine of the greatest lean of the cable that is requested of a swinging load
+DAMPING_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
+MIN_RAMP_S = 0.3  # in which the winch comes to its rate
+MAX_LEAN_SINE = 0.7  # sine of the greatest lean of the cable that is requested of a swinging load
 
 # Taylor coefficients of transfer's s(u): of u^7 ... u^13
 _STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
@@ -112,7 +114,7 @@ class Brake:
 
 
 @dataclass(frozen=True, slots=True)
-class Slow:
+class PathStop:
     """A stop along the path of another leg: the time of that leg passes ever more slowly and stops.
 
     x(t) = y(sigma(t)), sigma' = 1 - s(t / stop) with the s of `autopilot.trajectory.transfer`: every
@@ -183,17 +185,17 @@ class Slow:
 
 
 @dataclass(frozen=True, slots=True)
-class Catch:
+class CatchLoad:
     """The cable is slack in the air: the vehicle falls with its load and moves away from it until it is taut.
 
-    The thrust can only separate them faster, never slow the separation: they separate at `closing_m_s`, or
+    The thrust can only separate them faster, never slow the separation: they separate at `separation_m_s`, or
     faster if the slack would otherwise not be taken up in CATCH_S, since meanwhile both fall. The requested
-    motion depends on the state and not on time: `meeting`. `anchor` is where the vehicle was.
+    motion depends on the state and not on time: `falling_motion`. `anchor` is where the vehicle was.
     """
 
     anchor: Vec3
     length_m: float  # of the cable
-    closing_m_s: float
+    separation_m_s: float
     duration_s: float = inf
     control_mode: int = QUAD_POSITION
 
@@ -201,14 +203,14 @@ class Catch:
         """The anchor at rest."""
         return _rest(self.anchor)
 
-    def meeting(self, x_quad: Vec3, v_quad: Vec3, x_load: Vec3, v_load: Vec3, gravity: float) -> Jet:
+    def falling_motion(self, x_quad: Vec3, v_quad: Vec3, x_load: Vec3, v_load: Vec3, gravity: float) -> Jet:
         """Motion requested of the vehicle. Only the climb is requested: there is hardly any thrust, and
         turning would need more of it than falling allows."""
         cable = sub(x_load, x_quad)
         distance = norm(cable)
         q = scale(1.0 / max(distance, 1e-6), cable)
-        wanted = max(self.closing_m_s, (self.length_m - distance) / CATCH_S)
-        climb = v_quad[2] + (dot(q, sub(v_load, v_quad)) - wanted) * q[2]
+        separation_speed = max(self.separation_m_s, (self.length_m - distance) / CATCH_S)
+        climb = v_quad[2] + (dot(q, sub(v_load, v_quad)) - separation_speed) * q[2]
         return (x_quad, (v_quad[0], v_quad[1], climb), (0.0, 0.0, -gravity), ZERO, ZERO, ZERO, ZERO)
 
 
@@ -278,7 +280,7 @@ class Reel:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class SignalRun:
     """The signals of a mission as they are flown, from where the load hung when they began."""
 
     anchor: Vec3
@@ -294,13 +296,13 @@ class Run:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
         return _moved(self.anchor, self.path.jet(t - self.path.lead_s))
 
-    def asked(self, t: float) -> Jet:
+    def requested(self, t: float) -> Jet:
         """The same for the requested path."""
         return _moved(self.anchor, self.path.requested(t - self.path.lead_s))
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class PathStretch:
     """A stretch of a path through waypoints; the path continues beyond the end of the stretch.
 
     `offset` is the displacement of the load from the beginning of the path when it began; it fades away in
@@ -353,7 +355,7 @@ class Swing:
 
 
 @dataclass(frozen=True, slots=True)
-class Calm:
+class SwingDamping:
     """Take the swing out of the load: the cable's lean continues as it was and fades away.
 
     p = (p_0 + p_0' t) (1 - s(t / duration)), where p is the horizontal part of the unit vector from load to
@@ -374,15 +376,15 @@ class Calm:
 
     def upward(self, t: float) -> Vec3:
         """Unit vector, ENU: the direction from load to vehicle."""
-        rest = transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)[0][0]
-        x, y, _ = scale(rest, axpy(t, self.lean_rate, self.lean))
-        shrink = min(1.0, STEEPEST_LEAN / max(sqrt(x * x + y * y), 1e-9))
+        fade = transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)[0][0]
+        x, y, _ = scale(fade, axpy(t, self.lean_rate, self.lean))
+        shrink = min(1.0, MAX_LEAN_SINE / max(sqrt(x * x + y * y), 1e-9))
         x, y = shrink * x, shrink * y
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
 @dataclass(frozen=True, slots=True)
-class Steady:
+class LevelHold:
     """The vehicle is kept level by its gyroscope, with a thrust (N), while nothing else is known."""
 
     thrust_n: float
@@ -402,47 +404,49 @@ Leg = (
     Hold
     | Transfer
     | Brake
-    | Slow
-    | Catch
+    | PathStop
+    | CatchLoad
     | Creep
     | Reel
-    | Run
-    | Pass
+    | SignalRun
+    | PathStretch
     | Swing
-    | Calm
-    | Follow
-    | Posture
-    | Steady
+    | SwingDamping
+    | TrackPosition
+    | TrackAttitude
+    | LevelHold
 )
 
 
-def asked_jet(leg: Leg, t: float) -> Jet:
+def requested_jet(leg: Leg, t: float) -> Jet:
     """The requested motion where the leg flies a shaped one; otherwise the motion that it flies."""
-    return leg.asked(t) if isinstance(leg, Run) else leg.jet(t)
+    return leg.requested(t) if isinstance(leg, SignalRun) else leg.jet(t)
 
 
-def least_move_s(cable_length: float, gravity: float) -> float:
+def min_move_duration(cable_length: float, gravity: float) -> float:
     """Least duration (s) of a move that carries the load.
 
     With a limit of the acceleration alone, a short move would be quick: 5 cm would take 0.7 s, and its higher
     derivatives would turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at
     0.7 m of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
     """
-    return LEAST_SWINGS * 2.0 * pi * sqrt(cable_length / gravity)
+    return MIN_MOVE_PERIODS * 2.0 * pi * sqrt(cable_length / gravity)
 
 
-def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: float, least_s: float) -> Brake:
+def brake_leg(
+    begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: float, min_duration_s: float
+) -> Brake:
     """A stop that takes the velocity away with no more than about `accel_limit` (m/s^2)."""
-    duration = max(least_s, PEAK_SPEED * norm(velocity) / accel_limit)
+    duration = max(min_duration_s, PEAK_SPEED * norm(velocity) / accel_limit)
     return Brake(begin, velocity, acceleration, duration)
 
 
-def slow_leg(leg: Leg, t: float, accel_limit: float, least_s: float) -> Slow:
+def path_stop_leg(leg: Leg, t: float, accel_limit: float, min_duration_s: float) -> PathStop:
     """A stop on the path of `leg`, `t` seconds into it, that slows down with no more than about `accel_limit`
     (m/s^2). If `leg` is itself a stop: the rest of it."""
-    if isinstance(leg, Slow):
+    if isinstance(leg, PathStop):
         return replace(leg, elapsed_s=min(leg.elapsed_s + t, leg.stop_s))
-    return Slow(leg, t, max(least_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
+    return PathStop(leg, t, max(min_duration_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
 
 
 def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mode: int) -> Transfer:
@@ -451,28 +455,28 @@ def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mod
     return Transfer(begin, end, transfer_duration(distance, speed, accel), control_mode)
 
 
-def reel_leg(begin: Vec3, length: float, wanted: float, speed: float, accel: float) -> Reel:
-    """The winch makes a cable of `length` m `wanted` m long within the speed and acceleration given; the load
-    hangs at `begin`, the vehicle stays."""
-    longer = abs(wanted - length)
+def reel_leg(begin: Vec3, length: float, target_length: float, speed: float, accel: float) -> Reel:
+    """The winch makes a cable of `length` m `target_length` m long within the speed and acceleration given;
+    the load hangs at `begin`, the vehicle stays."""
+    length_change = abs(target_length - length)
     # a ramp takes PEAK_SPEED rate / accel, at half the rate on average; short ways do not reach the rate
-    rate = min(speed, sqrt(longer * accel / PEAK_SPEED))
-    ramp = max(PEAK_SPEED * rate / accel, SHORTEST_RAMP_S)
-    rate = min(rate, longer / ramp)
-    sign = 1.0 if wanted > length else -1.0
-    return Reel(begin, begin[2] + length, sign * rate, ramp, longer / rate - ramp)
+    rate = min(speed, sqrt(length_change * accel / PEAK_SPEED))
+    ramp = max(PEAK_SPEED * rate / accel, MIN_RAMP_S)
+    rate = min(rate, length_change / ramp)
+    sign = 1.0 if target_length > length else -1.0
+    return Reel(begin, begin[2] + length, sign * rate, ramp, length_change / rate - ramp)
 
 
-def top_of(leg: Leg) -> float | None:
+def winch_hold_height(leg: Leg) -> float | None:
     """Height at which the vehicle is held while the winch works; None where it rests."""
-    if isinstance(leg, Slow):
-        return top_of(leg.leg)
+    if isinstance(leg, PathStop):
+        return winch_hold_height(leg.leg)
     return leg.top_m if isinstance(leg, Reel) else None
 
 
-def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, least_s: float) -> Transfer:
-    """A transfer of the load within the limits given, and no quicker than `least_s` unless the distance is
-    zero."""
+def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, min_duration_s: float) -> Transfer:
+    """A transfer of the load within the limits given, and no quicker than `min_duration_s` unless the
+    distance is zero."""
     distance = norm(sub(end, begin))
-    duration = max(least_s, transfer_duration(distance, speed, accel)) if distance > 0.0 else 0.0
+    duration = max(min_duration_s, transfer_duration(distance, speed, accel)) if distance > 0.0 else 0.0
     return Transfer(begin, end, duration, LOAD_POSITION)

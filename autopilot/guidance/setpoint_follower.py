@@ -1,6 +1,6 @@
 """Following requests that may change at any moment: setpoints of a stream, a stick, a circle.
 
-Every request (one that jumps included) passes two stages. The governor moves a point r towards it within
+Every request (one that jumps included) passes two filters. The governor moves a point r towards it within
 limits of speed and acceleration; the smoother lets the load follow that point with derivatives up to the
 sixth that never jump:
 
@@ -13,7 +13,7 @@ acceleration of r is constant,
 
     x(t) = r - 7 r'/w + 28 r''/w^2 + exp(-w t) sum_k c_k t^k / k!,
 
-with c_k = (D + w)^k of the difference at t = 0: nothing is integrated, and a leg begun anew at any time
+with c_k = (D + w)^k of the difference at t = 0: nothing is integrated, and a leg restarted at any time
 continues from the jet of the one before.
 
 | symbol   | here     | unit  |
@@ -32,7 +32,7 @@ from math import atan, ceil, comb, cos, exp, inf, isnan, nan, radians, sin, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry import so3
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, column, mul, norm, scale, sub
-from autopilot.guidance.heading import LONGEST_STEP_S
+from autopilot.guidance.heading import MAX_STEP_S
 from autopilot.wire.dialect import plumbline as mavlink
 
 ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
@@ -40,16 +40,16 @@ K_P = 1.2  # 1/s, requested speed per metre of distance of the governor's point
 K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is a reserve
 SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
-FADED = 40.0  # periods 1/w of the smoother, after which it has arrived apart from rounding
-STEEPEST_DEG = 60.0  # greatest lean that is requested of the vehicle
-_LEAST_UP = cos(radians(STEEPEST_DEG))
+SETTLING_PERIODS = 40.0  # periods 1/w of the smoother, after which it has arrived apart from rounding
+MAX_LEAN_DEG = 60.0  # greatest lean that is requested of the vehicle
+_MIN_UPWARD = cos(radians(MAX_LEAN_DEG))
 FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
 _OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, except for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
 NEVER_US = 2**62
-NOWHERE: Vec3 = (nan, nan, nan)
+UNSPECIFIED: Vec3 = (nan, nan, nan)
 Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 
 
@@ -61,20 +61,20 @@ class PositionSetpoint:
     acceleration is requested, nothing holds the load.
     """
 
-    position: Vec3 = NOWHERE
-    velocity: Vec3 = NOWHERE
-    accel: Vec3 = NOWHERE
+    position: Vec3 = UNSPECIFIED
+    velocity: Vec3 = UNSPECIFIED
+    accel: Vec3 = UNSPECIFIED
     since_us: int = 0
     heading: float = nan  # rad, from east to north
-    turning: float = nan  # rad/s
+    yaw_rate: float = nan  # rad/s
 
     @property
-    def is_place(self) -> bool:
+    def is_fixed_position(self) -> bool:
         """Whether it requests a place that does not move, and nothing else."""
-        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel, self.turning))
+        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel, self.yaw_rate))
         return not moves and not all(map(isnan, self.position))
 
-    def adrift(self, v: Vec3) -> Vec3:
+    def acceleration_only_part(self, v: Vec3) -> Vec3:
         """The parts of a vector along the axes on which only an acceleration is requested."""
         x, y, z = (
             v[axis]
@@ -92,19 +92,19 @@ class Circle:
     centre: Vec3
     radius: float
     rate: float
-    phase: float  # angle from east at which it begins
+    start_angle: float  # angle from east at which it begins
     since_us: int
     ramp_s: float  # in which the rate is reached
     ends_us: int = NEVER_US  # when it has been flown
 
-    def seen(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
+    def smoother_input(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
         """Position, velocity and acceleration that a smoother of this rate turns into the circle."""
         t = max(0.0, (now_us - self.since_us) * 1e-6)
-        begun = t < self.ramp_s
-        gone = 0.5 * t * t / self.ramp_s if begun else t - 0.5 * self.ramp_s
-        turning = self.rate * (t / self.ramp_s if begun else 1.0)
+        ramping = t < self.ramp_s
+        progress_s = 0.5 * t * t / self.ramp_s if ramping else t - 0.5 * self.ramp_s
+        turning = self.rate * (t / self.ramp_s if ramping else 1.0)
         share = turning / rate
-        angle = self.phase + self.rate * gone + ORDER * atan(share)
+        angle = self.start_angle + self.rate * progress_s + ORDER * atan(share)
         radius = self.radius * (1.0 + share * share) ** (0.5 * ORDER)
         x, y = radius * cos(angle), radius * sin(angle)
         along = (-turning * y, turning * x, 0.0)
@@ -119,33 +119,33 @@ class AttitudeSetpoint:
     upward: Vec3
     thrust_n: float | None
     heading: float = nan  # rad, from east to north
-    turning: float = nan  # rad/s
+    yaw_rate: float = nan  # rad/s
     rates: Vec3 | None = None  # rad/s, body
 
     @property
     def is_too_steep(self) -> bool:
         """Whether the vehicle would lean by more than STEEPEST_DEG."""
-        return not self.upward[2] >= _LEAST_UP
+        return not self.upward[2] >= _MIN_UPWARD
 
 
-Asked = PositionSetpoint | Circle | AttitudeSetpoint
+Setpoint = PositionSetpoint | Circle | AttitudeSetpoint
 
 
 @dataclass(frozen=True, slots=True)
 class FollowLimits:
     """Limits of the governor and the rate of the smoother."""
 
-    speed: float  # m/s, towards a position
-    fastest: float  # m/s, for a requested velocity
+    approach_speed: float  # m/s, towards a position
+    max_speed: float  # m/s, for a requested velocity
     accel: float  # m/s^2
     rate: float  # rad/s
 
 
 @dataclass(frozen=True, slots=True)
-class Follow:
+class TrackPosition:
     """The load on its way to the governor's point, which moves at constant acceleration.
 
-    `onward` is the same motion begun anew later; until then each moment of it is known.
+    `redirected` is the same motion restarted later; until then each moment of it is known.
     """
 
     begin: Jet
@@ -192,12 +192,12 @@ class Follow:
         rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
         return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
-    def coasting(self, t: float, rate: float) -> Follow:
+    def coasting(self, t: float, rate: float) -> TrackPosition:
         """The motion from `t` seconds into this leg on, with its point continuing at its present velocity."""
         x, v, a = self.point
-        return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
+        return TrackPosition(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
 
-    def stopped(self, t: float, accel: float) -> tuple[tuple[Follow, ...], Vec3]:
+    def stopped(self, t: float, accel: float) -> tuple[tuple[TrackPosition, ...], Vec3]:
         """The legs from `t` seconds into this leg on to rest, and the place of that rest.
 
         The point slows down at `accel` (m/s^2), and its descent as fast as keeps it above the floor. The legs
@@ -207,14 +207,14 @@ class Follow:
         x, v, a = self.point
         x, v = axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
         level, drop = (v[0], v[1], 0.0), (0.0, 0.0, v[2])
-        least_s = norm(v) / accel
-        level_s = drop_s = _up_to_us(least_s)
+        min_duration_s = norm(v) / accel
+        level_s = drop_s = _ceil_to_us(min_duration_s)
         height = max(x[2] - FLOOR_M, 0.0)
-        if v[2] < 0.0 and -0.5 * v[2] * least_s > height:
-            drop_s = _up_to_us(max(2.0 * height, -v[2] / accel * -v[2]) / -v[2])
+        if v[2] < 0.0 and -0.5 * v[2] * min_duration_s > height:
+            drop_s = _ceil_to_us(max(2.0 * height, -v[2] / accel * -v[2]) / -v[2])
             lift = -v[2] / drop_s
-            level_s = _up_to_us(norm(level) / sqrt(max(accel * accel - lift * lift, 0.25 * accel * accel)))
-        legs: list[Follow] = []
+            level_s = _ceil_to_us(norm(level) / sqrt(max(accel * accel - lift * lift, 0.25 * accel * accel)))
+        legs: list[TrackPosition] = []
         jet, gone_s = self.jet(t), 0.0
         for until_s in sorted({level_s, drop_s}):
             push = ZERO
@@ -222,31 +222,36 @@ class Follow:
                 push = axpy(-1.0 / level_s, level, push)
             if gone_s < drop_s:
                 push = axpy(-1.0 / drop_s, drop, push)
-            lasts = _whole_us(until_s - gone_s)
+            lasts = _round_to_us(until_s - gone_s)
             if lasts <= 0.0:
                 continue
-            leg = Follow(jet, (x, v, push), self.rate, lasts)
+            leg = TrackPosition(jet, (x, v, push), self.rate, lasts)
             x, v = axpy(0.5 * lasts * lasts, push, axpy(lasts, v, x)), axpy(lasts, push, v)
             jet, gone_s = leg.jet(lasts), until_s
             legs.append(leg)
-        return (*legs, Follow(jet, (x, ZERO, ZERO), self.rate, _whole_us(FADED / self.rate))), x
+        return (
+            *legs,
+            TrackPosition(jet, (x, ZERO, ZERO), self.rate, _round_to_us(SETTLING_PERIODS / self.rate)),
+        ), x
 
-    def onward(self, t: float, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Follow:
+    def redirected(
+        self, t: float, setpoint: PositionSetpoint | Circle, limits: FollowLimits, now_us: int
+    ) -> TrackPosition:
         """The motion from `t` seconds into this leg on, towards what is requested at `now_us`."""
         x, v, a = self.point
-        point = governed(axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), asked, pace, now_us)
-        return Follow(self.jet(t), point, pace.rate)
+        point = governor_point(axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), setpoint, limits, now_us)
+        return TrackPosition(self.jet(t), point, limits.rate)
 
 
-def _whole_us(seconds: float) -> float:
+def _round_to_us(seconds: float) -> float:
     return round(seconds * 1e6) * 1e-6
 
 
-def _up_to_us(seconds: float) -> float:
+def _ceil_to_us(seconds: float) -> float:
     return ceil(seconds * 1e6) * 1e-6
 
 
-def begin_following(jet: Jet, rate: float) -> Follow:
+def start_following(jet: Jet, rate: float) -> TrackPosition:
     """A motion that continues from `jet` until something is requested.
 
     The point is at (1 + D/w)^7 x, as far as the jet determines it. A point that disagreed with the jet in its
@@ -254,14 +259,14 @@ def begin_following(jet: Jet, rate: float) -> Follow:
     """
     point = []
     for n in range(3):
-        asked = ZERO
+        input_point = ZERO
         for k in range(ORDER - n):
-            asked = axpy(_OF_INPUT[k] / rate**k, jet[n + k], asked)
-        point.append(asked)
-    return Follow(jet, (point[0], point[1], point[2]), rate)
+            input_point = axpy(_OF_INPUT[k] / rate**k, jet[n + k], input_point)
+        point.append(input_point)
+    return TrackPosition(jet, (point[0], point[1], point[2]), rate)
 
 
-def towards(distance: Vec3, accel: float) -> Vec3:
+def approach_velocity(distance: Vec3, accel: float) -> Vec3:
     """Velocity (m/s) of approach to a point that must be reached at rest: K_P times the distance near it, and
     far from it the velocity that a deceleration of `accel` allows."""
     away = norm(distance)
@@ -271,57 +276,66 @@ def towards(distance: Vec3, accel: float) -> Vec3:
     return scale(sqrt(2.0 * accel * (away - 0.5 * bend)) / away, distance)
 
 
-def _at_most(v: Vec3, limit: float) -> Vec3:
+def _limited(v: Vec3, limit: float) -> Vec3:
     size = norm(v)
     return v if size <= limit else scale(limit / size, v)
 
 
-def _or_zero(v: Vec3) -> Vec3:
+def _nan_to_zero(v: Vec3) -> Vec3:
     return (0.0 if isnan(v[0]) else v[0], 0.0 if isnan(v[1]) else v[1], 0.0 if isnan(v[2]) else v[2])
 
 
-def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Point:
+def governor_point(
+    x: Vec3, v: Vec3, setpoint: PositionSetpoint | Circle, limits: FollowLimits, now_us: int
+) -> Point:
     """The governor's point: its position, its velocity, and its acceleration from now on."""
-    if isinstance(asked, Circle):
-        place, along, push = asked.seen(now_us, pace.rate)
+    if isinstance(setpoint, Circle):
+        place, along, push = setpoint.smoother_input(now_us, limits.rate)
         distance = sub(place, x)
     else:
-        along = _at_most(_or_zero(asked.velocity), pace.fastest)
-        push = _at_most(_or_zero(asked.accel), pace.accel)
-        age = (now_us - asked.since_us) * 1e-6 + ORDER / pace.rate
-        aim = axpy(age, along, asked.position)
+        along = _limited(_nan_to_zero(setpoint.velocity), limits.max_speed)
+        push = _limited(_nan_to_zero(setpoint.accel), limits.accel)
+        age = (now_us - setpoint.since_us) * 1e-6 + ORDER / limits.rate
+        aim = axpy(age, along, setpoint.position)
         # on an axis without a requested position, the distance is zero
-        distance = _or_zero(sub(aim, x))
+        distance = _nan_to_zero(sub(aim, x))
         if aim[2] < FLOOR_M:
             distance = (distance[0], distance[1], FLOOR_M - x[2])
             along = (along[0], along[1], max(along[2], 0.0))
-    wanted = add(along, _at_most(towards(distance, BRAKE_SHARE * pace.accel), pace.speed))
-    if isinstance(asked, PositionSetpoint):
+    velocity_command = add(
+        along, _limited(approach_velocity(distance, BRAKE_SHARE * limits.accel), limits.approach_speed)
+    )
+    if isinstance(setpoint, PositionSetpoint):
         # the velocity to which an acceleration alone leads in the time in which velocities are reached
-        wanted = add(wanted, _at_most(asked.adrift(axpy(1.0 / K_V, push, v)), pace.fastest))
-        push = sub(push, asked.adrift(push))
+        velocity_command = add(
+            velocity_command,
+            _limited(setpoint.acceleration_only_part(axpy(1.0 / K_V, push, v)), limits.max_speed),
+        )
+        push = sub(push, setpoint.acceleration_only_part(push))
     # descend no faster than can be stopped at the floor
     height = max(x[2] - FLOOR_M, 0.0)
-    slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
-    near_floor = min(wanted[2], v[2]) < slowest
-    wanted = (wanted[0], wanted[1], max(wanted[2], slowest))
-    asked_for = axpy(K_V, sub(wanted, v), push)
+    min_velocity_z = -norm(approach_velocity((0.0, 0.0, height), BRAKE_SHARE * limits.accel))
+    near_floor = min(velocity_command[2], v[2]) < min_velocity_z
+    velocity_command = (velocity_command[0], velocity_command[1], max(velocity_command[2], min_velocity_z))
+    accel_command = axpy(K_V, sub(velocity_command, v), push)
     if not near_floor:
-        return x, v, _at_most(asked_for, pace.accel)
+        return x, v, _limited(accel_command, limits.accel)
     # braking above the floor comes first, the remaining acceleration is for the rest
-    lift = max(-pace.accel, min(asked_for[2], pace.accel))
-    level = _at_most((asked_for[0], asked_for[1], 0.0), sqrt(pace.accel * pace.accel - lift * lift))
+    lift = max(-limits.accel, min(accel_command[2], limits.accel))
+    level = _limited(
+        (accel_command[0], accel_command[1], 0.0), sqrt(limits.accel * limits.accel - lift * lift)
+    )
     return x, v, (level[0], level[1], lift)
 
 
 @dataclass(frozen=True, slots=True)
-class Posture:
+class TrackAttitude:
     """The vehicle follows an attitude setpoint; the position of the load is uncontrolled.
 
     Where body rates are requested, `attitude` is the attitude that turns at these rates, as it is at `at_us`.
     """
 
-    lean: AttitudeSetpoint
+    setpoint: AttitudeSetpoint
     anchor: Vec3
     attitude: Mat3 | None = None
     at_us: int = 0
@@ -334,31 +348,31 @@ class Posture:
 
     def upward(self, t: float) -> Vec3:
         """Unit vector, ENU: the requested thrust axis."""
-        return self.lean.upward if self.attitude is None else column(self.attitude, 2)
+        return self.setpoint.upward if self.attitude is None else column(self.attitude, 2)
 
-    def onward(self, lean: AttitudeSetpoint, seen: Mat3, now_us: int) -> Posture:
-        """The leg with what is requested at `now_us`, of a vehicle whose attitude is `seen`. Rates do not
+    def updated(self, setpoint: AttitudeSetpoint, measured: Mat3, now_us: int) -> TrackAttitude:
+        """The leg with what is requested at `now_us`, of a vehicle whose attitude is `measured`. Rates do not
         lean the vehicle further than a setpoint may."""
-        if lean.rates is None:
-            return replace(self, lean=lean, attitude=None)
+        if setpoint.rates is None:
+            return replace(self, setpoint=setpoint, attitude=None)
         if self.attitude is None:
-            return replace(self, lean=lean, attitude=seen, at_us=now_us)
-        elapsed_s = min((now_us - self.at_us) * 1e-6, LONGEST_STEP_S)
-        turned = mul(self.attitude, so3.exp(scale(elapsed_s, lean.rates)))
-        leaning = turned[2][2] < min(_LEAST_UP, self.attitude[2][2])
-        return replace(self, lean=lean, attitude=self.attitude if leaning else turned, at_us=now_us)
+            return replace(self, setpoint=setpoint, attitude=measured, at_us=now_us)
+        elapsed_s = min((now_us - self.at_us) * 1e-6, MAX_STEP_S)
+        turned = mul(self.attitude, so3.exp(scale(elapsed_s, setpoint.rates)))
+        leaning = turned[2][2] < min(_MIN_UPWARD, self.attitude[2][2])
+        return replace(self, setpoint=setpoint, attitude=self.attitude if leaning else turned, at_us=now_us)
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class SetpointStream:
     """The last request of one source, and its time."""
 
-    asked: Asked | None = None
+    setpoint: Setpoint | None = None
     at_us: int = -1
 
-    def alive(self, now_us: int, within_us: int) -> bool:
+    def is_fresh(self, now_us: int, within_us: int) -> bool:
         """Whether a request arrived within that time."""
         return self.at_us >= 0 and now_us - self.at_us <= within_us
 
 
-SILENT = Stream()
+NO_STREAM = SetpointStream()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.core.tick import ControlMemory, EstimateSummary
-from autopilot.estimation.filter import NO_LOAD, NO_SIGHT
+from autopilot.estimation.filter import NO_LOAD, NO_LOAD_DIRECTION
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
@@ -74,8 +74,8 @@ _FROM_ESTIMATOR = _copy_table(
     {
         "quat_wxyz": "vehicle.quat_wxyz",
         "accel_quad": "vehicle.accel_quad",
-        "horizontal_std": "doubt.horizontal",
-        "vertical_std": "doubt.vertical",
+        "horizontal_std": "uncertainty.horizontal",
+        "vertical_std": "uncertainty.vertical",
         "tension": "load.tension",
     },
 )
@@ -155,7 +155,7 @@ def put_instant(
         instant[_FORCES + i] = forces[i]
     is_uncertain = summary[_VEHICLE_PROBLEM] != 0.0 or (needs_load_estimate and summary[_LOAD_PROBLEM] != 0.0)
     instant[_FLAGS] = 0 if is_uncertain else _ESTIMATOR_FLAGS
-    load_undetected = summary[_LOAD_PROBLEM] == NO_LOAD or summary[_LOAD_PROBLEM] == NO_SIGHT
+    load_undetected = summary[_LOAD_PROBLEM] == NO_LOAD or summary[_LOAD_PROBLEM] == NO_LOAD_DIRECTION
     if load_undetected and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
         # in the air the accelerometer detects the pull; on the ground only sight shows that it has ended
         instant[_TENSION], instant[_TAUT] = nan, 0.0

@@ -14,7 +14,7 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.geometry.entry import entry_of, native_address_of
+from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.frames import quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, packed, width
@@ -170,13 +170,13 @@ class SampleRecords:
     def address(self, instant: Row, imu: Row) -> int:
         """The address of `put_sample`, compiled or loaded if necessary."""
         arguments = (instant, imu, self.home, 0, self.row, self.copies, self.word, self.records)
-        return native_address_of(put_sample, *arguments)
+        return kernel_address_of(put_sample, *arguments)
 
     def records_at(self, sample: Sample, now_us: int) -> bytes:
         """The records of an instant, one after the other; that of the inertial sample only if it is sane."""
         arguments = (sample.instant, sample.imu, self.home, now_us, self.row, self.copies)
         if self._put is None:
-            self._put = entry_of(put_sample, *arguments, self.word, self.records)
+            self._put = entry_point_of(put_sample, *arguments, self.word, self.records)
         self._put(*arguments, self.word, self.records)
         data = self.records.tobytes()
         if sample.imu_is_sane:

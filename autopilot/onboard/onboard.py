@@ -32,7 +32,7 @@ from autopilot.core.health import Condition, battery_constants
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import warm_up
 from autopilot.estimation.filter import estimator_tuning
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
@@ -319,7 +319,7 @@ class Onboard:
             commanded_rate(flight, now_us, self._shortest_us * 1e-6) if core.is_reeling else 0.0,
         )
         if self._put is None:
-            self._put = entry_of(answer_tick, *arguments)
+            self._put = entry_point_of(answer_tick, *arguments)
         end, self._imu_sane = self._put(*arguments)
         writer.sequence = (writer.sequence + 1) & 0xFF
         return self._frame_view[:end].tobytes()

@@ -33,11 +33,11 @@ from autopilot.estimation.records import (
     EstimatorState,
     ImuReading,
 )
-from autopilot.geometry.entry import entry_of, native_address_of
+from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
-from autopilot.guidance.layout import jets
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg, Run
+from autopilot.guidance.jet_table import jets
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg, SignalRun
 from autopilot.onboard.instant_row import NO_LEG, put_instant
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode
 from autopilot.services import identity, snapshot
@@ -325,7 +325,7 @@ class SnapshotSource:
             *(constants.phase, seq, *constants.load_and_rotors, instant),
         )
         if self._put is None:
-            self._put = entry_of(put_instant, *arguments)
+            self._put = entry_point_of(put_instant, *arguments)
         self._put(*arguments)
         return instant
 
@@ -342,7 +342,7 @@ def address_of_instant(constants: InstantConstants, instant: Row) -> int:
         constants.duration_s,
         0,
     )
-    return native_address_of(put_instant, *arguments, constants.phase, 0, *constants.load_and_rotors, instant)
+    return kernel_address_of(put_instant, *arguments, constants.phase, 0, *constants.load_and_rotors, instant)
 
 
 class InstantConstants(NamedTuple):
@@ -373,12 +373,14 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
         leg = flight.legs[0]
         mode, start_us = int(leg.control_mode), flight.leg_start_us
         duration_s = leg.duration_s if leg.duration_s < inf else nan
-        if isinstance(leg, Run) and setpoints is not None and setpoints.legs is flight.legs:
+        if isinstance(leg, SignalRun) and setpoints is not None and setpoints.legs is flight.legs:
             # while a winch reels, the flight record is replaced at each tick
             unchanged = (
                 before is not None and before.setpoints is setpoints and before.flight.legs is flight.legs
             )
-            requested = before.requested if before and unchanged else jets(leg, setpoints.times_s, asked=True)
+            requested = (
+                before.requested if before and unchanged else jets(leg, setpoints.times_s, requested=True)
+            )
     limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
     return InstantConstants(
         flight,
@@ -400,7 +402,7 @@ def _setpoint(leg: Leg, elapsed_s: float) -> tuple[Array, Array]:
     """The setpoint of a leg for this instant, and the requested path, if they are not laid out in tables."""
     times_s = np.array([elapsed_s])
     targets = jets(leg, times_s)
-    return targets, jets(leg, times_s, asked=True) if isinstance(leg, Run) else targets
+    return targets, jets(leg, times_s, requested=True) if isinstance(leg, SignalRun) else targets
 
 
 class CoreSnapshot(Snapshot):

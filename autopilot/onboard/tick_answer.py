@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.health import update_condition
-from autopilot.estimation.inbox import is_sane
+from autopilot.estimation.inbox import is_valid_imu
 from autopilot.estimation.records import ImuReading
-from autopilot.geometry.entry import native_address_of
+from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, unpack
 from autopilot.wire.compiled import Bytes
@@ -51,11 +51,11 @@ def answer_tick(
         released,
         reel_rate,
     )
-    return end, is_sane(unpack(ImuReading, imu, 0))
+    return end, is_valid_imu(unpack(ImuReading, imu, 0))
 
 
 def address_of_answer() -> int:
     """The address of `answer_tick`, compiled or loaded if necessary."""
     row, scratch = np.zeros(1), np.zeros(1, np.uint8)
     rows, buffers, flags = (row, row, row, row), (scratch, scratch), (False, False, False, 0.0)
-    return native_address_of(answer_tick, *rows, 0, False, 0, 0.0, *buffers, 0, 0, 0, *flags)
+    return kernel_address_of(answer_tick, *rows, 0, False, 0, 0.0, *buffers, 0, 0, 0, *flags)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from autopilot.core.sensor_inbox import address_of_read
 from autopilot.core.tick import CoreRows, placeholder_law
 from autopilot.estimation.records import Array
-from autopilot.geometry.addresses import kernel_giving
+from autopilot.geometry.addresses import call_kernel_returning
 from autopilot.geometry.packed import Row, width
 from autopilot.onboard.flight_log import CompiledLogging
 from autopilot.onboard.log_records import SampleRecords
@@ -73,9 +73,9 @@ DURATION_S, ROTOR_MIN, ROTOR_MAX = range(3)
 
 TIMESYNC = wire_record(mavlink.MAVLink_timesync_message, __name__)
 
-call_read_sensors: Any = kernel_giving(types.int64, types.int64, types.int64, types.boolean)
-call_answer_tick: Any = kernel_giving(types.int64, types.boolean)
-call_put_streams: Any = kernel_giving(types.int64, types.int64, types.int64)
+call_read_sensors: Any = call_kernel_returning(types.int64, types.int64, types.int64, types.boolean)
+call_answer_tick: Any = call_kernel_returning(types.int64, types.boolean)
+call_put_streams: Any = call_kernel_returning(types.int64, types.int64, types.int64)
 
 
 class Code(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from autopilot.core.sensor_inbox import Tick
 from autopilot.core.tick import TO_DECIDE
-from autopilot.geometry.addresses import ask_kernel_at, bytes_at, call_kernel_at
+from autopilot.geometry.addresses import bytes_at, call_int_kernel_at, call_kernel_at
 from autopilot.geometry.kernel import kernel
 from autopilot.onboard.tick_batch import (
     ANY_FIX,
@@ -95,7 +95,7 @@ def fly_next(batch: TickBatch, address: int, size: int) -> int:
     if count < 0 or count > batch.rows.inbox.shape[0] or now_us != before_us + period_us:
         return OTHER_DATAGRAM
     tick = numbers[TICK] + 1
-    outcome = ask_kernel_at(code.fly_tick, (batch.rows, batch.law, count, now_us, tick, dt, decided))
+    outcome = call_int_kernel_at(code.fly_tick, (batch.rows, batch.law, count, now_us, tick, dt, decided))
     if outcome == TO_DECIDE:
         numbers[READINGS], numbers[FIELDS], numbers[HAS_FIX] = count, fields, has_fix
         return NEEDS_DECISION

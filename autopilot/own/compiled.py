@@ -16,7 +16,7 @@ from numba.core.caching import NullCache
 
 from autopilot.geometry.addresses import numbers_at
 from autopilot.geometry.compiler import Kernel
-from autopilot.geometry.entry import address_of
+from autopilot.geometry.entry import c_function_address_of
 from autopilot.geometry.packed import pack, unpack, width
 from autopilot.own.loaded_class import LoadedClass
 
@@ -53,7 +53,7 @@ def c_function(entry: Any) -> CFunction:
     numba's `cfunc` is not used: it leaves the functions that it calls visible to the linker, which then takes
     in their place functions of the same name that were specialised for one caller.
     """
-    return CFunction(address_of(entry, 0), entry)
+    return CFunction(c_function_address_of(entry, 0), entry)
 
 
 def is_compiled(loaded_class: LoadedClass, methods: tuple[str, ...]) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 from numba.extending import overload
 
 from autopilot.control.records import State
-from autopilot.estimation.desk import NO_ESTIMATE, UNTOLD, Estimate
-from autopilot.geometry.compiler import INLINED
+from autopilot.estimation.estimator_exchange import NO_ESTIMATE, NOT_GIVEN, Estimate
+from autopilot.geometry.compiler import INLINE_OPTIONS
 from autopilot.geometry.linear import Mat3
 from autopilot.own.vectors import three_numbers
 
@@ -27,7 +27,7 @@ def estimated(
     v_quad: Numbers,
     R: Sequence[Numbers] | np.ndarray[Any, Any],
     omega_body: Numbers,
-    a_quad: Numbers = UNTOLD,
+    a_quad: Numbers = NOT_GIVEN,
     tension: float = nan,
     horizontal_std: float = nan,
     vertical_std: float = nan,
@@ -64,7 +64,7 @@ def _matrix(rows: Any) -> Mat3:
     return (first, second, third)
 
 
-@overload(estimated, jit_options=INLINED)
+@overload(estimated, jit_options=INLINE_OPTIONS)
 def _estimated(
     x_load: Any,
     v_load: Any,
@@ -74,7 +74,7 @@ def _estimated(
     v_quad: Any,
     R: Any,
     omega_body: Any,
-    a_quad: Any = UNTOLD,
+    a_quad: Any = NOT_GIVEN,
     tension: Any = nan,
     horizontal_std: Any = nan,
     vertical_std: Any = nan,
@@ -88,7 +88,7 @@ def _estimated(
         v_quad: Any,
         R: Any,
         omega_body: Any,
-        a_quad: Any = UNTOLD,
+        a_quad: Any = NOT_GIVEN,
         tension: Any = nan,
         horizontal_std: Any = nan,
         vertical_std: Any = nan,
@@ -99,7 +99,7 @@ def _estimated(
     return implement
 
 
-@overload(no_estimate, jit_options=INLINED)
+@overload(no_estimate, jit_options=INLINE_OPTIONS)
 def _no_estimate() -> Any:
     def implement() -> Any:
         return NO_ESTIMATE

@@ -7,9 +7,9 @@
         def start(self, now): ...                 # memory at the first tick; without it None
         def estimate(self, memory, now): ...      # (memory, estimate)
 
-`now` is `autopilot.estimation.desk.Sensed`; the estimate is made by `estimated` or `no_estimate` of
-`autopilot.own.estimates`. An estimator whose class is a NamedTuple of numbers, and whose methods are
-compiled by `kernel`, is called as machine code.
+`now` is `autopilot.estimation.estimator_exchange.Sensed`; the estimate is made by `estimated` or
+`no_estimate` of `autopilot.own.estimates`. An estimator whose class is a NamedTuple of numbers, and whose
+methods are compiled by `kernel`, is called as machine code.
 """
 
 from __future__ import annotations

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.estimation.desk import (
-    FORGOTTEN,
-    GIVEN,
+from autopilot.estimation.estimator_exchange import (
+    ESTIMATE_OFFSET,
+    ESTIMATOR_OFFSET,
+    LOST,
     NO_ESTIMATE,
     NOTHING_SENSED,
-    OWN,
     REST,
-    SOUND,
+    VALID,
     Estimate,
     Sensed,
-    flaw,
-    told_of,
+    estimate_fault,
+    fault_text,
 )
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.own.compiled import ExchangeLayout, compiled, function_address, is_compiled, memory_type
@@ -33,7 +33,7 @@ from autopilot.own.guard import CallError, Guard, MethodCaller, memory_and_answe
 from autopilot.own.source import error_text
 
 _C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
-_LAYOUT = ExchangeLayout(Sensed, GIVEN, OWN)
+_LAYOUT = ExchangeLayout(Sensed, ESTIMATE_OFFSET, ESTIMATOR_OFFSET)
 UNSET_ESTIMATE = Estimate(True, REST._replace(x_quad=(nan, nan, nan)), nan, nan, nan)
 
 
@@ -43,7 +43,7 @@ class EstimatorHost:
     def __init__(self, estimator: OwnEstimator, on_failure: Callable[[], None] = lambda: None) -> None:
         self.estimator = estimator
         self.guard = Guard(estimator, on_failure)
-        self.exchange: Row = np.zeros(OWN)
+        self.exchange: Row = np.zeros(ESTIMATOR_OFFSET)
         self._method_caller = MethodCaller(self.guard, _checked_answer)
         self._function: Any = _C_FUNCTION(self._call)
         self.reset()
@@ -51,7 +51,7 @@ class EstimatorHost:
     @property
     def has_estimate(self) -> bool:
         """Whether it has given an estimate."""
-        return bool(self.exchange[GIVEN])
+        return bool(self.exchange[ESTIMATE_OFFSET])
 
     @property
     def address(self) -> int:
@@ -61,7 +61,7 @@ class EstimatorHost:
     def reset(self) -> None:
         """Clear the exchange row: the next tick is the estimator's first."""
         pack(NOTHING_SENSED, self.exchange, 0)
-        pack(NO_ESTIMATE, self.exchange, GIVEN)
+        pack(NO_ESTIMATE, self.exchange, ESTIMATE_OFFSET)
 
     def configure(self, values: Mapping[str, float]) -> None:
         """Make the estimator with these parameters; its memory is kept. The exchange row may be replaced."""
@@ -72,12 +72,12 @@ class EstimatorHost:
             instance = self._method_caller.instance = self.estimator.new_instance(values)
             if not is_compiled(self.estimator, (METHOD,)):
                 return
-            if len(self.exchange) == OWN:
+            if len(self.exchange) == ESTIMATOR_OFFSET:
                 memory = memory_type(instance, NOTHING_SENSED)
                 self.exchange = np.zeros(_LAYOUT.size(kind, memory))
                 self.reset()
                 self._function = compiled(kind, (METHOD,), memory, _LAYOUT)[METHOD]
-            pack(instance, self.exchange, OWN)
+            pack(instance, self.exchange, ESTIMATOR_OFFSET)
         except BaseException as error:
             self.guard.fail(error_text(error, self.estimator.path, self.estimator.constructor_location))
 
@@ -85,19 +85,19 @@ class EstimatorHost:
         """Call it as the tick calls it, and reject the estimate if it is wrong."""
         had_estimate = self.has_estimate
         pack(now, self.exchange, 0)
-        pack(UNSET_ESTIMATE, self.exchange, GIVEN)
+        pack(UNSET_ESTIMATE, self.exchange, ESTIMATE_OFFSET)
         _C_FUNCTION(self.address)(self.exchange.ctypes.data)
-        estimate = unpack(Estimate, self.exchange, GIVEN)
-        problem = flaw(estimate) if estimate.known else FORGOTTEN if had_estimate else SOUND
-        if problem != SOUND:
+        estimate = unpack(Estimate, self.exchange, ESTIMATE_OFFSET)
+        problem = estimate_fault(estimate) if estimate.known else LOST if had_estimate else VALID
+        if problem != VALID:
             self.reject_estimate()
 
     def reject_estimate(self) -> None:
         """Fail, because the estimate in the exchange row is unusable or missing."""
-        estimate = unpack(Estimate, self.exchange, GIVEN)
-        problem = flaw(estimate) if estimate.known else FORGOTTEN
+        estimate = unpack(Estimate, self.exchange, ESTIMATE_OFFSET)
+        problem = estimate_fault(estimate) if estimate.known else LOST
         self.guard.fail(
-            self.guard.reason or f"{told_of(estimate, problem)} ({self.estimator.location(METHOD)})"
+            self.guard.reason or f"{fault_text(estimate, problem)} ({self.estimator.location(METHOD)})"
         )
 
     def _call(self, _: int) -> None:
@@ -105,7 +105,7 @@ class EstimatorHost:
         now = unpack(Sensed, self.exchange, 0)
         estimate = self._method_caller.call(METHOD, now, now.period_s or 1.0)
         if estimate is not None:
-            pack(estimate, self.exchange, GIVEN)
+            pack(estimate, self.exchange, ESTIMATE_OFFSET)
 
 
 def _checked_answer(answer: Any, method: str) -> tuple[Any, Estimate]:

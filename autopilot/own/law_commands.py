@@ -8,7 +8,7 @@ from typing import Any
 from numba.extending import overload
 
 from autopilot.control.law_exchange import ATTITUDE, FORCE, RATES, WRENCH, Asked
-from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.compiler import INLINE_OPTIONS
 from autopilot.geometry.linear import IDENTITY, ZERO
 from autopilot.own.vectors import three_numbers
 
@@ -38,7 +38,7 @@ def rates(thrust: float, omega_d: Sequence[float]) -> Asked:
     return Asked(RATES, float(thrust), three_numbers(omega_d, "the rate"), IDENTITY)
 
 
-@overload(wrench, jit_options=INLINED)
+@overload(wrench, jit_options=INLINE_OPTIONS)
 def _wrench(thrust: Any, moment: Any) -> Any:
     def implement(thrust: Any, moment: Any) -> Any:
         return Asked(WRENCH, thrust, moment, IDENTITY)
@@ -46,7 +46,7 @@ def _wrench(thrust: Any, moment: Any) -> Any:
     return implement
 
 
-@overload(force, jit_options=INLINED)
+@overload(force, jit_options=INLINE_OPTIONS)
 def _force(F: Any) -> Any:
     def implement(F: Any) -> Any:
         return Asked(FORCE, 0.0, F, IDENTITY)
@@ -54,7 +54,7 @@ def _force(F: Any) -> Any:
     return implement
 
 
-@overload(attitude, jit_options=INLINED)
+@overload(attitude, jit_options=INLINE_OPTIONS)
 def _attitude(R_d: Any, thrust: Any) -> Any:
     def implement(R_d: Any, thrust: Any) -> Any:
         return Asked(ATTITUDE, thrust, ZERO, R_d)
@@ -62,7 +62,7 @@ def _attitude(R_d: Any, thrust: Any) -> Any:
     return implement
 
 
-@overload(rates, jit_options=INLINED)
+@overload(rates, jit_options=INLINE_OPTIONS)
 def _rates(thrust: Any, omega_d: Any) -> Any:
     def implement(thrust: Any, omega_d: Any) -> Any:
         return Asked(RATES, thrust, omega_d, IDENTITY)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from autopilot.control.law_exchange import Asked, Believed, Held, Now
 from autopilot.control.records import Cable, Reference, State
-from autopilot.estimation.desk import (
+from autopilot.estimation.estimator_exchange import (
     NO_FORCES,
     DirectionSample,
     Driven,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of, native_address_of
+from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import Row, packed, unpack
@@ -207,7 +207,7 @@ def put_streams(
 def address_of_streams(instant: Row) -> int:
     """The address of `put_streams` for such an instant, compiled or loaded if necessary."""
     scratch = np.zeros(1, np.uint8)
-    return native_address_of(put_streams, 0, instant, instant, 0, 0, 0, 0, 0, scratch, scratch)
+    return kernel_address_of(put_streams, 0, instant, instant, 0, 0, 0, 0, 0, scratch, scratch)
 
 
 class StreamFrames:
@@ -230,6 +230,6 @@ class StreamFrames:
             *(dialect.component, dialect.sequence, self.payload, self._buffer),
         )
         if self._put is None:
-            self._put = entry_of(put_streams, *arguments)
+            self._put = entry_point_of(put_streams, *arguments)
         end, autopilot.sequence, dialect.sequence = self._put(*arguments)
         return self._buffer_view[:end].tobytes()

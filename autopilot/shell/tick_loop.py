@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from autopilot.core.sensor_inbox import Tick
-from autopilot.geometry.entry import entry_of
-from autopilot.geometry.kernel import kernel, threaded
+from autopilot.geometry.entry import entry_point_of
+from autopilot.geometry.kernel import kernel, nogil_kernel
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.tick_batch import (
     LAST_REQUEST_US,
@@ -90,7 +90,7 @@ def _send_windows(buffers: SocketBuffers, batch: TickBatch) -> None:
         numbers[WAITING_WINDOWS] = numbers[UNSENT_BYTES] = 0
 
 
-@threaded
+@nogil_kernel
 def fly_ticks(buffers: SocketBuffers, batch: TickBatch) -> int:
     """Fly ticks until the next one must be left to Python (NEEDS_PYTHON), another datagram arrives
     (OTHER_DATAGRAM), none does in time (TIMED_OUT), or the supervisor must decide (NEEDS_DECISION)."""
@@ -131,7 +131,7 @@ class TickLoop:
             return NO_BATCH
         buffers = self._buffers
         if self._fly_ticks is None:
-            self._fly_ticks = entry_of(fly_ticks, buffers, batch)
+            self._fly_ticks = entry_point_of(fly_ticks, buffers, batch)
         reason = self._fly_ticks(buffers, batch)
         flew_ticks = onboard.finish_batch()
         if reason == OTHER_DATAGRAM:
@@ -146,4 +146,4 @@ def warm_up(onboard: Onboard) -> None:
     if SUPPORTED:
         none = np.zeros(1, np.uint8)
         buffers = SocketBuffers(-1, none, np.zeros(1, np.int64), -1, none)
-        entry_of(fly_ticks, buffers, onboard.warmup_batch())
+        entry_point_of(fly_ticks, buffers, onboard.warmup_batch())

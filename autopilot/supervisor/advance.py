@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.guidance.legs import top_of
+from autopilot.guidance.legs import winch_hold_height
 from autopilot.supervisor.heading import advance_heading
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
@@ -80,7 +80,7 @@ def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flig
 def _with_reeled_length(flight: Flight) -> Flight:
     """The flight at the end of its present leg, with the cable length at which this leg ends."""
     leg = flight.legs[0] if flight.legs else None
-    top = None if leg is None else top_of(leg)
+    top = None if leg is None else winch_hold_height(leg)
     if leg is None or top is None:
         return flight
     length = top - leg.jet(leg.duration_s)[0][2]

@@ -6,8 +6,13 @@ from dataclasses import replace
 from math import inf, isnan, pi, radians
 
 from autopilot.geometry.linear import apply
-from autopilot.guidance.heading import Aim, Gaze, Heading, Spin, Towards, heading_of, nearest, turn
-from autopilot.guidance.setpoint_follower import AttitudeSetpoint, PositionSetpoint, Posture, Stream
+from autopilot.guidance.heading import Aim, FacePoint, Heading, Spin, TurnTo, heading_of, unwrap_near, wrap_pi
+from autopilot.guidance.setpoint_follower import (
+    AttitudeSetpoint,
+    PositionSetpoint,
+    SetpointStream,
+    TrackAttitude,
+)
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import IN_AIR, Flight, Phase, SetpointSource, View
@@ -19,7 +24,7 @@ MAX_HEADING_MISMATCH_RAD = radians(30.0)
 
 def with_aim(flight: Flight, aim: Aim, view: View) -> Flight:
     """The flight with another aim of its heading."""
-    return replace(flight, heading=flight.heading.asked(aim, view.now_us))
+    return replace(flight, heading=flight.heading.with_aim(aim, view.now_us))
 
 
 def with_turning_stopped(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -30,20 +35,20 @@ def with_turning_stopped(flight: Flight, view: View, settings: Settings) -> Flig
 def with_heading_aim(flight: Flight, request: TurnHeading, view: View) -> Flight:
     """The flight that turns to a heading, and keeps it."""
     heading = flight.heading
-    start = heading.aim.angle if isinstance(heading.aim, Towards) else heading.angle
-    change = request.angle_rad if request.relative else turn(request.angle_rad - start)
+    start = heading.aim.angle if isinstance(heading.aim, TurnTo) else heading.angle
+    change = request.angle_rad if request.relative else wrap_pi(request.angle_rad - start)
     if not request.relative and request.sense * change < 0.0:
         change += 2.0 * pi * request.sense
     rate = inf if request.rate_rad_s is None else request.rate_rad_s
-    return with_aim(flight, Towards(start + change, rate=rate), view)
+    return with_aim(flight, TurnTo(start + change, max_rate=rate), view)
 
 
 def with_look_at_aim(flight: Flight, request: LookAt, view: View, settings: Settings) -> Flight:
     """The flight whose heading points to a place; without a place, it stops where it points now."""
     if request.east_m is None or request.north_m is None:
-        looks_at_place = isinstance(flight.heading.aim, Gaze)
+        looks_at_place = isinstance(flight.heading.aim, FacePoint)
         return with_turning_stopped(flight, view, settings) if looks_at_place else flight
-    return with_aim(flight, Gaze((request.east_m, request.north_m, 0.0)), view)
+    return with_aim(flight, FacePoint((request.east_m, request.north_m, 0.0)), view)
 
 
 def with_step_heading_aims(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -60,8 +65,8 @@ def with_step_heading_aims(flight: Flight, view: View, settings: Settings) -> Fl
 def with_heading_before_flight(flight: Flight, view: View) -> Flight:
     """The flight of a vehicle that is being armed: its heading stays as it was left, unless it was turned."""
     measured, heading = heading_of(view.attitude), flight.heading.at_rest()
-    if not abs(turn(measured - heading.angle)) <= MAX_HEADING_MISMATCH_RAD and not isnan(measured):
-        heading = Heading(measured, aim=Towards(measured))
+    if not abs(wrap_pi(measured - heading.angle)) <= MAX_HEADING_MISMATCH_RAD and not isnan(measured):
+        heading = Heading(measured, aim=TurnTo(measured))
     return replace(flight, heading=heading)
 
 
@@ -71,17 +76,17 @@ def advance_heading(flight: Flight, view: View, settings: Settings) -> Flight:
         return flight
     flight = _with_setpoint_aim(flight, view, settings)
     leg = flight.legs[0] if flight.legs else None
-    if isinstance(leg, Posture) and leg.attitude is not None:
-        assert leg.lean.rates is not None
-        angle = nearest(heading_of(leg.attitude), flight.heading)
-        rate = apply(leg.attitude, leg.lean.rates)[2]
+    if isinstance(leg, TrackAttitude) and leg.attitude is not None:
+        assert leg.setpoint.rates is not None
+        angle = unwrap_near(heading_of(leg.attitude), flight.heading)
+        rate = apply(leg.attitude, leg.setpoint.rates)[2]
         followed = Heading(angle, rate, 0.0, view.now_us)
-        stop = Towards(followed.stop_angle(settings.heading))
+        stop = TurnTo(followed.stop_angle(settings.heading))
         return replace(flight, heading=replace(followed, aim=stop))
-    if flight.heading.rests:
+    if flight.heading.is_settled:
         return flight
     place, velocity, _ = commanded_motion(flight, view, settings)
-    advanced = flight.heading.onward(view.now_us, place, velocity, settings.heading)
+    advanced = flight.heading.advanced(view.now_us, place, velocity, settings.heading)
     return replace(flight, heading=advanced)
 
 
@@ -95,20 +100,22 @@ def _with_setpoint_aim(flight: Flight, view: View, settings: Settings) -> Flight
     if stream.at_us == flight.setpoints.heading_setpoint_us:
         return flight
     flight = replace(flight, setpoints=replace(flight.setpoints, heading_setpoint_us=stream.at_us))
-    setpoint = stream.asked
+    setpoint = stream.setpoint
     assert isinstance(setpoint, PositionSetpoint | AttitudeSetpoint)
     if not isnan(setpoint.heading):
-        rate = 0.0 if isnan(setpoint.turning) else setpoint.turning
-        return with_aim(flight, Towards(nearest(setpoint.heading, flight.heading), rate, stream.at_us), view)
-    if not isnan(setpoint.turning):
-        return with_aim(flight, Spin(setpoint.turning), view)
+        rate = 0.0 if isnan(setpoint.yaw_rate) else setpoint.yaw_rate
+        return with_aim(
+            flight, TurnTo(unwrap_near(setpoint.heading, flight.heading), rate, stream.at_us), view
+        )
+    if not isnan(setpoint.yaw_rate):
+        return with_aim(flight, Spin(setpoint.yaw_rate), view)
     return with_turning_stopped(flight, view, settings) if spinning else flight
 
 
-def _followed_stream(flight: Flight) -> Stream | None:
+def _followed_stream(flight: Flight) -> SetpointStream | None:
     """The stream of setpoints that is followed, if there is one."""
     if flight.phase != Phase.GUIDED or flight.setpoints.source == SetpointSource.ORBIT:
         return None
     manual = flight.setpoints.source == SetpointSource.MANUAL
     stream = flight.setpoints.manual if manual else flight.setpoints.offboard
-    return None if stream.asked is None else stream
+    return None if stream.setpoint is None else stream

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import norm
-from autopilot.guidance.legs import Calm, Hold, Leg, Pass, Swing
+from autopilot.guidance.legs import Hold, Leg, PathStretch, Swing, SwingDamping
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import start_phase_legs, transition, try_transition
 from autopilot.supervisor.motion import (
@@ -91,7 +91,7 @@ def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
 def after_last_leg(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The flight after the last leg of its phase has ended."""
     leg = flight.legs[0] if flight.legs else None
-    if isinstance(leg, Calm) and not leg.ends_step:  # now the phase can begin
+    if isinstance(leg, SwingDamping) and not leg.ends_step:  # now the phase can begin
         return start_phase_legs(flight, view, settings), Report()
     if flight.phase == Phase.LIFT and leg is not None and _has_lift_failed(flight, leg, view):
         text = "The load was not lifted: landing"
@@ -129,7 +129,7 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
     leg = flight.legs[0] if flight.legs else None
     if isinstance(leg, Swing) and not isinstance(next_step, AttitudeRun):
         return _with_legs(flight, (damping_leg(leg, view, settings, ends_step=True),), view), Report()
-    if isinstance(leg, Calm):
+    if isinstance(leg, SwingDamping):
         legs, here = stopping_legs(flight, view, settings)
         return _with_legs(flight, (*legs, Hold(here, SETTLE_S)), view), Report()
     reached = (plan.sequence[number],)
@@ -147,7 +147,11 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
 def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings: Settings) -> Flight:
     """The flight on the step after the one that ended with `leg`, without a stop where possible."""
     next_path = prepared_path(flight, flight.mission.step)
-    if isinstance(leg, Pass) and isinstance(next_path, PathSegment) and next_path.table is leg.path.table:
+    if (
+        isinstance(leg, PathStretch)
+        and isinstance(next_path, PathSegment)
+        and next_path.table is leg.path.table
+    ):
         # past the waypoint without a stop; the clock continues from the end of the stretch
         assert isinstance(step, Waypoint)
         legs: tuple[Leg, ...] = (replace(leg, path=next_path),)
@@ -169,7 +173,7 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
 def _started_at_leg_end(started: Flight, before: Flight, leg: Leg | None) -> Flight:
     """The flight on a step that began when the previous step ended, possibly between two ticks, so that the
     clock of the mission loses no time between steps."""
-    if leg is None or not started.legs or isinstance(started.legs[0], Calm):
+    if leg is None or not started.legs or isinstance(started.legs[0], SwingDamping):
         return started
     if norm(leg.jet(leg.duration_s)[1]) > AT_REST:  # its remaining motion is stopped from now on
         return started

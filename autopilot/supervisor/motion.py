@@ -7,19 +7,19 @@ from dataclasses import replace
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.legs import (
-    CALM_SHARE,
+    DAMPING_SHARE,
     LOAD_POSITION,
     QUAD_POSITION,
-    Calm,
     Leg,
-    Steady,
+    LevelHold,
     Swing,
+    SwingDamping,
     brake_leg,
     carry_leg,
-    slow_leg,
-    top_of,
+    path_stop_leg,
+    winch_hold_height,
 )
-from autopilot.guidance.setpoint_follower import Follow, Posture
+from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
 
@@ -66,21 +66,23 @@ def commanded_motion(flight: Flight, view: View, settings: Settings) -> tuple[Ve
 
 def tracks_attitude(leg: Leg) -> bool:
     """Whether the leg controls an attitude, which leaves the position uncontrolled."""
-    return isinstance(leg, Swing | Calm | Posture)
+    return isinstance(leg, Swing | SwingDamping | TrackAttitude)
 
 
-def damping_leg(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
+def damping_leg(leg: Leg, view: View, settings: Settings, ends_step: bool) -> SwingDamping:
     """The leg that must come between a leg that does not control the position and one that does."""
     cable = sub(view.x_quad, view.x_load)
     length = norm(cable)
     direction = scale(1.0 / length, cable)
     rate = scale(1.0 / length, tangent(direction, sub(view.v_quad, view.v_load)))
-    if isinstance(leg, Steady):
+    if isinstance(leg, LevelHold):
         anchor = _stopping_place(view)
     else:
-        anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
-    duration = CALM_SHARE * settings.min_move_s
-    return Calm(anchor, (direction[0], direction[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
+        anchor = view.x_load if isinstance(leg, TrackAttitude) else leg.jet(0.0)[0]
+    duration = DAMPING_SHARE * settings.min_move_s
+    return SwingDamping(
+        anchor, (direction[0], direction[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration
+    )
 
 
 def _stopping_place(view: View) -> Vec3:
@@ -96,14 +98,17 @@ def stopping_legs(flight: Flight, view: View, settings: Settings) -> tuple[tuple
         return (), x
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
-        if isinstance(leg, Follow):
+        if isinstance(leg, TrackPosition):
             return leg.stopped(t, settings.motion.accel_m_s2)
-        slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.min_move_s)
+        slow = path_stop_leg(leg, t, settings.motion.accel_m_s2, settings.min_move_s)
         return (slow,), slow.end
     accel, min_duration_s = settings.motion.accel_m_s2, settings.min_move_s
     brake = brake_leg(x, v, a, accel, min_duration_s)
     if v[2] < -FALL_SPEED or brake.end[2] < min(x[2], 0.0):  # out of a fall: brake as fast as possible
-        accel, min_duration_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * min_duration_s
+        accel, min_duration_s = (
+            max(accel, RESCUE_SHARE * settings.gravity_m_s2),
+            DAMPING_SHARE * min_duration_s,
+        )
         brake = brake_leg(x, v, a, accel, min_duration_s)
     return (brake,), brake.end
 
@@ -116,5 +121,5 @@ def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, min_duration
 def cable_length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
     """Length of the cable (m) when the load has come to rest at `here`; it follows from its height while the
     winch works."""
-    top = top_of(flight.legs[0]) if flight.legs else None
+    top = winch_hold_height(flight.legs[0]) if flight.legs else None
     return settings.cable_length_m if top is None else top - here[2]

@@ -10,7 +10,12 @@ from math import hypot
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, carry_leg, transfer_leg
-from autopilot.guidance.setpoint_follower import AttitudeSetpoint, Follow, Posture, begin_following
+from autopilot.guidance.setpoint_follower import (
+    AttitudeSetpoint,
+    TrackAttitude,
+    TrackPosition,
+    start_following,
+)
 from autopilot.supervisor.motion import AT_REST, carry, commanded_motion, position_mode, stopping_legs
 from autopilot.supervisor.setpoint_source import active_setpoint
 from autopilot.supervisor.settings import Settings
@@ -80,16 +85,16 @@ def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     attitude_setpoint = active_setpoint(flight)
     if isinstance(attitude_setpoint, AttitudeSetpoint):
-        posture = Posture(attitude_setpoint, commanded_motion(flight, view, settings)[0])
-        return (posture.onward(attitude_setpoint, view.attitude, view.now_us),)
+        attitude_leg = TrackAttitude(attitude_setpoint, commanded_motion(flight, view, settings)[0])
+        return (attitude_leg.updated(attitude_setpoint, view.attitude, view.now_us),)
     jet, rate = setpoint(flight, view.now_us), follow_limits(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
         x, v, a = commanded_motion(flight, view, settings)
-        return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
+        return (start_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
     leg = flight.legs[0]
-    if isinstance(leg, Follow):
+    if isinstance(leg, TrackPosition):
         return (leg.coasting(leg_time_s(flight, view.now_us), rate),)
-    return (begin_following(jet, rate),)
+    return (start_following(jet, rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:

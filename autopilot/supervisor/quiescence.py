@@ -15,20 +15,20 @@ from typing import NamedTuple
 from autopilot.control.records import HeadingReference, State
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, column, norm, sub
-from autopilot.geometry.packed import Each
-from autopilot.guidance.heading import EAST_NOSE
+from autopilot.geometry.packed import IntPerLane
+from autopilot.guidance.heading import EAST_REFERENCE
 from autopilot.guidance.legs import (
     LOAD_POSITION,
     QUAD_POSITION,
-    Calm,
-    Catch,
+    CatchLoad,
     Creep,
     Leg,
-    Steady,
+    LevelHold,
     Swing,
-    top_of,
+    SwingDamping,
+    winch_hold_height,
 )
-from autopilot.guidance.setpoint_follower import Posture
+from autopilot.guidance.setpoint_follower import TrackAttitude
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
@@ -65,8 +65,8 @@ class Stretch(NamedTuple):
 
     mode: int  # UNCONTROLLED or a control mode
     idle: bool  # the rotors idle, while none is controlled
-    first_us: Each
-    stop_us: Each  # when it ends at the latest
+    first_us: IntPerLane
+    stop_us: IntPerLane  # when it ends at the latest
     period_us: int  # between the ticks for which the setpoints are computed
     watch: int
     threshold: float  # m: of the watch
@@ -108,7 +108,7 @@ def uncontrolled_stretch(until_us: int, now_us: int, idle: bool) -> Stretch:
         anchor_height=0.0,
         upward=ZERO,
         thrust=nan,
-        heading=EAST_NOSE,
+        heading=EAST_REFERENCE,
     )
 
 
@@ -173,11 +173,11 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
     has_fence = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
     return bool(
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
-        or isinstance(leg, Catch)
+        or isinstance(leg, CatchLoad)
         or flight.cable.slack_since_us >= 0
         or flight.phase == Phase.GUIDED
-        or top_of(leg) is not None
-        or not flight.heading.rests
+        or winch_hold_height(leg) is not None
+        or not flight.heading.is_settled
         or (has_fence and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
     )
 
@@ -208,19 +208,19 @@ def _leg_end_us(flight: Flight, leg: Leg) -> int:
 
 def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
     """Height to hold, direction and thrust (N; NaN: the one that holds the height) of an attitude leg."""
-    if isinstance(leg, Steady):
+    if isinstance(leg, LevelHold):
         return 0.0, leg.upward(t), leg.thrust_n
-    if not isinstance(leg, Swing | Calm | Posture):
+    if not isinstance(leg, Swing | SwingDamping | TrackAttitude):
         return 0.0, ZERO, nan
-    thrust = leg.lean.thrust_n if isinstance(leg, Posture) else None
+    thrust = leg.setpoint.thrust_n if isinstance(leg, TrackAttitude) else None
     return leg.anchor[2], leg.upward(t), nan if thrust is None else thrust
 
 
 def _heading_reference(flight: Flight, leg: Leg, ahead_s: float) -> HeadingReference:
     """The heading `ahead_s` seconds from now; b1 of an attitude that body rates lead."""
-    if isinstance(leg, Posture) and leg.attitude is not None:
+    if isinstance(leg, TrackAttitude) and leg.attitude is not None:
         return HeadingReference(column(leg.attitude, 0), ZERO, ZERO)
-    return flight.heading.nose(ahead_s)
+    return flight.heading.reference(ahead_s)
 
 
 @kernel

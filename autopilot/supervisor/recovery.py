@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from autopilot.guidance.legs import Steady
+from autopilot.guidance.legs import LevelHold
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Event, Flight, Text, View
@@ -35,7 +35,7 @@ def resume_flight(flight: Flight, restart: RestartState, view: View, settings: S
         flight.mission, speed_m_s=motion.speed_m_s, takeoff_altitude_m=motion.takeoff_altitude_m
     )
     flight = transition(replace(flight, cable=cable, mission=mission), Event.FOUND_IN_FLIGHT, view, settings)
-    return replace(flight, legs=(Steady(restart.thrust_n),), leg_start_us=view.now_us, following=())
+    return replace(flight, legs=(LevelHold(restart.thrust_n),), leg_start_us=view.now_us, following=())
 
 
 def abort_flight(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, tuple[Text, ...]]:

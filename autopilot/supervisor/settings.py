@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import cos, inf, radians
 
 from autopilot.guidance.heading import HeadingLimits
-from autopilot.guidance.legs import least_move_s
+from autopilot.guidance.legs import min_move_duration
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import Bounds
@@ -132,7 +132,7 @@ def settings_from(
     length, gravity, load_mass = table["VEH_CABLE_LEN"], table["VEH_GRAVITY"], table["VEH_LOAD_MASS"]
     return Settings(
         cable_length_m=length,
-        min_move_s=least_move_s(length, gravity),
+        min_move_s=min_move_duration(length, gravity),
         gravity_m_s2=gravity,
         load_weight_n=load_mass * gravity,
         weight_n=(table["VEH_QUAD_MASS"] + load_mass) * gravity,
@@ -148,8 +148,8 @@ def settings_from(
             return_altitude_m=table["RTL_RETURN_ALT"],
         ),
         heading=HeadingLimits(
-            rate=radians(table["MPC_YAWRAUTO_MAX"]),
-            fastest=radians(table["MPC_MAN_Y_MAX"]),
+            approach_rate=radians(table["MPC_YAWRAUTO_MAX"]),
+            max_rate=radians(table["MPC_MAN_Y_MAX"]),
             accel=radians(table["MPC_YAWRAUTO_ACC"]),
         ),
         failsafe=FailsafeSettings(

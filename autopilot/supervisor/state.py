@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
-from autopilot.guidance.heading import EASTWARD, Heading
+from autopilot.guidance.heading import HEADING_EAST, Heading
 from autopilot.guidance.legs import Leg
-from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, FollowLimits, Stream
+from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle, FollowLimits, SetpointStream
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
@@ -140,8 +140,8 @@ class Setpoints:
     """The setpoints received, and the source of those that are followed while GUIDED."""
 
     source: SetpointSource = SetpointSource.OFFBOARD
-    offboard: Stream = SILENT
-    manual: Stream = SILENT
+    offboard: SetpointStream = NO_STREAM
+    manual: SetpointStream = NO_STREAM
     circle: Circle | None = None
     heading_setpoint_us: int = -1  # when the setpoint was received whose heading is the present aim
 
@@ -177,7 +177,7 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
-    heading: Heading = EASTWARD
+    heading: Heading = HEADING_EAST
     returning: bool = False  # home, or landing there
     # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
     external_arming_problems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

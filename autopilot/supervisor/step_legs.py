@@ -12,8 +12,8 @@ from autopilot.guidance.legs import (
     QUAD_ATTITUDE,
     Hold,
     Leg,
-    Pass,
-    Run,
+    PathStretch,
+    SignalRun,
     Swing,
     reel_leg,
 )
@@ -63,7 +63,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
                 and norm(sub(here, path.start)) < NEAR_START
             ):
                 fade = min(settings.min_move_s, float(path.table[-1, 1]))
-                go = Pass(path, sub(here, path.start), fade)
+                go = PathStretch(path, sub(here, path.start), fade)
             else:
                 go = carry(here, there, flight.mission.speed_m_s, settings, _min_duration_s(flight))
             return (go, Hold(there, max(hold - hold_reduction_s(flight), 0.0))) if hold > 0.0 else (go,)
@@ -73,7 +73,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
             there = destination(step, here, flight)
             return (carry(here, there, flight.mission.speed_m_s, settings, _min_duration_s(flight)),)
         case Signals():
-            return (Run(here, _signals_of(flight, flight.mission.step) or unshaped_signals(step)),)
+            return (SignalRun(here, _signals_of(flight, flight.mission.step) or unshaped_signals(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
         ):

@@ -17,9 +17,9 @@ import numpy as np
 from autopilot.core.flight_core import SETPOINTS_LOCKSTEP, FlightCore, commanded_rate
 from autopilot.core.tick import placeholder_law
 from autopilot.estimation.inbox import new_inbox
-from autopilot.geometry.entry import entry_of
-from autopilot.geometry.packed import packed, place_of, unpack
-from autopilot.guidance.layout import COLUMNS, jets
+from autopilot.geometry.entry import entry_point_of
+from autopilot.geometry.packed import field_offset, packed, unpack
+from autopilot.guidance.jet_table import COLUMNS, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.requests import Arm, StartMission
@@ -45,8 +45,8 @@ GROUND_WINDOW_US = 20_000  # between two turns of the ground station in lockstep
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
-_TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
-_SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
+_TICK, _NOW = field_offset(World, "tick"), field_offset(World, "now_us")
+_SLACK_EVENTS = field_offset(World, "plant") + field_offset(PlantState, "slack_events")
 # machine code of `fly_stretch` and of the ticks that it calls, by the type of the cable's rows
 _ENTRIES: dict[type, tuple[Callable[..., bool], Code]] = {}
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
@@ -181,7 +181,7 @@ class SweepFlight:
             code = Code(code_of_world(world, self.chain), code_of_autopilot(core, law))
             arguments = (False, False, False, 0.0, 0, self.chain)
             _ENTRIES[cable_type] = (
-                entry_of(fly_stretch, code, world, core, law, *self._flight_rows, *arguments),
+                entry_point_of(fly_stretch, code, world, core, law, *self._flight_rows, *arguments),
                 code,
             )
         return _ENTRIES[cable_type]
@@ -234,7 +234,7 @@ class SweepFlight:
         leg_elapsed_us = now_us - flight.leg_start_us
         ticks = np.arange(len(self.core.rows.targets))
         times = np.asarray((leg_elapsed_us + stretch.period_us * ticks) * 1e-6, np.float64)
-        self.requested_path = jets(leg, times, asked=True)
+        self.requested_path = jets(leg, times, requested=True)
 
     # ---- what the ground station does
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from autopilot.core.tick import Winch
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import unpack
 from gcs.sweep.flight import SweepFlight
 from gcs.sweep.lane_kernel import fly_lanes
@@ -154,7 +154,7 @@ class LaneGroup:
             ticks,
         )
         if law not in _ENTRIES:
-            _ENTRIES[law] = entry_of(fly_lanes, *arguments)
+            _ENTRIES[law] = entry_point_of(fly_lanes, *arguments)
         return _ENTRIES[law](*arguments)
 
     def _copy_back(self, members: Sequence[int], ticks: int) -> None:

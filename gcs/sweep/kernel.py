@@ -22,9 +22,9 @@ from autopilot.core.tick import (
     row_at,
     vector_at,
 )
-from autopilot.geometry.addresses import ask_kernel_at, call_kernel_at
-from autopilot.geometry.compiler import INSIDE
-from autopilot.geometry.entry import native_address_of
+from autopilot.geometry.addresses import call_int_kernel_at, call_kernel_at
+from autopilot.geometry.compiler import INNER_OPTIONS
+from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
@@ -101,14 +101,14 @@ def code_of_world(world: WorldRows, chain: ChainRows | None = None) -> int:
     """The address of the world's tick for such rows, which is compiled or loaded if necessary."""
     if not hasattr(world_tick, "overloads"):
         return 0
-    return native_address_of(world_tick, world, world.rotors[REQUESTED], False, 0.0, chain)
+    return kernel_address_of(world_tick, world, world.rotors[REQUESTED], False, 0.0, chain)
 
 
 def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
     """The address of the autopilot's tick for such rows and any law, compiled or loaded if necessary."""
     if not hasattr(fly_tick, "overloads"):
         return 0
-    return native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False)
+    return kernel_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False)
 
 
 def call_world_tick(
@@ -118,7 +118,7 @@ def call_world_tick(
     world_tick(world, world.rotors[REQUESTED], gripper_open, reel_rate, chain)
 
 
-@overload(call_world_tick, jit_options=INSIDE)
+@overload(call_world_tick, jit_options=INNER_OPTIONS)
 def _overload_world_tick(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> Any:
     def called(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> None:
         call_kernel_at(code.world, (world, world.rotors[REQUESTED], gripper_open, reel_rate, chain))
@@ -140,14 +140,14 @@ def call_fly_tick(
     return fly_tick(core, law_rows, readings, now_us, tick, dt, decided)
 
 
-@overload(call_fly_tick, jit_options=INSIDE)
+@overload(call_fly_tick, jit_options=INNER_OPTIONS)
 def _overload_fly_tick(
     code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
 ) -> Any:
     def called(
         code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
     ) -> Any:
-        return ask_kernel_at(code.fly, (core, law_rows, readings, now_us, tick, dt, decided))
+        return call_int_kernel_at(code.fly, (core, law_rows, readings, now_us, tick, dt, decided))
 
     return called
 

@@ -8,7 +8,7 @@ from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, fly_tick, row_at, ve
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
-from autopilot.geometry.lanes import in_lanes, parted
+from autopilot.geometry.lanes import as_lane_array, diverged_lanes
 from autopilot.geometry.packed import Row, unpack, with_field
 from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.kernel import add_to_figures
@@ -21,16 +21,16 @@ from sitl.world import World, WorldModel, WorldRows, world_tick
 def world_in_lanes(rows: WorldRows) -> WorldRows:
     """The rows of the world, in lanes where each flight has its own; the others are shared."""
     return WorldRows(
-        in_lanes(rows.world),
+        as_lane_array(rows.world),
         rows.model,
-        in_lanes(rows.seed),
+        as_lane_array(rows.seed),
         rows.clock,
         rows.delivery,
-        in_lanes(rows.errors),
-        in_lanes(rows.queue),
-        in_lanes(rows.commands),
+        as_lane_array(rows.errors),
+        as_lane_array(rows.queue),
+        as_lane_array(rows.commands),
         rows.command_ring,
-        in_lanes(rows.rotors),
+        as_lane_array(rows.rotors),
         rows.rotor_table,
     )
 
@@ -40,28 +40,28 @@ def core_in_lanes(rows: CoreRows) -> CoreRows:
     """The same for the rows of the autopilot."""
     h = rows.history
     history = History(
-        in_lanes(h.ring),
-        in_lanes(h.covariance),
-        in_lanes(h.error),
+        as_lane_array(h.ring),
+        as_lane_array(h.covariance),
+        as_lane_array(h.error),
         h.columns,
-        in_lanes(h.shares),
-        in_lanes(h.gain),
-        in_lanes(h.scalars),
-        in_lanes(h.consistency),
+        as_lane_array(h.jacobian),
+        as_lane_array(h.gain),
+        as_lane_array(h.scalars),
+        as_lane_array(h.consistency),
     )
     return CoreRows(
-        in_lanes(rows.estimator),
-        in_lanes(rows.control),
-        in_lanes(rows.summary),
-        in_lanes(rows.commands),
+        as_lane_array(rows.estimator),
+        as_lane_array(rows.control),
+        as_lane_array(rows.summary),
+        as_lane_array(rows.commands),
         history,
-        in_lanes(rows.inbox),
+        as_lane_array(rows.inbox),
         rows.constants,
         rows.winch,
-        in_lanes(rows.stretch),
+        as_lane_array(rows.stretch),
         rows.targets,
         rows.references,
-        in_lanes(rows.rotors),
+        as_lane_array(rows.rotors),
         rows.table,
     )
 
@@ -83,11 +83,11 @@ def fly_lanes(
     the supervisor must decide for lane 0, all bits are set.
     """
     world, core = world_in_lanes(world_rows), core_in_lanes(core_rows)
-    law_rows = with_field(own_law_rows, "memory", in_lanes(own_law_rows.memory))
-    figures = in_lanes(figure_rows)
+    law_rows = with_field(own_law_rows, "memory", as_lane_array(own_law_rows.memory))
+    figures = as_lane_array(figure_rows)
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us
-    parted()
+    diverged_lanes()
     for done in range(ticks):
         put_forces(core.rotors, core.table, world)
         world_tick(world, world.rotors[REQUESTED], False, 0.0)
@@ -99,7 +99,7 @@ def fly_lanes(
             add_to_figures(
                 figures, world, core, vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
             )
-        diverged = parted()
+        diverged = diverged_lanes()
         if outcome == TO_DECIDE:
             return done, (1 << LANES) - 1
         if diverged != 0:

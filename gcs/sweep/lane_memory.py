@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from autopilot.core.tick import ControlMemory, CoreRows
 from autopilot.estimation.inbox import COLUMNS as READING_COLUMNS
-from autopilot.estimation.records import RING_COLUMNS, RING_LENGTH, ROOM, EstimatorState
+from autopilot.estimation.records import PADDED_SIZE, RING_COLUMNS, RING_LENGTH, EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
-from autopilot.geometry.packed import place_of
+from autopilot.geometry.packed import field_offset
 from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.flight import SweepFlight
 from sitl.world import Floats, WorldRows
@@ -28,16 +28,16 @@ from sitl.world import Floats, WorldRows
 _WORLD = ("world", "seed", "errors", "queue", "commands", "rotors")
 _CORE = ("estimator", "control", "summary", "commands", "stretch", "rotors")
 _HISTORY = ("covariance", "consistency")
-_SCRATCH = ("error", "shares", "gain", "scalars")
+_SCRATCH = ("error", "jacobian", "gain", "scalars")
 _SHARED = ("clock", "command_ring")  # of the world: integers, the same for all flights
 _SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
 # columns of the covariance in lanes: with 32, a row would take 2 KiB, and the numbers of one column would
 # compete for few places of the processor's cache
-_COLUMNS = ROOM + 8
+_COLUMNS = PADDED_SIZE + 8
 _ALIGNED = 64  # bytes
-_MEMORY, _HEAD, _RESETS = (place_of(EstimatorState, name) for name in ("memory_s", "head", "resets"))
-_STOP_US, _MODE = place_of(Stretch, "stop_us"), place_of(Stretch, "mode")
-_CONTROL_MODE = place_of(ControlMemory, "control_mode")
+_MEMORY, _HEAD, _RESETS = (field_offset(EstimatorState, name) for name in ("memory_s", "head", "resets"))
+_STOP_US, _MODE = field_offset(Stretch, "stop_us"), field_offset(Stretch, "mode")
+_CONTROL_MODE = field_offset(ControlMemory, "control_mode")
 
 
 Indices = NDArray[np.intp]
@@ -90,7 +90,7 @@ class LaneMemory:
         self._shared = slice(shared.start, slices["shared.command_ring"].stop)
         lanes = self._lanes = _aligned(shared.start)
         ring = _aligned(arrays["history.ring"].size)
-        square = self._square = _aligned(ROOM * _COLUMNS).reshape(ROOM, _COLUMNS, LANES)
+        square = self._square = _aligned(PADDED_SIZE * _COLUMNS).reshape(PADDED_SIZE, _COLUMNS, LANES)
         common = self._common = np.zeros(self._shared.stop - self._shared.start)
 
         def in_lanes(name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -209,10 +209,10 @@ def _copy_in(
     for i in range(offsets.after_covariance, offsets.end):
         for lane in range(LANES):
             lanes[i, lane] = blocks[members[lane], i]
-    for i in range(ROOM):
-        for j in range(ROOM):
+    for i in range(PADDED_SIZE):
+        for j in range(PADDED_SIZE):
             for lane in range(LANES):
-                covariance[i, j, lane] = blocks[members[lane], offsets.covariance + ROOM * i + j]
+                covariance[i, j, lane] = blocks[members[lane], offsets.covariance + PADDED_SIZE * i + j]
     for row in rows:
         for j in range(RING_COLUMNS):
             for lane in range(LANES):
@@ -238,10 +238,12 @@ def _copy_out(
     for i in range(offsets.after_covariance, offsets.end):
         for k in range(count):
             blocks[members[k], i] = lanes[i, source_lanes[k]]
-    for i in range(ROOM):
-        for j in range(ROOM):
+    for i in range(PADDED_SIZE):
+        for j in range(PADDED_SIZE):
             for k in range(count):
-                blocks[members[k], offsets.covariance + ROOM * i + j] = covariance[i, j, source_lanes[k]]
+                blocks[members[k], offsets.covariance + PADDED_SIZE * i + j] = covariance[
+                    i, j, source_lanes[k]
+                ]
     for row in rows:
         for j in range(RING_COLUMNS):
             for k in range(count):

@@ -25,7 +25,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import if_above, single
+from autopilot.geometry.lanes import if_above, to_single
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack
 from autopilot.wire.convert.geodesy import EARTH_RADIUS_M, Home
@@ -59,7 +59,7 @@ class Wire(NamedTuple):
 
 @kernel
 def _single3(row: Row, first: int) -> Vec3:
-    return (single(row[first]), single(row[first + 1]), single(row[first + 2]))
+    return (to_single(row[first]), to_single(row[first + 1]), to_single(row[first + 2]))
 
 
 @kernel
@@ -68,18 +68,20 @@ def put_forces(rotors: Array, table: Array, world: WorldRows) -> None:
     `table` are the mixer's."""
     rotors_of_world = world.rotors
     for i in range(min(table.shape[0] - 1, world.rotor_table.shape[0])):
-        rotors_of_world[REQUESTED, i] = single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
+        rotors_of_world[REQUESTED, i] = to_single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
 
 
 def rounded_reel_rate(rate: float) -> float:
     """The winch's rate (m/s), rounded as in HIL_ACTUATOR_CONTROLS."""
-    return float(single(rate / REEL_MAX) * REEL_MAX)
+    return float(to_single(rate / REEL_MAX) * REEL_MAX)
 
 
 @kernel
 def _pose(row: Row, wire: Wire) -> PoseReading:
     sent = quat_ned_frd_from_enu_flu((row[READING + 3], row[READING + 4], row[READING + 5], row[READING + 6]))
-    quat = quat_enu_flu_from_ned_frd((single(sent[0]), single(sent[1]), single(sent[2]), single(sent[3])))
+    quat = quat_enu_flu_from_ned_frd(
+        (to_single(sent[0]), to_single(sent[1]), to_single(sent[2]), to_single(sent[3]))
+    )
     v_quad = ZERO if wire.pose_velocity_std < 0.0 else _single3(row, READING + 7)
     return PoseReading(
         0.0,
@@ -143,22 +145,25 @@ def deliver_readings(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> 
     """
     newest = _newest(IMU, now_us, rows)
     inbox[0, box.KIND] = box.IMU
-    inbox[0, box.SHOWS] = now_us if newest >= 0 else box.LONG_AGO
+    inbox[0, box.SAMPLE_TIME_US] = now_us if newest >= 0 else box.REPEATED_SAMPLE
     if newest >= 0:
         row = rows.queue[IMU, newest]
         for i in range(3):
-            inbox[0, box.READING + i] = single(row[READING + 3 + i])
-            inbox[0, box.READING + 3 + i] = single(row[READING + i])
+            inbox[0, box.READING + i] = to_single(row[READING + 3 + i])
+            inbox[0, box.READING + 3 + i] = to_single(row[READING + i])
     count = 1
     index = pop_arrived(MOCAP, now_us, rows)
     while index >= 0:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.POSE, rows.queue[MOCAP, index, STAMP_US]
+        inbox[count, box.KIND], inbox[count, box.SAMPLE_TIME_US] = (
+            box.POSE,
+            rows.queue[MOCAP, index, STAMP_US],
+        )
         pack(_pose(rows.queue[MOCAP, index], wire), inbox[count], box.READING)
         count += 1
         index = pop_arrived(MOCAP, now_us, rows)
     index = pop_arrived(LOAD, now_us, rows)
     while index >= 0:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.LOAD, rows.queue[LOAD, index, STAMP_US]
+        inbox[count, box.KIND], inbox[count, box.SAMPLE_TIME_US] = box.LOAD, rows.queue[LOAD, index, STAMP_US]
         pack(_load(rows.queue[LOAD, index], wire), inbox[count], box.READING)
         count += 1
         index = pop_arrived(LOAD, now_us, rows)
@@ -167,30 +172,30 @@ def deliver_readings(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> 
         row = rows.queue[CABLE, index]
         if row[READING + 3] > 0.0:  # the cable is seen
             direction = DirectionReading(0.0, _single3(row, READING), wire.direction_std)
-            inbox[count, box.KIND], inbox[count, box.SHOWS] = box.DIRECTION, row[STAMP_US]
+            inbox[count, box.KIND], inbox[count, box.SAMPLE_TIME_US] = box.DIRECTION, row[STAMP_US]
             pack(direction, inbox[count], box.READING)
             count += 1
         index = pop_arrived(CABLE, now_us, rows)
     newest = _newest(GNSS, now_us, rows)
     if newest >= 0 and rows.queue[GNSS, newest, READING + 6] < LOST:
-        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.FIX, rows.queue[GNSS, newest, STAMP_US]
+        inbox[count, box.KIND], inbox[count, box.SAMPLE_TIME_US] = box.FIX, rows.queue[GNSS, newest, STAMP_US]
         pack(_fix(rows.queue[GNSS, newest], wire), inbox[count], box.READING)
         count += 1
     newest = _newest(BARO, now_us, rows)
     if newest >= 0:
         inbox[count, box.KIND] = box.HEIGHT
-        altitude = single(wire.home[2] + rows.queue[BARO, newest, READING])
+        altitude = to_single(wire.home[2] + rows.queue[BARO, newest, READING])
         inbox[count, box.READING] = altitude - wire.home[2]
         count += 1
     newest = _newest(MAG, now_us, rows)
     if newest >= 0:
         inbox[count, box.KIND] = box.FIELD
         for i in range(3):
-            inbox[count, box.READING + i] = single(rows.queue[MAG, newest, READING + i])
+            inbox[count, box.READING + i] = to_single(rows.queue[MAG, newest, READING + i])
         count += 1
     if now_us % ESC_PERIOD_US == 0:
         for first in range(0, rows.rotor_table.shape[0], 4):
-            inbox[count, box.KIND] = box.SPEEDS
+            inbox[count, box.KIND] = box.ROTOR_SPEEDS
             inbox[count, box.READING] = first
             for i in range(4):
                 inbox[count, box.READING + 1 + i] = rotor_speed(rows, first + i)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from autopilot.geometry.machine_code import ROOT, drop_unused, why_not_kept
+from autopilot.geometry.machine_code import ROOT, drop_unused, storage_problem
 from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from gcs.errors import GcsError
@@ -67,7 +67,7 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
     if not quiet:
         expected = duration_text(expected_s([part.cost_s for part in waiting], cores))
         count = f"{total} parts" if total > 1 else waiting[0].title
-        not_kept_reason = why_not_kept()
+        not_kept_reason = storage_problem()
         if not_kept_reason:
             notify(
                 f"what is compiled cannot be kept ({not_kept_reason}), so that every command begins with it; "

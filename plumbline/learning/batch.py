@@ -17,9 +17,9 @@ from autopilot.core.flight_core import FlightCore
 from autopilot.core.tick import CoreConstants, EstimateSummary, placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import History, new_history
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import pack, unpack, width
-from autopilot.guidance.layout import COLUMNS
+from autopilot.guidance.jet_table import COLUMNS
 from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.vehicle.rotors import mixer_table
@@ -74,7 +74,7 @@ class Episodes:
         work = count * scenario.ticks * (10 if scenario.estimated else 1)
         self._threads = max(1, min(cores, work // _MIN_TICKS_PER_THREAD)) if threads is None else threads
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
-        self._run = entry_of(
+        self._run = entry_point_of(
             step_or_start, *self._job(self._all[:0], False, self._no_places, self._no_places)
         )
 

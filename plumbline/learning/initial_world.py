@@ -9,7 +9,7 @@ import numpy as np
 from autopilot.control.actuators.mixer import FORCE as MIXED
 from autopilot.control.actuators.mixer import mix, new_rotors
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.geometry.packed import Row, packed, place_of, unpack
+from autopilot.geometry.packed import Row, field_offset, packed, unpack
 from autopilot.geometry.so3 import IDENTITY_QUAT
 from autopilot.vehicle.rotors import mixer_table
 from plumbline.learning.scenario import Draw, Scenario
@@ -21,7 +21,7 @@ _NEVER = 2**62
 
 
 def _vector_slice(field: str) -> slice:
-    first = place_of(World, "plant") + place_of(PlantState, field)
+    first = field_offset(World, "plant") + field_offset(PlantState, field)
     return slice(first, first + 3)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance.layout import COLUMNS, jets
+from autopilot.guidance.jet_table import COLUMNS, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import Settings

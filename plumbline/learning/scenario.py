@@ -11,7 +11,7 @@ import numpy as np
 from autopilot.core.flight_core import Setup
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import packed
-from autopilot.guidance.layout import COLUMNS
+from autopilot.guidance.jet_table import COLUMNS
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import divider

@@ -18,7 +18,7 @@ from autopilot.control.records import Reference, State, with_cable_length
 from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
 from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary, Winch
 from autopilot.estimation.records import History
-from autopilot.geometry.kernel import kernel, threaded
+from autopilot.geometry.kernel import kernel, nogil_kernel
 from autopilot.geometry.linear import E1, ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.packed import pack, unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
@@ -61,7 +61,7 @@ def _core(estimators: EstimatorRows, i: int, mixing: Mixing) -> CoreRows:
         h.covariance[i],
         h.error[i],
         h.columns[i],
-        h.shares[i],
+        h.jacobian[i],
         h.gain[i],
         h.scalars[i],
         h.consistency[i],
@@ -271,7 +271,7 @@ def _start_one(batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3,
     _observe(batch, i, task, unpack(Episode, batch.episode[i], 0), out)
 
 
-@threaded
+@nogil_kernel
 def step_or_start(
     batch: Batch,
     chosen: Any,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import pi
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import bits_of, of_bits
+from autopilot.geometry.lanes import bits_of, float_from_bits
 
 _TURN = 2.0 * pi / 4294967296.0  # rad, of one step of a word
 _EIGHTH = 1 << 29
@@ -24,7 +24,7 @@ def logarithm(x: float) -> float:
     """The natural logarithm of a number between 1e-300 and 1e300."""
     bits = bits_of(x)
     exponent = (bits - _ROOT_HALF_BITS) >> 52
-    f = of_bits(bits - (exponent << 52)) - 1.0  # in sqrt(1/2) - 1 ... sqrt(2) - 1
+    f = float_from_bits(bits - (exponent << 52)) - 1.0  # in sqrt(1/2) - 1 ... sqrt(2) - 1
     s = f / (2.0 + f)
     z = s * s
     w = z * z

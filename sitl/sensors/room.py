@@ -15,7 +15,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import each
+from autopilot.geometry.lanes import int_per_lane
 from autopilot.geometry.linear import Vec3, dot, norm
 from sitl.sensors.elementary import cosine_sine
 from sitl.sensors.noise import Noise, gaussian, words
@@ -37,7 +37,7 @@ class Room(NamedTuple):
 def _wave(axis: int, angle: int, place: Vec3, length: float, noise: Noise) -> float:
     direction = gaussian(noise, axis)
     turns = dot(direction, place) / (norm(direction) * length)
-    return cosine_sine((each(turns * _WORDS) + angle) & _MASK)[0]
+    return cosine_sine((int_per_lane(turns * _WORDS) + angle) & _MASK)[0]
 
 
 @kernel

@@ -33,7 +33,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import each
+from autopilot.geometry.lanes import int_per_lane
 from autopilot.geometry.linear import Vec3, scale
 from autopilot.wire.convert.simulator import rotor_speed_rpm
 from sitl.plant.records import Truth
@@ -92,7 +92,7 @@ def rotor_vibration(
     for i in range(count):
         force = rotors.rows[FORCE, i]
         hz = rotor_speed_rpm(force, table[i, STRENGTH] * truth.rotor_max) / 60.0
-        word = each(phases[i] + hz * config.period_s * _WORDS) & _MASK
+        word = int_per_lane(phases[i] + hz * config.period_s * _WORDS) & _MASK
         phases[i] = word * 1.0
         cosine, sine = cosine_sine(word)
         if table[i, YAW] > 0.0:  # this rotor turns clockwise: its drag turns the body the other way

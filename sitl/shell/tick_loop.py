@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of
-from autopilot.geometry.kernel import kernel, threaded
+from autopilot.geometry.entry import entry_point_of
+from autopilot.geometry.kernel import kernel, nogil_kernel
 from autopilot.shell.machine_sockets import (
     SUPPORTED,
     SYSTEM_ADDRESS_BYTES,
@@ -72,7 +72,7 @@ def _send_tick(buffers: SocketBuffers, batch: TickBatch) -> None:
     send_to_at(buffers.fd, batch.buffer.ctypes.data, length, buffers.peer.ctypes.data, SYSTEM_ADDRESS_BYTES)
 
 
-@threaded
+@nogil_kernel
 def exchange(buffers: SocketBuffers, batch: TickBatch) -> int:
     """Run ticks of the world, each as soon as the one before is answered. Returns SILENCE or HEARD if the
     present tick is not answered, MOVED if the world is at a tick of which no frames are written yet."""
@@ -124,7 +124,7 @@ class TickLoop:
         buffers.gathered[: len(gathered)] = np.frombuffer(gathered, np.uint8)
         buffers.sizes[_GATHERED], buffers.window_ends_us[0] = len(gathered), link.window_ends_us
         if self._exchange is None:
-            self._exchange = entry_of(exchange, buffers, batch)
+            self._exchange = entry_point_of(exchange, buffers, batch)
         reason = self._exchange(buffers, batch)
         link.gather(buffers.gathered[: buffers.sizes[_GATHERED]].tobytes(), int(buffers.window_ends_us[0]))
         if batch.numbers[TICKS_RUN]:
@@ -168,4 +168,4 @@ def warm_up(simulator: HilSimulator) -> None:
     """Prepare the machine code of `exchange`, if this simulator can use it."""
     batch = simulator.tick_batch()
     if SUPPORTED and batch is not None:
-        entry_of(exchange, _new_buffers(-1, -1, b"", b""), batch)
+        entry_point_of(exchange, _new_buffers(-1, -1, b"", b""), batch)

@@ -146,7 +146,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.closed_ticks": ("autopilot", "sitl", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.templates": ("plumbline",),  # files of users, which import what scripts import
-    "plumbline.estimators": ("autopilot.estimation.desk", RECORDS, "autopilot.own"),
+    "plumbline.estimators": ("autopilot.estimation.estimator_exchange", RECORDS, "autopilot.own"),
     "plumbline.laws": ("autopilot.control.law_exchange", RECORDS, "autopilot.own"),
     "plumbline.planners": ("autopilot.trajectory", "autopilot.own"),
     "plumbline.vectors": ("autopilot.geometry",),
@@ -304,7 +304,7 @@ BAD = {
     "autopilot/estimation/release.py": "from autopilot.control.load_motion import Drag",
     "autopilot/estimation/measurements/pose.py": "from autopilot.supervisor.state import Flight",
     "autopilot/guidance/legs.py": "from autopilot.supervisor.state import Flight",
-    "autopilot/guidance/layout.py": "from autopilot.services.records import Verdict",
+    "autopilot/guidance/jet_table.py": "from autopilot.services.records import Verdict",
     "autopilot/services/commands.py": "def f():\n    from autopilot.control.laws import thesis",
     "autopilot/services/endpoint.py": "from autopilot.onboard import onboard",
     "autopilot/supervisor/advance.py": "from autopilot.core.flight_core import FlightCore",

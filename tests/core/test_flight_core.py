@@ -8,7 +8,7 @@ import pytest
 
 from autopilot.core.flight_core import SETPOINTS_BRAKING
 from autopilot.geometry.linear import norm
-from autopilot.guidance.legs import Brake, Slow
+from autopilot.guidance.legs import Brake, PathStop
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Land, Takeoff, Waypoint
@@ -26,7 +26,7 @@ def test_a_stop_is_laid_out_in_portions(command: str) -> None:
     else:
         assert craft.command(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, nan) == ACCEPTED
     stop = craft.flight.legs[0]
-    assert isinstance(stop, Brake | Slow)
+    assert isinstance(stop, Brake | PathStop)
     portions = 0
     while craft.flight.legs[0] is stop:
         before = craft.onboard.core.rows.targets

@@ -78,7 +78,7 @@ class Read(NamedTuple):
 
 
 def reading_in(row: np.ndarray) -> tuple[int, int, Any]:
-    kind, shows_us = int(row[box.KIND]), int(row[box.SHOWS])
+    kind, shows_us = int(row[box.KIND]), int(row[box.SAMPLE_TIME_US])
     if kind in KINDS:
         return kind, shows_us, unpack(KINDS[kind], row, box.READING)
     return kind, shows_us, tuple(row[box.READING : box.READING + (1 if kind == box.HEIGHT else 3)])
@@ -87,10 +87,10 @@ def reading_in(row: np.ndarray) -> tuple[int, int, Any]:
 def sample_of(inbox: SensorInbox) -> ImuReading | None:
     """The inertial sample of the last tick; None where it is not sane."""
     imu = unpack(ImuReading, inbox.imu, 0)
-    return imu if box.is_sane(imu) else None
+    return imu if box.is_valid_imu(imu) else None
 
 
-def tick_of(*datagrams: bytes, rows: int = box.ROOM) -> Read:
+def tick_of(*datagrams: bytes, rows: int = box.INBOX_ROWS) -> Read:
     inbox = SensorInbox(HOME, box.new_inbox(rows))
     tick = inbox.read(b"".join(datagrams), -1)
     assert tick is not None
@@ -134,7 +134,7 @@ def test_the_sensor_message_is_the_clock_and_the_inertial_sample() -> None:
     assert tick.imu is not None
     assert tick.imu.accel == pytest.approx((0.0, 0.5, 9.81), abs=SINGLE)
     assert tick.imu.gyro == pytest.approx((0.1, 0.2, 0.3), abs=SINGLE)
-    assert record(tick, box.IMU) == (box.LONG_AGO, tick.imu), "nothing of it was updated"
+    assert record(tick, box.IMU) == (box.REPEATED_SAMPLE, tick.imu), "nothing of it was updated"
     tick = tick_of(sensor(INERTIAL))
     assert record(tick, box.IMU) == (NOW_US, tick.imu)
 

@@ -16,12 +16,12 @@ from autopilot.control.laws import LAWS
 from autopilot.core.flight_core import FlightCore
 from autopilot.core.tick import FLOWN, TO_DECIDE, fly_tick
 from autopilot.estimation import inbox as box
-from autopilot.estimation.filter import complaints
+from autopilot.estimation.filter import estimate_problems
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import pack
 from autopilot.geometry.so3 import IDENTITY_QUAT
-from autopilot.guidance.layout import COLUMNS
+from autopilot.guidance.jet_table import COLUMNS
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION
 from autopilot.onboard.onboard import build_setup
 from autopilot.supervisor.quiescence import FOREVER_US, UNCONTROLLED, uncontrolled_stretch
@@ -166,7 +166,7 @@ def numbers_of(core: FlightCore) -> list[float]:
     e = e._replace(
         vehicle=e.vehicle._replace(age_s=0.0),
         load=e.load._replace(age_s=0.0),
-        aids=e.aids._replace(magnetic_age=0.0, barometer_age=0.0),
+        sensor_errors=e.sensor_errors._replace(magnetic_age=0.0, barometer_age=0.0),
     )
     row = np.zeros(len(core.rows.estimator))
     pack(e, row, 0)
@@ -201,7 +201,7 @@ def test_behind_any_readings_honest_ones_settle_the_estimate_again(script: list[
     for tick in range(8 + REPEATS, 8 + REPEATS + 750):
         now_us = BEGIN_US + tick * TICK_US
         update_estimate(core, put_hover(core, now_us, tick), now_us, tick)
-    assert complaints(core.estimator, core.settings.failsafe.sensor_age_limit_s) == ()
+    assert estimate_problems(core.estimator, core.settings.failsafe.sensor_age_limit_s) == ()
     assert core.state.x_load == pytest.approx((0.0, 0.0, HOVER_M), abs=0.02)
 
 

@@ -55,7 +55,7 @@ def estimate(
     for kind, found in aged:
         for reading in found:
             box.put_reading(inbox, count, kind, 0, reading)
-            inbox[count, box.SHOWS] = -1e6 * (reading.age_s + tuning.imu_age)
+            inbox[count, box.SAMPLE_TIME_US] = -1e6 * (reading.age_s + tuning.imu_age)
             count += 1
     if readings.height_m is not None:
         box.put_vector(inbox, count, box.HEIGHT, (readings.height_m,))

@@ -6,7 +6,7 @@ from math import nan
 
 import pytest
 
-from autopilot.estimation.covariance import enter, gather, scalar, within_gate
+from autopilot.estimation.covariance import add_jacobian_entry, compute_gain_rows, start_scalar, within_gate
 from autopilot.estimation.records import FIX, POSITION, SIZE, TEST_RATIO, new_history
 
 
@@ -19,9 +19,9 @@ def test_a_reading_beyond_the_gate_is_refused_and_its_ratio_is_kept(
     history = new_history()
     history.covariance[POSITION, POSITION] = 3.0
     for k in range(2):
-        scalar(history, k, innovation_m, 1.0)  # variances: 1 of the reading, 3 of the estimate
-        enter(history, k, POSITION, 1.0)
-    gather(history, 0, 2, SIZE)
+        start_scalar(history, k, innovation_m, 1.0)  # variances: 1 of the reading, 3 of the estimate
+        add_jacobian_entry(history, k, POSITION, 1.0)
+    compute_gain_rows(history, 0, 2, SIZE)
     assert within_gate(history, FIX, 2, 5.0) is accepted
     ratio = innovation_m**2 / 4.0 / 25.0
     assert history.consistency[FIX, TEST_RATIO] == pytest.approx(ratio, nan_ok=True)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from autopilot.estimation.filter import complaints
-from autopilot.estimation.history import carry_back, past3, past4, row_before
+from autopilot.estimation.filter import estimate_problems
+from autopilot.estimation.history import correct_past_states, interpolate3, interpolate4, row_before
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.pose import correct_pose
 from autopilot.estimation.predict import predict
@@ -75,7 +75,7 @@ def errors(trace: Trace, motion: Motion) -> dict[str, tuple[Array, Array, int]]:
         "attitude": ((turned * motion.attitude(t).inv()).as_rotvec(), mean(ATTITUDE, 3), 3),
         "x_load": (
             trace.of(lambda e: e.load.x_load)[s] - motion.x_load(t),
-            trace.of(lambda e: e.doubt.load)[s] ** 2,
+            trace.of(lambda e: e.uncertainty.load)[s] ** 2,
             3,
         ),
         "v_load": (trace.of(lambda e: e.load.v_load)[s] - motion.v_load(t), rate, 3),
@@ -169,7 +169,7 @@ def test_a_drop_out_grows_the_covariance_and_readings_end_it(motion: Motion) -> 
         return None if 5.0 < t < 6.0 else x
 
     trace = track(motion, 8.0, Noise(), seed=6, tampered=silent)
-    for pick in (lambda e: e.doubt.horizontal, lambda e: e.doubt.load):
+    for pick in (lambda e: e.uncertainty.horizontal, lambda e: e.uncertainty.load):
         std = trace.of(pick)
         gone = slice(round(5.02 / TICK_S), round(5.99 / TICK_S))
         assert (np.diff(std[gone]) > 0.0).all()
@@ -177,8 +177,8 @@ def test_a_drop_out_grows_the_covariance_and_readings_end_it(motion: Motion) -> 
         assert std[-1] == pytest.approx(std[round(4.9 / TICK_S)], rel=0.1)
     assert trace.states[-1].resets == 2.0, "a second without readings is bridged, not started over"
     # the pendulum keeps the load's position known for longer
-    assert complaints(trace.states[round(5.9 / TICK_S)], 0.5) == ("no vehicle pose from a tracker",)
-    assert complaints(trace.states[-1], 0.5) == ()
+    assert estimate_problems(trace.states[round(5.9 / TICK_S)], 0.5) == ("no vehicle pose from a tracker",)
+    assert estimate_problems(trace.states[-1], 0.5) == ()
 
 
 def test_slack_and_taut_are_told_by_the_distance() -> None:
@@ -244,7 +244,7 @@ def test_a_knock_between_two_samples_of_the_accelerometer_is_followed_at_once(st
     the limit for flight.
     """
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
-    refused, doubt = 0.0, 0.0
+    refused, uncertainty = 0.0, 0.0
     for k in range(500):
         t = TICK_S * k
         height = 0.06 + 0.3 * max(0.0, 1.0 - t)
@@ -256,9 +256,9 @@ def test_a_knock_between_two_samples_of_the_accelerometer_is_followed_at_once(st
         state = estimate(state, history, still, tuning, TICK_S)
         refused = max(refused, state.vehicle.rejected)
         if t > 0.5:
-            doubt = max(doubt, state.doubt.load)
+            uncertainty = max(uncertainty, state.uncertainty.load)
     assert 0.0 < refused <= 5.0
-    assert doubt < 0.01
+    assert uncertainty < 0.01
     assert state.resets == 2.0
     assert state.vehicle.x_quad[2] == pytest.approx(0.06, abs=5e-4)
     assert abs(state.vehicle.v_quad[2]) < 0.01
@@ -281,7 +281,7 @@ def test_a_cable_a_little_too_short_to_be_taut_is_found_slack() -> None:
         if state.load.taut > 0.0:
             since = t
     assert since < 1.15
-    assert state.doubt.load < 0.01
+    assert state.uncertainty.load < 0.01
 
 
 def definite(state: EstimatorState, history: History) -> bool:
@@ -336,7 +336,7 @@ def test_looking_back_sees_the_past_and_a_correction_moves_all_of_it_that_matter
     now, ring = state.time_s, history.ring
 
     def x_at(age: float) -> float:
-        return past3(ring, *row_before(state.head, ring, now - age), X_QUAD)[0]
+        return interpolate3(ring, *row_before(state.head, ring, now - age), X_QUAD)[0]
 
     for age in (0.0, 0.001, 0.004, 0.0213, 0.3):
         assert x_at(age) == pytest.approx(state.vehicle.x_quad[0] - 2.0 * age, abs=1e-9)
@@ -347,9 +347,9 @@ def test_looking_back_sees_the_past_and_a_correction_moves_all_of_it_that_matter
     error[:] = 0.0
     error[POSITION], error[VELOCITY] = 0.5, 3.0
     error[ATTITUDE + 2] = np.pi
-    carry_back(state.head, history, 0.021)
+    correct_past_states(state.head, history, 0.021)
     for age, moved in ((0.0, 0.5), (0.011, 0.5 - 0.033), (0.019, 0.5 - 0.057), (0.1, 0.0)):
         assert x_at(age) - before[age] == pytest.approx(moved, abs=1e-12), age
     for age, turned in ((0.021, 1.0), (0.1, 0.0)):
         at = row_before(state.head, ring, now - age)
-        assert abs(past4(ring, *at, QUAT)[3]) == pytest.approx(turned, abs=1e-9)
+        assert abs(interpolate4(ring, *at, QUAT)[3]) == pytest.approx(turned, abs=1e-9)

@@ -39,8 +39,10 @@ def started(stated: float) -> tuple[EstimatorState, History]:
         history.covariance[GNSS + i, GNSS + i] = slow * slow
     state = blank_state()
     vehicle = state.vehicle._replace(source=RECEIVER, age_s=0.1)
-    aids = state.aids._replace(horizontal_slow=slow, vertical_slow=slow, gnss=(0.2, 0.0, 0.0))
-    return state._replace(vehicle=vehicle, aids=aids, size=SIZE), history
+    sensor_errors = state.sensor_errors._replace(
+        horizontal_slow_std=slow, vertical_slow_std=slow, gnss=(0.2, 0.0, 0.0)
+    )
+    return state._replace(vehicle=vehicle, sensor_errors=sensor_errors, size=SIZE), history
 
 
 def corrected(state: EstimatorState, history: History, stated: float, rtk: float) -> EstimatorState:
@@ -52,18 +54,18 @@ def test_what_it_floated_by_is_over_once_it_is_fixed() -> None:
     state, history = started(FLOAT_STD)
     state = corrected(state, history, FIXED_STD, RTK_FIXED)
     assert math.sqrt(history.covariance[GNSS, GNSS]) < SLOW_SHARE * FIXED_STD * 1.001
-    assert abs(state.aids.gnss[0]) < SLOW_SHARE * FIXED_STD
+    assert abs(state.sensor_errors.gnss[0]) < SLOW_SHARE * FIXED_STD
     # the place is that of the fix, which was 0.2 m off before
     assert state.vehicle.x_quad[0] == pytest.approx(0.05, abs=FIXED_STD)
 
 
 def test_while_it_floats_the_place_is_hardly_moved() -> None:
     state, history = started(FIXED_STD)
-    before = state.aids
+    before = state.sensor_errors
     state = corrected(state, history, FLOAT_STD, RTK_FLOAT)
-    assert (state.aids.horizontal_slow, state.aids.vertical_slow) == (
-        before.horizontal_slow,
-        before.vertical_slow,
+    assert (state.sensor_errors.horizontal_slow_std, state.sensor_errors.vertical_slow_std) == (
+        before.horizontal_slow_std,
+        before.vertical_slow_std,
     )
     assert abs(state.vehicle.x_quad[0]) < 1e-4
     state, history = started(FIXED_STD)

@@ -47,7 +47,7 @@ def row_of(kind: int, reading: Any, shows_us: float = NOW_US) -> Any:
         box.put_vector(rows, 0, kind, reading)
     else:
         box.put_reading(rows, 0, kind, 0, reading)
-        rows[0, box.SHOWS] = shows_us
+        rows[0, box.SAMPLE_TIME_US] = shows_us
     return rows[0]
 
 
@@ -98,12 +98,12 @@ def test_an_instant_that_is_no_number_gives_no_age(shows_us: float) -> None:
 
 # ---- one reading
 
-READERS = {PoseReading: box.pose_in, LoadReading: box.load_in, GnssReading: box.fix_in}
+READERS = {PoseReading: box.read_pose, LoadReading: box.read_load, GnssReading: box.read_fix}
 DEVIATIONS = {PoseReading: (11, 12, 13), LoadReading: (7, 8), GnssReading: (7, 8)}
 LEAST = {
-    PoseReading: (box.LEAST_POSITION_STD_M, box.LEAST_ANGLE_STD_RAD, box.LEAST_VELOCITY_STD_M_S),
-    LoadReading: (box.LEAST_POSITION_STD_M, box.LEAST_VELOCITY_STD_M_S),
-    GnssReading: (box.LEAST_FIX_STD_M, box.LEAST_FIX_STD_M),
+    PoseReading: (box.MIN_POSITION_STD_M, box.MIN_ANGLE_STD_RAD, box.MIN_VELOCITY_STD_M_S),
+    LoadReading: (box.MIN_POSITION_STD_M, box.MIN_VELOCITY_STD_M_S),
+    GnssReading: (box.MIN_FIX_STD_M, box.MIN_FIX_STD_M),
 }
 PLACED = pytest.mark.parametrize("reading", [POSE, LOAD, FIX], ids=["pose", "load", "fix"])
 
@@ -158,7 +158,7 @@ def test_a_tracker_that_states_no_deviation_is_believed_to_the_least(reading: An
 def test_a_receiver_that_states_no_deviation_is_not_believed() -> None:
     for place in DEVIATIONS[GnssReading]:
         for value in NO_NUMBERS:
-            assert not box.fix_in(changed(FIX, place, value), 0.0)[0]
+            assert not box.read_fix(changed(FIX, place, value), 0.0)[0]
 
 
 @pytest.mark.parametrize("reading", [POSE, LOAD], ids=["pose", "load"])
@@ -176,12 +176,12 @@ def test_a_velocity_that_was_not_measured_is_none_whatever_stands_there(reading:
     "quat", [(0.0, 0.0, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0), (NAN, 0.0, 0.0, 1.0)]
 )
 def test_a_quaternion_that_is_no_rotation_is_dropped(quat: tuple[float, float, float, float]) -> None:
-    assert not box.pose_in(row_of(box.POSE, POSE._replace(quat_wxyz=quat)), 0.0)[0]
+    assert not box.read_pose(row_of(box.POSE, POSE._replace(quat_wxyz=quat)), 0.0)[0]
 
 
 def test_a_quaternion_rounded_by_the_wire_is_a_rotation() -> None:
     quat = tuple(float(np.float32(v)) for v in (0.1825742, 0.3651484, 0.5477226, 0.7302967))
-    believed, read = box.pose_in(row_of(box.POSE, POSE._replace(quat_wxyz=quat)), 0.0)
+    believed, read = box.read_pose(row_of(box.POSE, POSE._replace(quat_wxyz=quat)), 0.0)
     assert believed
     assert read.quat_wxyz == quat
 
@@ -189,7 +189,7 @@ def test_a_quaternion_rounded_by_the_wire_is_a_rotation() -> None:
 @pytest.mark.parametrize("length", [0.51, 1.0, 1.99])
 def test_a_direction_is_made_a_unit_vector(length: float) -> None:
     along = (0.6 * length, 0.0, -0.8 * length)
-    believed, read = box.direction_in(row_of(box.DIRECTION, SIGHT._replace(direction_body=along)), 0.01)
+    believed, read = box.read_direction(row_of(box.DIRECTION, SIGHT._replace(direction_body=along)), 0.01)
     assert believed
     assert read.direction_body == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
     assert (read.age_s, read.direction_std) == (0.01, 0.01)
@@ -199,16 +199,16 @@ def test_a_direction_is_made_a_unit_vector(length: float) -> None:
     "along", [(0.0, 0.0, 0.0), (0.0, 0.0, -0.49), (0.0, 0.0, -2.01), *((v, 0.0, -1.0) for v in NO_NUMBERS)]
 )
 def test_what_is_no_direction_is_dropped(along: tuple[float, float, float]) -> None:
-    assert not box.direction_in(row_of(box.DIRECTION, SIGHT._replace(direction_body=along)), 0.0)[0]
+    assert not box.read_direction(row_of(box.DIRECTION, SIGHT._replace(direction_body=along)), 0.0)[0]
 
 
 def test_a_direction_of_no_age_or_no_precision_is_dropped_and_a_perfect_one_is_not() -> None:
-    assert not box.direction_in(row_of(box.DIRECTION, SIGHT), NAN)[0]
-    assert not box.direction_in(row_of(box.DIRECTION, SIGHT._replace(direction_std=INF)), 0.0)[0]
+    assert not box.read_direction(row_of(box.DIRECTION, SIGHT), NAN)[0]
+    assert not box.read_direction(row_of(box.DIRECTION, SIGHT._replace(direction_std=INF)), 0.0)[0]
     for stated in (0.0, NAN):
-        believed, read = box.direction_in(row_of(box.DIRECTION, SIGHT._replace(direction_std=stated)), 0.0)
+        believed, read = box.read_direction(row_of(box.DIRECTION, SIGHT._replace(direction_std=stated)), 0.0)
         assert believed
-        assert read.direction_std == box.LEAST_DIRECTION_STD_RAD
+        assert read.direction_std == box.MIN_DIRECTION_STD_RAD
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ def test_a_direction_of_no_age_or_no_precision_is_dropped_and_a_perfect_one_is_n
     ],
 )
 def test_an_inertial_sample_is_a_number_within_any_sensors_range(gyro: Any, accel: Any, sane: bool) -> None:
-    assert box.is_sane(ImuReading(gyro, accel)) == sane
+    assert box.is_valid_imu(ImuReading(gyro, accel)) == sane
 
 
 # ---- the estimate from an inbox
@@ -235,11 +235,11 @@ def begun(rows: list[Any], ticks: int = 20) -> tuple[EstimatorState, History]:
     """An estimate that has received these rows for some ticks."""
     state, history = blank_state(), new_history()
     for _ in range(ticks):
-        state = heard(state, history, rows)
+        state = after_readings(state, history, rows)
     return state, history
 
 
-def heard(state: EstimatorState, history: History, rows: list[Any]) -> EstimatorState:
+def after_readings(state: EstimatorState, history: History, rows: list[Any]) -> EstimatorState:
     inbox = np.array(rows)
     return estimate(
         state, history, inbox, len(rows), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0, ZERO
@@ -282,14 +282,14 @@ DROPPED = {
 def test_what_is_dropped_leaves_no_trace(rows: list[Any], dropped: Any) -> None:
     alone, beside = begun(rows), begun(rows)
     for between in range(len(rows) + 1):
-        alone = (heard(*alone, rows), alone[1])
-        beside = (heard(*beside, [*rows[:between], dropped, *rows[between:]]), beside[1])
+        alone = (after_readings(*alone, rows), alone[1])
+        beside = (after_readings(*beside, [*rows[:between], dropped, *rows[between:]]), beside[1])
         assert bits(*alone) == bits(*beside)
 
 
 def test_without_a_sound_sample_the_last_one_goes_on() -> None:
     state, history = begun(TRACKED)
-    state = heard(state, history, TRACKED[1:])
+    state = after_readings(state, history, TRACKED[1:])
     assert state.last_imu == STILL
 
 
@@ -303,7 +303,7 @@ def test_readings_of_different_kinds_may_come_in_any_order(rows: list[Any]) -> N
 def test_rows_behind_the_count_are_not_read() -> None:
     inbox = np.array([*TRACKED, row_of(box.POSE, POSE._replace(x_quad=(5.0, 5.0, 5.0)))])
     alone, beside = begun(TRACKED), begun(TRACKED)
-    first = heard(*alone, TRACKED)
+    first = after_readings(*alone, TRACKED)
     second = estimate(
         *beside, inbox, len(TRACKED), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0, ZERO
     )
@@ -327,7 +327,7 @@ def test_a_fix_waits_for_an_attitude_to_start_with(field: Any, accel: Any) -> No
     assert state.vehicle.source == 0.0
     assert state.resets == 0.0
     for _ in range(20):
-        state = heard(state, history, AIDED)
+        state = after_readings(state, history, AIDED)
     assert state.vehicle.source == 2.0
     assert state.vehicle.x_quad[:2] == pytest.approx(OVER[:2], abs=0.02)
     assert np.isfinite(history.covariance).all()

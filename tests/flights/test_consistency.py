@@ -20,6 +20,7 @@ from autopilot.estimation.records import (
     ATTITUDE,
     DIRECTION,
     FIX,
+    LINE_OF_SIGHT,
     LOAD,
     MAGNETIC,
     POSE,
@@ -27,7 +28,6 @@ from autopilot.estimation.records import (
     PRESSURE,
     RATE,
     SENSORS,
-    SIGHT,
     VELOCITY,
 )
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
@@ -49,7 +49,7 @@ PARTS = {
     "rate": (RATE, 2),
 }
 # number of scalars in a reading of each kind
-SCALARS = {POSE: 6, LOAD: 3, FIX: 6, PRESSURE: 1, MAGNETIC: 1, SIGHT: 2}
+SCALARS = {POSE: 6, LOAD: 3, FIX: 6, PRESSURE: 1, MAGNETIC: 1, LINE_OF_SIGHT: 2}
 
 
 def error_of(craft: Craft) -> NDArray[Any]:
@@ -114,7 +114,7 @@ def test_the_error_is_what_the_filter_says(sensors: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sensors", "readings"), [("lab", (POSE, LOAD)), ("rtk", (FIX, PRESSURE, MAGNETIC, SIGHT))]
+    ("sensors", "readings"), [("lab", (POSE, LOAD)), ("rtk", (FIX, PRESSURE, MAGNETIC, LINE_OF_SIGHT))]
 )
 def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tuple[int, ...]) -> None:
     """Measured: 1.00, 0.99; 1.03, 1.00, 0.87, 0.99."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from autopilot.geometry.linear import Vec3, norm, sub
-from autopilot.guidance.setpoint_follower import Follow
+from autopilot.guidance.setpoint_follower import TrackPosition
 from autopilot.supervisor.state import Phase, setpoint
 from autopilot.wire.dialect import plumbline as m
 from missions import model
@@ -35,7 +35,7 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
             if k % 12 == 0:
                 say(n, e, d)
             craft.tick()
-            if isinstance(craft.flight.legs[0], Follow):
+            if isinstance(craft.flight.legs[0], TrackPosition):
                 t = (craft.onboard.now_us - craft.flight.leg_start_us) * 1e-6
                 worst = max(worst, norm(sub(craft.truth.x_load, craft.flight.legs[0].jet(t)[0])))
         return worst

@@ -10,7 +10,7 @@ import pytest
 
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.guidance.heading import heading_of, turn
+from autopilot.guidance.heading import heading_of, wrap_pi
 from autopilot.supervisor.state import Phase, setpoint
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
@@ -56,7 +56,7 @@ def watched(craft: Craft, seconds: float, say: Callable[[], None] | None = None)
         jet = setpoint(craft.flight, craft.onboard.now_us)
         assert jet is not None
         error = max(error, norm(sub(craft.truth.x_load, jet[0])))
-        lag = max(lag, abs(turn(nose(craft) - craft.flight.heading.angle)))
+        lag = max(lag, abs(wrap_pi(nose(craft) - craft.flight.heading.angle)))
     return Seen(error, lag)
 
 
@@ -82,11 +82,11 @@ def test_a_quarter_turn_and_back_by_the_other_side(law: float, lag_deg: float) -
     assert seen.error < 0.006 and seen.lag < math.radians(lag_deg)
     assert craft.command(m.MAV_CMD_CONDITION_YAW, 90.0, 0.0, -1.0) == ACCEPTED  # further to the left
     halfway = watched(craft, 2.5)
-    assert abs(turn(nose(craft))) > 0.75 * math.pi, "turned the shorter way"
+    assert abs(wrap_pi(nose(craft))) > 0.75 * math.pi, "turned the shorter way"
     seen = watched(craft, 10.0)
     assert nose(craft) == pytest.approx(0.0, abs=0.01)
     assert max(halfway.error, seen.error) < 0.006
-    assert craft.flight.heading.rests
+    assert craft.flight.heading.is_settled
 
 
 # measured 6.5 mm at 1.5 m/s (without turning 5.9 mm); thesis and lqr lag behind motion, the nose does not
@@ -100,7 +100,7 @@ def test_the_nose_goes_round_and_round_over_a_load_in_motion(law: float, error: 
     assert craft.truth.omega_body[2] == pytest.approx(-math.radians(150.0), rel=0.02)
     # silence: the load is held, and the nose stops
     craft.wait(10.0)
-    assert craft.flight.phase == Phase.HOLD and craft.flight.heading.rests
+    assert craft.flight.phase == Phase.HOLD and craft.flight.heading.is_settled
     assert abs(craft.truth.omega_body[2]) < 0.02
 
 
@@ -155,10 +155,10 @@ def test_the_nose_keeps_looking_at_a_place() -> None:
     for _ in range(7):
         watched(craft, 1.0, say)
         x = craft.truth.x_quad
-        assert abs(turn(nose(craft) - math.atan2(here[1] - x[1], here[0] - x[0]))) < math.radians(3.0)
+        assert abs(wrap_pi(nose(craft) - math.atan2(here[1] - x[1], here[0] - x[0]))) < math.radians(3.0)
     assert craft.command(m.MAV_CMD_DO_SET_ROI_NONE) == ACCEPTED
     craft.wait(10.0)
-    assert craft.flight.heading.rests
+    assert craft.flight.heading.is_settled
 
 
 # ---- attitude and body rates
@@ -228,7 +228,7 @@ def test_a_vehicle_that_landed_takes_off_again_with_the_heading_it_has() -> None
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
     while craft.flight.phase != Phase.HOLD:
         craft.wait(0.25)
-        assert abs(turn(nose(craft) - 0.5 * math.pi)) < 0.1
+        assert abs(wrap_pi(nose(craft) - 0.5 * math.pi)) < 0.1
 
 
 def test_items_of_a_mission_turn_the_nose_and_stop_nothing() -> None:
@@ -252,8 +252,8 @@ def test_items_of_a_mission_turn_the_nose_and_stop_nothing() -> None:
     craft.run(lambda craft: craft.flight.mission.step == 2)
     assert norm(craft.truth.v_load) > 0.3, "flown through, as without the item"
     craft.run(lambda craft: craft.flight.mission.step == 4)
-    assert abs(turn(nose(craft) - math.radians(-90.0))) < 0.05, "south"
+    assert abs(wrap_pi(nose(craft) - math.radians(-90.0))) < 0.05, "south"
     craft.run(lambda craft: craft.flight.mission.step == 5)
     east, north, _ = craft.truth.x_quad
-    assert abs(turn(nose(craft) - math.atan2(12.0 - north, 4.0 - east))) < 0.05, "to the place"
+    assert abs(wrap_pi(nose(craft) - math.atan2(12.0 - north, 4.0 - east))) < 0.05, "to the place"
     assert not any("kept" in text for text in craft.texts)

@@ -28,7 +28,7 @@ def part(mark: str, statement: str, cost_s: float = 1.0) -> Part:
 def nothing_compiled(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    monkeypatch.setattr("autopilot.geometry.machine_code.CHOSEN_BY_USER", "")
+    monkeypatch.setattr("autopilot.geometry.machine_code.USER_CACHE_DIR", "")
 
 
 def test_a_flight_needs_its_law_alone():

@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from autopilot.geometry.addresses import ask_kernel_at, call_kernel_at
-from autopilot.geometry.entry import native_address_of
+from autopilot.geometry.addresses import call_int_kernel_at, call_kernel_at
+from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row
 
@@ -46,12 +46,12 @@ def by_address(own: Own, share: float, chosen: bool) -> None:
 
 @kernel
 def answer_of(address: int, rows: Rows, more: int) -> int:
-    return int(ask_kernel_at(address, (rows, more)))
+    return int(call_int_kernel_at(address, (rows, more)))
 
 
 def test_it_writes_into_the_same_rows_given_the_members_of_a_tuple_or_the_tuple() -> None:
     rows = Rows(np.array([1.0, 3.0]), np.zeros(1))
-    address = native_address_of(doubled, rows, 0.5, True)
+    address = kernel_address_of(doubled, rows, 0.5, True)
     by_address(Own(rows.first, rows.second, address), 0.5, True)
     assert rows.second[0] == 6.5
     by_address(Own(rows.first, rows.second, address), 0.5, False)
@@ -60,5 +60,5 @@ def test_it_writes_into_the_same_rows_given_the_members_of_a_tuple_or_the_tuple(
 
 def test_it_hands_back_a_whole_number() -> None:
     rows = Rows(np.zeros(4), np.zeros(1))
-    address = native_address_of(counted, rows, 1)
+    address = kernel_address_of(counted, rows, 1)
     assert [answer_of(address, rows, more) for more in (-9, 0, 2**40)] == [-5, 4, 2**40 + 4]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row
 
@@ -24,7 +24,7 @@ def weighed(rows: Rows, weight: float, count: int) -> float:
 
 
 def test_the_entry_returns_what_the_kernel_returns_and_writes_into_the_same_rows() -> None:
-    enter = entry_of(weighed, Rows(np.zeros(2), np.zeros(2)), 0.5, 1)
+    enter = entry_point_of(weighed, Rows(np.zeros(2), np.zeros(2)), 0.5, 1)
     for k in range(3):
         rows = Rows(np.array([1.0 + k, 2.0]), np.array([3.0, 4.0]))
         assert enter(rows, 0.1, k) == weighed(rows, 0.1, k)
@@ -33,4 +33,4 @@ def test_the_entry_returns_what_the_kernel_returns_and_writes_into_the_same_rows
 
 
 def test_what_is_not_compiled_is_called_as_it_is() -> None:
-    assert entry_of(len, [1]) is len
+    assert entry_point_of(len, [1]) is len

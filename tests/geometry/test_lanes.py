@@ -1,5 +1,5 @@
 """Eight flights at once: in each lane the bits that one number gives, and a record of the lanes that
-parted."""
+diverged."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.lanes import (
+    as_lane_array,
     bits_of,
-    each,
+    diverged_lanes,
+    float_from_bits,
     if_above,
-    in_lanes,
-    of_bits,
-    parted,
-    rows_in,
-    single,
-    taken,
+    int_per_lane,
+    row_count,
+    table_value,
+    to_single,
 )
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.so3 import quat_from_rotation, quat_log, rotation_from_quat
@@ -52,23 +52,23 @@ def computed(x: Any, out: Any) -> None:
     out[4] = max(a, b, 0.5)
     out[5] = min(a, b, c)
     out[6] = math.sin(a) + math.cos(b) + math.atan2(a, b)
-    out[7] = single(c)
+    out[7] = to_single(c)
     out[12] = if_above(a, b, c, 1.0)
     total = 0.0
     for part in (a, b, 1.0):
         total += part
     out[8] = total
-    out[9] = of_bits(bits_of(a) ^ 1)
-    seconds = each(x[3])
+    out[9] = float_from_bits(bits_of(a) ^ 1)
+    seconds = int_per_lane(x[3])
     out[10] = (seconds // 7) * 1.0 + (seconds % 7)
     out[11] = ((seconds & 0xFF) << 3) + (seconds >> 2)
 
 
 @kernel
 def computed_in_lanes(x: Any, out: Any) -> int:
-    parted()
-    computed(in_lanes(x), in_lanes(out))
-    return parted()
+    diverged_lanes()
+    computed(as_lane_array(x), as_lane_array(out))
+    return diverged_lanes()
 
 
 NUMBER = st.floats(allow_subnormal=False) | st.sampled_from([0.0, -0.0, math.inf, -math.inf, math.nan])
@@ -93,12 +93,12 @@ def test_each_lane_has_the_bits_of_one_number(flights: list[tuple[float, float, 
 
 @kernel
 def decided(x: Any) -> int:
-    a = in_lanes(x)
-    parted()
+    a = as_lane_array(x)
+    diverged_lanes()
     steps = 0
     while a[0] > steps:
         steps += 1
-    return steps * 1000 + parted()
+    return steps * 1000 + diverged_lanes()
 
 
 @pytest.mark.parametrize(
@@ -118,19 +118,19 @@ def test_lane_0_decides_and_the_others_that_differ_are_told(
 
 @kernel
 def questions(x: Any, which: int) -> int:
-    a = in_lanes(x)[0]
-    parted()
+    a = as_lane_array(x)[0]
+    diverged_lanes()
     if which == 0:
-        return int(a) * 1000 + parted()
+        return int(a) * 1000 + diverged_lanes()
     if which == 1:
-        return math.ceil(a) * 1000 + parted()
+        return math.ceil(a) * 1000 + diverged_lanes()
     if which == 2:
-        return (1 if math.isnan(a) else 0) * 1000 + parted()
+        return (1 if math.isnan(a) else 0) * 1000 + diverged_lanes()
     if which == 3:
-        return (1 if math.isfinite(a) else 0) * 1000 + parted()
+        return (1 if math.isfinite(a) else 0) * 1000 + diverged_lanes()
     if which == 4:
-        return (1 if math.isinf(a) else 0) * 1000 + parted()
-    return (1 if a != 1.0 else 0) * 1000 + parted()
+        return (1 if math.isinf(a) else 0) * 1000 + diverged_lanes()
+    return (1 if a != 1.0 else 0) * 1000 + diverged_lanes()
 
 
 def test_what_can_have_one_answer_only_is_that_of_lane_0() -> None:
@@ -169,9 +169,9 @@ def turned(quat: Any, out: Any) -> None:
 
 @kernel
 def turned_in_lanes(quat: Any, out: Any) -> int:
-    parted()
-    turned(in_lanes(quat), in_lanes(out))
-    return parted()
+    diverged_lanes()
+    turned(as_lane_array(quat), as_lane_array(out))
+    return diverged_lanes()
 
 
 def test_records_and_tuples_mix_one_number_with_eight() -> None:
@@ -187,12 +187,12 @@ def test_records_and_tuples_mix_one_number_with_eight() -> None:
 
 @kernel
 def looked_up(tables: Any, at: Any, out: Any) -> int:
-    rows, found = in_lanes(at), in_lanes(out)
-    row = each(rows[0])
-    found[0] = taken(tables, row, 1)
-    found[1] = rows_in(tables) * 1.0
-    parted()
-    return (1 if 0 <= row < rows_in(tables) else 0) * 1000 + parted()
+    rows, found = as_lane_array(at), as_lane_array(out)
+    row = int_per_lane(rows[0])
+    found[0] = table_value(tables, row, 1)
+    found[1] = row_count(tables) * 1.0
+    diverged_lanes()
+    return (1 if 0 <= row < row_count(tables) else 0) * 1000 + diverged_lanes()
 
 
 def test_each_flight_has_its_own_table_and_row() -> None:
@@ -208,8 +208,8 @@ def test_each_flight_has_its_own_table_and_row() -> None:
 
 
 def test_python_does_the_same_to_one_number() -> None:
-    assert single(0.1) == float(np.float32(0.1))
-    assert of_bits(bits_of(-1.5)) == -1.5 and bits_of(1.0) == 0x3FF0000000000000
+    assert to_single(0.1) == float(np.float32(0.1))
+    assert float_from_bits(bits_of(-1.5)) == -1.5 and bits_of(1.0) == 0x3FF0000000000000
     assert if_above(2.0, 1.0, 3.0, 4.0) == 3.0 and if_above(math.nan, 1.0, 3.0, 4.0) == 4.0
-    assert each(3.0) == 3 and taken(np.arange(6.0).reshape(2, 3), 1, 2) == 5.0
-    assert rows_in(np.zeros((4, 2))) == 4
+    assert int_per_lane(3.0) == 3 and table_value(np.arange(6.0).reshape(2, 3), 1, 2) == 5.0
+    assert row_count(np.zeros((4, 2))) == 4

@@ -131,7 +131,7 @@ def test_what_is_ready_is_known_by_its_sources_and_its_part(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", "")
+    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", "")
     source = Path(s2.__file__)
     assert not machine_code.is_ready(source, ("tick",))
     machine_code.mark_ready(source, ("tick", "law"))
@@ -146,9 +146,9 @@ def test_what_is_not_used_for_long_is_deleted_and_its_mark_before_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", "")
+    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", "")
     source = Path(__file__)
-    folder = machine_code.folder_of(source)
+    folder = machine_code.kernel_folder(source)
     other = folder.with_name("0123")
     for one in (folder, other):
         (one / "code").mkdir(parents=True)
@@ -158,9 +158,9 @@ def test_what_is_not_used_for_long_is_deleted_and_its_mark_before_it(
     for one in marks:
         os.utime(one, (0.0, 0.0))
     assert machine_code.is_marked(source, "used")
-    machine_code.note_use(folder)
+    machine_code.record_use(folder)
 
-    machine_code.drop_unused(machine_code.KEPT_S + 43200.0)  # half a day beyond the limit
+    machine_code.drop_unused(machine_code.RETENTION_S + 43200.0)  # half a day beyond the limit
     assert machine_code.is_marked(source, "used") and not machine_code.is_marked(source, "unused")
     assert (folder / "code").is_dir() and (other / "code").is_dir()
     machine_code.drop_unused(time.time())
@@ -176,7 +176,7 @@ def test_a_directory_that_cannot_be_written_is_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", str(tmp_path / "file"))
+    monkeypatch.setattr(machine_code, "USER_CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     source = Path(s2.__file__)
     machine_code.mark_ready(source, ("tick",))

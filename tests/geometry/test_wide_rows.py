@@ -10,16 +10,16 @@ import pytest
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
-from autopilot.geometry.lanes import in_lanes
-from autopilot.geometry.wide import turned
+from autopilot.geometry.lanes import as_lane_array
+from autopilot.geometry.wide import transposed
 from autopilot.geometry.wide_rows import (
+    accumulate_and_scale,
     combine,
+    subtract_row,
+    subtract_rows,
+    subtract_squares,
     symmetrise,
-    take_row,
-    take_rows,
-    take_squares,
     transpose,
-    weigh,
 )
 
 ROOM, ROWS = 32, 9
@@ -31,31 +31,39 @@ def all_rows(square: Any, rows: Any, into: Any, which: Any, shares: Any, count: 
     """All operations on rows, one after the other."""
     for k in range(count):
         combine(rows, k, square, which, shares, n)
-    take_row(rows, 1, shares[2, 2], 0, n)
+    subtract_row(rows, 1, shares[2, 2], 0, n)
     for k in range(count):
-        take_rows(rows, k, shares, n)
-    weigh(into, rows, shares, count, n)
+        subtract_rows(rows, k, shares, n)
+    accumulate_and_scale(into, rows, shares, count, n)
 
 
 @kernel
 def all_rows_in_lanes(square: Any, rows: Any, into: Any, which: Any, shares: Any, count: int, n: int) -> None:
-    all_rows(in_lanes(square), in_lanes(rows), in_lanes(into), which, in_lanes(shares), count, n)
+    all_rows(
+        as_lane_array(square),
+        as_lane_array(rows),
+        as_lane_array(into),
+        which,
+        as_lane_array(shares),
+        count,
+        n,
+    )
 
 
 @kernel
 def squares(square: Any, rows: Any, count: int, n: int) -> None:
-    take_squares(square, rows, count, n)
+    subtract_squares(square, rows, count, n)
 
 
 @kernel
 def squares_in_lanes(square: Any, rows: Any, count: int, n: int) -> None:
-    take_squares(in_lanes(square), in_lanes(rows), count, n)
+    subtract_squares(as_lane_array(square), as_lane_array(rows), count, n)
 
 
 @kernel
 def moved(before: Any, n: int) -> None:
     transpose(before, n)
-    after = turned(before)
+    after = transposed(before)
     for i in range(n):
         after[2, i] = 3.0 * after[5, i]
     symmetrise(after, n)
@@ -63,7 +71,7 @@ def moved(before: Any, n: int) -> None:
 
 @kernel
 def moved_in_lanes(square: Any, n: int) -> None:
-    moved(in_lanes(square), n)
+    moved(as_lane_array(square), n)
 
 
 def numbers(*shape: int) -> list[Any]:

@@ -15,24 +15,24 @@ from autopilot.geometry.linear import Vec3, norm
 from autopilot.guidance.legs import (
     LOAD_ATTITUDE,
     LOAD_POSITION,
+    MAX_LEAN_SINE,
     QUAD_ATTITUDE,
     QUAD_POSITION,
-    STEEPEST_LEAN,
     Brake,
-    Calm,
     Creep,
     Hold,
     Leg,
-    Pass,
+    PathStop,
+    PathStretch,
     Reel,
-    Run,
-    Slow,
+    SignalRun,
     Swing,
+    SwingDamping,
     brake_leg,
     carry_leg,
-    least_move_s,
+    min_move_duration,
+    path_stop_leg,
     reel_leg,
-    slow_leg,
     transfer_leg,
 )
 from autopilot.supervisor.settings import path_limits
@@ -56,15 +56,15 @@ LEGS: dict[str, Leg] = {
     "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
-    "run": Run(HERE, unshaped_signals(SIGNALS)),
-    "shaped run": Run(HERE, SHAPED),
-    "pass": Pass(PASSAGE, (0.02, -0.01, 0.0), 1.7),
-    "slow": Slow(Run(HERE, unshaped_signals(SIGNALS)), 0.9, 2.4),
+    "run": SignalRun(HERE, unshaped_signals(SIGNALS)),
+    "shaped run": SignalRun(HERE, SHAPED),
+    "pass": PathStretch(PASSAGE, (0.02, -0.01, 0.0), 1.7),
+    "slow": PathStop(SignalRun(HERE, unshaped_signals(SIGNALS)), 0.9, 2.4),
     "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
     "reel": Reel(HERE, HERE[2] + 0.7, 0.4, 1.0, 0.6),
-    "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
+    "calm": SwingDamping(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
 }
-LEAST_S = least_move_s(0.7, 9.81)
+LEAST_S = min_move_duration(0.7, 9.81)
 STEP_S = 1e-4
 # central differences over 0.1 ms: second order, against derivatives that grow by up to 1e2 with each order
 DIFFERENCE = 1e-5
@@ -132,8 +132,8 @@ def test_a_brake_out_of_steady_motion_keeps_to_its_limit_and_never_turns_back(
 
 @given(at=st.floats(0.0, 2.7), limit=st.floats(0.2, 5.0))
 def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit: float) -> None:
-    run = Run(HERE, unshaped_signals(SIGNALS))
-    leg = slow_leg(run, at, limit, LEAST_S)
+    run = SignalRun(HERE, unshaped_signals(SIGNALS))
+    leg = path_stop_leg(run, at, limit, LEAST_S)
     assert leg.duration_s >= LEAST_S
     for stopped, going in zip(leg.jet(0.0), run.jet(at), strict=True):
         assert stopped == pytest.approx(going, abs=ROUNDING)
@@ -146,9 +146,9 @@ def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit
 def test_a_stop_flies_no_part_of_its_path_faster() -> None:
     """The run reaches 2 m/s at the peak of its sine; a stop that begins while it accelerates must not become
     faster than that."""
-    run = Run(HERE, unshaped_signals(SIGNALS))
+    run = SignalRun(HERE, unshaped_signals(SIGNALS))
     fastest = max(norm(run.jet(0.02 * k)[1]) for k in range(200))
-    leg = slow_leg(run, 0.75, 1.0, LEAST_S)
+    leg = path_stop_leg(run, 0.75, 1.0, LEAST_S)
     speeds = [norm(leg.jet(leg.duration_s * k / 100)[1]) for k in range(101)]
     assert max(speeds) <= fastest + ROUNDING
     middle = leg.jet(0.5 * leg.duration_s)
@@ -158,9 +158,9 @@ def test_a_stop_flies_no_part_of_its_path_faster() -> None:
 
 
 def test_a_stop_out_of_a_stop_is_the_rest_of_it() -> None:
-    first = slow_leg(Run(HERE, unshaped_signals(SIGNALS)), 0.9, 1.5, LEAST_S)
-    second = slow_leg(first, 0.4, 1.5, LEAST_S)
-    third = slow_leg(second, 0.3, 1.5, LEAST_S)
+    first = path_stop_leg(SignalRun(HERE, unshaped_signals(SIGNALS)), 0.9, 1.5, LEAST_S)
+    second = path_stop_leg(first, 0.4, 1.5, LEAST_S)
+    third = path_stop_leg(second, 0.3, 1.5, LEAST_S)
     assert (third.leg, third.end) == (first.leg, first.end)
     assert third.duration_s == pytest.approx(first.duration_s - 0.7)
     for again, before in zip(third.jet(0.2), first.jet(0.9), strict=True):
@@ -169,7 +169,7 @@ def test_a_stop_out_of_a_stop_is_the_rest_of_it() -> None:
 
 @given(lean=st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)), rate=vectors)
 def test_calming_goes_on_from_the_lean_and_ends_upright(lean: tuple[float, float], rate: Vec3) -> None:
-    leg = Calm(HERE, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), False, 1.2)
+    leg = SwingDamping(HERE, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), False, 1.2)
     up = leg.upward(0.0)
     assert up == pytest.approx((lean[0], lean[1], sqrt(1.0 - lean[0] ** 2 - lean[1] ** 2)))
     soon = leg.upward(STEP_S)
@@ -178,7 +178,7 @@ def test_calming_goes_on_from_the_lean_and_ends_upright(lean: tuple[float, float
     for k in range(20):
         direction = leg.upward(leg.duration_s * k / 20)
         assert norm(direction) == pytest.approx(1.0, abs=1e-12)
-        assert sqrt(1.0 - direction[2] ** 2) <= STEEPEST_LEAN + 1e-9
+        assert sqrt(1.0 - direction[2] ** 2) <= MAX_LEAN_SINE + 1e-9
     assert leg.control_mode == LOAD_ATTITUDE
 
 
@@ -217,8 +217,8 @@ def test_carrying_is_never_quicker_than_the_pendulum_and_else_as_quick_as_it_may
 
 
 def test_the_least_duration_of_a_move_at_the_cable_of_table_4_1() -> None:
-    assert least_move_s(0.7, 9.81) == pytest.approx(2.0, abs=0.03)
-    assert least_move_s(2.8, 9.81) == pytest.approx(2.0 * least_move_s(0.7, 9.81))
+    assert min_move_duration(0.7, 9.81) == pytest.approx(2.0, abs=0.03)
+    assert min_move_duration(2.8, 9.81) == pytest.approx(2.0 * min_move_duration(0.7, 9.81))
 
 
 @pytest.mark.parametrize(("wanted", "speed"), [(1.9, 0.3), (0.75, 0.3), (0.4, 0.05), (0.7005, 0.3)])

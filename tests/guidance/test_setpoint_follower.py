@@ -12,27 +12,27 @@ from hypothesis import strategies as st
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
 from autopilot.guidance.legs import LOAD_POSITION, transfer_leg
 from autopilot.guidance.setpoint_follower import (
-    NOWHERE,
+    UNSPECIFIED,
     Circle,
-    Follow,
     FollowLimits,
     PositionSetpoint,
-    begin_following,
-    governed,
+    TrackPosition,
+    governor_point,
+    start_following,
 )
 
 PACE = FollowLimits(1.5, 5.0, 1.5, 13.1)
 
 
 def led(
-    asked: PositionSetpoint | Circle, seconds: float, leg: Follow | None = None, begin_us: int = 0
+    asked: PositionSetpoint | Circle, seconds: float, leg: TrackPosition | None = None, begin_us: int = 0
 ) -> list[Any]:
     """Jets at every 20 ms on the way."""
-    leg = leg or begin_following((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    leg = leg or start_following((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     found = []
     for k in range(round(seconds / 0.02)):
         now_us = begin_us + 20_000 * k
-        leg = leg.onward(0.02 if k else 0.0, asked, PACE, now_us)
+        leg = leg.redirected(0.02 if k else 0.0, asked, PACE, now_us)
         found.append(leg.jet(0.0))
     return [*found, leg]
 
@@ -44,17 +44,17 @@ vectors = st.tuples(finite, finite, finite)
 @settings(max_examples=40, deadline=None)
 @given(asked=st.lists(vectors, min_size=2, max_size=5), kinds=st.lists(st.booleans(), min_size=5, max_size=5))
 def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bool]) -> None:
-    leg = begin_following(((0.0, 0.0, 5.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    leg = start_following(((0.0, 0.0, 5.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     now_us = 0
-    for vector, is_place in zip(asked, kinds, strict=False):
+    for vector, is_fixed in zip(asked, kinds, strict=False):
         wish = (
-            PositionSetpoint(vector, NOWHERE, NOWHERE, now_us)
-            if is_place
+            PositionSetpoint(vector, UNSPECIFIED, UNSPECIFIED, now_us)
+            if is_fixed
             else PositionSetpoint(velocity=vector, since_us=now_us)
         )
         for _ in range(10):
             now_us += 20_000
-            after = leg.onward(0.02, wish, PACE, now_us)
+            after = leg.redirected(0.02, wish, PACE, now_us)
             for n, (before_, after_) in enumerate(zip(leg.jet(0.02), after.jet(0.0), strict=True)):
                 # derivative n is of the size of the motion times rate^n, and is continuous to rounding
                 assert norm(sub(before_, after_)) <= 1e-9 * 40.0 * PACE.rate**n
@@ -62,11 +62,11 @@ def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bo
 
 
 @settings(max_examples=60, deadline=None)
-@given(at_s=st.floats(0.0, 9.7), place=vectors, is_place=st.booleans())
-def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_place: bool) -> None:
+@given(at_s=st.floats(0.0, 9.7), place=vectors, is_fixed=st.booleans())
+def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_fixed: bool) -> None:
     before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
-    wish = PositionSetpoint(place) if is_place else PositionSetpoint(velocity=place)
-    *jets, _ = led(wish, 3.0, begin_following(before.jet(at_s), PACE.rate))
+    wish = PositionSetpoint(place) if is_fixed else PositionSetpoint(velocity=place)
+    *jets, _ = led(wish, 3.0, start_following(before.jet(at_s), PACE.rate))
     # measured in 300 examples: 1.50 m/s^2 and 5.9 m/s^3; with a point that begins at the velocity alone 1.63
     # and 16.5
     assert max(norm(jet[2]) for jet in jets) < 1.05 * PACE.accel
@@ -78,7 +78,7 @@ def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: 
 def test_it_comes_to_rest_over_the_floor_wherever_it_was_led(
     height: float, wish: Vec3, seconds: float
 ) -> None:
-    leg = begin_following(((0.0, 0.0, height), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    leg = start_following(((0.0, 0.0, height), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     *_, leg = led(PositionSetpoint(velocity=wish), seconds, leg)
     legs, end = leg.stopped(0.013, PACE.accel)
     last = leg.jet(0.013)
@@ -110,7 +110,7 @@ def test_derivatives_are_those_of_the_motion() -> None:
 def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot() -> None:
     *jets, leg = led(PositionSetpoint((12.0, 0.0, 3.0)), 15.0)
     assert norm(sub(leg.jet(0.0)[0], (12.0, 0.0, 3.0))) < 1e-3
-    assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.speed
+    assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.approach_speed
     assert max(norm(jet[2]) for jet in jets) < 1.001 * PACE.accel
     assert max(jet[0][0] for jet in jets) < 12.001  # measured: 4 um short of it
 
@@ -126,7 +126,7 @@ def test_a_velocity_is_reached_and_held_and_stops() -> None:
 
 
 def test_no_velocity_leads_below_the_floor() -> None:
-    leg = begin_following(((0.0, 0.0, 3.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    leg = start_following(((0.0, 0.0, 3.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     *jets, leg = led(PositionSetpoint(velocity=(0.0, 0.0, -3.0)), 12.0, leg)
     assert 0.27 < min(jet[0][2] for jet in jets) <= leg.jet(0.0)[0][2] + 0.03
     assert leg.jet(0.0)[0][2] == pytest.approx(0.3, abs=0.02)
@@ -150,6 +150,6 @@ def test_a_circle_is_flown_on_its_radius() -> None:
 def test_the_governor_never_asks_for_more_than_its_acceleration(
     x: Vec3, v: Vec3, place: Vec3, now: int
 ) -> None:
-    point = governed(x, v, PositionSetpoint(place, v, x, 0), PACE, now)
+    point = governor_point(x, v, PositionSetpoint(place, v, x, 0), PACE, now)
     assert all(map(math.isfinite, (*point[0], *point[1], *point[2])))
     assert norm(point[2]) <= PACE.accel * 1.000001

@@ -11,7 +11,7 @@ import pytest
 
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import unpack
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run, asked_jet
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, SignalRun, requested_jet
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.instant import Instant
 from autopilot.supervisor.state import leg_time_s
@@ -43,11 +43,11 @@ def watching(seen: Counter[str]) -> Callable[[Onboard, HilSimulator], bool]:
         seen[type(leg).__name__] += 1
         assert said.elapsed_s == elapsed_s
         assert said.duration_s == leg.duration_s if leg.duration_s < inf else isnan(said.duration_s)
-        jet, asked = leg.jet(elapsed_s), asked_jet(leg, elapsed_s)
+        jet, asked = leg.jet(elapsed_s), requested_jet(leg, elapsed_s)
         if leg.control_mode == LOAD_POSITION:
             assert (said.x_load_d, said.v_load_d, said.a_load_d) == jet[:3]
             assert (said.x_load_requested, said.v_load_requested) == asked[:2]
-            if isinstance(leg, Run):
+            if isinstance(leg, SignalRun):
                 seen["asked otherwise"] += asked[0] != jet[0]
         else:
             assert (said.x_load_d, said.v_load_d, said.x_load_requested) == (x_load, ZERO, x_load)
@@ -63,7 +63,7 @@ def watching(seen: Counter[str]) -> Callable[[Onboard, HilSimulator], bool]:
 @pytest.mark.parametrize(
     ("mission", "least"),
     [
-        ("case-a", {"Run": 1000, "Hold": 100, "Transfer": 100, "asked otherwise": 100}),
+        ("case-a", {"SignalRun": 1000, "Hold": 100, "Transfer": 100, "asked otherwise": 100}),
         (str(WINCH), {"Reel": 100}),
     ],
 )

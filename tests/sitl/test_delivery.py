@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from autopilot.core.sensor_inbox import SensorInbox
-from autopilot.estimation.inbox import KIND, POSE, SHOWS, age_of, new_inbox
+from autopilot.estimation.inbox import KIND, POSE, SAMPLE_TIME_US, age_of, new_inbox
 from autopilot.wire.convert.geodesy import Home
 from sitl.hil import HilSimulator
 
@@ -118,7 +118,7 @@ def test_the_autopilots_inbox_takes_them_all_as_they_come(answerer) -> None:
         poses = rows[rows[:, KIND] == POSE]
         # a reading is refused if it is of the future, or older than the estimator's memory
         assert all(np.isfinite(age_of(row, simulator.now_us, 0.0)) for row in poses)
-        taken += poses[:, SHOWS].astype(int).tolist()
+        taken += poses[:, SAMPLE_TIME_US].astype(int).tolist()
         answerer().fly(simulator, 1)
     assert taken != sorted(taken)
     last = max(taken) - 40_000  # the longest that one can be on its way

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
-from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
+from autopilot.guidance.legs import LOAD_POSITION, Brake, Creep, Hold, SignalRun, Swing, SwingDamping
+from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
@@ -153,17 +153,17 @@ def test_a_pause_in_any_step_stops_and_continuing_finishes_the_mission(step: int
 
 def test_signals_begin_again_from_their_anchor_after_a_pause() -> None:
     sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), SIGNALS, model.Land())
-    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], Run))
+    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], SignalRun))
     run = sky.flight.legs[0]
-    assert isinstance(run, Run)
+    assert isinstance(run, SignalRun)
     sky.wait(1.2)
     sky.ask(Pause())
     sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
     assert norm(sub(sky.view.x_load, run.anchor)) > 0.01, "paused somewhere else"
     sky.ask(Continue())
-    sky.run(lambda s: isinstance(s.flight.legs[0], Run))
+    sky.run(lambda s: isinstance(s.flight.legs[0], SignalRun))
     again = sky.flight.legs[0]
-    assert isinstance(again, Run)
+    assert isinstance(again, SignalRun)
     assert again.anchor == pytest.approx(run.anchor, abs=1e-9)
     assert sky.view.x_load == pytest.approx(run.anchor, abs=1e-3)
 
@@ -176,7 +176,7 @@ def test_two_attitude_runs_follow_each_other_without_a_stop_and_the_last_is_calm
         if sky.flight.legs and (not kinds or kinds[-1] is not type(sky.flight.legs[0])):
             kinds.append(type(sky.flight.legs[0]))
     first = kinds.index(Swing)
-    assert kinds[first : first + 4] == [Swing, Calm, Brake, Hold]
+    assert kinds[first : first + 4] == [Swing, SwingDamping, Brake, Hold]
     assert kinds.count(Swing) == 2, "the pair is one motion"
 
 
@@ -342,7 +342,7 @@ def under_way(phase: Phase) -> Flight:
     held = Flight(
         phase=Phase.HOLD,
         mission=MissionProgress(plan=plan, step=1, takeoff_altitude_m=4.0, speed_m_s=1.0),
-        setpoints=Setpoints(offboard=Stream(PositionSetpoint(HERE), 0)),
+        setpoints=Setpoints(offboard=SetpointStream(PositionSetpoint(HERE), 0)),
     )
     return entered(held, phase, hanging(x=HERE), SETTINGS)
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from autopilot.geometry.linear import ZERO, norm, sub
 from autopilot.guidance.setpoint_follower import (
-    NOWHERE,
-    Follow,
+    UNSPECIFIED,
     PositionSetpoint,
-    Posture,
+    TrackAttitude,
+    TrackPosition,
 )
 from autopilot.onboard.snapshot import reported_mode
 from autopilot.services import identity
@@ -44,12 +44,14 @@ DENIED, LATER = m.MAV_RESULT_DENIED, m.MAV_RESULT_TEMPORARILY_REJECTED
 
 def at(*position: float, **more: Any) -> FollowSetpoint:
     x, y, z = position
-    return FollowSetpoint((x, y, z), more.get("velocity", NOWHERE), NOWHERE, more.get("relative", False))
+    return FollowSetpoint(
+        (x, y, z), more.get("velocity", UNSPECIFIED), UNSPECIFIED, more.get("relative", False)
+    )
 
 
 def moving(*velocity: float) -> FollowSetpoint:
     vx, vy, vz = velocity
-    return FollowSetpoint(NOWHERE, (vx, vy, vz), NOWHERE, False)
+    return FollowSetpoint(UNSPECIFIED, (vx, vy, vz), UNSPECIFIED, False)
 
 
 def stream(sky: Sky, request: Any, seconds: float) -> None:
@@ -99,7 +101,7 @@ def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() ->
 def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
     sky = offboard(at(0.0, 0.0, 2.0))
     assert sky.ask(at(1.0, math.nan, math.nan, relative=True)).result == ACCEPTED
-    asked = sky.flight.setpoints.offboard.asked
+    asked = sky.flight.setpoints.offboard.setpoint
     assert isinstance(asked, PositionSetpoint)
     assert asked.position[0] == pytest.approx(sky.view.x_load[0] + 1.0)
     assert math.isnan(asked.position[1])
@@ -109,7 +111,7 @@ def test_setpoints_for_the_vehicle_are_a_cable_above_those_for_the_load() -> Non
     guided = replace(SETTINGS.setpoints, target_is_vehicle=True)
     sky = Sky(settings=replace(SETTINGS, setpoints=guided)).airborne()
     sky.ask(at(0.0, 0.0, 5.0))
-    asked = sky.flight.setpoints.offboard.asked
+    asked = sky.flight.setpoints.offboard.setpoint
     assert isinstance(asked, PositionSetpoint)
     assert asked.position[2] == pytest.approx(5.0 - CABLE_LENGTH)
 
@@ -135,13 +137,13 @@ def test_an_attitude_is_followed_and_calmed_afterwards() -> None:
     sky = offboard(lean)
     sky.tick()
     leg = sky.flight.legs[0]
-    assert isinstance(leg, Posture)
-    assert leg.lean.thrust_n == pytest.approx(SETTINGS.weight_n)
+    assert isinstance(leg, TrackAttitude)
+    assert leg.setpoint.thrust_n == pytest.approx(SETTINGS.weight_n)
     stream(sky, lean, 1.0)
     stream(sky, at(0.0, 0.0, 2.0), 8.0)
-    assert isinstance(sky.flight.legs[0], Follow)
+    assert isinstance(sky.flight.legs[0], TrackPosition)
     stream(sky, lean, 0.5)
-    assert isinstance(sky.flight.legs[0], Posture)
+    assert isinstance(sky.flight.legs[0], TrackAttitude)
     assert sky.ask(Pause()).result == ACCEPTED
     sky.wait(6.0)
     assert sky.flight.phase == Phase.HOLD

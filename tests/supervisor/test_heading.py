@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from autopilot.geometry.linear import IDENTITY, Mat3, column
-from autopilot.guidance.heading import Gaze, Heading, Spin, Towards
-from autopilot.guidance.setpoint_follower import NOWHERE, STEEPEST_DEG, Posture
+from autopilot.guidance.heading import FacePoint, Heading, Spin, TurnTo
+from autopilot.guidance.setpoint_follower import MAX_LEAN_DEG, UNSPECIFIED, TrackAttitude
 from autopilot.services import identity
 from autopilot.services.requests import (
     Arm,
@@ -38,7 +38,7 @@ NORTH_NOSE: Mat3 = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 def place(heading: float = math.nan, turning: float = math.nan, **more: Any) -> FollowSetpoint:
     return FollowSetpoint(
-        (0.0, 0.0, 2.0), NOWHERE, NOWHERE, False, heading_rad=heading, yaw_rate_rad_s=turning
+        (0.0, 0.0, 2.0), UNSPECIFIED, UNSPECIFIED, False, heading_rad=heading, yaw_rate_rad_s=turning
     )
 
 
@@ -63,7 +63,7 @@ def sky() -> Sky:
 def turned(sky: Sky, request: Any, seconds: float = 15.0) -> float:
     assert sky.ask(request).result == ACCEPTED
     sky.wait(seconds)
-    assert sky.flight.heading.rests
+    assert sky.flight.heading.is_settled
     return sky.flight.heading.angle
 
 
@@ -96,7 +96,7 @@ def test_on_the_ground_the_nose_is_not_turned() -> None:
     ground = Sky()
     for request in (TurnHeading(NORTH), LookAt(5.0, 5.0), LookAt(None, None)):
         assert ground.ask(request).result == LATER
-    assert ground.flight.heading.rests
+    assert ground.flight.heading.is_settled
 
 
 def test_a_place_to_look_at_stays_ahead_until_it_is_let_go(sky: Sky) -> None:
@@ -108,14 +108,14 @@ def test_a_place_to_look_at_stays_ahead_until_it_is_let_go(sky: Sky) -> None:
     assert sky.flight.heading.angle == pytest.approx(WEST, abs=1e-3)
     assert sky.ask(LookAt(None, None)).result == ACCEPTED
     sky.wait(5.0)
-    assert sky.flight.heading.rests
+    assert sky.flight.heading.is_settled
     assert sky.ask(LookAt(1e9, 0.0)).result == sky.ask(LookAt(math.nan, 0.0)).result == DENIED
 
 
 def test_looking_no_more_leaves_another_heading_alone(sky: Sky) -> None:
     assert sky.ask(TurnHeading(NORTH)).result == ACCEPTED
     assert sky.ask(LookAt(None, None)).result == ACCEPTED
-    assert sky.flight.heading.aim == Towards(NORTH)
+    assert sky.flight.heading.aim == TurnTo(NORTH)
 
 
 def test_a_place_to_go_to_has_a_heading(sky: Sky) -> None:
@@ -127,7 +127,7 @@ def test_a_place_to_go_to_has_a_heading(sky: Sky) -> None:
     assert sky.flight.heading.angle == 0.0
     assert sky.view.x_load == pytest.approx((1.0, 0.0, 2.0), abs=1e-6)
     refused = sky.ask(Reposition(0.0, 0.0, -1.0, True, heading_rad=NORTH))
-    assert refused.result == DENIED and sky.flight.heading.rests
+    assert refused.result == DENIED and sky.flight.heading.is_settled
 
 
 # ---- by setpoints
@@ -137,7 +137,7 @@ def test_the_heading_of_a_setpoint_is_taken_once(sky: Sky) -> None:
     offboard(sky, place(NORTH), 6.0)
     assert sky.flight.heading.angle == pytest.approx(NORTH, abs=1e-3)
     stream(sky, place(), 1.0)  # states no heading
-    assert sky.flight.heading.aim == Towards(NORTH, since_us=sky.flight.heading.aim.since_us)  # type: ignore[union-attr]
+    assert sky.flight.heading.aim == TurnTo(NORTH, since_us=sky.flight.heading.aim.since_us)  # type: ignore[union-attr]
     # a heading requested in between holds until a setpoint states one
     assert sky.ask(TurnHeading(0.0)).result == ACCEPTED
     stream(sky, place(), 6.0)
@@ -148,7 +148,7 @@ def test_the_heading_of_a_setpoint_is_taken_once(sky: Sky) -> None:
 
 def test_setpoints_that_are_not_followed_turn_nothing(sky: Sky) -> None:
     stream(sky, place(NORTH), 1.0)
-    assert sky.flight.heading.rests and sky.flight.heading.angle == 0.0
+    assert sky.flight.heading.is_settled and sky.flight.heading.angle == 0.0
 
 
 @pytest.mark.parametrize("then", ["silence", "hold", "place"])
@@ -163,7 +163,7 @@ def test_turning_lasts_as_long_as_it_is_asked_for(sky: Sky, then: str) -> None:
     else:
         sky.wait(9.0)
         assert sky.flight.phase == Phase.HOLD
-    assert sky.flight.heading.rests
+    assert sky.flight.heading.is_settled
     assert 1.0 < sky.flight.heading.angle < 2.5
 
 
@@ -171,7 +171,7 @@ def test_the_stick_turns_and_flies_along_the_nose(sky: Sky) -> None:
     assert sky.ask(FollowStick((0.0, 0.0, 0.0))).result == ACCEPTED
     assert sky.ask(POSCTL).result == ACCEPTED
     stream(sky, FollowStick((0.0, 0.0, 0.0), yaw_rate=1.0), 4.0)
-    assert sky.flight.heading.rate == pytest.approx(SETTINGS.heading.fastest, abs=0.01)
+    assert sky.flight.heading.rate == pytest.approx(SETTINGS.heading.max_rate, abs=0.01)
     stream(sky, FollowStick((0.0, 0.0, 0.0)), 10.0)
     angle = sky.flight.heading.angle
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 6.0)
@@ -187,7 +187,7 @@ def test_axes_of_the_nose(sky: Sky) -> None:
         ((0.0, 1.0, nan), (-1.0, 0.0, 0.0)),
         ((nan, nan, 0.3), (0.0, 0.0, 0.3)),
     ):
-        offboard(sky, FollowSetpoint(NOWHERE, asked, NOWHERE, True, body=True), 6.0)
+        offboard(sky, FollowSetpoint(UNSPECIFIED, asked, UNSPECIFIED, True, body=True), 6.0)
         assert sky.view.v_load == pytest.approx(velocity, abs=0.02)
 
 
@@ -196,7 +196,7 @@ def test_yaw_in_axes_of_the_nose_is_from_north_or_from_the_nose(settings: Any, a
     """The nose points south: yaw 0 means north to PX4, and no turn to ArduPilot."""
     sky = Sky(settings=settings).airborne()
     turned(sky, TurnHeading(SOUTH))
-    forward = FollowSetpoint(NOWHERE, (0.0, 0.0, 0.0), NOWHERE, True, body=True, heading_rad=NORTH)
+    forward = FollowSetpoint(UNSPECIFIED, (0.0, 0.0, 0.0), UNSPECIFIED, True, body=True, heading_rad=NORTH)
     stream(sky, forward, 0.1)
     if settings is SETTINGS:
         assert sky.ask(OFFBOARD).result == ACCEPTED
@@ -210,7 +210,7 @@ def test_the_heading_of_an_attitude(sky: Sky) -> None:
 
 
 def test_attitudes_that_lean_too_far_are_refused(sky: Sky) -> None:
-    for lean, result in ((STEEPEST_DEG - 1.0, ACCEPTED), (STEEPEST_DEG + 1.0, DENIED), (180.0, DENIED)):
+    for lean, result in ((MAX_LEAN_DEG - 1.0, ACCEPTED), (MAX_LEAN_DEG + 1.0, DENIED), (180.0, DENIED)):
         upward = (math.sin(math.radians(lean)), 0.0, math.cos(math.radians(lean)))
         assert sky.ask(FollowAttitude(upward, 0.5)).result == result
 
@@ -219,7 +219,7 @@ def test_body_rates_turn_the_attitude_from_where_it_is(sky: Sky) -> None:
     sky.view = sky.view._replace(attitude=NORTH_NOSE)
     offboard(sky, FollowRates((0.0, 0.0, 0.5), None), 2.0)
     leg = sky.flight.legs[0]
-    assert isinstance(leg, Posture) and leg.attitude is not None
+    assert isinstance(leg, TrackAttitude) and leg.attitude is not None
     begun = sky.view.attitude
     nose = column(leg.attitude, 0)
     # from the first tick on, `Sky` shows its own attitude
@@ -228,18 +228,18 @@ def test_body_rates_turn_the_attitude_from_where_it_is(sky: Sky) -> None:
     assert sky.flight.heading.angle == pytest.approx(math.atan2(nose[1], nose[0]), abs=0.03)
     stream(sky, FollowRates((0.4, 0.0, 0.0), None), 1.0)
     leg = sky.flight.legs[0]
-    assert isinstance(leg, Posture) and leg.attitude is not None
+    assert isinstance(leg, TrackAttitude) and leg.attitude is not None
     assert math.acos(leg.upward(0.0)[2]) == pytest.approx(0.4, abs=0.01)
     # an attitude again: the heading continues from where the rates left it
     stream(sky, FollowAttitude((0.0, 0.0, 1.0), None), 0.1)
     leg = sky.flight.legs[0]
-    assert isinstance(leg, Posture) and leg.attitude is None
+    assert isinstance(leg, TrackAttitude) and leg.attitude is None
     assert leg.upward(0.0) == (0.0, 0.0, 1.0)
 
 
 def test_body_rates_lean_no_further_than_an_attitude_may(sky: Sky) -> None:
     offboard(sky, FollowRates((0.0, 1.0, 0.0), 0.5), 3.0)
-    assert math.degrees(math.acos(sky.flight.legs[0].upward(0.0)[2])) == pytest.approx(STEEPEST_DEG, abs=2.0)  # type: ignore[union-attr]
+    assert math.degrees(math.acos(sky.flight.legs[0].upward(0.0)[2])) == pytest.approx(MAX_LEAN_DEG, abs=2.0)  # type: ignore[union-attr]
     stream(sky, FollowRates((0.0, -1.0, 0.0), 0.5), 0.5)
     assert math.degrees(math.acos(sky.flight.legs[0].upward(0.0)[2])) < 40.0  # type: ignore[union-attr]
 
@@ -263,7 +263,7 @@ def test_the_heading_stays_over_a_landing(sky: Sky) -> None:
     assert sky.ask(Land()).result == ACCEPTED
     sky.run(lambda sky: sky.flight.phase == Phase.DISARMED)
     heading = sky.flight.heading
-    assert heading.rests and not isinstance(heading.aim, Gaze)
+    assert heading.is_settled and not isinstance(heading.aim, FacePoint)
     assert heading.angle == pytest.approx(NORTH, abs=0.2)
 
 
@@ -275,7 +275,7 @@ def test_a_vehicle_that_was_turned_on_the_ground_flies_with_the_heading_it_has(
     sky.view = view(attitude=attitude)
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     assert sky.flight.heading.angle == pytest.approx(angle)
-    assert sky.flight.heading.rests
+    assert sky.flight.heading.is_settled
 
 
 def test_a_heading_that_was_lost_with_the_estimate_is_found_again() -> None:

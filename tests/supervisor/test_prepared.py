@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Hold, Pass, Run, asked_jet
+from autopilot.guidance.legs import Hold, PathStretch, SignalRun, requested_jet
 from autopilot.services.requests import Arm, Land, Pause, ReturnHome, StartMission
 from autopilot.services.requests import Takeoff as TakeOff
 from autopilot.supervisor.mission import with_plan
@@ -64,13 +64,13 @@ def test_getting_ready_is_taken_from_the_delay_before() -> None:
     sky = started(Takeoff(2.0), Delay(3.0), EDGE, model.Land())
     sky.run(lambda s: s.flight.phase == Phase.MISSION)
     begun = sky.now_us
-    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], Run))
+    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], SignalRun))
     run = sky.flight.legs[0]
-    assert isinstance(run, Run)
+    assert isinstance(run, SignalRun)
     assert run.path.lead_s > 0.3
     assert (sky.now_us - begun) * 1e-6 == pytest.approx(3.0 - run.path.lead_s, abs=1e-6 * STEP_US)
-    asked = asked_jet(run, leg_time_s(sky.flight, sky.now_us))
-    assert asked == run.asked(0.0)
+    asked = requested_jet(run, leg_time_s(sky.flight, sky.now_us))
+    assert asked == run.requested(0.0)
     assert norm(asked[1]) == 0.0
 
 
@@ -82,7 +82,7 @@ def test_the_clock_of_a_mission_loses_nothing_from_step_to_step() -> None:
     for seconds in (3.0, 1.2345):
         expected_us += round(seconds * 1e6)
         leg = sky.flight.legs[0]
-        sky.run(lambda s, leg=leg: s.flight.legs[0] is not leg and isinstance(s.flight.legs[0], Run))
+        sky.run(lambda s, leg=leg: s.flight.legs[0] is not leg and isinstance(s.flight.legs[0], SignalRun))
         path = sky.flight.legs[0].path
         asked_us.append(sky.flight.leg_start_us + round(path.lead_s * 1e6) - expected_us)
         expected_us += round(path.duration_s * 1e6)
@@ -95,7 +95,7 @@ def test_the_setpoint_looks_ahead_into_the_step_that_follows() -> None:
     hold = sky.flight.legs[0]
     assert isinstance(hold, Hold)
     (run,) = sky.flight.following
-    assert isinstance(run, Run)
+    assert isinstance(run, SignalRun)
     for ahead in (0.0, 0.1, 0.3):
         found, wanted = np.array(jet_ahead(sky.flight, hold.duration_s + ahead)), np.array(run.jet(ahead))
         # adding and subtracting 2.55 s loses the last digits of the time
@@ -140,7 +140,7 @@ def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     sky = started(Takeoff(2.0), *ROUND, model.Land())
     sky.run(lambda s: s.flight.mission.step == item and s.flight.phase == Phase.MISSION)
     sky.wait(1.0)
-    assert isinstance(sky.flight.legs[0], Pass)
+    assert isinstance(sky.flight.legs[0], PathStretch)
     assert sky.ask(Pause()).result == ACCEPTED
     sky.wait(4.0)
     assert sky.ask(StartMission(None)).result == ACCEPTED

@@ -18,8 +18,8 @@ import pytest
 from autopilot.control.records import State
 from autopilot.core.flight_core import with_cable_now
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
-from autopilot.guidance.legs import least_move_s
-from autopilot.guidance.setpoint_follower import NOWHERE
+from autopilot.guidance.legs import min_move_duration
+from autopilot.guidance.setpoint_follower import UNSPECIFIED
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -156,7 +156,7 @@ class Watched(Sky):
         self.flight = with_cable_now(self.flight, self.now_us + STEP_US)
         length = self.flight.cable.length_m
         if length is not None and length != self.settings.cable_length_m:
-            least_s = least_move_s(length, self.settings.gravity_m_s2)
+            least_s = min_move_duration(length, self.settings.gravity_m_s2)
             self.settings = replace(self.settings, cable_length_m=length, min_move_s=least_s)
 
     def _disturb(self, stretch: Stretch) -> None:
@@ -289,7 +289,7 @@ def turns() -> Watched:
 
 def offboard_rise() -> Watched:
     sky = Watched()
-    low, high = (FollowSetpoint((0.0, 0.0, z), NOWHERE, NOWHERE, False) for z in (0.0, 1.5))
+    low, high = (FollowSetpoint((0.0, 0.0, z), UNSPECIFIED, UNSPECIFIED, False) for z in (0.0, 1.5))
     led(sky, low, 0.2)
     assert sky.ask(OFFBOARD).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
@@ -304,7 +304,7 @@ def offboard_rise() -> Watched:
 def fenced() -> Watched:
     sky = Watched(Takeoff(2.0), Waypoint(4.0, 0.0, 2.0))
     zones = Fence((Disc(True, (0.0, 0.0), 3.0),))
-    east = FollowSetpoint(NOWHERE, (1.5, 0.0, 0.0), NOWHERE, False)
+    east = FollowSetpoint(UNSPECIFIED, (1.5, 0.0, 0.0), UNSPECIFIED, False)
     sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=zones))
     sky.airborne()
     led(sky, east, 0.1)

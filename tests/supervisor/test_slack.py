@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.guidance.legs import Catch, Hold
+from autopilot.guidance.legs import CatchLoad, Hold
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.state import CableState, Flight, Phase
 from tests.doubles.sky import SETTINGS, hanging
@@ -20,4 +20,4 @@ def test_noise_alone_starts_no_catch() -> None:
     flight = replace(flight, cable=replace(flight.cable, taut_length_m=0.75))  # now there is a gap as well
     for k in range(50, 60):
         flight, _ = advance(flight, hanging(k * 4000)._replace(pull_n=-1.0), SETTINGS)
-    assert isinstance(flight.legs[0], Catch)
+    assert isinstance(flight.legs[0], CatchLoad)

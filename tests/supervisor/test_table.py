@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from autopilot.guidance.legs import Catch
-from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
+from autopilot.guidance.legs import CatchLoad
+from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
@@ -121,7 +121,7 @@ def on_mission(*steps: Step, step: int = 0) -> Flight:
     return Flight(
         Phase.HOLD,
         mission=MissionProgress(plan, step, active=True, takeoff_altitude_m=4.0, speed_m_s=1.0),
-        setpoints=Setpoints(offboard=Stream(PositionSetpoint(HERE), 0)),
+        setpoints=Setpoints(offboard=SetpointStream(PositionSetpoint(HERE), 0)),
     )
 
 
@@ -155,7 +155,7 @@ def landed(flight: Flight) -> Flight:
 
 def catching(flight: Flight) -> Flight:
     """The flight while its load is caught; when it is advanced, the cable has been taut for a second."""
-    catch = Catch((1.0, 0.0, 2.7), 0.7, 0.3)
+    catch = CatchLoad((1.0, 0.0, 2.7), 0.7, 0.3)
     return replace(flight, legs=(catch,), cable=replace(flight.cable, slack_since_us=0))
 
 

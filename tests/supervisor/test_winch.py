@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from autopilot.core.flight_core import commanded_rate, with_cable_now
-from autopilot.guidance.legs import Hold, Reel, Slow, top_of
+from autopilot.guidance.legs import Hold, PathStop, Reel, winch_hold_height
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.state import Flight, Phase
@@ -96,8 +96,8 @@ def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     assert with_cable_now(flight, 2_000_000).cable.length_m == pytest.approx(0.7 + 0.3 * 1.5)
     assert with_cable_now(flight, 2_000_000).cable.reel_rate == 0.3
     assert commanded_rate(flight, 2_000_000, 0.004) == 0.3
-    stopping = Slow(leg, 2.0, 1.0)
-    assert top_of(stopping) == 2.7
+    stopping = PathStop(leg, 2.0, 1.0)
+    assert winch_hold_height(stopping) == 2.7
     stopped = with_cable_now(replace(flight, legs=(stopping,)), 1_000_000)
     assert stopped.cable.length_m == pytest.approx(0.7 + 0.3 * 2.0)
     assert stopped.cable.reel_rate == 0.0

@@ -48,7 +48,7 @@ from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.packed import with_field
-from autopilot.geometry.s2 import pull_of
+from autopilot.geometry.s2 import force_along_cable
 
 # m: a load this much higher than where it lay is in the air
 _OFF_GROUND = 0.03
@@ -217,7 +217,7 @@ def with_load_mass(vehicle: Vehicle, load_mass: float) -> Vehicle:
 @kernel
 def cable_force(force: Vec3, q: Vec3, axis: Vec3) -> float:
     """The cable's part of a force on the vehicle, N along q; the rest acts across the rotors' axis."""
-    return pull_of(dot(force, axis), q, axis)
+    return force_along_cable(dot(force, axis), q, axis)
 
 
 @kernel

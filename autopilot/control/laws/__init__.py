@@ -10,7 +10,7 @@ from autopilot.control.believed import believed_vehicle
 from autopilot.control.law_exchange import Link
 from autopilot.control.laws.interface import Law, register
 from autopilot.control.laws.own import OWN
-from autopilot.geometry.packed import pack, place_of
+from autopilot.geometry.packed import field_offset, pack
 from autopilot.vehicle.law_files import law_files
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.parameter_table import ParameterTable
@@ -52,4 +52,4 @@ def is_own(constants: Any) -> bool:
 
 def link_own(rows: Any, link: Link) -> None:
     """Let the rows of a custom law call its functions."""
-    pack(link, rows.constants, place_of(OWN.constants, "link"))
+    pack(link, rows.constants, field_offset(OWN.constants, "link"))

@@ -27,7 +27,7 @@ import numpy as np
 from numba.extending import overload
 
 from autopilot.control.records import Vehicle
-from autopilot.geometry.compiler import INSIDE
+from autopilot.geometry.compiler import INNER_OPTIONS
 from autopilot.geometry.packed import packed, unpack, width
 from autopilot.wire.parameter_table import ParameterTable
 
@@ -103,7 +103,7 @@ def _law_of_type(kind: Any) -> Law | None:
     return _BY_RECORD.get(getattr(kind, "instance_class", None))
 
 
-@overload(kernels_of, jit_options=INSIDE)
+@overload(kernels_of, jit_options=INNER_OPTIONS)
 def _kernels_of(record: Any) -> Any:
     law = _law_of_type(record)
     if law is None:
@@ -116,7 +116,7 @@ def _kernels_of(record: Any) -> Any:
     return constant_kernels
 
 
-@overload(constants_of, jit_options=INSIDE)
+@overload(constants_of, jit_options=INNER_OPTIONS)
 def _constants_of(rows: Any) -> Any:
     law = _law_of_type(rows)
     if law is None:
@@ -129,7 +129,7 @@ def _constants_of(rows: Any) -> Any:
     return unpacked
 
 
-@overload(memory_of, jit_options=INSIDE)
+@overload(memory_of, jit_options=INNER_OPTIONS)
 def _memory_of(rows: Any) -> Any:
     law = _law_of_type(rows)
     if law is None:

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from autopilot.estimation.correction import enter_position, heard, inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
+from autopilot.estimation.correction import (
+    add_position_jacobian,
+    inject_error,
+    past_state,
+    with_capacity,
+    with_sensor_errors,
+)
+from autopilot.estimation.covariance import (
+    add_jacobian_entry,
+    compute_gain_rows,
+    fuse_scalars,
+    start_correction,
+    start_scalar,
+    within_gate,
+)
 from autopilot.estimation.records import (
     BAROMETER,
     PRESSURE,
     RECEIVER,
     SIZE,
-    AidEstimate,
     EstimatorState,
     EstimatorTuning,
     History,
+    SensorErrors,
 )
 from autopilot.geometry.kernel import kernel
 
-ANY_OFFSET_STD = 100.0  # m: the first reading defines the zero
+UNKNOWN_OFFSET_STD = 100.0  # m: the first reading defines the zero
 
 
 @kernel
@@ -26,20 +39,20 @@ def correct_barometer(
     """The state after a reading of the height (m), which is used only with a satellite receiver."""
     if state.vehicle.source != RECEIVER:
         return state
-    state = heard(state, age, SIZE)
-    n, a = state.size, state.aids
+    state = with_capacity(state, age, SIZE)
+    n, a = state.size, state.sensor_errors
     starting = a.barometer_age == float("inf")
-    state = with_aids(
+    state = with_sensor_errors(
         state,
-        AidEstimate(
+        SensorErrors(
             a.mounting,
             a.heading,
             height - state.vehicle.x_quad[2] if starting else a.barometer,
             a.gnss,
-            a.horizontal_slow,
-            a.vertical_slow,
+            a.horizontal_slow_std,
+            a.vertical_slow_std,
             a.reversion,
-            a.debt,
+            a.pending_correction,
             a.field,
             a.magnetic_age,
             age,
@@ -47,17 +60,17 @@ def correct_barometer(
         ),
     )
     if starting:
-        history.covariance[BAROMETER, BAROMETER] = ANY_OFFSET_STD * ANY_OFFSET_STD
-    past = look_back(state, history, tuning, age)
-    innovation = height - past.x_quad[2] - state.aids.barometer
-    scalar(history, 0, innovation, tuning.barometer_std * tuning.barometer_std)
-    enter_position(history, 0, past, 2)
-    enter(history, 0, BAROMETER, 1.0)
-    gather(history, 0, 1, n)
+        history.covariance[BAROMETER, BAROMETER] = UNKNOWN_OFFSET_STD * UNKNOWN_OFFSET_STD
+    past = past_state(state, history, tuning, age)
+    innovation = height - past.x_quad[2] - state.sensor_errors.barometer
+    start_scalar(history, 0, innovation, tuning.barometer_std * tuning.barometer_std)
+    add_position_jacobian(history, 0, past, 2)
+    add_jacobian_entry(history, 0, BAROMETER, 1.0)
+    compute_gain_rows(history, 0, 1, n)
     if not within_gate(history, PRESSURE, 1, tuning.gate_sigma):
         return state
-    begin(history)
-    nis = absorb(history, 1, n)
+    start_correction(history)
+    nis = fuse_scalars(history, 1, n)
     history.consistency[PRESSURE, 0] += 1.0
     history.consistency[PRESSURE, 1] += nis
-    return inject(state, history)
+    return inject_error(state, history)

@@ -2,29 +2,36 @@
 
 With m = exp(c) R^T q, where c is the mounting error about the body's forward and left axes, R exp(-c) m
 differs from the direction q by its own error, by attitude x q and by (R c) x q. While the cable is slack, the
-load lies on the ground, where the line of sight meets the load's height.
+load is on the ground, where the line of sight meets the load's height.
 """
 
 from __future__ import annotations
 
 from autopilot.estimation.correction import (
-    Past,
-    enter_attitude,
-    enter_direction,
-    heard,
-    inject,
-    load_at,
-    look_back,
+    PastState,
+    add_attitude_jacobian,
+    add_direction_jacobian,
+    inject_error,
+    load_with_status,
+    past_state,
+    with_capacity,
     with_load,
 )
-from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
+from autopilot.estimation.covariance import (
+    add_jacobian_entry,
+    compute_gain_rows,
+    fuse_scalars,
+    start_correction,
+    start_scalar,
+    within_gate,
+)
 from autopilot.estimation.records import (
     CAMERA,
     DIRECTION,
+    LINE_OF_SIGHT,
     MOUNTING,
-    NOBODY,
+    NO_SENSOR,
     POSITION,
-    SIGHT,
     SIZE,
     TRACKER,
     DirectionReading,
@@ -38,13 +45,15 @@ from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross, dot,
 from autopilot.geometry.so3 import exp, rotation_from_quat
 
 REJECTIONS_BEFORE_RESET = 10.0
-LEAST_SLOPE = 0.3  # of a line of sight that is to meet the ground
-LEAST_HEIGHT = 0.1  # m above the load, for the same
+MIN_SLOPE = 0.3  # of a line of sight that is to meet the ground
+MIN_HEIGHT = 0.1  # m above the load, for the same
 
 
 @kernel
-def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> LoadEstimate:
-    """A lying load moved to `x_load`."""
+def with_observed_position(
+    load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float
+) -> LoadEstimate:
+    """A load on the ground moved to `x_load`."""
     return LoadEstimate(
         x_load,
         load.v_load,
@@ -56,8 +65,8 @@ def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> 
         load.taut,
         load.tension,
         load.pull,
-        load.pulled_s,
-        load.held_s,
+        load.pull_duration_s,
+        load.tautness_age_s,
         age_s,
         0.0,
         CAMERA,
@@ -65,39 +74,45 @@ def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> 
 
 
 @kernel
-def see_lying(
+def correct_load_on_ground(
     state: EstimatorState,
     history: History,
-    past: Past,
-    sight: Vec3,
+    past: PastState,
+    line_of_sight: Vec3,
     reading: DirectionReading,
     tuning: EstimatorTuning,
 ) -> EstimatorState:
-    """The lying load moved towards where the line of sight meets its height."""
+    """The load on the ground moved towards where the line of sight meets its height."""
     load, P = state.load, history.covariance
     height = past.x_quad[2] - load.x_load[2]
-    if not (height > LEAST_HEIGHT and -sight[2] > LEAST_SLOPE):
+    if not (height > MIN_HEIGHT and -line_of_sight[2] > MIN_SLOPE):
         return state
-    far = height / -sight[2]
-    seen = (past.x_quad[0] + far * sight[0], past.x_quad[1] + far * sight[1])
-    tilt = state.doubt.tilt
-    down = sight[2] * sight[2]
-    slow = far * far * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / down
+    range_m = height / -line_of_sight[2]
+    intersection = (past.x_quad[0] + range_m * line_of_sight[0], past.x_quad[1] + range_m * line_of_sight[1])
+    tilt = state.uncertainty.tilt
+    down2 = line_of_sight[2] * line_of_sight[2]
+    slow_var = range_m * range_m * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / down2
     # an error of the height moves this point sideways
-    slow += P[POSITION + 2, POSITION + 2] * (1.0 - down) / down
-    own = far * reading.direction_std / sight[2]
-    variance = own * own + slow
+    slow_var += P[POSITION + 2, POSITION + 2] * (1.0 - down2) / down2
+    sensor_std = range_m * reading.direction_std / line_of_sight[2]
+    variance = sensor_std * sensor_std + slow_var
     var = load.covariance[0]
-    off = (seen[0] - load.x_load[0], seen[1] - load.x_load[1])
+    innovation = (intersection[0] - load.x_load[0], intersection[1] - load.x_load[1])
     limit = 2.0 * tuning.gate_sigma * tuning.gate_sigma * (var + variance)
-    if not off[0] * off[0] + off[1] * off[1] <= limit:
+    if not innovation[0] * innovation[0] + innovation[1] * innovation[1] <= limit:
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
-            return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
+            return with_load(
+                state, load_with_status(load, load.age_s, load.rejected + 1.0, load.source), state.resets
+            )
         var = 1.0
     k = var / (var + variance)
-    x_load = (load.x_load[0] + k * off[0], load.x_load[1] + k * off[1], load.x_load[2])
-    # slow errors are the same in all sights and do not average out
-    return with_load(state, put(load, x_load, max((1.0 - k) * var, slow), reading.age_s), state.resets)
+    x_load = (load.x_load[0] + k * innovation[0], load.x_load[1] + k * innovation[1], load.x_load[2])
+    # slow errors are the same in all readings and do not average out
+    return with_load(
+        state,
+        with_observed_position(load, x_load, max((1.0 - k) * var, slow_var), reading.age_s),
+        state.resets,
+    )
 
 
 @kernel
@@ -109,55 +124,57 @@ def correct_direction(
     Ignored where a tracker sees the load.
     """
     load = state.load
-    if state.vehicle.source == NOBODY or load.source == TRACKER:
+    if state.vehicle.source == NO_SENSOR or load.source == TRACKER:
         return state
-    state = heard(state, reading.age_s, SIZE)
+    state = with_capacity(state, reading.age_s, SIZE)
     n = state.size
-    past = look_back(state, history, tuning, reading.age_s)
+    past = past_state(state, history, tuning, reading.age_s)
     R = rotation_from_quat(past.quat_wxyz)
-    c = state.aids.mounting
-    sight = apply(R, apply(exp((-c[0], -c[1], 0.0)), reading.direction_body))
+    c = state.sensor_errors.mounting
+    line_of_sight = apply(R, apply(exp((-c[0], -c[1], 0.0)), reading.direction_body))
     if load.taut == 0.0:
-        return see_lying(state, history, past, sight, reading, tuning)
+        return correct_load_on_ground(state, history, past, line_of_sight, reading, tuning)
     q = past.q_cable
-    off = sub(sight, q)
+    difference = sub(line_of_sight, q)
     # the stated deviation includes the mounting
-    stated = reading.direction_std * reading.direction_std
-    variance = max(stated - tuning.mounting_std * tuning.mounting_std, 0.25 * stated)
-    innovation = (dot(past.across, off), dot(past.along, off))
+    stated_var = reading.direction_std * reading.direction_std
+    variance = max(stated_var - tuning.mounting_std * tuning.mounting_std, 0.25 * stated_var)
+    innovation = (dot(past.across, difference), dot(past.along, difference))
     for i in range(2):
-        scalar(history, i, innovation[i], variance)
-        enter_sight(history, i, past, R)
-    gather(history, 0, 2, n)
-    if not (within_gate(history, SIGHT, 2, tuning.gate_sigma) and dot(sight, q) > 0.0):
+        start_scalar(history, i, innovation[i], variance)
+        add_line_of_sight_jacobian(history, i, past, R)
+    compute_gain_rows(history, 0, 2, n)
+    if not (within_gate(history, LINE_OF_SIGHT, 2, tuning.gate_sigma) and dot(line_of_sight, q) > 0.0):
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
-            return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
-        widen(history)
-        gather(history, 0, 2, n)
+            return with_load(
+                state, load_with_status(load, load.age_s, load.rejected + 1.0, load.source), state.resets
+            )
+        reset_direction_uncertainty(history)
+        compute_gain_rows(history, 0, 2, n)
         state = with_load(state, load, state.resets + 1.0)
-    begin(history)
-    nis = absorb(history, 2, n)
-    history.consistency[SIGHT, 0] += 1.0
-    history.consistency[SIGHT, 1] += nis
-    state = inject(state, history)
-    return with_load(state, load_at(state.load, reading.age_s, 0.0, CAMERA), state.resets)
+    start_correction(history)
+    nis = fuse_scalars(history, 2, n)
+    history.consistency[LINE_OF_SIGHT, 0] += 1.0
+    history.consistency[LINE_OF_SIGHT, 1] += nis
+    state = inject_error(state, history)
+    return with_load(state, load_with_status(state.load, reading.age_s, 0.0, CAMERA), state.resets)
 
 
 @kernel
-def widen(history: History) -> None:
-    """Make direction and rate of the cable unknown, so that the sights decide them."""
+def reset_direction_uncertainty(history: History) -> None:
+    """Make direction and rate of the cable unknown, so that the readings decide them."""
     P = history.covariance
     for i in range(DIRECTION, DIRECTION + 4):
         P[i, i] += 1.0
 
 
 @kernel
-def enter_sight(history: History, i: int, past: Past, R: tuple[Vec3, Vec3, Vec3]) -> None:
-    """Enter component i of the seen direction in the cable's axes, as scalar i."""
+def add_line_of_sight_jacobian(history: History, i: int, past: PastState, R: tuple[Vec3, Vec3, Vec3]) -> None:
+    """Enter component i of the observed direction in the cable's axes, as scalar i."""
     axis = past.across if i == 0 else past.along
     turn = cross(past.q_cable, axis)
-    enter_attitude(history, i, past, scale(-1.0, turn))
-    enter_direction(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
-    mounted = apply_transposed(R, turn)
-    enter(history, i, MOUNTING, mounted[0])
-    enter(history, i, MOUNTING + 1, mounted[1])
+    add_attitude_jacobian(history, i, past, scale(-1.0, turn))
+    add_direction_jacobian(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
+    mounting_share = apply_transposed(R, turn)
+    add_jacobian_entry(history, i, MOUNTING, mounting_share[0])
+    add_jacobian_entry(history, i, MOUNTING + 1, mounting_share[1])

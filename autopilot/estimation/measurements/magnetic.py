@@ -9,23 +9,36 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from autopilot.estimation.correction import enter_attitude, heard, inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
+from autopilot.estimation.correction import (
+    add_attitude_jacobian,
+    inject_error,
+    past_state,
+    with_capacity,
+    with_sensor_errors,
+)
+from autopilot.estimation.covariance import (
+    add_jacobian_entry,
+    compute_gain_rows,
+    fuse_scalars,
+    start_correction,
+    start_scalar,
+    within_gate,
+)
 from autopilot.estimation.records import (
     HEADING,
     MAGNETIC,
     RECEIVER,
     SIZE,
-    AidEstimate,
     EstimatorState,
     EstimatorTuning,
     History,
+    SensorErrors,
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, dot
 from autopilot.geometry.so3 import rotation_from_quat
 
-LEAST_LEVEL = 0.05  # share of the field that must be horizontal to give a heading
+MIN_HORIZONTAL_SHARE = 0.05  # share of the field that must be horizontal to give a heading
 
 
 @kernel
@@ -35,20 +48,20 @@ def magnetic_north(declination: float) -> Vec3:
 
 
 @kernel
-def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState:
+def with_magnetic_reading(state: EstimatorState, field: Vec3, age: float) -> EstimatorState:
     """The state with the magnetometer's last reading."""
-    a = state.aids
-    return with_aids(
+    a = state.sensor_errors
+    return with_sensor_errors(
         state,
-        AidEstimate(
+        SensorErrors(
             a.mounting,
             a.heading,
             a.barometer,
             a.gnss,
-            a.horizontal_slow,
-            a.vertical_slow,
+            a.horizontal_slow_std,
+            a.vertical_slow_std,
             a.reversion,
-            a.debt,
+            a.pending_correction,
             field,
             age,
             a.barometer_age,
@@ -63,28 +76,28 @@ def correct_magnetic(
 ) -> EstimatorState:
     """The state after a reading of the field (body axes, any unit), which corrects the estimate only with a
     satellite receiver."""
-    state = with_field(state, field, age)
+    state = with_magnetic_reading(state, field, age)
     if state.vehicle.source != RECEIVER:
         return state
-    state = heard(state, age, SIZE)
+    state = with_capacity(state, age, SIZE)
     n = state.size
-    past = look_back(state, history, tuning, age)
+    past = past_state(state, history, tuning, age)
     u = apply(rotation_from_quat(past.quat_wxyz), field)
-    level = sqrt(u[0] * u[0] + u[1] * u[1])
-    if not level > LEAST_LEVEL * sqrt(dot(u, u)):
+    horizontal = sqrt(u[0] * u[0] + u[1] * u[1])
+    if not horizontal > MIN_HORIZONTAL_SHARE * sqrt(dot(u, u)):
         return state
     north = magnetic_north(tuning.declination)
     angle = atan2(u[0] * north[1] - u[1] * north[0], u[0] * north[0] + u[1] * north[1])
-    innovation = angle - state.aids.heading
-    steep = u[2] / level
-    scalar(history, 0, innovation, tuning.magnetic_std * tuning.magnetic_std)
-    enter_attitude(history, 0, past, (-steep * north[0], -steep * north[1], 1.0))
-    enter(history, 0, HEADING, 1.0)
-    gather(history, 0, 1, n)
+    innovation = angle - state.sensor_errors.heading
+    steep = u[2] / horizontal
+    start_scalar(history, 0, innovation, tuning.magnetic_std * tuning.magnetic_std)
+    add_attitude_jacobian(history, 0, past, (-steep * north[0], -steep * north[1], 1.0))
+    add_jacobian_entry(history, 0, HEADING, 1.0)
+    compute_gain_rows(history, 0, 1, n)
     if not within_gate(history, MAGNETIC, 1, tuning.gate_sigma):
         return state
-    begin(history)
-    nis = absorb(history, 1, n)
+    start_correction(history)
+    nis = fuse_scalars(history, 1, n)
     history.consistency[MAGNETIC, 0] += 1.0
     history.consistency[MAGNETIC, 1] += nis
-    return inject(state, history)
+    return inject_error(state, history)

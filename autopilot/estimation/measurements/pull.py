@@ -13,12 +13,25 @@ estimated while nothing pulled.
 from __future__ import annotations
 
 from autopilot.control.drag import drag_force
-from autopilot.estimation.correction import enter_attitude, enter_direction, heard, inject, look_back
-from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar, within_gate
+from autopilot.estimation.correction import (
+    add_attitude_jacobian,
+    add_direction_jacobian,
+    inject_error,
+    past_state,
+    with_capacity,
+)
+from autopilot.estimation.covariance import (
+    add_jacobian_entry,
+    compute_gain_rows,
+    fuse_scalars,
+    start_correction,
+    start_scalar,
+    within_gate,
+)
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     CAMERA,
-    NOBODY,
+    NO_SENSOR,
     PULL,
     PUSH,
     SIZE,
@@ -32,24 +45,22 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, axpy, column, cross, dot, scale, sub
 from autopilot.geometry.so3 import rotation_from_quat
 
-FIRM, LOOSE = (
-    0.3,
-    0.05,
-)  # of the load's weight: a stronger pull shows the cable's direction; a weaker one is none
-HIGH = 0.2  # of the cable's length above the load: higher up, the vehicle is off the ground
+# of the load's weight: a stronger pull shows the cable's direction; a weaker one is none
+FIRM_PULL, NO_PULL = 0.3, 0.05
+MIN_HEIGHT = 0.2  # of the cable's length above the load: higher up, the vehicle is off the ground
 SLANT_STD = 0.005  # rad, between the rotors' force and the body's axis
 
 
 @kernel
-def unseen(load: LoadEstimate) -> bool:
-    """Whether no sensor has ever seen the load."""
+def is_never_observed(load: LoadEstimate) -> bool:
+    """Whether no sensor has ever observed the load."""
     return load.source == CAMERA and load.age_s == float("inf")
 
 
 @kernel
-def pulling(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Vec3:
+def cable_force(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Vec3:
     """Force of the cable on the vehicle, N, world, by the last sample of the accelerometer."""
-    vehicle, push = state.vehicle, state.air.vehicle
+    vehicle, push = state.vehicle, state.air.vehicle_accel
     R = rotation_from_quat(vehicle.quat_wxyz)
     a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
     known = axpy(thrust, column(R, 2), drag_force(vehicle.v_quad, tuning.drag))
@@ -66,45 +77,45 @@ def correct_pull(
     measured.
     """
     load = state.load
-    if state.vehicle.source == NOBODY or not unseen(load):
+    if state.vehicle.source == NO_SENSOR or not is_never_observed(load):
         return state
-    state = heard(state, 0.0, SIZE)
+    state = with_capacity(state, 0.0, SIZE)
     weight = tuning.load_mass * tuning.gravity
     taut = load.taut > 0.0
     if taut:
-        told = load.pull > FIRM * weight
+        is_informative = load.pull > FIRM_PULL * weight
     else:
-        over = state.vehicle.x_quad[2] - load.x_load[2]
-        told = abs(load.pull) < LOOSE * weight and over > HIGH * tuning.cable_length
-    if not told:
+        height = state.vehicle.x_quad[2] - load.x_load[2]
+        is_informative = abs(load.pull) < NO_PULL * weight and height > MIN_HEIGHT * tuning.cable_length
+    if not is_informative:
         return state
     n = state.size
-    past = look_back(state, history, tuning, 0.0)
-    r = pulling(state, tuning, thrust)
+    past = past_state(state, history, tuning, 0.0)
+    force = cable_force(state, tuning, thrust)
     # slack: the remaining acceleration, east and north; taut: the direction of the pull
-    by = 1.0 / dot(r, past.q_cable) if taut else 1.0 / tuning.quad_mass
-    if not by > 0.0:
+    factor = 1.0 / dot(force, past.q_cable) if taut else 1.0 / tuning.quad_mass
+    if not factor > 0.0:
         return state
-    share, slant = tuning.quad_mass * by, SLANT_STD * thrust * by
-    variance = share * share * accel_noise(state.vibration, tuning) + slant * slant
+    share, slant_std = tuning.quad_mass * factor, SLANT_STD * thrust * factor
+    variance = share * share * accel_noise(state.vibration, tuning) + slant_std * slant_std
     for i in range(2):
         axis = (1.0 - i, float(i), 0.0)
         if taut:
             axis = past.across if i == 0 else past.along
-        scalar(history, i, by * dot(r, axis), variance)
-        enter_attitude(history, i, past, scale(by, cross(axis, r)))
+        start_scalar(history, i, factor * dot(force, axis), variance)
+        add_attitude_jacobian(history, i, past, scale(factor, cross(axis, force)))
         if taut:
-            enter_direction(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
-        about = apply_transposed(past.R, axis)
+            add_direction_jacobian(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
+        body_axis = apply_transposed(past.R, axis)
         for j in range(3):
-            enter(history, i, ACCEL_BIAS + j, share * about[j])
-        enter(history, i, PUSH, share * axis[0])
-        enter(history, i, PUSH + 1, share * axis[1])
-    gather(history, 0, 2, n)
+            add_jacobian_entry(history, i, ACCEL_BIAS + j, share * body_axis[j])
+        add_jacobian_entry(history, i, PUSH, share * axis[0])
+        add_jacobian_entry(history, i, PUSH + 1, share * axis[1])
+    compute_gain_rows(history, 0, 2, n)
     if not within_gate(history, PULL, 2, tuning.gate_sigma):
         return state
-    begin(history)
-    nis = absorb(history, 2, n)
+    start_correction(history)
+    nis = fuse_scalars(history, 2, n)
     history.consistency[PULL, 0] += 1.0
     history.consistency[PULL, 1] += nis
-    return inject(state, history)
+    return inject_error(state, history)

@@ -8,8 +8,13 @@ from math import cos, isnan, pi, sin
 from typing import Any
 
 from autopilot.geometry.linear import E3, Vec3, add, scale
-from autopilot.guidance.legs import top_of
-from autopilot.guidance.setpoint_follower import STEEPEST_DEG, AttitudeSetpoint, PositionSetpoint, Stream
+from autopilot.guidance.legs import winch_hold_height
+from autopilot.guidance.setpoint_follower import (
+    MAX_LEAN_DEG,
+    AttitudeSetpoint,
+    PositionSetpoint,
+    SetpointStream,
+)
 from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
 from autopilot.supervisor.machine import try_transition
 from autopilot.supervisor.motion import commanded_motion
@@ -36,7 +41,7 @@ def offboard(flight: Flight, request: Any, view: View, settings: Settings) -> De
     if flight.phase == Phase.GUIDED and flight.setpoints.source == SetpointSource.OFFBOARD:
         return flight, ACCEPTED
     # one setpoint is enough: MAVSDK requests the mode right after its first
-    if not flight.setpoints.offboard.alive(view.now_us, STREAM_US):
+    if not flight.setpoints.offboard.is_fresh(view.now_us, STREAM_US):
         return flight, temporarily_denied("OFFBOARD denied: send setpoints first, more than two a second")
     if flight.phase in ON_GROUND:
         return replace(interrupt_mission(flight), action_when_armed=ActionWhenArmed.OFFBOARD), ACCEPTED
@@ -45,7 +50,7 @@ def offboard(flight: Flight, request: Any, view: View, settings: Settings) -> De
 
 def position_control(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """POSCTL: follow the stick."""
-    if not flight.setpoints.manual.alive(view.now_us, settings.setpoints.manual_loss_us):
+    if not flight.setpoints.manual.is_fresh(view.now_us, settings.setpoints.manual_loss_us):
         return flight, temporarily_denied("POSCTL denied: no MANUAL_CONTROL received")
     if flight.phase in ON_GROUND:
         return flight, temporarily_denied("POSCTL denied: take off first")
@@ -56,7 +61,7 @@ def start_guided(
     flight: Flight, source: SetpointSource, request_name: str, view: View, settings: Settings
 ) -> Decision:
     """Follow the setpoints of another source; `request_name` names the request in a refusal."""
-    if flight.legs and top_of(flight.legs[0]) is not None:
+    if flight.legs and winch_hold_height(flight.legs[0]) is not None:
         return flight, temporarily_denied(f"{request_name} denied while the winch works")
     guided = replace(interrupt_mission(flight), setpoints=replace(flight.setpoints, source=source))
     after = try_transition(guided, Event.GUIDE, view, settings)
@@ -114,7 +119,9 @@ def _accept_setpoint(
     flight: Flight, setpoint: PositionSetpoint | AttitudeSetpoint, view: View, settings: Settings
 ) -> Flight:
     """The flight after a setpoint: in ArduPilot's GUIDED a vehicle that holds or circles follows it."""
-    flight = replace(flight, setpoints=replace(flight.setpoints, offboard=Stream(setpoint, view.now_us)))
+    flight = replace(
+        flight, setpoints=replace(flight.setpoints, offboard=SetpointStream(setpoint, view.now_us))
+    )
     circling = flight.phase == Phase.GUIDED and flight.setpoints.source == SetpointSource.ORBIT
     if (
         not settings.setpoints.ardupilot_guided
@@ -132,7 +139,7 @@ def follow_attitude(flight: Flight, request: FollowAttitude, view: View, setting
     thrust = _thrust_n(request.thrust, settings)
     setpoint = AttitudeSetpoint(request.thrust_axis, thrust, request.heading_rad, request.yaw_rate_rad_s)
     if setpoint.is_too_steep:
-        return flight, denied(f"Attitude setpoint refused: leans by more than {STEEPEST_DEG:g} deg")
+        return flight, denied(f"Attitude setpoint refused: leans by more than {MAX_LEAN_DEG:g} deg")
     return _accept_setpoint(flight, setpoint, view, settings), ACCEPTED
 
 
@@ -153,8 +160,8 @@ def follow_stick(flight: Flight, request: FollowStick, view: View, settings: Set
     """Take the stick, as a velocity setpoint."""
     direction = _body_to_enu(flight.heading.angle)(request.velocity_share)
     velocity = scale(settings.setpoints.stick_speed_m_s, direction)
-    turning = request.yaw_rate * settings.heading.fastest
-    setpoint = PositionSetpoint(velocity=velocity, since_us=view.now_us, turning=turning)
+    turning = request.yaw_rate * settings.heading.max_rate
+    setpoint = PositionSetpoint(velocity=velocity, since_us=view.now_us, yaw_rate=turning)
     return replace(
-        flight, setpoints=replace(flight.setpoints, manual=Stream(setpoint, view.now_us))
+        flight, setpoints=replace(flight.setpoints, manual=SetpointStream(setpoint, view.now_us))
     ), ACCEPTED

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, reel_leg
-from autopilot.guidance.setpoint_follower import SILENT, AttitudeSetpoint
+from autopilot.guidance.setpoint_follower import NO_STREAM, AttitudeSetpoint
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Grab, Release, Winch
 from autopilot.supervisor.machine import transition
@@ -70,7 +70,7 @@ def with_load_released(flight: Flight, view: View, settings: Settings) -> Flight
         return transition(alone, Event.RELEASED, view, settings)
     alone = replace(alone, legs=())
     if flight.phase == Phase.GUIDED and isinstance(active_setpoint(flight), AttitudeSetpoint):
-        without_setpoints = replace(alone, setpoints=replace(alone.setpoints, offboard=SILENT))
+        without_setpoints = replace(alone, setpoints=replace(alone.setpoints, offboard=NO_STREAM))
         return transition(without_setpoints, Event.HOLD, view, settings)
     held = flight.mission.active or flight.phase == Phase.MISSION
     return transition(alone, Event.HOLD if held else Event.RELEASED, view, settings)

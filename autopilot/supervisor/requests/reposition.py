@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, norm, sub
-from autopilot.guidance.heading import Towards, nearest
+from autopilot.guidance.heading import TurnTo, unwrap_near
 from autopilot.guidance.legs import Hold, carry_leg
 from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
 from autopilot.supervisor.heading import with_aim
@@ -38,7 +38,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     if not isinstance(hold_leg, Hold) and requested != (None, None, None):
         return flight, temporarily_denied("Reposition denied while the load swings: hold first")
     if request.heading_rad is not None:
-        held = with_aim(held, Towards(nearest(request.heading_rad, held.heading)), view)
+        held = with_aim(held, TurnTo(unwrap_near(request.heading_rad, held.heading)), view)
     if requested == (None, None, None):
         return held, verdict
     assert isinstance(hold_leg, Hold)

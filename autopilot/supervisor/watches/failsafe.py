@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import degrees, isfinite
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Steady
+from autopilot.guidance.legs import LevelHold
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -33,7 +33,7 @@ def watch_failsafe(flight: Flight, view: View, settings: Settings) -> WatchResul
 def watch_missing_readings(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Land when readings that the flight requires are missing, whatever is being flown."""
     in_air = flight.phase in IN_AIR and flight.phase not in LANDING
-    if not view.estimate_problems or not in_air or isinstance(flight.legs[0], Steady):
+    if not view.estimate_problems or not in_air or isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     text = f"Failsafe: {view.estimate_problems[0]}, landing"
     return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
@@ -49,7 +49,7 @@ def give_up_flight(flight: Flight, why: str) -> WatchResult:
 def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
     """Why the flight cannot continue, or an empty string."""
     limits = settings.failsafe
-    if view.estimate_loss and not (flight.legs and isinstance(flight.legs[0], Steady)):
+    if view.estimate_loss and not (flight.legs and isinstance(flight.legs[0], LevelHold)):
         return view.estimate_loss
     if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
         return "the estimate is not a number"

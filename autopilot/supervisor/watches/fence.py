@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import axpy, sub
-from autopilot.guidance.legs import Catch, Steady
+from autopilot.guidance.legs import CatchLoad, LevelHold
 from autopilot.supervisor.motion import commanded_motion, stopping_legs, tracks_attitude
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -43,7 +43,7 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
         or not has_fence(flight, settings)
     ):
         return WatchResult(flight)
-    if isinstance(flight.legs[0], Catch | Steady):
+    if isinstance(flight.legs[0], CatchLoad | LevelHold):
         return WatchResult(flight)
     why = _breach(flight, view, settings)
     if bool(why) == bool(area.breach):

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Steady
+from autopilot.guidance.legs import LevelHold
 from autopilot.supervisor.motion import damping_leg
 from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.settings import Settings
@@ -29,7 +29,7 @@ LANDING_TEXT = "Restarted in flight: landing"
 
 def watch_recovery(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Hold the load, or land, once the sensors determine the state; give up if they do not."""
-    if not flight.legs or not isinstance(flight.legs[0], Steady):
+    if not flight.legs or not isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     t = leg_time_s(flight, view.now_us)
     if view.estimate_problems and t >= MAX_RECOVERY_S:
@@ -55,7 +55,7 @@ def watch_recovery(flight: Flight, view: View, settings: Settings) -> WatchResul
     return WatchResult(flight, None, ((WARNING, HOLDING_TEXT),))
 
 
-def _with_braking_thrust(flight: Flight, leg: Steady, view: View, settings: Settings) -> Flight:
+def _with_braking_thrust(flight: Flight, leg: LevelHold, view: View, settings: Settings) -> Flight:
     """The flight with a thrust that stops climbing or sinking, because the last commanded thrust may have
     been for the beginning of a climb. A thrust that cannot have carried the load stays as it is: the load
     then lies on the ground, and what is assumed about it may be wrong."""
@@ -65,4 +65,4 @@ def _with_braking_thrust(flight: Flight, leg: Steady, view: View, settings: Sett
         return flight
     accel = min(STOP_ACCEL, max(-STOP_ACCEL, -STOP_GAIN * view.v_quad[2]))
     thrust = weight * (1.0 + accel / settings.gravity_m_s2) / max(view.attitude[2][2], MIN_UPRIGHT)
-    return replace(flight, legs=(Steady(max(thrust, min_thrust)),))
+    return replace(flight, legs=(LevelHold(max(thrust, min_thrust)),))

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.guidance.setpoint_follower import AttitudeSetpoint, Follow, PositionSetpoint, Posture
+from autopilot.guidance.setpoint_follower import (
+    AttitudeSetpoint,
+    PositionSetpoint,
+    TrackAttitude,
+    TrackPosition,
+)
 from autopilot.supervisor.motion import with_control_modes
 from autopilot.supervisor.phase_legs import MIN_LOAD_HEIGHT
 from autopilot.supervisor.setpoint_source import active_setpoint, is_source_lost
@@ -29,7 +34,7 @@ def watch_takeoff_setpoint(flight: Flight, view: View, settings: Settings) -> Wa
     """Armed for OFFBOARD, take off when a setpoint is above the ground."""
     if flight.phase != Phase.ARMED or flight.action_when_armed != ActionWhenArmed.OFFBOARD:
         return WatchResult(flight)
-    setpoint = flight.setpoints.offboard.asked
+    setpoint = flight.setpoints.offboard.setpoint
     if not isinstance(setpoint, PositionSetpoint) or is_source_lost(flight, view.now_us, settings):
         return WatchResult(flight)
     height = setpoint.position[2]
@@ -53,16 +58,16 @@ def watch_setpoints(flight: Flight, view: View, settings: Settings) -> WatchResu
     if source == SetpointSource.ORBIT and circle is not None and view.now_us >= circle.ends_us:
         return WatchResult(flight, Event.HOLD, ((INFO, "Circle flown: holding"),))
     setpoint, leg = active_setpoint(flight), flight.legs[0]
-    if isinstance(leg, Posture):
+    if isinstance(leg, TrackAttitude):
         if isinstance(setpoint, AttitudeSetpoint):
-            return WatchResult(replace(flight, legs=(leg.onward(setpoint, view.attitude, view.now_us),)))
+            return WatchResult(replace(flight, legs=(leg.updated(setpoint, view.attitude, view.now_us),)))
         return WatchResult(flight, Event.OTHER_SETPOINT)
-    if isinstance(leg, Follow):
+    if isinstance(leg, TrackPosition):
         if isinstance(setpoint, AttitudeSetpoint):
             return WatchResult(flight, Event.OTHER_SETPOINT)
         if setpoint is not None:
             t = leg_time_s(flight, view.now_us)
-            followed = leg.onward(t, setpoint, follow_limits(flight, settings), view.now_us)
+            followed = leg.redirected(t, setpoint, follow_limits(flight, settings), view.now_us)
             return WatchResult(
                 replace(flight, legs=with_control_modes(flight, (followed,)), leg_start_us=view.now_us)
             )

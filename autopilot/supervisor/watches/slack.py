@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Catch, Creep, Steady
+from autopilot.guidance.legs import CatchLoad, Creep, LevelHold
 from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -30,21 +30,21 @@ SLACK_US = 20_000  # time for which this must be the case
 
 def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Catch a load that falls freely; begin the phase again when it hangs on the cable."""
-    if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], Steady):
+    if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
     on_ground = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
-    if isinstance(flight.legs[0], Catch) and on_ground:
+    if isinstance(flight.legs[0], CatchLoad) and on_ground:
         flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
         return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
     if flight.cable.slack_since_us < 0:
         return WatchResult(flight)
     lasted_us = view.now_us - flight.cable.slack_since_us
-    if not isinstance(flight.legs[0], Catch):
+    if not isinstance(flight.legs[0], CatchLoad):
         if lasted_us < SLACK_US:
             return WatchResult(flight)
         cable = replace(flight.cable, slack_since_us=-1)
-        catch = Catch(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
+        catch = CatchLoad(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
         flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
         return WatchResult(flight, None, ((WARNING, "Cable slack: falling with the load to catch it"),))
     if lasted_us < PULL_US and not (
@@ -73,7 +73,7 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
     A gust can hide or imitate a pull, and noise of a tracker a gap of a few millimetres: a small gap counts
     only if the pull confirms it.
     """
-    if isinstance(flight.legs[0], Catch):
+    if isinstance(flight.legs[0], CatchLoad):
         in_condition = view.taut
     else:
         gap = flight.cable.taut_length_m - norm(sub(view.x_quad, view.x_load))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from autopilot.geometry.packed import place_of
+from autopilot.geometry.packed import field_offset
 from sitl.sensors.files import load_profile
 from sitl.sensors.overrides import OVERRIDDEN_KEYS, with_overrides
 from sitl.sensors.shipped import PROFILES
@@ -64,5 +64,5 @@ def test_vibration_can_be_changed_in_flight(core) -> None:
     table.set("SIM_VIB_ACC", 3.0)
     flown.retune(flown.truth, settings_of(table))
     (changed,) = np.flatnonzero(~((flown.rows.model == before) | np.isnan(before)))
-    assert changed == place_of(WorldModel, "vibration") + place_of(VibrationConfig, "accel")
+    assert changed == field_offset(WorldModel, "vibration") + field_offset(VibrationConfig, "accel")
     assert (before[changed], flown.rows.model[changed]) == (0.0, 3.0)

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from autopilot.guidance.layout import jets, jets_ahead
+from autopilot.guidance.jet_table import jets, jets_ahead
 from autopilot.guidance.legs import (
     LOAD_POSITION,
     Brake,
     Creep,
     Hold,
     Leg,
-    Pass,
-    Run,
-    Slow,
+    PathStop,
+    PathStretch,
+    SignalRun,
     Transfer,
-    asked_jet,
+    requested_jet,
 )
 from autopilot.supervisor.settings import path_limits
 from autopilot.supervisor.state import Flight, jet_ahead
@@ -37,8 +37,8 @@ LEGS = (
     Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0),
     Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
-    Run((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
-    Slow(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
+    SignalRun((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
+    PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
 )
 
 
@@ -46,7 +46,7 @@ LEGS = (
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_leg_laid_out_is_the_leg(leg: Leg, asked: bool) -> None:
     times = np.arange(-3, 1500) * 0.004
-    expected = [np.ravel(asked_jet(leg, t) if asked else leg.jet(t)) for t in times.tolist()]
+    expected = [np.ravel(requested_jet(leg, t) if asked else leg.jet(t)) for t in times.tolist()]
     assert np.array_equal(jets(leg, times, asked), np.array(expected))
 
 
@@ -63,7 +63,7 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
     passage, shaped = made[1], made[4]
     assert isinstance(passage, PathSegment) and isinstance(shaped, ShapedSignals) and len(shaped.pieces)
     times = np.arange(-3, 2500) * 0.004
-    for leg in (Pass(passage, (0.1, -0.2, 0.05), 1.5), Run((0.1, 0.2, 0.3), shaped)):
+    for leg in (PathStretch(passage, (0.1, -0.2, 0.05), 1.5), SignalRun((0.1, 0.2, 0.3), shaped)):
         expected = [np.ravel(leg.jet(t)) for t in times.tolist()]
         assert np.array_equal(jets(leg, times), np.array(expected))
 
@@ -77,13 +77,13 @@ def test_signals_are_those_of_the_path_and_the_times_whatever_was_laid_out_befor
     for anchor in ((0.0, 0.0, 1.0), (1.0, 2.0, 3.0)):
         for path in paths:
             for at in (times, times + 0.5):
-                expected = [np.ravel(Run(anchor, path).jet(t)) for t in at.tolist()]
-                assert np.array_equal(jets(Run(anchor, path), at), np.array(expected))
+                expected = [np.ravel(SignalRun(anchor, path).jet(t)) for t in at.tolist()]
+                assert np.array_equal(jets(SignalRun(anchor, path), at), np.array(expected))
 
 
 def test_the_path_ahead_goes_on_into_what_follows() -> None:
     first, second = Transfer((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), 2.0), Hold((1.0, 0.0, 1.0), 0.5)
-    third = Run((1.0, 0.0, 1.0), unshaped_signals(SIGNALS))
+    third = SignalRun((1.0, 0.0, 1.0), unshaped_signals(SIGNALS))
     flight = Flight(legs=(first, second), following=(third,))
     times = np.arange(1000) * 0.004
     expected = [np.ravel(jet_ahead(flight, t)) for t in times.tolist()]

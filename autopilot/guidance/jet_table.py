@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
+from autopilot.guidance.legs import Creep, Hold, Leg, PathStretch, SignalRun, Transfer, requested_jet
 from autopilot.trajectory.shaping import ShapedSignals, evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
@@ -20,7 +20,10 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
-_KEPT, _WORTH = 3, 500  # evaluated signals to keep, each of at least so many times: those of a sweep
+_CACHE_SIZE, _MIN_CACHED_TIMES = (
+    3,
+    500,
+)  # evaluated signals to keep, each of at least so many times: those of a sweep
 
 
 @kernel
@@ -43,11 +46,11 @@ def _runs(
     pieces: PieceTable,
     duration: float,
     lead: float,
-    asked: bool,
+    requested: bool,
     out: Floats,
 ) -> None:
     for k in range(times.shape[0]):
-        if asked:
+        if requested:
             _put(out[k], evaluate_requested(table, duration, times[k] - lead))
         else:
             _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
@@ -58,24 +61,24 @@ class _Evaluated(NamedTuple):
 
     path: ShapedSignals
     times_s: Floats
-    asked: bool
+    requested: bool
     found: Floats
 
 
-_evaluated: deque[_Evaluated] = deque(maxlen=_KEPT)  # the last ones
+_evaluated: deque[_Evaluated] = deque(maxlen=_CACHE_SIZE)  # the last ones
 
 
-def _signals(path: ShapedSignals, times_s: Floats, asked: bool) -> Floats:
+def _signals(path: ShapedSignals, times_s: Floats, requested: bool) -> Floats:
     """(n, 21) the signals of a path at n times. A sweep needs the flown and the requested ones: where both
     are the same, they are evaluated once."""
-    asked = asked or not len(path.pieces)
+    requested = requested or not len(path.pieces)
     for one in _evaluated:
-        if one.path is path and one.asked == asked and np.array_equal(one.times_s, times_s):
+        if one.path is path and one.requested == requested and np.array_equal(one.times_s, times_s):
             return one.found
     found = np.zeros((len(times_s), COLUMNS))
-    _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, asked, found)
-    if len(times_s) >= _WORTH:
-        _evaluated.append(_Evaluated(path, times_s.copy(), asked, found))
+    _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, requested, found)
+    if len(times_s) >= _MIN_CACHED_TIMES:
+        _evaluated.append(_Evaluated(path, times_s.copy(), requested, found))
     return found
 
 
@@ -92,18 +95,18 @@ def _passes(
                 out[k, 3 * i + j] = out[k, 3 * i + j] + fading[i][j]
 
 
-def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
-    """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg), in machine code for the
+def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
+    """(n, 21) `leg.jet` (or `requested_jet`) at each of the n times (s into the leg), in machine code for the
     kinds of legs that last long."""
     # by the exact type: a leg of a subclass may mean something else
-    if type(leg) is Run:
-        found = _signals(leg.path, times_s, asked).copy()
+    if type(leg) is SignalRun:
+        found = _signals(leg.path, times_s, requested).copy()
         found[:, :3] += leg.anchor
         return found
     found = np.zeros((len(times_s), COLUMNS))
     if type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
-    elif type(leg) is Pass:
+    elif type(leg) is PathStretch:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
     elif type(leg) is Hold:
         found[:, :3] = leg.position
@@ -113,7 +116,7 @@ def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
         found[:, 3:6] = leg.velocity
     else:
         for k, t in enumerate(times_s.tolist()):
-            found[k] = np.ravel(asked_jet(leg, t) if asked else leg.jet(t))
+            found[k] = np.ravel(requested_jet(leg, t) if requested else leg.jet(t))
     return found
 
 

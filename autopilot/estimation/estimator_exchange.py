@@ -20,14 +20,14 @@ from autopilot.estimation.inbox import (
     LOAD,
     POSE,
     READING,
-    SHOWS,
+    SAMPLE_TIME_US,
     age_of,
-    direction_in,
-    fix_in,
-    is_sane,
-    load_in,
-    pose_in,
-    vector_in,
+    is_valid_imu,
+    read_direction,
+    read_fix,
+    read_load,
+    read_pose,
+    read_vector,
 )
 from autopilot.estimation.records import Array, EstimatorTuning, ImuReading
 from autopilot.geometry.kernel import kernel
@@ -37,7 +37,7 @@ from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.layout import MAX_ROTORS
 
 NEVER = -inf  # time of the last reading of a sensor that never sent one
-UNTOLD: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not contain
+NOT_GIVEN: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not contain
 UNIT_TOLERANCE = 0.02  # of the square of a length that must be 1
 
 Forces = tuple[  # of each rotor, N; zeros for rotors that do not exist
@@ -150,7 +150,7 @@ class Estimate(NamedTuple):
     """Output of an estimator."""
 
     known: bool  # False: there is no estimate yet
-    state: State  # a_quad may be UNTOLD
+    state: State  # a_quad may be NOT_GIVEN
     tension: float  # N of the cable; NaN: not given
     horizontal_std: float  # m, of the vehicle's position, each axis; NaN: not given
     vertical_std: float
@@ -174,8 +174,8 @@ NOTHING_SENSED = Sensed(
     False,
     REST,
 )
-GIVEN = width(Sensed)  # where the estimate begins on the desk
-OWN = GIVEN + width(Estimate)  # from here on, the desk holds the estimator's own data
+ESTIMATE_OFFSET = width(Sensed)  # where the estimate begins in the row
+ESTIMATOR_OFFSET = ESTIMATE_OFFSET + width(Estimate)  # from here on, the row holds the estimator's own data
 
 
 @kernel
@@ -194,35 +194,37 @@ def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning:
         row, kind = inbox[i], inbox[i, KIND]
         if kind == IMU:
             imu = unpack(ImuReading, row, READING)
-            if row[SHOWS] == now_us and is_sane(imu):
+            if row[SAMPLE_TIME_US] == now_us and is_valid_imu(imu):
                 inertial = InertialSample(True, time_s, imu.gyro, imu.accel)
         elif kind == POSE:
             age = age_of(row, now_us, tuning.imu_age)
-            ok, p = pose_in(row, age)
-            if ok:
+            valid, p = read_pose(row, age)
+            if valid:
                 R = rotation_from_quat(p.quat_wxyz)
                 std = (p.position_std, p.attitude_std, p.velocity_std)
                 pose = PoseSample(True, time_s - age, p.x_quad, R, p.v_quad, std[0], std[1], std[2])
         elif kind == LOAD:
             age = age_of(row, now_us, tuning.imu_age)
-            ok, at = load_in(row, age)
-            if ok:
-                load = LoadSample(True, time_s - age, at.x_load, at.v_load, at.position_std, at.velocity_std)
+            valid, p_load = read_load(row, age)
+            if valid:
+                load = LoadSample(
+                    True, time_s - age, p_load.x_load, p_load.v_load, p_load.position_std, p_load.velocity_std
+                )
         elif kind == DIRECTION:
             age = age_of(row, now_us, tuning.imu_age)
-            ok, sight = direction_in(row, age)
-            if ok:
-                direction = DirectionSample(True, time_s - age, sight.direction_body, sight.direction_std)
+            valid, d = read_direction(row, age)
+            if valid:
+                direction = DirectionSample(True, time_s - age, d.direction_body, d.direction_std)
         elif kind == FIX:
             age = age_of(row, now_us, tuning.imu_age)
-            ok, f = fix_in(row, age)
-            if ok:
+            valid, f = read_fix(row, age)
+            if valid:
                 std2 = (f.horizontal_std, f.vertical_std)
                 fix = FixSample(True, time_s - age, f.position, f.velocity, std2[0], std2[1], f.rtk != 0.0)
         elif kind == FIELD:
-            gauss = vector_in(row)
-            size = norm(gauss)
-            if isfinite(size) and size > 0.0:
+            gauss = read_vector(row)
+            strength = norm(gauss)
+            if isfinite(strength) and strength > 0.0:
                 field = FieldSample(True, time_s - tuning.magnetic_age, gauss)
         elif kind == HEIGHT and isfinite(row[READING]):
             height = HeightSample(True, time_s - tuning.barometer_age, row[READING])
@@ -245,7 +247,7 @@ def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning:
 
 
 # what is wrong with an estimate
-SOUND, NO_NUMBER, NO_ROTATION, NO_DIRECTION, FORGOTTEN = range(5)
+VALID, NOT_A_NUMBER, NOT_A_ROTATION, NOT_A_UNIT_VECTOR, LOST = range(5)
 
 
 @kernel
@@ -259,40 +261,40 @@ def _is_unit(v: Vec3) -> bool:
 
 
 @kernel
-def flaw(estimate: Estimate) -> int:
-    """What is wrong with a known estimate: SOUND if nothing is."""
+def estimate_fault(estimate: Estimate) -> int:
+    """What is wrong with a known estimate: VALID if nothing is."""
     s = estimate.state
     numbers = _is_number(s.x_load) and _is_number(s.v_load) and _is_number(s.x_quad) and _is_number(s.v_quad)
     numbers = numbers and _is_number(s.omega_body) and _is_number(s.q_cable_dot) and _is_number(s.q_cable)
-    told = not (isnan(s.a_quad[0]) and isnan(s.a_quad[1]) and isnan(s.a_quad[2]))
-    if not numbers or (told and not _is_number(s.a_quad)):
-        return NO_NUMBER
+    a_quad_given = not (isnan(s.a_quad[0]) and isnan(s.a_quad[1]) and isnan(s.a_quad[2]))
+    if not numbers or (a_quad_given and not _is_number(s.a_quad)):
+        return NOT_A_NUMBER
     if not _is_unit(s.q_cable):
-        return NO_DIRECTION
+        return NOT_A_UNIT_VECTOR
     a, b, c = s.R
-    level = abs(dot(a, b)) + abs(dot(b, c)) + abs(dot(c, a)) < UNIT_TOLERANCE
-    if not (_is_unit(a) and _is_unit(b) and _is_unit(c) and level):
-        return NO_ROTATION
-    return SOUND
+    orthogonal = abs(dot(a, b)) + abs(dot(b, c)) + abs(dot(c, a)) < UNIT_TOLERANCE
+    if not (_is_unit(a) and _is_unit(b) and _is_unit(c) and orthogonal):
+        return NOT_A_ROTATION
+    return VALID
 
 
-def told_of(estimate: Estimate, found: int) -> str:
+def fault_text(estimate: Estimate, fault: int) -> str:
     """What is wrong with an estimate, in words."""
     state = estimate.state
-    if found == FORGOTTEN:
+    if fault == LOST:
         return "gives no estimate any more"
-    if found == NO_DIRECTION:
-        return f"gives q_cable = {_shown(state.q_cable)}, which is no unit vector"
-    if found == NO_ROTATION:
-        return f"gives R = {_shown(state.R)}, which is no rotation"
+    if fault == NOT_A_UNIT_VECTOR:
+        return f"gives q_cable = {_formatted(state.q_cable)}, which is no unit vector"
+    if fault == NOT_A_ROTATION:
+        return f"gives R = {_formatted(state.R)}, which is no rotation"
     for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "a_quad"):
         vector = getattr(state, name)
         if not _is_number(vector):
-            return f"gives {name} = {_shown(vector)}"
+            return f"gives {name} = {_formatted(vector)}"
     return "returns a value that is not a number"
 
 
-def _shown(value: Any) -> str:
+def _formatted(value: Any) -> str:
     if isinstance(value, tuple):
-        return f"({', '.join(map(_shown, value))})"
+        return f"({', '.join(map(_formatted, value))})"
     return f"{value:.4g}"

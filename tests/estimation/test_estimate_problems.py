@@ -6,14 +6,14 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.estimation.filter import complaints, load_problem, vehicle_problem
+from autopilot.estimation.filter import estimate_problems, load_problem, vehicle_problem
 from autopilot.estimation.records import (
     CAMERA,
-    NOBODY,
+    NO_SENSOR,
     RECEIVER,
     TRACKER,
-    Doubt,
     EstimatorState,
+    Uncertainty,
     blank_state,
 )
 
@@ -21,7 +21,7 @@ OLDEST_S = 0.5
 PROMISED = 0.1  # m, slow part of a receiver's error
 # with a receiver: 0.15 m and 1.2 times the error that it states
 FIX_LEVEL = 0.15 + 1.2 * PROMISED
-NO_DOUBT = Doubt(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_DOUBT = Uncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 VEHICLE_AGE, LOAD_AGE = "age of the vehicle", "age of the load"
 
 NO_POSE = "no vehicle pose from a tracker"
@@ -31,7 +31,7 @@ FIX = "vehicle position not settled, good to {:.1f} m"
 ATTITUDE = "vehicle attitude not settled"
 HEADING = "vehicle heading not settled"
 NO_LOAD = "no load position from a tracker"
-NO_SIGHT = "no direction to the load from the camera"
+NO_LOAD_DIRECTION = "no direction to the load from the camera"
 LOAD = "load position not settled"
 
 
@@ -39,15 +39,15 @@ def settled(source: float, load_source: float, part: str = "", value: float = 0.
     """An estimate without doubt, its load hanging, in which one part has this value: an age in s, or a
     standard deviation in m or rad."""
     state = blank_state()
-    doubts = {part: value} if part in Doubt._fields else {}
+    doubts = {part: value} if part in Uncertainty._fields else {}
     vehicle_age_s = value if part == VEHICLE_AGE else 0.0
     load_age_s = value if part == LOAD_AGE else 0.0
     assert not part or doubts or part in (VEHICLE_AGE, LOAD_AGE)
     return state._replace(
         vehicle=state.vehicle._replace(source=source, age_s=vehicle_age_s),
         load=state.load._replace(source=load_source, age_s=load_age_s, taut=1.0),
-        doubt=NO_DOUBT._replace(**doubts),
-        aids=state.aids._replace(horizontal_slow=PROMISED),
+        uncertainty=NO_DOUBT._replace(**doubts),
+        sensor_errors=state.sensor_errors._replace(horizontal_slow_std=PROMISED),
     )
 
 
@@ -67,38 +67,40 @@ LIMITS = [
     (RECEIVER, CAMERA, "vertical", inf, ""),
     (RECEIVER, CAMERA, "tilt", 0.05, ATTITUDE),
     (RECEIVER, CAMERA, "heading", 0.15, HEADING),
-    (RECEIVER, CAMERA, LOAD_AGE, 1.0, NO_SIGHT),  # the pendulum bridges this time
+    (RECEIVER, CAMERA, LOAD_AGE, 1.0, NO_LOAD_DIRECTION),  # the pendulum bridges this time
     (RECEIVER, CAMERA, "load", 0.1, LOAD),
 ]
-ABOUT_THE_LOAD = (NO_LOAD, NO_SIGHT, LOAD)
+ABOUT_THE_LOAD = (NO_LOAD, NO_LOAD_DIRECTION, LOAD)
 
 
 @pytest.mark.parametrize(("source", "load_source", "part", "last", "words"), LIMITS)
 def test_each_doubt_has_its_limit_and_its_words(
     source: float, load_source: float, part: str, last: float, words: str
 ) -> None:
-    assert complaints(settled(source, load_source, part, 0.999 * last), OLDEST_S) == ()
-    beyond = (1.001 * last, nan) if words == NO_SIGHT else (1.001 * last, inf, nan)
+    assert estimate_problems(settled(source, load_source, part, 0.999 * last), OLDEST_S) == ()
+    beyond = (1.001 * last, nan) if words == NO_LOAD_DIRECTION else (1.001 * last, inf, nan)
     for value in beyond if words else (inf, nan):
         state = settled(source, load_source, part, value)
-        assert complaints(state, OLDEST_S) == ((words.format(state.doubt.horizontal),) if words else ())
+        assert estimate_problems(state, OLDEST_S) == (
+            (words.format(state.uncertainty.horizontal),) if words else ()
+        )
         about_the_load = words in ABOUT_THE_LOAD
         assert bool(load_problem(state, OLDEST_S)) == about_the_load
         assert bool(vehicle_problem(state, OLDEST_S)) == (bool(words) and not about_the_load)
         if about_the_load:
-            assert complaints(state, OLDEST_S, carries=False) == ()
+            assert estimate_problems(state, OLDEST_S, carries_load=False) == ()
 
 
 @pytest.mark.parametrize(
-    ("held_s", "doubt", "words"),
+    ("tautness_age_s", "uncertainty", "words"),
     [(9.0, 0.0999, ()), (9.0, 0.1001, (LOAD,)), (9.0, nan, (LOAD,)), (0.9, 1.0, ())],
 )
 def test_a_load_that_no_sensor_has_ever_seen_is_flown_by_its_pull(
-    held_s: float, doubt: float, words: tuple[str, ...]
+    tautness_age_s: float, uncertainty: float, words: tuple[str, ...]
 ) -> None:
-    state = settled(RECEIVER, CAMERA, "load", doubt)
-    state = state._replace(load=state.load._replace(age_s=inf, held_s=held_s))
-    assert complaints(state, OLDEST_S) == words
+    state = settled(RECEIVER, CAMERA, "load", uncertainty)
+    state = state._replace(load=state.load._replace(age_s=inf, tautness_age_s=tautness_age_s))
+    assert estimate_problems(state, OLDEST_S) == words
 
 
 @pytest.mark.parametrize(
@@ -119,28 +121,28 @@ def test_a_load_on_the_ground_may_be_hidden_as_long_as_one_that_hangs(
     # the doubt is that of the last prediction; a reading since then has settled it
     state = settled(TRACKER, load_source, "load", 1.0)
     load = state.load._replace(taut=0.0, age_s=age_s, covariance=(std_m**2, 0.0, 1.0))
-    assert complaints(state._replace(load=load), OLDEST_S) == words
+    assert estimate_problems(state._replace(load=load), OLDEST_S) == words
 
 
 def test_who_bears_older_readings_is_obeyed() -> None:
     old = settled(TRACKER, TRACKER, LOAD_AGE, 9.0)
-    assert (complaints(old, 10.0), complaints(old, 8.0)) == ((), (NO_LOAD,))
+    assert (estimate_problems(old, 10.0), estimate_problems(old, 8.0)) == ((), (NO_LOAD,))
 
 
 def test_the_first_complaint_of_each_is_told_vehicle_before_load() -> None:
     blind = blank_state()
-    assert (blind.vehicle.source, blind.load.source) == (NOBODY, NOBODY)
-    assert complaints(blind, OLDEST_S) == (NO_POSE, NO_LOAD)
-    assert complaints(blind, OLDEST_S, carries=False) == (NO_POSE,)
+    assert (blind.vehicle.source, blind.load.source) == (NO_SENSOR, NO_SENSOR)
+    assert estimate_problems(blind, OLDEST_S) == (NO_POSE, NO_LOAD)
+    assert estimate_problems(blind, OLDEST_S, carries_load=False) == (NO_POSE,)
 
 
 def test_a_fix_that_has_not_settled_says_how_good_it_is() -> None:
-    assert complaints(settled(RECEIVER, CAMERA, "horizontal", 2.345), OLDEST_S) == (
+    assert estimate_problems(settled(RECEIVER, CAMERA, "horizontal", 2.345), OLDEST_S) == (
         "vehicle position not settled, good to 2.3 m",
     )
 
 
 def test_a_longer_limit_of_age_holds_for_the_receiver_too() -> None:
     state = settled(RECEIVER, CAMERA, VEHICLE_AGE, 2.5)
-    assert complaints(state, OLDEST_S) == (NO_FIX,)
-    assert complaints(state, 3.0) == ()
+    assert estimate_problems(state, OLDEST_S) == (NO_FIX,)
+    assert estimate_problems(state, 3.0) == ()

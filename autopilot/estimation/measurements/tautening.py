@@ -1,0 +1,100 @@
+"""Correction by a cable that comes taut: the load is on the ground, the vehicle one cable length above it.
+
+A plain receiver and a barometer know the height to decimetres; here the height is measured once, and the
+climb rate, which is zero.
+"""
+
+from __future__ import annotations
+
+from autopilot.estimation.correction import inject_error, past_state, with_sensor_errors
+from autopilot.estimation.covariance import (
+    compute_gain_rows,
+    fuse_scalars,
+    normalised_innovation_squared,
+    start_correction,
+    start_scalar,
+)
+from autopilot.estimation.measurements.load import add_load_position_jacobian, add_load_velocity_jacobian
+from autopilot.estimation.records import (
+    CAMERA,
+    RECEIVER,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+    SensorErrors,
+)
+from autopilot.estimation.tautness import PULL_SLACK, cable_is_unloaded
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3
+
+GROUND_LOAD_HEIGHT_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
+GROUND_LOAD_CLIMB_STD = 0.05  # m/s, of its climb
+# time in which measurements of the climb of a load on the ground count as one: samples are not independent
+CLIMB_CORRELATION_S = 0.3
+
+
+@kernel
+def _with_pending_correction(a: SensorErrors, pending_correction: Vec3) -> SensorErrors:
+    return SensorErrors(
+        a.mounting,
+        a.heading,
+        a.barometer,
+        a.gnss,
+        a.horizontal_slow_std,
+        a.vertical_slow_std,
+        a.reversion,
+        pending_correction,
+        a.field,
+        a.magnetic_age,
+        a.barometer_age,
+        a.rejected,
+    )
+
+
+@kernel
+def correct_tautening(
+    state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning, dt: float
+) -> EstimatorState:
+    """The state after a prediction over dt seconds; `before` is the load before this prediction.
+
+    A cable that comes taut measures height and climb rate; the climb rate is also measured while the cable
+    pulls and the load is still on the ground. The laws receive the correction of the height at
+    once: they are about to lift the load off this ground.
+    """
+    load = state.load
+    if state.vehicle.source != RECEIVER or load.source != CAMERA or load.taut == 0.0:
+        return state
+    came_taut = before.taut == 0.0
+    is_pulling = load.pull > PULL_SLACK * tuning.load_mass * tuning.gravity
+    if not came_taut and not (is_pulling and cable_is_unloaded(load, state.memory_s, state.missing_pull)):
+        return state
+    n, pending_correction = state.size, state.sensor_errors.pending_correction
+    past = past_state(state, history, tuning, 0.0)
+    start_correction(history)
+    count = 0
+    climb_var = (
+        GROUND_LOAD_CLIMB_STD
+        * GROUND_LOAD_CLIMB_STD
+        * (1.0 if came_taut else max(1.0, CLIMB_CORRELATION_S / dt))
+    )
+    if came_taut:
+        start_scalar(
+            history, 0, before.x_load[2] - load.x_load[2], GROUND_LOAD_HEIGHT_STD * GROUND_LOAD_HEIGHT_STD
+        )
+        add_load_position_jacobian(history, 0, past, load.length, 2)
+        compute_gain_rows(history, 0, 1, n)
+        if not normalised_innovation_squared(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
+            return state
+        count = 1
+    climb = past.v_quad[2] + load.length * past.q_cable_dot[2]
+    start_scalar(history, count, -climb, climb_var)
+    add_load_velocity_jacobian(history, count, past, load.length, 2)
+    compute_gain_rows(history, count, count + 1, n)
+    fuse_scalars(history, count + 1, n)
+    state = inject_error(state, history)
+    corrected = state.sensor_errors.pending_correction
+    return with_sensor_errors(
+        state,
+        _with_pending_correction(state.sensor_errors, (corrected[0], corrected[1], pending_correction[2])),
+    )
