@@ -12,7 +12,7 @@ import pytest
 PROGRAM = """
 import sys
 from numba.core.dispatcher import Dispatcher
-from autopilot.guidance.legs import Pass
+from autopilot.guidance.legs import PathStretch
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from missions.model import Takeoff, Waypoint
@@ -69,7 +69,7 @@ for message, command in (
             craft.tick()
 craft = Craft(*steps)
 craft.begin()
-craft.run(lambda craft: bool(craft.flight.legs) and isinstance(craft.flight.legs[0], Pass))
+craft.run(lambda craft: bool(craft.flight.legs) and isinstance(craft.flight.legs[0], PathStretch))
 left = {name for name, count in census().items() if count != before.get(name, 0)}
 assert not left, left
 """

@@ -82,7 +82,7 @@ class Paced:
         self.told: list[tuple[str, int]] = []  # texts to the operators, with their severity
         time = SimpleNamespace(sleep=self._sleep, perf_counter_ns=self._perf_counter_ns)
         monkeypatch.setattr(loops, "time", time)
-        parameters = SimpleNamespace(say=lambda text, severity: self.told.append((text, severity)))
+        parameters = SimpleNamespace(send_text=lambda text, severity: self.told.append((text, severity)))
         simulator: Any = SimpleNamespace(tick_us=4000, pacing=None, parameters=parameters)
         self.pacing = Pacing(speed)
         self._clock = loops.Clock(self.pacing, simulator, self.said.append)

@@ -83,7 +83,7 @@ def test_reached_numbers_are_those_of_the_items_a_step_ends_with() -> None:
     sequence = sky.flight.mission.plan.sequence
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert sky.reached == list(sequence)
-    assert sequence[-1] == sky.flight.mission.plan.items - 1
+    assert sequence[-1] == sky.flight.mission.plan.item_count - 1
     assert sequence[4] - sequence[3] == 3, "term, factor, run"
 
 

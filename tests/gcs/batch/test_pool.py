@@ -71,6 +71,6 @@ def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.Monke
     for own in ((), ("mine.py",)):
         flown.clear()
         plan = SimpleNamespace(own=lambda _law, own=own: own)
-        prepared: Any = SimpleNamespace(plan=plan, in_lanes=frozenset())
+        prepared: Any = SimpleNamespace(plan=plan, lane_laws=frozenset())
         rows = work.fly_cases(prepared, cases, lambda: 0.0, lambda: len(flown) == 11)
         assert [row["index"] for row in rows] == flown == list(range(11))

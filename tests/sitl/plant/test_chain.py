@@ -274,8 +274,8 @@ def test_machine_code_and_python_agree_to_the_bit() -> None:
     program = """
 import hashlib
 from autopilot.geometry.packed import packed
-from benchmarks.cable_convergence import chain_model, swinging
-plant = swinging(chain_model(5, drag_coefficient=1.2, hook=0.05, gyration=0.02, gyration_upright=0.01))
+from benchmarks.cable_convergence import chain_model, swinging_plant
+plant = swinging_plant(chain_model(5, drag_coefficient=1.2, hook=0.05, gyration=0.02, gyration_upright=0.01))
 plant.fly(0.02)
 numbers = [packed(plant.state), plant.rows.x, plant.rows.v, plant.rows.body]
 print(hashlib.sha256(b"".join(one.tobytes() for one in numbers)).hexdigest())
