@@ -174,7 +174,7 @@ def the_same_of_each_that_is_left(laws: SimpleNamespace, model: SimpleNamespace,
     """Idling rotors all give the same force, except those that are lost; the thrust is their sum."""
     for layout, lost in ((UNEVEN, 0b100), (MOST_ROTORS, 0)):
         rotors = laws.new_rotors()
-        result = laws.spread(0.05, mixer_table(layout, lost), rotors)
+        result = laws.equal_forces(0.05, mixer_table(layout, lost), rotors)
         expected = [0.0 if lost >> i & 1 else 0.05 for i in range(len(layout))]
         close(rotors[laws.FORCE, : len(layout)], expected, EXACT)
         close((result.achieved_thrust, *result.achieved_moment), (sum(expected), 0.0, 0.0, 0.0), EXACT)
