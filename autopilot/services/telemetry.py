@@ -230,12 +230,10 @@ def _estimator_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _ekf_status_report(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    flags, tested = s.estimator_flags & _UINT16, s.test_ratios
-    # as ArduPilot, the roots; 0 is unknown
-    roots = [math.sqrt(ratio) if ratio > 0.0 else 0.0 for ratio in tested]
-    velocity, horizontal, vertical, magnetic = roots
-    report = (velocity, horizontal, vertical, magnetic, 0.0)
-    return (mavlink.MAVLink_ekf_status_report_message(flags, *report),)
+    flags = s.estimator_flags & _UINT16
+    # as ArduPilot, the roots; 0 is unknown, as is the height above the ground
+    roots = [math.sqrt(ratio) if ratio > 0.0 else 0.0 for ratio in s.test_ratios]
+    return (mavlink.MAVLink_ekf_status_report_message(flags, *(*roots, 0.0)),)
 
 
 def _vibration(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.samples import PHASE_NAMES, Samples
-from gcs.analysis.tracks import LoadTrack, Telemetry, rotor_names
+from gcs.analysis.tracks import Telemetry, rotor_names
 from gcs.formats.arrow import array_of, text_array
 
 if TYPE_CHECKING:
@@ -34,15 +34,6 @@ def _component_columns(
     return {f"{name}_{part}{suffix}": values[:, i] for i, part in enumerate(parts)}
 
 
-def vehicle_velocity(truth: LoadTrack) -> Floats:
-    """(n, 3) of x_load - distance q; the distance, constant while the cable is taut, is differentiated."""
-    if len(truth.time_s) < 2:
-        return np.full_like(truth.velocity_m_s, np.nan)
-    reeled = np.gradient(truth.distance_m, truth.time_s)[:, None]
-    moved = truth.velocity_m_s - truth.distance_m[:, None] * truth.q_cable_dot - reeled * truth.q_cable
-    return np.asarray(moved)
-
-
 def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     """The columns of flight.parquet except the name of the phase; ENU and FLU, SI and rad."""
     t = samples.time_s
@@ -50,7 +41,6 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     true_rotors, commanded = telemetry.rotors_truth, telemetry.rotors_commanded
     attitude, estimated_attitude = telemetry.attitude_truth, telemetry.attitude_estimated
     estimate, setpoint, wind = telemetry.load_estimated, telemetry.setpoint, telemetry.wind
-    estimated_vehicle_m = estimate.position_m - estimate.distance_m[:, None] * estimate.q_cable
     estimated_quat = linear(estimated_attitude.time_s, estimated_attitude.quat_wxyz, t)
     wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 
@@ -92,8 +82,8 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         "cable_taut": truth.taut == 1,
         "cable_slack_events": truth.slack_events,
         **_component_columns("vehicle_true", "m", samples.vehicle_m),
-        **_component_columns("vehicle_estimated", "m", linear(estimate.time_s, estimated_vehicle_m, t)),
-        **_component_columns("vehicle_velocity_true", "m_s", vehicle_velocity(truth)),
+        **_component_columns("vehicle_estimated", "m", linear(estimate.time_s, estimate.vehicle_m, t)),
+        **_component_columns("vehicle_velocity_true", "m_s", truth.vehicle_m_s),
         **_component_columns("vehicle_quaternion", "", samples.quat_wxyz, ("w", "x", "y", "z")),
         **_component_columns(
             "vehicle_angle", "rad", roll_pitch_yaw(samples.quat_wxyz), ("roll", "pitch", "yaw")

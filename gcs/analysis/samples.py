@@ -132,6 +132,6 @@ def samples_of(telemetry: Telemetry) -> Samples:
         requested_m_s=np.where(tracked, linear(setpoint.time_s, setpoint.requested_m_s, time_s), np.nan),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
         filtered_m=hermite(filtered.time_s, filtered.position_m, filtered.velocity_m_s, time_s),
-        vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,
+        vehicle_m=truth.vehicle_m,
         quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),
     )

@@ -120,7 +120,7 @@ def _origin(hil: Columns, load: LoadTrack) -> Home | None:
     _, load_rows, hil_rows = np.intersect1d(load_us, hil_us, return_indices=True)
     if not len(load_rows):
         return None
-    vehicle = load.position_m[load_rows] - load.distance_m[load_rows, None] * load.q_cable[load_rows]
+    vehicle = load.vehicle_m[load_rows]
     degE7, mm = hil["lat lon"][hil_rows], hil["alt"][hil_rows]
     initial = Home(1e-7 * float(degE7[0, 0]), 1e-7 * float(degE7[0, 1]), 1e-3 * float(mm[0]))
     # take the first vehicle position as origin, then move it by the mean difference

@@ -34,6 +34,20 @@ class LoadTrack:
     slack_events: Ints  # (n,) since start, wraps at 65536
     taut: Ints  # (n,) 1 while taut
 
+    @property
+    def vehicle_m(self) -> Floats:
+        """(n, 3) ENU, position of the vehicle."""
+        return self.position_m - self.distance_m[:, None] * self.q_cable
+
+    @property
+    def vehicle_m_s(self) -> Floats:
+        """(n, 3) ENU, velocity of the vehicle; the distance, constant while taut, is differentiated."""
+        if len(self.time_s) < 2:
+            return np.full_like(self.velocity_m_s, np.nan)
+        reeled = np.gradient(self.distance_m, self.time_s)[:, None]
+        turned = self.distance_m[:, None] * self.q_cable_dot
+        return np.asarray(self.velocity_m_s - turned - reeled * self.q_cable)
+
 
 @dataclass(frozen=True)
 class FilterTrack:

@@ -196,6 +196,14 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     tilt_rate = np.gradient(motion.tilt, time, axis=0)
     edge = int(_EDGE_S * rate)
     kept = slice(edge, len(time) - edge)
+
+    def filtered(term: Floats) -> Floats:
+        return np.asarray(filtfilt(b, a, term, axis=0)[kept])
+
+    pull, velocity, acceleration, quadratic = map(
+        filtered,
+        (cable_force[:, :2], slow.velocity[:, :2], slow.acceleration[:, :2], speed * slow.velocity[:, :2]),
+    )
     found = np.array([model.mass_ratio, model.vehicle_drag_per_s, model.tilt_share, 0.0, 0.0])
     for _ in range(_MAX_VEHICLE_ITERATIONS):
         drag = found[1] + found[4] * speed[:, 0]
@@ -205,17 +213,12 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
             + drag * slow.velocity[:, 2]
             + found[0] * cable_force[:, 2]
         )[:, None]
-        terms = [
-            cable_force[:, :2],
-            slow.velocity[:, :2],
-            slow.acceleration[:, :2],
-            -up * tilt_rate,
-            speed * slow.velocity[:, :2],
-            up * np.array([1.0, 0.0]),
-            up * np.array([0.0, 1.0]),
-        ]
-        rows = np.stack([filtfilt(b, a, term, axis=0)[kept] for term in terms], axis=-1)
-        target = filtfilt(b, a, up * motion.tilt, axis=0)[kept]
+        delay, level_x, level_y = map(
+            filtered, (-up * tilt_rate, up * np.array([1.0, 0.0]), up * np.array([0.0, 1.0]))
+        )
+        terms = [pull, velocity, acceleration, delay, quadratic, level_x, level_y]
+        rows = np.stack(terms, axis=-1)
+        target = filtered(up * motion.tilt)
         flat = rows.reshape(-1, len(terms))
         if np.linalg.matrix_rank(flat) < len(terms):
             raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")

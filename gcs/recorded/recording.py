@@ -199,7 +199,7 @@ def recording_of(telemetry: Telemetry, name: str) -> Recording:
         raise RecordingError(f"the load {carried} off the ground; at least {MIN_ROWS} rows are needed")
     attitude_at = Slerp(attitude.time_s, Rotation.from_quat(np.roll(attitude.quat_wxyz, -1, axis=1)))
     time, load = track.time_s[carried_rows], track.position_m[carried_rows]
-    vehicle = load - track.distance_m[carried_rows, None] * track.q_cable[carried_rows]
+    vehicle = track.vehicle_m[carried_rows]
     return Recording(name, time, vehicle, attitude_at(time).as_quat(), load)
 
 

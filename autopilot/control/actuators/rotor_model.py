@@ -80,11 +80,6 @@ def queue_rows(constants: ActuationConstants) -> int:
     return constants.whole_periods + 2
 
 
-def stopped_actuation(rows: int = ROWS) -> Actuation:
-    """Rotors that stand still, and no command on its way."""
-    return Actuation(np.zeros((rows, 4)), 0.0, ZERO)
-
-
 def steady_actuation(thrust: float, rows: int = ROWS) -> Actuation:
     """Rotors that have been commanded this thrust (N) for a long time."""
     queue = np.zeros((rows, 4))
