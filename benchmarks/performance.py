@@ -3,7 +3,8 @@
     python benchmarks/performance.py [--flights 200] [--real-time 60] [--linear] [--docs docs/performance.md]
 
 Seconds depend on the machine and on what else it runs; only ratios can be compared. Repeated measurements are
-made in turn, and the median counts. With --docs the tables are written into the page, between its markers.
+made in turn, and the median counts. With --docs the tables are written into the page, between its markers, in
+place of those of the same kind of machine; those of other machines stay.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors `lab`, and o
 REAL_TIME_HZ = 500
 _CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a progress line of `gcs fly` begins
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
+_SECTION = re.compile(r"^### (.+)\n((?:(?!### ).*\n)*)", re.MULTILINE)  # of a machine: its heading and tables
 
 
 class NoLog:
@@ -179,7 +181,7 @@ def machine() -> str:
     width = next((bits for flag, bits in widths.items() if flag in about["flags"].split()), 0)
     vectors = f", vectors of {width} bits" if width else ""
     name_of_model = about["model name"] or platform.machine()
-    return f"{os.cpu_count()} cores of {name_of_model}{vectors}, Python {platform.python_version()}."
+    return f"{os.cpu_count()} cores of {name_of_model}{vectors}, Python {platform.python_version()}"
 
 
 Rows = Iterator[tuple[str, ...]]  # each as soon as it is measured
@@ -293,6 +295,15 @@ def table(head: Sequence[str], rows: Rows) -> str:
     return "\n".join(lines)
 
 
+def with_machine(page: str, about: str, text: str) -> str:
+    """The page with these tables under a heading that names the machine."""
+    before, _, rest = page.partition(f"{BEGIN}\n")
+    measured, _, after = rest.partition(END)
+    sections = dict(_SECTION.findall(measured)) | {about: f"{text}\n"}
+    kept = "\n".join(f"### {name}\n\n{body.strip()}\n" for name, body in sorted(sections.items()))
+    return f"{before}{BEGIN}\n{kept}{END}{after}"
+
+
 def main() -> None:
     """Measure, print, and with `--docs` write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -308,13 +319,11 @@ def main() -> None:
     print(about)
     with tempfile.TemporaryDirectory() as name:
         text = table(("Case B", "measured", "beside it"), all_rows(options, Path(name)))
-    text = f"{about}\n\n{text}\n"
     if options.linear:
-        text += "\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows()) + "\n"
+        text += "\n\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows())
     if options.docs:
         page = options.docs.read_text(encoding="utf-8")
-        made = re.sub(f"{BEGIN}.*{END}", f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
-        options.docs.write_text(made, encoding="utf-8")
+        options.docs.write_text(with_machine(page, about, text), encoding="utf-8")
 
 
 if __name__ == "__main__":
