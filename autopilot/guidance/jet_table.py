@@ -20,10 +20,8 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
-_CACHE_SIZE, _MIN_CACHED_TIMES = (
-    3,
-    500,
-)  # evaluated signals to keep, each of at least so many times: those of a sweep
+_CACHE_SIZE = 3  # evaluated signals to keep
+_MIN_CACHED_TIMES = 500  # of signals that are kept: those of a sweep
 
 
 @kernel

@@ -264,9 +264,10 @@ def _limits(view: View, ax: Any) -> None:
     track = view.telemetry.rotors_commanded
     if not len(track.time_s):
         track = view.telemetry.rotors_truth
-    for values in (track.force_min_n, track.force_max_n):
-        if len(values) and np.isfinite(values[-1]):
-            ax.axhline(float(values[-1]), color=RED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
+    limits = [float(values[-1]) for values in (track.force_min_n, track.force_max_n) if len(values)]
+    drawn = [limit for limit in limits if np.isfinite(limit)]
+    for limit, label in zip(drawn, ("limit", None), strict=False):
+        ax.axhline(limit, color=RED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2, label=label)
 
 
 def tension(view: View, path: Target) -> None:

@@ -76,10 +76,8 @@ INITIAL_SPEED_STD = 0.2  # m/s
 # of a vehicle that is found in the air
 AIRBORNE_THRUST_SHARE = 0.5  # of its weight: above this thrust, the rotors carry it
 SUSPENDED_PULL_SHARE = 0.5  # of the load's weight that must pull at the vehicle for the load to hang from it
-AIRBORNE_SPEED_STD, AIRBORNE_TILT_STD = (
-    1.0,
-    0.15,
-)  # m/s; rad, by which acceleration tilts the measured vertical
+AIRBORNE_SPEED_STD = 1.0  # m/s
+AIRBORNE_TILT_STD = 0.15  # rad, by which acceleration tilts the measured vertical
 SUSPENDED_STD, SUSPENDED_SPEED_STD = 0.3, 1.0  # of the cable's length, horizontal; m/s
 UNKNOWN_POSITION_STD = 100.0  # m: the first fix decides the position
 MAX_MAGNETIC_AGE_S = 0.2
