@@ -40,7 +40,6 @@ SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors `lab`, and o
 REAL_TIME_HZ = 500
 _CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a progress line of `gcs fly` begins
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
-_SECTION = re.compile(r"^### (.+)\n((?:(?!### ).*\n)*)", re.MULTILINE)  # of a machine: its heading and tables
 
 
 class NoLog:
@@ -296,11 +295,11 @@ def table(head: Sequence[str], rows: Rows) -> str:
 
 
 def with_machine(page: str, about: str, text: str) -> str:
-    """The page with these tables under a heading that names the machine."""
-    before, _, rest = page.partition(f"{BEGIN}\n")
-    measured, _, after = rest.partition(END)
-    sections = dict(_SECTION.findall(measured)) | {about: f"{text}\n"}
-    kept = "\n".join(f"### {name}\n\n{body.strip()}\n" for name, body in sorted(sections.items()))
+    """The page with these tables under a heading that names the machine; ValueError if it has no markers."""
+    before, rest = page.split(BEGIN, 1)
+    measured, after = rest.split(END, 1)
+    sections = dict(section.split("\n", 1) for section in measured.split("### ")[1:]) | {about: text}
+    kept = "\n".join(f"### {name}\n\n{tables.strip()}\n" for name, tables in sorted(sections.items()))
     return f"{before}{BEGIN}\n{kept}{END}{after}"
 
 

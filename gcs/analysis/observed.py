@@ -100,7 +100,7 @@ def _item_positions(items: Sequence[WireItem], load: LoadTrack, home: Home) -> F
     """(items, 3) position of the hanging load at the end of each item, ENU."""
     taut = load.distance_m[load.taut > 0]
     cable_m = float(np.median(taut if len(taut) else load.distance_m))
-    vehicle_ground_m = float(load.position_m[0, 2] - load.distance_m[0] * load.q_cable[0, 2])
+    vehicle_ground_m = float(load.vehicle_m[0, 2])
     ground_m = load.position_m[0, 2]
     found, last = [], load.position_m[0]
     for item in items:

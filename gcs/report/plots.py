@@ -264,9 +264,9 @@ def _limits(view: View, ax: Any) -> None:
     track = view.telemetry.rotors_commanded
     if not len(track.time_s):
         track = view.telemetry.rotors_truth
-    limits = [float(values[-1]) for values in (track.force_min_n, track.force_max_n) if len(values)]
-    drawn = [limit for limit in limits if np.isfinite(limit)]
-    for limit, label in zip(drawn, ("limit", None), strict=False):
+    ends = (track.force_min_n[-1:], track.force_max_n[-1:])
+    limits = [float(limit) for limit in np.concatenate(ends) if np.isfinite(limit)]
+    for limit, label in zip(limits, ("limit", None), strict=False):  # the legend needs one of them
         ax.axhline(limit, color=RED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2, label=label)
 
 
