@@ -218,6 +218,7 @@ class Stage:
         self.gcs = self.second_gcs = self.api = self.tcp = ""  # ports
         self.witness: Witness
         self._running: list[subprocess.Popen[Any]] = []
+        self._programs: list[tuple[subprocess.Popen[bytes], Path]] = []  # with their output
         self._mavproxies: list[Mavproxy] = []
 
     def begin(self, *options: str, speed: float = 1.0) -> None:
@@ -265,14 +266,23 @@ class Stage:
                 cwd=self.directory,
             )
         self._running.append(process)
+        self._programs.append((process, log))
 
         def told() -> Told:
-            code = process.wait(LONG_S)
+            process.wait(LONG_S)
+            self._raise_if_failed(process, log)
             lines = log.read_text(errors="replace").splitlines()
-            assert code == 0, "\n".join([*lines[-40:], *self.witness.texts])
             return Told(json.loads(lines[-1]), "\n".join(lines[:-1]))
 
         return told
+
+    def _raise_if_failed(self, process: subprocess.Popen[bytes], log: Path) -> None:
+        code = process.poll()
+        assert not code, f"a client ended with {code}\n{self._said(log)}"
+
+    def _said(self, log: Path) -> str:
+        lines = log.read_text(errors="replace").splitlines()
+        return "\n".join([f"{log.name}:", *lines[-40:], "the vehicle:", *self.witness.texts])
 
     def run_gcs(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a gcs command at the second ground station's port, to its end."""
@@ -295,13 +305,16 @@ class Stage:
         self.wait_until(lambda: text in self.witness.texts, timeout_s)
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
-        """Wait until the condition holds."""
+        """Wait until the condition holds; a client that failed makes it happen never."""
         turn = threading.Event()
         for _ in range(round(timeout_s / 0.05)):
             if condition():
                 return
+            for process, log in self._programs:
+                self._raise_if_failed(process, log)
             turn.wait(0.05)
-        raise AssertionError(f"in vain waited; the vehicle said {self.witness.texts}")
+        output = "\n".join(self._said(log) for _, log in self._programs)
+        raise AssertionError(f"in vain waited\n{output or self.witness.texts}")
 
     def end(self) -> None:
         for program in self._mavproxies:
