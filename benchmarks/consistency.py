@@ -1,7 +1,7 @@
 """Consistency of the estimator: its own covariance compared with its true error, phase by phase.
 
-    python benchmarks/consistency.py [--mission NAME] [--sensors NAME ...] [--wind M_S ...] [--seeds N]
-                                     [--set NAME=VALUE ...] [--jobs N]
+    python benchmarks/consistency.py [--mission NAME] [--vehicle NAME] [--sensors NAME ...] [--wind M_S ...]
+                                     [--seeds N] [--set NAME=VALUE ...] [--jobs N]
 
 Flies a mission with each seed, as in a sweep (without messages), in calm air and in wind, and compares the
 error of the estimate with the filter's covariance ten times a second. Prints, for each phase of the flight
@@ -17,6 +17,7 @@ import json
 import sys
 from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -170,13 +171,17 @@ def _fly_nees(task: tuple[Mission, Conditions, StartTimes]) -> tuple[Nees, dict[
 
 
 def measure(
-    mission: Mission, sensors: str, settings: dict[str, float], seeds: int, pool: ProcessPoolExecutor
+    mission: Mission,
+    vehicle: str,
+    sensors: str,
+    settings: dict[str, float],
+    seeds: int,
+    pool: ProcessPoolExecutor,
 ) -> tuple[Nees, list[dict[str, object]]]:
     """The NEES of `seeds` flights together, and the result of each."""
-    start = start_times(mission, Conditions(sensors=sensors, settings=settings))
-    tasks = [
-        (mission, Conditions(sensors=sensors, seed=s + 1, settings=settings), start) for s in range(seeds)
-    ]
+    conditions = Conditions(vehicle, sensors, settings=settings)
+    start = start_times(mission, conditions)
+    tasks = [(mission, replace(conditions, seed=s + 1), start) for s in range(seeds)]
     together: Nees = defaultdict(lambda: defaultdict(list))
     ends = []
     for found, end in pool.map(_fly_nees, tasks):
@@ -190,6 +195,7 @@ def measure(
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--mission", default="case-b")
+    parser.add_argument("--vehicle", default="bebop")
     parser.add_argument("--sensors", nargs="*", default=["lab", "rtk"])
     parser.add_argument("--wind", nargs="*", type=float, default=[0.0, 5.0], metavar="M_S")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
@@ -204,7 +210,7 @@ def main() -> int:
         for sensors in options.sensors:
             for wind in options.wind:
                 settings = {**settings_for_all, **({"SIM_WIND_E": wind} if wind else {})}
-                found, ends = measure(mission, sensors, settings, options.seeds, pool)
+                found, ends = measure(mission, options.vehicle, sensors, settings, options.seeds, pool)
                 title = f"`{sensors}`, " + (f"{wind:g} m/s of wind" if wind else "calm")
                 print(table(title, found))
                 worst = max(float(str(end["error_mm"])) for end in ends)

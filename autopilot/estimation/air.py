@@ -2,7 +2,8 @@
 
 The error state contains the acceleration d that the pendulum leaves out, as a random walk. Drag is learned
 beside it, by the least-squares fit of d to the load's velocity, both less their means over some seconds. With
-this fit, d follows the speed immediately.
+this fit, d follows the speed immediately. What varies of d beyond its drag is the effect of gusts, whose
+strength is learned from it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from math import sqrt
 from autopilot.control.drag import GUST_RANDOM_WALK
 from autopilot.estimation.covariance import decay_factor
 from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
+from autopilot.estimation.tautness import is_never_observed
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
 
@@ -19,6 +21,8 @@ DRAG_CHANGE_TIME_S = 0.15  # for which a change of drag lasts
 # m/s^2, by a wind that a camera cannot distinguish from its own mounting and the slow error of a receiver
 HIDDEN_WIND_ACCEL = 0.17
 LEARNING_S = 4.0
+GUST_TIME_S = 2.0  # for which gusts last
+GUST_LEARNING_S = 2.0
 # drag is learned from motion faster than MIN_LEARNING_SPEED, m/s, and is at most MAX_DRAG, 1/s
 MIN_LEARNING_SPEED, MAX_DRAG = 0.2, 2.0
 
@@ -27,19 +31,26 @@ MIN_LEARNING_SPEED, MAX_DRAG = 0.2, 2.0
 def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: EstimatorTuning) -> float:
     """How fast the load's acceleration by the air may change, m/s^2 per square root of a second.
 
-    The root of the sum of squares of three parts: the configured walk; gusts, which grow with the wind, or
-    with the wind that may be hidden where no tracker measures the load; and the change of drag, c u^2, with
-    the speed, 2 c u times the acceleration, where u^2 includes the wind that the acceleration c u^2
+    The root of the sum of squares of three parts: the configured walk; gusts; and the change of drag, c u^2,
+    with the speed, 2 c u times the acceleration, where u^2 includes the wind that the acceleration c u^2
     indicates.
+
+    Gusts of the variance s^2 that last for T walk by 2 s^2 / T. A mean over the time L leaves s^2 L / (L + T)
+    of this variance, so that the learned one means a walk of 2 s'^2 (1 / T + 1 / L). It is at most that of
+    strong gusts in the wind that d shows, or that may be hidden where no tracker measures the load. Without a
+    sensor of the load, gusts cannot be learned: they are not distinguishable from those on the vehicle.
     """
     configured_walk, c = tuning.air_walk, tuning.load_drag
     wind2 = air.load_accel[0] * air.load_accel[0] + air.load_accel[1] * air.load_accel[1]
     speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
-    gusts = (
+    strong_gusts = (
         GUST_RANDOM_WALK
         * GUST_RANDOM_WALK
         * (wind2 if load.source == TRACKER else wind2 + HIDDEN_WIND_ACCEL * HIDDEN_WIND_ACCEL)
     )
+    gusts = 0.0
+    if not is_never_observed(load):
+        gusts = min(strong_gusts, air.gust_variance * (1.0 / GUST_TIME_S + 1.0 / LEARNING_S))
     return sqrt(
         configured_walk * configured_walk
         + gusts
@@ -72,6 +83,7 @@ def predict_air(
             air.mean_accel,
             air.velocity_accel_covariance,
             air.velocity_variance,
+            air.gust_variance,
         )
     v, c = load.v_load, air.load_drag
     d = (d[0] - c * (v[0] - before.v_load[0]), d[1] - c * (v[1] - before.v_load[1]))
@@ -89,6 +101,16 @@ def predict_air(
         MAX_DRAG,
         max(0.0, -velocity_accel_covariance / (velocity_variance + MIN_LEARNING_SPEED * MIN_LEARNING_SPEED)),
     )
+    g0, g1 = d[0] - mean_accel[0] + drag * s0, d[1] - mean_accel[1] + drag * s1
+    gust_share = dt / (GUST_LEARNING_S + dt)
+    gust_variance = air.gust_variance + gust_share * (g0 * g0 + g1 * g1 - air.gust_variance)
     return AirEstimate(
-        d, vehicle_accel, drag, mean_velocity, mean_accel, velocity_accel_covariance, velocity_variance
+        d,
+        vehicle_accel,
+        drag,
+        mean_velocity,
+        mean_accel,
+        velocity_accel_covariance,
+        velocity_variance,
+        gust_variance,
     )

@@ -34,7 +34,7 @@ from autopilot.estimation.measurements.gnss import correct_gnss, initial_load
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.magnetic import correct_magnetic
 from autopilot.estimation.measurements.pose import correct_pose
-from autopilot.estimation.measurements.pull import correct_pull, is_never_observed
+from autopilot.estimation.measurements.pull import correct_pull
 from autopilot.estimation.measurements.tautening import correct_tautening
 from autopilot.estimation.measurements.zero_velocity import correct_zero_velocity
 from autopilot.estimation.predict import predict
@@ -50,6 +50,7 @@ from autopilot.estimation.records import (
     ImuReading,
 )
 from autopilot.estimation.release import release_load
+from autopilot.estimation.tautness import is_never_observed
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.geometry.packed import unpack, with_field

@@ -52,7 +52,7 @@ from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rota
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a tracked load: whether it falls freely or rests on the ground is unknown
 # rad/s^2, error of the pendulum model of a cable that does not carry its load; the same of a tracked load
-LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.5
+LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.2
 # m/s, speed at which a tracked load and the vehicle move apart until the cable carries
 SEPARATION_SPEED_STD = 0.3
 PENDING_CORRECTION_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on

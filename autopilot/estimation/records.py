@@ -227,6 +227,7 @@ class AirEstimate(NamedTuple):
     mean_accel: tuple[float, float]  # m/s^2, the same of the load's acceleration by the air
     velocity_accel_covariance: float  # m^2/s^3, mean product of both, each less its mean
     velocity_variance: float  # m^2/s^2, mean square of the speed less its mean
+    gust_variance: float  # (m/s^2)^2, mean square of the load's acceleration by the wind less its mean
 
 
 class Vibration(NamedTuple):
@@ -319,7 +320,7 @@ def blank_state() -> EstimatorState:
             source=NO_SENSOR,
         ),
         sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
-        air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0),
+        air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0),
         uncertainty=Uncertainty(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),

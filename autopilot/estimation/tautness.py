@@ -11,6 +11,7 @@ from __future__ import annotations
 from autopilot.estimation.covariance import zero_covariance
 from autopilot.estimation.records import (
     AIR,
+    CAMERA,
     DIRECTION,
     LENGTH,
     POSITION,
@@ -56,9 +57,18 @@ SNATCH_DELAY_S = 0.015  # time after which the measured pull shows it
 # share of the air's deviation with which a tracked load begins: wind soon shows, and the law that lifts the
 # load is not disturbed while the filter searches for it
 INITIAL_AIR_SHARE = 0.1
+# The same of a load that no sensor has ever measured: its pull shows only the sum of the wind on the load and
+# the wind on the vehicle, and a wrong share of the load makes the law lean.
+UNOBSERVED_AIR_SHARE = 0.2
 LIFT_OFF_SPEED_STD = 0.02  # m/s, across the cable, of a load that the cable has begun to pull
 # no cable comes taut while the last direction to the load is older, unless there never was one
 MAX_DIRECTION_AGE_S = 1.0
+
+
+@kernel
+def is_never_observed(load: LoadEstimate) -> bool:
+    """Whether no sensor has ever observed the load."""
+    return load.source == CAMERA and load.age_s == float("inf")
 
 
 @kernel
@@ -183,15 +193,17 @@ def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
     across, along = load.across, cross(load.q_cable, load.across)
     aa, ab, bb = load.covariance
-    if load.source != TRACKER:
+    tracked = load.source == TRACKER
+    if not tracked:
         bb += LIFT_OFF_SPEED_STD * LIFT_OFF_SPEED_STD
-    else:
-        initial_air_std = INITIAL_AIR_SHARE * tuning.air_std
+    if tracked or is_never_observed(load):
+        initial_air_std = (INITIAL_AIR_SHARE if tracked else UNOBSERVED_AIR_SHARE) * tuning.air_std
         zero_covariance(P, AIR, 2)
         P[AIR, AIR], P[AIR + 1, AIR + 1] = (
             initial_air_std * initial_air_std,
             initial_air_std * initial_air_std,
         )
+    if tracked:
         _set_relative_rows(P, DIRECTION, POSITION, across, along, length)
     _set_relative_rows(P, RATE, VELOCITY, across, along, length)
     s = 1.0 / length

@@ -30,7 +30,6 @@ from autopilot.estimation.covariance import (
 )
 from autopilot.estimation.records import (
     ACCEL_BIAS,
-    CAMERA,
     NO_SENSOR,
     PULL,
     PUSH,
@@ -38,8 +37,8 @@ from autopilot.estimation.records import (
     EstimatorState,
     EstimatorTuning,
     History,
-    LoadEstimate,
 )
+from autopilot.estimation.tautness import is_never_observed
 from autopilot.estimation.vibration import accel_noise
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, axpy, column, cross, dot, scale, sub
@@ -49,12 +48,6 @@ from autopilot.geometry.so3 import rotation_from_quat
 FIRM_PULL, NO_PULL = 0.3, 0.05
 MIN_HEIGHT = 0.2  # of the cable's length above the load: higher up, the vehicle is off the ground
 SLANT_STD = 0.005  # rad, between the rotors' force and the body's axis
-
-
-@kernel
-def is_never_observed(load: LoadEstimate) -> bool:
-    """Whether no sensor has ever observed the load."""
-    return load.source == CAMERA and load.age_s == float("inf")
 
 
 @kernel

@@ -1,0 +1,53 @@
+"""How strong the gusts on the load are, as the estimator learns it from its own estimate of them."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from autopilot.estimation.air import GUST_RANDOM_WALK, GUST_TIME_S, air_walk, predict_air
+from autopilot.estimation.records import CAMERA, TRACKER, blank_state
+from autopilot.geometry.linear import ZERO
+from tests.doubles.motion import bebop_tuning
+
+TICK_S = 0.02
+WIND = 0.5  # m/s^2, mean acceleration of the load by the wind
+TUNING = bebop_tuning()._replace(air_walk=0.003, load_drag=0.0)
+TAUT = blank_state().load._replace(taut=1.0, source=TRACKER, v_load=ZERO, age_s=0.0)
+
+
+def learned_walk(gust_std: float) -> float:
+    """The walk after ten minutes of gusts of this standard deviation on each axis, m/s^2 / sqrt(s); the mean
+    over the last nine."""
+    random, air = np.random.default_rng(5), blank_state().air
+    share = TICK_S / GUST_TIME_S
+    gust, squares = np.zeros(2), []
+    for tick in range(round(600.0 / TICK_S)):
+        gust += -share * gust + gust_std * sqrt(2.0 * share) * random.normal(size=2)
+        air = predict_air(air._replace(load_accel=(WIND + gust[0], gust[1])), TAUT, TAUT, TUNING, TICK_S)
+        if tick * TICK_S > 60.0:
+            squares.append(air_walk(TAUT, air, ZERO, TUNING) ** 2)
+    return sqrt(float(np.mean(squares)))
+
+
+def test_steady_wind_walks_no_faster_than_configured() -> None:
+    assert learned_walk(0.0) == pytest.approx(TUNING.air_walk, rel=1e-3)
+
+
+@pytest.mark.parametrize("gust_std", [0.02, 0.05])
+def test_gusts_walk_as_fast_as_they_do(gust_std: float) -> None:
+    walk2 = 2.0 * gust_std**2 / GUST_TIME_S + TUNING.air_walk**2
+    assert learned_walk(gust_std) == pytest.approx(sqrt(walk2), rel=0.1)
+
+
+def test_the_wind_limits_what_is_believed_of_gusts() -> None:
+    air = blank_state().air._replace(load_accel=(WIND, 0.0), gust_variance=1.0)
+    assert air_walk(TAUT, air, ZERO, TUNING) == pytest.approx(GUST_RANDOM_WALK * WIND, rel=1e-3)
+
+
+def test_gusts_on_a_load_that_no_sensor_observed_are_not_learned() -> None:
+    air = blank_state().air._replace(load_accel=(WIND, 0.0), gust_variance=1.0)
+    unobserved = TAUT._replace(source=CAMERA, age_s=float("inf"))
+    assert air_walk(unobserved, air, ZERO, TUNING) == TUNING.air_walk
