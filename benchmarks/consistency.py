@@ -199,7 +199,7 @@ def main() -> int:
     parser.add_argument("--sensors", nargs="*", default=["lab", "rtk"])
     parser.add_argument("--wind", nargs="*", type=float, default=[0.0, 5.0], metavar="M_S")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
-    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     settings_for_all = {

@@ -64,7 +64,7 @@ _DRAG_SPEED, _MAX_FACTOR = 0.2, 50.0
 _DEFAULT_DRAG_RATE = 0.05
 # m/s^2, standard deviation of an accelerometer sample up to which, in still air, the push is learned as
 # fast as configured
-_QUIET_ACCEL_STD = 0.06
+_QUIET_ACCEL_STD = 0.03
 # of the weight: a smaller push may be nothing but noise
 _PUSH_NOISE_SHARE = 0.03
 # of the nominal mass of the load
