@@ -746,8 +746,8 @@ def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: 
     breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     for push in (0.0, breeze, 0.9 * breeze, breeze + 0.5):
         observed = still._replace(steady_push=(0.6 * push, -0.8 * push, 0.0))
-        quiet = 0.06 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
-        for noise in (0.05, 0.12, 1.0):
+        quiet = 0.03 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
+        for noise in (0.02, 0.12, 1.0):
             slower = max(1.0, noise / quiet)
             rested = law.slowed_by_noise(constants, observed, noise * noise)
             agree(rested.push, constants.push / slower, 1e-9 * constants.push)

@@ -97,9 +97,9 @@ def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
 
 
 # Means over 10 seeds and 8 instants. Instants of one flight are alike: the chi-square bounds are those of
-# the seeds with three instants that count. The stated error of direction and rate is too large: the noise
-# of the pendulum stands for drag on a fast load. Measured per axis, position to rate: lab 1.00, 1.00,
-# 1.08, 0.86, 0.63; rtk 0.91, 0.94, 1.04, 0.90, 0.62.
+# the seeds with three instants that count. With a camera, the stated error of the rate is too large: gusts
+# are learned from an estimate that its noise moves. Measured per axis, position to rate: lab 0.99, 0.99,
+# 1.04, 0.94, 0.85; rtk 0.89, 0.95, 1.16, 1.35, 0.55.
 COUNTING = 3 * len(SEEDS)
 MODEL_MARGIN = 0.5  # share of the stated variance of the pendulum that the true one must reach
 
@@ -138,3 +138,25 @@ def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
         return sum(flown.load_error_rms_m**2 for flown in flights)
 
     assert square(4.0) < 3.0 * square(0.0)
+
+
+@pytest.mark.parametrize("sensors", ["lab-blind", "rtk-blind"])
+def test_a_load_without_a_sensor_is_flown_in_gusts(sensors: str) -> None:
+    """Measured: at worst 61 and 78 mm of 20 seeds. Where the wind on the load is assumed as with a sensor, half
+    of the flights are lost."""
+    mission = load_mission("case-b")
+    told: dict[str, Any] = {"sensors": sensors, "settings": {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}}
+    start = start_times(mission, Conditions(**told))
+    flights = [fly(mission, Conditions(seed=seed, **told), start) for seed in (1, 2, 3)]
+    assert [flown.outcome for flown in flights] == ["completed"] * 3
+    assert max(flown.load_error_max_m for flown in flights) < 0.12
+
+
+def test_noise_that_the_autopilot_does_not_expect_is_filtered() -> None:
+    """Measured: 24.6 mm at worst of 20 seeds, and one tick in a thousand saturated."""
+    mission = load_mission("case-b")
+    noisy = {"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05}
+    start = start_times(mission, Conditions(settings=noisy))
+    flights = [fly(mission, Conditions(seed=seed, settings=noisy), start) for seed in (1, 2, 3)]
+    assert max(flown.load_error_max_m for flown in flights) < 0.025
+    assert max(flown.saturated_fraction for flown in flights) < 0.01
