@@ -142,8 +142,8 @@ def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
 
 @pytest.mark.parametrize("sensors", ["lab-blind", "rtk-blind"])
 def test_a_load_without_a_sensor_is_flown_in_gusts(sensors: str) -> None:
-    """Measured: at worst 61 and 78 mm of 20 seeds. Where the wind on the load is assumed as with a sensor, half
-    of the flights are lost."""
+    """Measured: 61 and 78 mm at worst of 20 seeds. If the filter expects as much wind on the load as with a
+    sensor, half of the flights are lost."""
     mission = load_mission("case-b")
     told: dict[str, Any] = {"sensors": sensors, "settings": {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}}
     start = start_times(mission, Conditions(**told))
