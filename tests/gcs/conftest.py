@@ -52,6 +52,7 @@ class ScriptedVehicle:
         self.armed = False
         self.started_us: int | None = None
         self.script: Callable[[ScriptedVehicle, float], None] | None = None
+        self.nothing_waits = threading.Event()  # set by `LiveVehicle` when it has taken all that was sent
         self.phase = mavlink.PLUMBLINE_PHASE_DISARMED
         self.custom_mode = PX4_HOLD
         self.item = 0
@@ -361,8 +362,11 @@ class LiveVehicle(threading.Thread):
             link.settimeout(0.005)
             began_ns = time.monotonic_ns()
             while not self._over.is_set():
-                with suppress(OSError):  # nothing came, or the ground station does not listen yet
-                    self.vehicle.receive(link.recv(65535))
+                with suppress(ConnectionRefusedError):  # the ground station does not listen yet
+                    try:
+                        self.vehicle.receive(link.recv(65535))
+                    except TimeoutError:
+                        self.vehicle.nothing_waits.set()
                 for datagram in self.vehicle.tick((time.monotonic_ns() - began_ns) // 1000):
                     with suppress(OSError):
                         link.sendto(datagram, self._ground)
