@@ -34,7 +34,7 @@ from autopilot.estimation.records import (
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from gcs.closed_loop import Conditions
-from gcs.sweep.flight import fly, start_times
+from gcs.sweep.flight import FlightResult, fly, start_times
 from missions.fileformat import load_mission
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
@@ -126,16 +126,20 @@ def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tup
         assert 0.8 < total / count / SCALARS[sensor] < 1.2, (sensor, total / count / SCALARS[sensor])
 
 
+def flights(name: str, seeds: tuple[int, ...], **told: Any) -> list[FlightResult]:
+    """A mission by name under these conditions, once with each seed."""
+    mission = load_mission(name)
+    start = start_times(mission, Conditions(**told))
+    return [fly(mission, Conditions(seed=seed, **told), start) for seed in seeds]
+
+
 def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
     """For 3 s at a time each fix is off by the same 0.15 m. Measured as RMS: 20.9 mm without, 28.2 mm with
     such fixes; 57 mm if each is assumed to have an independent error."""
-    hover = load_mission("hover")
 
     def square(floats_per_min: float) -> float:
-        told: dict[str, Any] = {"sensors": "rtk", "settings": {"SIM_GPS_FLT": floats_per_min}}
-        boarded = start_times(hover, Conditions(**told))
-        flights = (fly(hover, Conditions(seed=seed, **told), boarded) for seed in (2, 3, 4))
-        return sum(flown.load_error_rms_m**2 for flown in flights)
+        floating = flights("hover", (2, 3, 4), sensors="rtk", settings={"SIM_GPS_FLT": floats_per_min})
+        return sum(flown.load_error_rms_m**2 for flown in floating)
 
     assert square(4.0) < 3.0 * square(0.0)
 
@@ -144,19 +148,14 @@ def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
 def test_a_load_without_a_sensor_is_flown_in_gusts(sensors: str) -> None:
     """Measured: 61 and 78 mm at worst of 20 seeds. If the filter expects as much wind on the load as with a
     sensor, half of the flights are lost."""
-    mission = load_mission("case-b")
-    told: dict[str, Any] = {"sensors": sensors, "settings": {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}}
-    start = start_times(mission, Conditions(**told))
-    flights = [fly(mission, Conditions(seed=seed, **told), start) for seed in (1, 2, 3)]
-    assert [flown.outcome for flown in flights] == ["completed"] * 3
-    assert max(flown.load_error_max_m for flown in flights) < 0.12
+    gusts = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
+    blind = flights("case-b", (1, 2, 3), sensors=sensors, settings=gusts)
+    assert [flown.outcome for flown in blind] == ["completed"] * 3
+    assert max(flown.load_error_max_m for flown in blind) < 0.12
 
 
 def test_noise_that_the_autopilot_does_not_expect_is_filtered() -> None:
     """Measured: 24.6 mm at worst of 20 seeds, and one tick in a thousand saturated."""
-    mission = load_mission("case-b")
-    noisy = {"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05}
-    start = start_times(mission, Conditions(settings=noisy))
-    flights = [fly(mission, Conditions(seed=seed, settings=noisy), start) for seed in (1, 2, 3)]
-    assert max(flown.load_error_max_m for flown in flights) < 0.025
-    assert max(flown.saturated_fraction for flown in flights) < 0.01
+    noisy = flights("case-b", (1, 2, 3), settings={"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05})
+    assert max(flown.load_error_max_m for flown in noisy) < 0.025
+    assert max(flown.saturated_fraction for flown in noisy) < 0.01

@@ -64,6 +64,12 @@ class ScriptedVehicle:
         self._asked_us = 0
         self._next_heartbeat_us = 0
 
+    def wait_until_all_is_taken(self) -> None:
+        """Wait until a live vehicle has taken what was sent to it before this call."""
+        for _ in range(2):  # the first may tell of a moment before the call
+            self.nothing_waits.clear()
+            assert self.nothing_waits.wait(10.0)
+
     # ---- out
 
     def send(self, message: Any) -> None:

@@ -117,9 +117,7 @@ def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_ca
     def run(*words: str) -> tuple[int, list[str]]:
         asked.clear()
         result = CliRunner().invoke(gcs, [*words, "--connect", port], prog_name="gcs")
-        for _ in range(2):  # the last request may be on its way; a first wait may be about before
-            vehicle.nothing_waits.clear()
-            assert vehicle.nothing_waits.wait(10.0)
+        vehicle.wait_until_all_is_taken()  # the last request may be on its way
         return result.exit_code, result.stderr.splitlines()
 
     texts = run("texts")
