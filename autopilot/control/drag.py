@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, scale
 
-# 1/sqrt(s), random walk of the wind's force, as a share of this force: gusts are a fifth of the wind and last
-# for 2 s, and the drag, c u^2, changes by 2 c u times the gust: 2 * 0.2 * sqrt(2 / 2 s)
-GUST_RANDOM_WALK = 0.4
+GUST_TIME_S = 2.0  # for which gusts last
+# 1/sqrt(s), random walk of the wind's force, as a share of this force: gusts are a fifth of the wind, and the
+# drag, c u^2, changes by 2 c u times the gust
+GUST_RANDOM_WALK = 2.0 * 0.2 * sqrt(2.0 / GUST_TIME_S)
 
 
 class Drag(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from autopilot.control.drag import GUST_RANDOM_WALK
+from autopilot.control.drag import GUST_RANDOM_WALK, GUST_TIME_S
 from autopilot.estimation.covariance import decay_factor
 from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
 from autopilot.estimation.tautness import is_never_observed
@@ -21,7 +21,6 @@ DRAG_CHANGE_TIME_S = 0.15  # for which a change of drag lasts
 # m/s^2, by a wind that a camera cannot distinguish from its own mounting and the slow error of a receiver
 HIDDEN_WIND_ACCEL = 0.17
 LEARNING_S = 4.0
-GUST_TIME_S = 2.0  # for which gusts last
 GUST_LEARNING_S = 2.0
 # drag is learned from motion faster than MIN_LEARNING_SPEED, m/s, and is at most MAX_DRAG, 1/s
 MIN_LEARNING_SPEED, MAX_DRAG = 0.2, 2.0

@@ -7,7 +7,8 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from autopilot.estimation.air import GUST_RANDOM_WALK, GUST_TIME_S, air_walk, predict_air
+from autopilot.control.drag import GUST_RANDOM_WALK, GUST_TIME_S
+from autopilot.estimation.air import air_walk, predict_air
 from autopilot.estimation.records import CAMERA, TRACKER, blank_state
 from autopilot.geometry.linear import ZERO
 from tests.doubles.motion import bebop_tuning
