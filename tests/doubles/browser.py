@@ -57,6 +57,8 @@ class Browser:
         self.resize(width, height)
         self.prefer(theme)
         self.driver.get(url)
+        # `get` may return while the page is still loading
+        self.wait("document.readyState === 'complete' && document.URL !== 'about:blank'")
 
     def resize(self, width: int, height: int) -> None:
         """Set the size of the page in CSS pixels."""
