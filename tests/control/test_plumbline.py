@@ -746,12 +746,14 @@ def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: 
     breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     for push in (0.0, breeze, 0.9 * breeze, breeze + 0.5):
         observed = still._replace(steady_push=(0.6 * push, -0.8 * push, 0.0))
-        quiet = 0.03 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
+        quiet = 0.02 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
         for noise in (0.02, 0.12, 1.0):
             slower = max(1.0, noise / quiet)
             rested = law.slowed_by_noise(constants, observed, noise * noise)
             agree(rested.push, constants.push / slower, 1e-9 * constants.push)
-            assert rested._replace(push=constants.push) == constants
+            white = vehicle.quad_mass * math.sqrt(0.04 / 1.96) * noise  # what a share of 0.04 leaves of noise
+            agree(rested.max_lag, 4.0 * white, 1e-9)
+            assert rested._replace(push=constants.push, max_lag=constants.max_lag) == constants
     # the effect of the wind on the load is filtered with 0.15 s
     blown = law.with_wind_on_load(
         still._replace(load_air_accel=(0.3, -0.2, 0.1)), (0.1, 0.5, 0.4), 0.02, constants
@@ -766,6 +768,29 @@ def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: 
     agree(
         law.cable_force((0.0, 0.0, -3.0), (math.sin(1.3), 0.0, -math.cos(1.3)), (0.0, 0.0, 1.0)), 6.0, 1e-12
     )
+
+
+def sudden_gusts_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """A push that noise can explain is learned slowly; of a greater one all but this noise promptly."""
+    lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    still = law.nominal_in_flight(vehicle)
+    slowed = law.slowed_by_noise(
+        law.observer_constants(0.3, 0.1, 0.0, 0.0, 9.0, TICK, Drag(0.0, 0.0), vehicle), still, 0.4 * 0.4
+    )
+    share = TICK / 0.1
+    ticks = 100
+    prompt, slow = (1.0 - (1.0 - s) ** ticks for s in (share, share * 0.02 / 0.4))
+    for gust in (0.9, 6.0):
+        push = np.array([0.6, -0.8, 0.0]) * gust * slowed.max_lag
+        pose = model.pack(ZERO, ZERO, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
+        state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(push / vehicle.quad_mass))
+        observed = still
+        for _ in range(ticks):
+            observed = law.observe(observed, state, 1.0, lift, ZERO, slowed, Drag(0.0, 0.0), vehicle)
+        agree(observed.prompt_push, prompt * push, 1e-9)
+        expected = slow * push if gust < 1.0 else (prompt - 1.0 / gust) * push
+        agree(observed.steady_push, expected, 1e-9)
+        agree(observed.push, observed.steady_push, ROUNDING)
 
 
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -909,6 +934,7 @@ PROOFS: tuple[Callable[..., None], ...] = (
     mass_and_wind_are_found,
     drag_is_found,
     gusts_outweigh_noise,
+    sudden_gusts_are_followed,
     torque_is_found,
     it_comes_back,
 )

@@ -11,9 +11,10 @@
 | T | tension | | N | (r . b) / (q . b) |
 | m_L | load_mass | | kg | T / w |
 | P | push | I | N | p + k s |
-| p | steady_push | I | N | r - T q - k s |
+| p | steady_push | I | N | r - T q - k s, averaged |
 | s | shape_drag | I | N | drag of the shape `shape` |
 | k | factor | | | of s, beyond the assumed drag |
+| c | prompt_push | I | N | as p, averaged over a shorter time where noise slows p |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
 and the wind's push. Wind drag on rotors and frame acts across the rotors' axis b; the push along b is assumed
@@ -26,6 +27,11 @@ push is learned while the vehicle is off the ground. The part of the push that f
 load hangs free is drag: k is the least-squares fit of the push to drag of the assumed shape, both taken as
 differences from their means over some seconds. This part is known without the delay with which the rest is
 learned.
+
+Noise of the accelerometer slows p, so that it does not shake the vehicle. A gust would then be learned too
+late. So a second average c is never slowed, and p follows it wherever they differ by more than noise can
+explain: a first-order filter that takes the share a of each sample leaves the part sqrt(a / (2 - a)) of white
+noise.
 
 `torque_observer` estimates the torque on the vehicle besides that of rotors and cable.
 """
@@ -64,9 +70,11 @@ _DRAG_SPEED, _MAX_FACTOR = 0.2, 50.0
 _DEFAULT_DRAG_RATE = 0.05
 # m/s^2, standard deviation of an accelerometer sample up to which, in still air, the push is learned as
 # fast as configured
-_QUIET_ACCEL_STD = 0.03
+_QUIET_ACCEL_STD = 0.02
 # of the weight: a smaller push may be nothing but noise
 _PUSH_NOISE_SHARE = 0.03
+# standard deviations of its noise by which the push may differ from the promptly learned one
+_PUSH_SIGMAS = 4.0
 # of the nominal mass of the load
 _MIN_MASS_RATIO = 0.25
 _MAX_MASS_RATIO = 4.0
@@ -82,6 +90,9 @@ class ObserverConstants(NamedTuple):
     air: float
     gust_noise: float  # m/s^2 / N: noise that the gusts of a wind outweigh, for each newton of its push
     push_noise: float  # N, push that may be nothing but noise
+    prompt: float  # as `push`, which noise slows
+    prompt_noise: float  # kg, noise of the promptly learned push divided by that of the accelerometer
+    max_lag: float  # N, by which the push may differ from the promptly learned one
     max_push: float  # N
     shape: Drag
     min_factor: float
@@ -98,6 +109,7 @@ class DisturbanceEstimate(NamedTuple):
     ground_force: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
     load_ground_height: float  # m, height at which the load lay
     steady_push: Vec3  # N, the part of the push that does not follow the speed
+    prompt_push: Vec3  # N, the same, learned as fast as configured
     drag: Drag  # learned drag, beyond the assumed drag
     mean_shape_drag: Vec3  # N
     mean_residual: Vec3  # N
@@ -137,6 +149,9 @@ def observer_constants(
         share(_AIR_TIME),
         GUST_RANDOM_WALK * push_time / (sqrt(period) * vehicle.quad_mass),
         _PUSH_NOISE_SHARE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
+        share(push_time),
+        vehicle.quad_mass * sqrt(share(push_time) / (2.0 - share(push_time))),
+        0.0,
         max_push,
         drag if has_drag else Drag(_DEFAULT_DRAG_RATE * vehicle.quad_mass, 0.0),
         -1.0 if has_drag else 0.0,
@@ -148,7 +163,8 @@ def observer_constants(
 def slowed_by_noise(
     constants: ObserverConstants, observed: DisturbanceEstimate, accel_var: float
 ) -> ObserverConstants:
-    """The constants by which the push is learned more slowly if the accelerometer is noisy against the gusts.
+    """The constants by which the push is learned more slowly if the accelerometer is noisy against the gusts,
+    unless it differs from the promptly learned one by more than this noise.
 
     `accel_var`, (m/s^2)^2, is the variance of a sample. The filter of a push that wanders by w sqrt(t) and is
     measured every T seconds with noise of standard deviation s has the time constant s sqrt(T) / w.
@@ -156,7 +172,8 @@ def slowed_by_noise(
     quiet = _QUIET_ACCEL_STD + constants.gust_noise * max(
         0.0, norm(observed.steady_push) - constants.push_noise
     )
-    return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / quiet))
+    slowed = with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / quiet))
+    return with_field(slowed, "max_lag", _PUSH_SIGMAS * constants.prompt_noise * sqrt(accel_var))
 
 
 @kernel
@@ -179,6 +196,7 @@ def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
         g * g,
         vehicle.quad_mass * g,
         0.0,
+        ZERO,
         ZERO,
         Drag(0.0, 0.0),
         ZERO,
@@ -235,6 +253,7 @@ def observe(
     and cable; `vehicle` is the nominal one."""
     q, a = state.q_cable, state.a_quad
     load_mass, steady_push, learned = observed.load_mass, observed.steady_push, observed.drag
+    prompt_push = observed.prompt_push
     mean_shape_drag, mean_residual = observed.mean_shape_drag, observed.mean_residual
     drag_correlation, drag_square = observed.drag_correlation, observed.drag_square
     mass_correlation, mass_square = observed.mass_correlation, observed.mass_square
@@ -284,7 +303,12 @@ def observe(
     else:
         torque = without_compensation(observed.torque, state)
     if not ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity:
-        steady_push = axpy(constants.push, sub(axpy(-factor, shape_drag, residual), steady_push), steady_push)
+        now = axpy(-factor, shape_drag, residual)
+        steady_push = axpy(constants.push, sub(now, steady_push), steady_push)
+        prompt_push = axpy(constants.prompt, sub(now, prompt_push), prompt_push)
+        lag = sub(prompt_push, steady_push)
+        if norm(lag) > constants.max_lag:
+            steady_push = axpy(-constants.max_lag / norm(lag), lag, prompt_push)
         size = norm(steady_push)
         if size > constants.max_push:
             steady_push = scale(constants.max_push / size, steady_push)
@@ -296,6 +320,7 @@ def observe(
         ground_force,
         load_ground_height,
         steady_push,
+        prompt_push,
         learned,
         mean_shape_drag,
         mean_residual,
