@@ -2,8 +2,8 @@
 
 The error state contains the acceleration d that the pendulum leaves out, as a random walk. Drag is learned
 beside it, by the least-squares fit of d to the load's velocity, both less their means over some seconds. With
-this fit, d follows the speed immediately. What varies of d beyond its drag is the effect of gusts, whose
-strength is learned from it.
+this fit, d follows the speed immediately. What varies of d beyond its drag, and beyond what noise explains,
+is the effect of gusts, whose strength is learned from it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from math import sqrt
 
 from autopilot.control.drag import GUST_RANDOM_WALK, GUST_TIME_S
 from autopilot.estimation.covariance import decay_factor
-from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
+from autopilot.estimation.records import AIR, TRACKER, AirEstimate, Array, EstimatorTuning, LoadEstimate
 from autopilot.estimation.tautness import is_never_observed
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
@@ -22,6 +22,9 @@ DRAG_CHANGE_TIME_S = 0.15  # for which a change of drag lasts
 HIDDEN_WIND_ACCEL = 0.17
 LEARNING_S = 4.0
 GUST_LEARNING_S = 2.0
+# of the variance that the filter states of d: by so much d varies with the noise of the readings although the
+# air is steady; most of it is a constant error, of the camera's mounting or the attitude
+NOISE_SHARE = 0.06
 # drag is learned from motion faster than MIN_LEARNING_SPEED, m/s, and is at most MAX_DRAG, 1/s
 MIN_LEARNING_SPEED, MAX_DRAG = 0.2, 2.0
 
@@ -64,9 +67,15 @@ def _moved_towards(mean: tuple[float, float], to: tuple[float, float], share: fl
 
 @kernel
 def predict_air(
-    air: AirEstimate, before: LoadEstimate, load: LoadEstimate, tuning: EstimatorTuning, dt: float
+    air: AirEstimate,
+    before: LoadEstimate,
+    load: LoadEstimate,
+    P: Array,
+    tuning: EstimatorTuning,
+    dt: float,
 ) -> AirEstimate:
-    """The accelerations by the air dt seconds later; `load` is the load at that time."""
+    """The accelerations by the air dt seconds later; `load` is the load, and `P` the covariance, at that
+    time."""
     load_decay, vehicle_decay = (
         decay_factor(tuning.air_std, tuning.air_walk, dt),
         decay_factor(tuning.push_std, tuning.push_walk, dt),
@@ -86,7 +95,7 @@ def predict_air(
         )
     v, c = load.v_load, air.load_drag
     d = (d[0] - c * (v[0] - before.v_load[0]), d[1] - c * (v[1] - before.v_load[1]))
-    share = dt / (LEARNING_S + dt)
+    share = dt / (min(LEARNING_S, load.tautness_age_s) + dt)
     mean_velocity, mean_accel = (
         _moved_towards(air.mean_velocity, (v[0], v[1]), share),
         _moved_towards(air.mean_accel, d, share),
@@ -102,7 +111,8 @@ def predict_air(
     )
     g0, g1 = d[0] - mean_accel[0] + drag * s0, d[1] - mean_accel[1] + drag * s1
     gust_share = dt / (GUST_LEARNING_S + dt)
-    gust_variance = air.gust_variance + gust_share * (g0 * g0 + g1 * g1 - air.gust_variance)
+    gust2 = g0 * g0 + g1 * g1 - NOISE_SHARE * (P[AIR, AIR] + P[AIR + 1, AIR + 1])
+    gust_variance = max(0.0, air.gust_variance + gust_share * (gust2 - air.gust_variance))
     return AirEstimate(
         d,
         vehicle_accel,

@@ -51,8 +51,9 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a tracked load: whether it falls freely or rests on the ground is unknown
-# rad/s^2, error of the pendulum model of a cable that does not carry its load; the same of a tracked load
-LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.2
+# rad/s^2, error of the pendulum model of a cable that does not carry its load; the same of a tracked load in
+# calm air, and the share of d by which the air moves a load that rests on the ground less than one that hangs
+LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD, RESTING_AIR_SHARE = 5.0, 0.05, 0.7
 # m/s, speed at which a tracked load and the vehicle move apart until the cable carries
 SEPARATION_SPEED_STD = 0.3
 PENDING_CORRECTION_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on
@@ -230,6 +231,20 @@ def state_uncertainty(history: History, load: LoadEstimate, size: int) -> Uncert
 
 
 @kernel
+def pendulum_error(state: EstimatorState, tuning: EstimatorTuning) -> tuple[float, float]:
+    """Standard deviations of the pendulum's acceleration (rad/s^2), and of the speed at which the ends of
+    the cable move apart (m/s)."""
+    load, d = state.load, state.air.load_accel
+    if load.taut == 0.0 or not cable_is_unloaded(load, state.memory_s, state.missing_pull):
+        return tuning.cable_accel_std, 0.0
+    if load.source != TRACKER:
+        return LIFTING_ACCEL_STD, 0.0
+    by_air = RESTING_AIR_SHARE / load.length
+    variance = LIFTING_TRACKED_ACCEL_STD * LIFTING_TRACKED_ACCEL_STD
+    return sqrt(variance + by_air * by_air * (d[0] * d[0] + d[1] * d[1])), SEPARATION_SPEED_STD
+
+
+@kernel
 def predict(
     state: EstimatorState,
     history: History,
@@ -246,11 +261,7 @@ def predict(
     gyro_var = gyro_noise(vibration, tuning)
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
     a = vehicle.accel_quad
-    cable_accel_std, separation_std = tuning.cable_accel_std, 0.0
-    if load.taut > 0.0 and cable_is_unloaded(load, state.memory_s, state.missing_pull):
-        tracked = load.source == TRACKER
-        cable_accel_std = LIFTING_TRACKED_ACCEL_STD if tracked else LIFTING_ACCEL_STD
-        separation_std = SEPARATION_SPEED_STD if tracked else 0.0
+    cable_accel_std, separation_std = pendulum_error(state, tuning)
     inputs = PropagationInputs(
         (a[0], a[1], a[2] + tuning.gravity),
         R,
@@ -295,7 +306,7 @@ def predict(
             sensor_errors.barometer_age + dt,
             sensor_errors.rejected,
         ),
-        predict_air(air, state.load, load, tuning, dt),
+        predict_air(air, state.load, load, history.covariance, tuning, dt),
         state_uncertainty(history, load, state.size),
         imu,
         vibration,

@@ -11,9 +11,11 @@ from __future__ import annotations
 from autopilot.estimation.covariance import zero_covariance
 from autopilot.estimation.records import (
     AIR,
+    ATTITUDE,
     CAMERA,
     DIRECTION,
     LENGTH,
+    MOUNTING,
     POSITION,
     RATE,
     SIZE,
@@ -27,7 +29,7 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, axpy, column, cross, norm, sub
+from autopilot.geometry.linear import Vec3, apply_transposed, axpy, column, cross, norm, sub
 from autopilot.geometry.s2 import force_along_cable, normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -54,13 +56,12 @@ MISSING_PULL_TIME_S = 2.0  # time constant with which the missing part of the pu
 # accelerometer.
 SNATCH_PULL, SNATCH_SPEED = 0.3, 0.2
 SNATCH_DELAY_S = 0.015  # time after which the measured pull shows it
-# share of the air's deviation with which a tracked load begins: wind soon shows, and the law that lifts the
-# load is not disturbed while the filter searches for it
-INITIAL_AIR_SHARE = 0.1
-# The same of a load that no sensor has ever measured: its pull shows only the sum of the wind on the load and
-# the wind on the vehicle, and a wrong share of the load makes the law lean.
-UNOBSERVED_AIR_SHARE = 0.2
-LIFT_OFF_SPEED_STD = 0.02  # m/s, across the cable, of a load that the cable has begun to pull
+# share of the air's deviation with which a load begins that a tracker measures: wind soon shows, and the law
+# that lifts the load is not disturbed while the filter searches for it; and one that no sensor has ever
+# measured: its pull shows only the sum of the wind on the load and the wind on the vehicle, and a wrong share
+# of the load makes the law lean
+INITIAL_AIR_SHARE = 0.2
+LIFT_OFF_SPEED_STD = 0.025  # m/s, across the cable, of a load that the cable has begun to pull
 # no cable comes taut while the last direction to the load is older, unless there never was one
 MAX_DIRECTION_AGE_S = 1.0
 
@@ -186,7 +187,23 @@ def _set_relative_rows(
 
 
 @kernel
-def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length: float) -> LoadEstimate:
+def _set_seen_rows(P: Array, row: int, axis: Vec3, load: LoadEstimate, vehicle: VehicleEstimate) -> None:
+    """Set the row of b . (direction of the cable) as a camera has seen it, in body axes: an error of the
+    attitude, and one of the camera's mounting, is one of the direction. `row` is after theirs."""
+    turn = cross(load.q_cable, axis)
+    mounting = apply_transposed(rotation_from_quat(vehicle.quat_wxyz), turn)
+    for j in range(SIZE):
+        value = turn[0] * P[ATTITUDE, j] + turn[1] * P[ATTITUDE + 1, j] + turn[2] * P[ATTITUDE + 2, j]
+        value -= mounting[0] * P[MOUNTING, j] + mounting[1] * P[MOUNTING + 1, j]
+        P[row, j], P[j, row] = value, value
+    value = turn[0] * P[ATTITUDE, row] + turn[1] * P[ATTITUDE + 1, row] + turn[2] * P[ATTITUDE + 2, row]
+    P[row, row] = value - mounting[0] * P[MOUNTING, row] - mounting[1] * P[MOUNTING + 1, row]
+
+
+@kernel
+def tauten(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning, length: float
+) -> LoadEstimate:
     """The load on a taut cable: direction and rate of the cable replace its own position and velocity."""
     P = history.covariance
     zero_covariance(P, DIRECTION, 5)
@@ -197,7 +214,7 @@ def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length
     if not tracked:
         bb += LIFT_OFF_SPEED_STD * LIFT_OFF_SPEED_STD
     if tracked or is_never_observed(load):
-        initial_air_std = (INITIAL_AIR_SHARE if tracked else UNOBSERVED_AIR_SHARE) * tuning.air_std
+        initial_air_std = INITIAL_AIR_SHARE * tuning.air_std
         zero_covariance(P, AIR, 2)
         P[AIR, AIR], P[AIR + 1, AIR + 1] = (
             initial_air_std * initial_air_std,
@@ -205,6 +222,12 @@ def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length
         )
     if tracked:
         _set_relative_rows(P, DIRECTION, POSITION, across, along, length)
+    elif not is_never_observed(load):
+        _set_seen_rows(P, DIRECTION, across, load, vehicle)
+        _set_seen_rows(P, DIRECTION + 1, along, load, vehicle)
+        aa = max(
+            0.0, aa - 0.5 * length * length * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
+        )
     _set_relative_rows(P, RATE, VELOCITY, across, along, length)
     s = 1.0 / length
     for i in range(2):
@@ -268,7 +291,7 @@ def detect_tautness(
             speed_var < KNOWN_SPEED_STD * KNOWN_SPEED_STD or load.tautness_age_s > SPEED_KNOWN_AFTER_S
         )
         if load.taut == 0.0 and speed_known and distance > TAUT_ABOVE * tuning.cable_length:
-            return tauten(load, history, tuning, distance)
+            return tauten(load, vehicle, history, tuning, distance)
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
@@ -279,7 +302,7 @@ def detect_tautness(
         if load.pull_duration_s > PULL_TAUT_S and (
             load.age_s < MAX_DIRECTION_AGE_S or load.age_s == float("inf")
         ):
-            load = tauten(load, history, tuning, tuning.cable_length)
+            load = tauten(load, vehicle, history, tuning, tuning.cable_length)
             x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
             return with_load_position(load, x_load)
         return load

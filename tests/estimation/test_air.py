@@ -6,28 +6,39 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from autopilot.control.drag import GUST_RANDOM_WALK, GUST_TIME_S
 from autopilot.estimation.air import air_walk, predict_air
-from autopilot.estimation.records import CAMERA, TRACKER, blank_state
+from autopilot.estimation.records import AIR, CAMERA, PADDED_SIZE, TRACKER, blank_state
 from autopilot.geometry.linear import ZERO
 from tests.doubles.motion import bebop_tuning
 
 TICK_S = 0.02
 WIND = 0.5  # m/s^2, mean acceleration of the load by the wind
 TUNING = bebop_tuning()._replace(air_walk=0.003, load_drag=0.0)
-TAUT = blank_state().load._replace(taut=1.0, source=TRACKER, v_load=ZERO, age_s=0.0)
+TAUT = blank_state().load._replace(
+    taut=1.0, source=TRACKER, v_load=ZERO, age_s=0.0, tautness_age_s=float("inf")
+)
 
 
-def learned_walk(gust_std: float) -> float:
+def covariance(air_std: float) -> NDArray[np.float64]:
+    """A covariance that states `air_std` (m/s^2) on each axis of the load's acceleration by the air."""
+    P = np.zeros((PADDED_SIZE, PADDED_SIZE))
+    P[AIR, AIR] = P[AIR + 1, AIR + 1] = air_std**2
+    return P
+
+
+def learned_walk(gust_std: float, air_std: float = 0.0) -> float:
     """The walk after ten minutes of gusts of this standard deviation on each axis, m/s^2 / sqrt(s); the mean
     over the last nine."""
     random, air = np.random.default_rng(5), blank_state().air
     share = TICK_S / GUST_TIME_S
-    gust, squares = np.zeros(2), []
+    gust, squares, P = np.zeros(2), [], covariance(air_std)
     for tick in range(round(600.0 / TICK_S)):
         gust += -share * gust + gust_std * sqrt(2.0 * share) * random.normal(size=2)
-        air = predict_air(air._replace(load_accel=(WIND + gust[0], gust[1])), TAUT, TAUT, TUNING, TICK_S)
+        blown = air._replace(load_accel=(WIND + gust[0], gust[1]))
+        air = predict_air(blown, TAUT, TAUT, P, TUNING, TICK_S)
         if tick * TICK_S > 60.0:
             squares.append(air_walk(TAUT, air, ZERO, TUNING) ** 2)
     return sqrt(float(np.mean(squares)))
@@ -41,6 +52,26 @@ def test_steady_wind_walks_no_faster_than_configured() -> None:
 def test_gusts_walk_as_fast_as_they_do(gust_std: float) -> None:
     walk2 = 2.0 * gust_std**2 / GUST_TIME_S + TUNING.air_walk**2
     assert learned_walk(gust_std) == pytest.approx(sqrt(walk2), rel=0.1)
+
+
+def test_gusts_that_noise_explains_are_not_learned() -> None:
+    # the mean over 4 s leaves 2/3 of a gust's variance, and noise explains 0.06 of the stated variance
+    explained_std = sqrt(0.06 / (2.0 / 3.0)) * 0.1
+    assert learned_walk(0.3 * explained_std, 0.1) < 1.1 * TUNING.air_walk
+    gust_std = 2.0 * explained_std
+    walk2 = 2.0 * (gust_std**2 - explained_std**2) / GUST_TIME_S + TUNING.air_walk**2
+    assert learned_walk(gust_std, 0.1) == pytest.approx(sqrt(walk2), rel=0.15)
+
+
+def test_wind_that_a_lifted_load_meets_is_no_gust() -> None:
+    air = blank_state().air._replace(load_accel=(WIND, 0.0))
+    for tick in range(round(1.0 / TICK_S)):
+        lifted = TAUT._replace(tautness_age_s=(tick + 1) * TICK_S)
+        air = predict_air(
+            air._replace(load_accel=(WIND, 0.0)), lifted, lifted, covariance(0.0), TUNING, TICK_S
+        )
+    assert air.mean_accel[0] == pytest.approx(WIND, rel=0.03)
+    assert air_walk(TAUT, air, ZERO, TUNING) < 0.2 * GUST_RANDOM_WALK * WIND
 
 
 def test_the_wind_limits_what_is_believed_of_gusts() -> None:

@@ -184,7 +184,7 @@ def suspended_load(state: EstimatorState, history: History, tuning: EstimatorTun
         0.0,
         CAMERA,
     )
-    return tauten(at_end, history, tuning, tuning.cable_length)
+    return tauten(at_end, state.vehicle, history, tuning, tuning.cable_length)
 
 
 @kernel
