@@ -298,6 +298,9 @@ def _suggested_key(key: str, owner: type[BaseModel], given: Collection[str]) -> 
     # altitude_ft and altitude both mean altitude_m: compare the part before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
+    begun = [k for k in known if k.startswith(key)]
+    if len(begun) == 1:
+        return begun[0]
     if "_" not in key and same:  # a word alone, such as cable: related keys are listed in order of importance
         return same[0]
     return nearest(key, same, min_similarity=0.0) or nearest(key, [one for one in known if one not in given])

@@ -13,6 +13,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+from autopilot.own.source import file_being_loaded
 from gcs.errors import GcsError
 from missions.nearest import did_you_mean
 
@@ -23,7 +24,7 @@ _MAX_SHOWN_CHARS = 80  # characters of a value
 _PHRASES = (  # phrases of the command line, and their equivalents in Python
     (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
-    (r"--force tries", "force=True tries"),
+    (r"--force tries:;?", "force=True tries:"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),
     (r"Invalid value for '--([a-z]+)'", r"\1"),
@@ -37,12 +38,14 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
 )
 
 
-def checks_argument_names(function: Callable[P, R]) -> Callable[P, R]:
-    """The function; an unknown argument name raises a TypeError that suggests the nearest name."""
+def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
+    """The function; an unknown argument name raises a TypeError that suggests the nearest name, and a call by
+    a script that is loaded only for its class raises `Error`."""
     names = tuple(signature(function).parameters)
 
     @wraps(function)
     def wrapper(*values: P.args, **named: P.kwargs) -> R:
+        _require_guard(function.__name__)
         for name in named:
             if name not in names:
                 hint = did_you_mean(name, names)
@@ -51,6 +54,16 @@ def checks_argument_names(function: Callable[P, R]) -> Callable[P, R]:
         return function(*values, **named)
 
     return wrapper
+
+
+def _require_guard(called: str) -> None:
+    """Refuse calls of a script that another process loads for a class of its own: it would fly again."""
+    script = file_being_loaded()
+    if script is not None:
+        raise GcsError(
+            f"{script.name} calls plumbline.{called} while its class is loaded; "
+            'put its calls below: if __name__ == "__main__":'
+        )
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from gcs.workflows.flight_options import FlightOptions
 from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
-    checks_argument_names,
+    called_by_scripts,
     errors_for_python,
     file_path,
     positive,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot by name
 
 
-@checks_argument_names
+@called_by_scripts
 def fly(
     mission: str | Path | model.Mission,
     *,

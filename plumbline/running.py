@@ -33,7 +33,7 @@ from gcs.workflows.transfer import checked_upload
 from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
-    checks_argument_names,
+    called_by_scripts,
     errors_for_python,
     number,
     parameter_name,
@@ -62,7 +62,7 @@ _NAMED_CONDITIONS: dict[str, Condition] = {
 }
 
 
-@checks_argument_names
+@called_by_scripts
 def connect(
     address: str = "udpin:127.0.0.1:14550", *, timeout_s: float = 10.0, signing_key: bytes | None = None
 ) -> RunningVehicle:

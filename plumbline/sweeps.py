@@ -14,7 +14,7 @@ from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
 from gcs.workflows.flight_options import own_part_options
 from plumbline.arguments import (
-    checks_argument_names,
+    called_by_scripts,
     errors_for_python,
     file_path,
     items,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _ERROR_PREFIX = "gcs: "  # begins the line of a known error
 
 
-@checks_argument_names
+@called_by_scripts
 def sweep(
     mission: str | Path | Mission,
     *,
@@ -69,7 +69,8 @@ def sweep(
 
     Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
     polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script
-    needs no `if __name__ == "__main__"`. `Error` if the sweep cannot be flown.
+    needs `if __name__ == "__main__"` only if it passes a class of its own. `Error` if the sweep cannot be
+    flown.
     """
     with ExitStack() as stack:
         arguments = []

@@ -29,6 +29,9 @@ _MAX_ERROR_CHARS = 120  # most characters of an error that are reported
 _MAX_COMPILER_CHARS = 240  # the same for errors of the compiler, which name types before the reason
 
 
+_loading: list[Path] = []  # files of custom classes that are being loaded, in which order
+
+
 class OwnError(ValueError):
     """A custom class cannot be used; the text says where and why."""
 
@@ -75,7 +78,14 @@ def _module_from_file(location: str) -> ModuleType:
     path = Path(location).expanduser()
     if not path.is_file():
         raise OwnError(f"{location}: no such file")
+    running = sys.modules.get("__main__")
+    if running is not None and _is_same_file(getattr(running, "__file__", None), path):
+        return running  # a script that passes a class of its own is not run again
     return _load_module(path.resolve(), location)
+
+
+def _is_same_file(first: str | None, second: Path) -> bool:
+    return first is not None and Path(first).is_file() and second.samefile(first)
 
 
 def _load_module(path: Path, label: str) -> ModuleType:
@@ -91,15 +101,22 @@ def _load_module(path: Path, label: str) -> ModuleType:
     sys.modules[name] = module
     folder = str(path.parent)
     sys.path.insert(0, folder)  # files beside it can be imported
+    _loading.append(path)
     try:
         spec.loader.exec_module(module)
     except BaseException as error:
         del sys.modules[name]
         raise OwnError(f"{label}: {error_text(error, path)}") from error
     finally:
+        _loading.pop()
         if folder in sys.path:
             sys.path.remove(folder)
     return module
+
+
+def file_being_loaded() -> Path | None:
+    """The file of a custom class whose code runs now because it is being loaded; None if there is none."""
+    return _loading[-1] if _loading else None
 
 
 def _import_module(location: str) -> ModuleType:

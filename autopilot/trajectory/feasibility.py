@@ -234,10 +234,11 @@ def _hover_violations(limits: VehicleLimits) -> list[Violation]:
     weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
     if weight <= limits.usable_thrust_n:
         return []
+    too_heavy = vehicle.quad_mass_kg * vehicle.gravity_m_s2 >= limits.usable_thrust_n
     text = (
         f"vehicle ({vehicle.quad_mass_kg:g} kg) and load ({vehicle.load_mass_kg:g} kg) weigh {weight:.2f} N; "
         f"{limits.thrust_text} ({_excess_text(weight, limits.usable_thrust_n)}): it cannot hover; "
-        "lower load_mass_kg, or raise rotor_max_n"
+        f"lower {'quad_mass_kg' if too_heavy else 'load_mass_kg'}, or raise rotor_max_n"
     )
     return [Violation(0, "thrust", weight, limits.usable_thrust_n, 0.0, text)]
 

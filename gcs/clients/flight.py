@@ -457,6 +457,14 @@ def _upload(client: FlightClient) -> list[Operation]:
     return [MissionUpload(client.connection.target, client.items)]
 
 
+def _arm(client: FlightClient) -> list[Operation]:
+    target = client.connection.target
+    assert target is not None
+    # a take-off that somebody has requested before, and that would begin instead of the mission
+    withdrawal = [command.disarm(target)] if client.view.mode == "takeoff" else []
+    return [*withdrawal, command.arm(target)]
+
+
 def _one_operation(make: Callable[..., Operation]) -> Callable[[FlightClient], list[Operation]]:
     return lambda client: [make(client.connection.target)]
 
@@ -488,7 +496,7 @@ _TABLE = {
     Stage.STREAMS: StageRow(Stage.UPLOAD, stage_if_refused=Stage.UPLOAD, operations=_streams),
     Stage.UPLOAD: StageRow(Stage.READY, operations=_upload),
     Stage.READY: StageRow(Stage.ARM, is_done=_is_ready, limit_us=READY_LIMIT_US),
-    Stage.ARM: StageRow(Stage.START, operations=_one_operation(command.arm)),
+    Stage.ARM: StageRow(Stage.START, operations=_arm),
     Stage.START: StageRow(
         Stage.FLY, stage_if_refused=Stage.DISARM, operations=_one_operation(command.start_mission)
     ),

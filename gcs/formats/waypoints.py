@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from autopilot.wire.items import WireItem
 from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
+Number = TypeVar("Number", int, float)
+
 HEADER = "QGC WPL 110"
 _COLUMNS = 12
+_WHOLE_COLUMNS = (0, 1, 2, 3, 11)  # of whole numbers
 
 
 def read_waypoints(text: str) -> list[FileItem]:
@@ -25,15 +29,22 @@ def read_waypoints(text: str) -> list[FileItem]:
         where = f"line {number}"
         if len(words) != _COLUMNS:
             raise FormatError(f"{where}: {len(words)} columns; must be {_COLUMNS}")
-        try:
-            seq, current, frame, command, autocontinue = (int(words[i]) for i in (0, 1, 2, 3, 11))
-            params = [float(word) for word in words[4:11]]
-        except ValueError as error:
-            raise FormatError(f"{where}: {error}") from None
+        seq, current, frame, command, autocontinue = (
+            _parsed(int, words, column, where) for column in _WHOLE_COLUMNS
+        )
+        params = [_parsed(float, words, column, where) for column in range(4, 11)]
         if seq != len(items):
             raise FormatError(f"{where}: item number {seq}; must be {len(items)}")
         items.append(FileItem(item_of(frame, command, current, autocontinue, params, where), where))
     return items
+
+
+def _parsed(kind: Callable[[str], Number], words: Sequence[str], column: int, where: str) -> Number:
+    try:
+        return kind(words[column])
+    except ValueError:
+        what = "a whole number" if column in _WHOLE_COLUMNS else "a number"
+        raise FormatError(f"{where}: column {column + 1} is {words[column]!r}; must be {what}") from None
 
 
 def write_waypoints(items: Sequence[WireItem]) -> str:

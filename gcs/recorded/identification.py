@@ -24,7 +24,7 @@ from scipy.special import stdtrit
 
 from gcs.recorded.estimates import filter_rows, filtered_estimates, load_position, predictions
 from gcs.recorded.load_model import LoadModel
-from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion
+from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion, distances
 from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
 from gcs.recorded.smoothing import Floats, smooth
 
@@ -76,6 +76,7 @@ _MINIMUM = {
 MIN_DURATION_S = 2.0 * _EDGE_S + _BLOCK_S
 
 
+_MAX_LENGTH_CHANGE = 0.1  # of the length, between 5 % and 95 % of the rows
 _TILT_SHARE = (0.5, 2.0)  # of a vehicle that tilts to accelerate, as all multirotors do
 
 
@@ -229,6 +230,17 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), gradients, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
     return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
+
+
+def length_warning(motion: Motion) -> str:
+    """Why a constant length of the cable does not fit the recording; empty: it fits."""
+    low, middle, high = np.nanpercentile(distances(motion), (5.0, 50.0, 95.0))
+    if high - low <= _MAX_LENGTH_CHANGE * middle:
+        return ""
+    return (
+        f"the load is {low:.2f} to {high:.2f} m from the vehicle, by a winch or a slack cable, and a "
+        "constant length is assumed"
+    )
 
 
 def map_warning(vehicle: Sequence[Identified]) -> str:

@@ -32,6 +32,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         TooLittleMotionError,
         identify_load,
         identify_vehicle,
+        length_warning,
         map_warning,
         tracked_length,
     )
@@ -44,7 +45,8 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         duration_s = float(motion.time_s[-1] - motion.time_s[0])
         if duration_s < MIN_DURATION_S:
             raise InputError(
-                f"{path}: {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are needed to identify anything"
+                f"{path}: carries the load for {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are "
+                "needed to identify anything"
             )
 
         def report_progress(done: int, total: int) -> None:
@@ -56,13 +58,13 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
             known = {one.name: one.value for one in load if one.is_determined}
             vehicle = identify_vehicle(motion, model._replace(**known))
         except (NoLoadError, TooLittleMotionError) as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(f"{path}: {length_warning(motion) or error}") from None
         found: list[Identified] = [tracked_length(motion, column_map.attachment.below_m), *load, *vehicle]
     return {
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
         "not_told": [one.name for one in found if not one.is_determined],
-        "doubt": map_warning(vehicle),
+        "doubt": length_warning(motion) or map_warning(vehicle),
     }
 
 
@@ -75,6 +77,7 @@ def replay(
         MIN_DURATION_S,
         TooLittleMotionError,
         identify_vehicle,
+        length_warning,
         map_warning,
     )
     from gcs.recorded.replay_files import write_picture, write_table
@@ -85,8 +88,9 @@ def replay(
         _, motion, model = _read(path, columns)
         rows = filter_rows(motion, model)
         load_is_measured = bool(np.isfinite(motion.load).all())
-        record: dict[str, Any] = {**_rows_record(path, motion), "doubt": ""}
-        if load_is_measured and record["duration_s"] >= MIN_DURATION_S:
+        doubt = length_warning(motion) if load_is_measured else ""
+        record: dict[str, Any] = {**_rows_record(path, motion), "doubt": doubt}
+        if load_is_measured and not doubt and record["duration_s"] >= MIN_DURATION_S:
             with suppress(TooLittleMotionError):
                 record["doubt"] = map_warning(identify_vehicle(motion, model))
         if load_is_measured:

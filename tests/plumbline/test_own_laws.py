@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +68,34 @@ def test_a_class_a_file_and_a_module_fly_the_same() -> None:
     assert by_class.outcome == "completed"
     assert by_class.summary["law"] == by_file.summary["law"] == "heavier"
     assert by_class.tlog != plumbline.fly(SHORT, law="plumbline.examples.load_pid:LoadPid", quiet=True).tlog
+
+
+SCRIPT = """
+import plumbline
+from missions.model import Delay, Land, Mission, Takeoff
+from plumbline.examples.load_pid import LoadPid
+
+class Mine(LoadPid):
+    pass
+
+print("runs")
+print(plumbline.fly(Mission("short", "Short", "", (), (Takeoff(0.5), Delay(1.0), Land())), law=Mine).outcome)
+"""
+
+
+def test_a_script_that_passes_its_own_class_runs_once(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["runs", "completed"]
+
+
+def test_a_script_that_a_sweep_loads_for_its_class_is_told_to_guard_its_calls(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    told = "script.py calls plumbline.fly while its class is loaded; put its calls below: if __name__ =="
+    with pytest.raises(plumbline.Error, match=re.escape(told)):
+        plumbline.sweep("hover", laws=[f"{script}:Mine"])
 
 
 def test_its_parameters_are_set() -> None:

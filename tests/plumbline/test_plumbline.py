@@ -220,7 +220,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),  # type: ignore[arg-type]
     "infeasible": (
         lambda: plumbline.fly(WILD),
-        "; force=True tries",
+        "; force=True tries: items[",
     ),
     "fails": (
         lambda: plumbline.fly("hover", planner="plumbline.examples.load_pid:LoadPid"),

@@ -323,7 +323,7 @@ def test_a_gust_that_holds_the_vehicle_up_is_no_landing() -> None:
 HERE = (1.0, 0.0, 2.0)
 NAN3 = (math.nan, 0.0, 0.0)
 TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
-    "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121 deg exceeds FS_TILT_DEG 120"),
+    "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121.0 deg exceeds FS_TILT_DEG 120"),
     "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is not a number"),
     "nothing to land by": (
         {"estimate_loss": "no reading of the inertial unit"},

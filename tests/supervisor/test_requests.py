@@ -199,6 +199,14 @@ def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
     assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1] == Verdict(ACCEPTED, "Ready to arm")
 
 
+def test_who_disarms_a_disarmed_vehicle_withdraws_what_would_begin() -> None:
+    sky = Sky()
+    assert sky.ask(R.Takeoff(2.0)).result == ACCEPTED
+    assert sky.ask(R.Arm(False, False)).result == ACCEPTED
+    assert sky.ask(R.Arm(True, False)).result == ACCEPTED
+    assert sky.flight.phase == Phase.ARMED
+
+
 @pytest.mark.parametrize("phase", sorted(IN_AIR))
 def test_in_the_air_rotors_stop_by_force_only(phase: Phase) -> None:
     flight = flight_in(phase, False, PLAN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import chain
 
 from autopilot.geometry.linear import norm
@@ -46,10 +47,10 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
 
 
 def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decision:
-    """Arm, and begin what was selected; or disarm, in the air by force only."""
+    """Arm, and begin what was selected; or disarm, in the air by force only, and select nothing."""
     if not request.arm:
         if flight.phase == Phase.DISARMED:
-            return flight, ACCEPTED
+            return replace(interrupt_mission(flight), action_when_armed=ActionWhenArmed.NOTHING), ACCEPTED
         in_air = flight.phase not in ON_GROUND
         if in_air and not request.force:
             return flight, denied("Disarming denied: in the air")

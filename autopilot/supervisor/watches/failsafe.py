@@ -55,7 +55,7 @@ def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
         return "the estimate is not a number"
     if view.tilt_rad > limits.tilt_limit_rad:
         limit = degrees(limits.tilt_limit_rad)
-        return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"
+        return f"tilt {degrees(view.tilt_rad):.1f} deg exceeds FS_TILT_DEG {limit:.0f}"
     if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = setpoint(flight, view.now_us)
         what, place = ("vehicle", view.x_quad) if flight.cable.released else ("load", view.x_load)

@@ -138,6 +138,13 @@ def test_a_flight_survives_a_bad_link(world, fly):
     assert fly()[0].outcome.name == "completed"
 
 
+def test_a_take_off_that_waits_for_arming_is_withdrawn_before(world, fly):
+    world.vehicle.custom_mode = 4 << 16 | 2 << 24  # PX4: auto, take-off
+    assert fly()[0].outcome.name == "completed"
+    arming = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+    assert [m.param1 for m in world.vehicle.commands if m.command == arming] == [0.0, 1.0]
+
+
 def test_arming_refused(world, fly):
     vehicle = world.vehicle
     vehicle.command_results[mavlink.MAV_CMD_COMPONENT_ARM_DISARM] = [mavlink.MAV_RESULT_DENIED]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,13 @@ from gcs.closed_loop import Conditions, fly
 from gcs.commands.options import display_name
 from gcs.errors import EXIT_USAGE
 from gcs.recorded.column_map import load_map
-from gcs.recorded.identification import Identified, identify_load, identify_vehicle, map_warning
+from gcs.recorded.identification import (
+    Identified,
+    identify_load,
+    identify_vehicle,
+    length_warning,
+    map_warning,
+)
 from gcs.recorded.motion import motion_of
 from gcs.recorded.recording import read_recording
 from gcs.workflows.recorded import name_of
@@ -141,6 +148,15 @@ def test_a_load_that_was_never_carried_is_told(tmp_path: Path) -> None:
         result.stderr
         == f"gcs: {path}: the load is never carried off the ground; at least 200 rows are needed\n"
     )
+
+
+def test_a_length_that_changes_is_named() -> None:
+    rows = np.zeros((100, 3))
+    motion = SimpleNamespace(load=rows, attachment=SimpleNamespace(position=np.add(rows, (0.0, 0.0, 0.7))))
+    assert length_warning(motion) == ""  # type: ignore[arg-type]
+    reeled = np.where(np.arange(100)[:, None] < 50, (0.0, 0.0, 0.0), (0.0, 0.0, 0.2))
+    motion.load = reeled
+    assert length_warning(motion).startswith("the load is 0.50 to 0.70 m from the vehicle, by a winch or")  # type: ignore[arg-type]
 
 
 def test_a_tilt_that_does_not_show_the_acceleration_casts_doubt_on_the_map() -> None:
