@@ -1,7 +1,7 @@
 """Consistency of the estimator: its own covariance compared with its true error, phase by phase.
 
     python benchmarks/consistency.py [--mission NAME] [--vehicle NAME] [--sensors NAME ...] [--wind M_S ...]
-                                     [--seeds N] [--set NAME=VALUE ...] [--jobs N]
+                                     [--seeds N] [--set NAME=VALUE ...] [--jobs N] [--docs PAGE]
 
 Flies a mission with each seed, as in a sweep (without messages), in calm air and in wind, and compares the
 error of the estimate with the filter's covariance ten times a second. Prints, for each phase of the flight
@@ -19,6 +19,7 @@ from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from math import sqrt
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,7 @@ from autopilot.geometry.packed import unpack
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from gcs.closed_loop import Conditions
+from gcs.experiments.marked_text import write_between
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import StartTimes, SweepFlight, start_times
 from missions.fileformat import load_mission
@@ -57,6 +59,7 @@ PARTS = {
     "gyro bias": (GYRO_BIAS, 3),
     "accel bias": (ACCEL_BIAS, 3),
 }
+BEGIN, END = "<!-- measured: benchmarks/consistency.py -->\n", "<!-- end of measured -->"
 Array = NDArray[np.float64]
 # phase -> part -> NEES of each instant, and its number of degrees of freedom
 Nees = dict[str, dict[str, list[tuple[float, int]]]]
@@ -201,18 +204,21 @@ def main() -> int:
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--docs", type=Path, help="the page that shows the tables")
     options = parser.parse_args()
     settings_for_all = {
         name: float(value) for name, _, value in (pair.partition("=") for pair in options.set)
     }
     mission = load_mission(options.mission)
+    tables = []
     with ProcessPoolExecutor(options.jobs) as pool:
         for sensors in options.sensors:
             for wind in options.wind:
                 settings = {**settings_for_all, **({"SIM_WIND_E": wind} if wind else {})}
                 found, ends = measure(mission, options.vehicle, sensors, settings, options.seeds, pool)
                 title = f"`{sensors}`, " + (f"{wind:g} m/s of wind" if wind else "calm")
-                print(table(title, found))
+                tables.append(table(title, found))
+                print(tables[-1])
                 worst = max(float(str(end["error_mm"])) for end in ends)
                 rms = sqrt(float(np.mean([float(str(end["rms_mm"])) ** 2 for end in ends])))
                 slant = max(float(str(end["cable_deg"])) for end in ends)
@@ -227,6 +233,8 @@ def main() -> int:
                 for end in ends:
                     if end["outcome"] != "completed":
                         print(json.dumps(end))
+    if options.docs:
+        write_between(options.docs, BEGIN, END, "\n".join(f"{each}\n" for each in tables))
     return 0
 
 

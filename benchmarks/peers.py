@@ -15,7 +15,6 @@ import argparse
 import importlib.util
 import logging
 import math
-import re
 import statistics
 import sys
 import time
@@ -30,13 +29,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.learning_speed import TIMESTEP_S, mujoco_model
 from gcs.closed_loop import Conditions
+from gcs.experiments.marked_text import write_between
 from gcs.sweep.flight import fly, start_times
 from missions.fileformat import load_mission
 from sitl.vehicles.truth import load_truth
 
 FLIGHT_S = 20.0  # of a peer's flight; ours is longer, which costs less per second
 RADIUS_M, PERIOD_S = 1.0, 8.0
-BEGIN, END = "<!-- peers -->", "<!-- end of peers -->"
+BEGIN, END = "<!-- peers -->\n", "<!-- end of peers -->"
 
 
 class Peer(NamedTuple):
@@ -161,9 +161,7 @@ def main() -> None:
     text = "\n".join(lines) + "\n"
     print(text)
     if options.docs:
-        page = options.docs.read_text(encoding="utf-8")
-        made = re.sub(f"{BEGIN}.*{END}", f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
-        options.docs.write_text(made, encoding="utf-8")
+        write_between(options.docs, BEGIN, END, text)
 
 
 if __name__ == "__main__":

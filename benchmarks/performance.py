@@ -30,6 +30,7 @@ from pathlib import Path
 
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
+from gcs.experiments.marked_text import split_at_marks, write_between
 from gcs.sweep.flight import fly, start_times
 from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff, Waypoint
@@ -39,7 +40,7 @@ TICKS_PER_S = 250  # the simulator's default
 SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors `lab`, and of its answer
 REAL_TIME_HZ = 500
 _CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a progress line of `gcs fly` begins
-BEGIN, END = "<!-- measured -->", "<!-- end -->"
+BEGIN, END = "<!-- measured -->\n", "<!-- end -->"
 
 
 class NoLog:
@@ -294,13 +295,10 @@ def table(head: Sequence[str], rows: Rows) -> str:
     return "\n".join(lines)
 
 
-def with_machine(page: str, about: str, text: str) -> str:
-    """The page with these tables under a heading that names the machine; ValueError if it has no markers."""
-    before, rest = page.split(BEGIN, 1)
-    measured, after = rest.split(END, 1)
+def with_machine(measured: str, about: str, text: str) -> str:
+    """What is measured on several machines, with these tables under a heading that names this one."""
     sections = dict(section.split("\n", 1) for section in measured.split("### ")[1:]) | {about: text}
-    kept = "\n".join(f"### {name}\n\n{tables.strip()}\n" for name, tables in sorted(sections.items()))
-    return f"{before}{BEGIN}\n{kept}{END}{after}"
+    return "\n".join(f"### {name}\n\n{tables.strip()}\n" for name, tables in sorted(sections.items()))
 
 
 def main() -> None:
@@ -321,8 +319,8 @@ def main() -> None:
     if options.linear:
         text += "\n\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows())
     if options.docs:
-        page = options.docs.read_text(encoding="utf-8")
-        options.docs.write_text(with_machine(page, about, text), encoding="utf-8")
+        _, measured, _ = split_at_marks(options.docs, BEGIN, END)
+        write_between(options.docs, BEGIN, END, with_machine(measured, about, text))
 
 
 if __name__ == "__main__":

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import plumbline
+from gcs.experiments.marked_text import split_at_marks, write_between
 
 CASES = ("case-a", "case-b", "case-c")
-BEGIN, END = "<!-- measured -->", "<!-- end -->"
+BEGIN, END = "<!-- measured -->\n", "<!-- end -->"
 MIN_SHARE = 0.005  # of the ticks at a rotor's limit, that is shown
 
 
@@ -111,14 +112,12 @@ def row(effect: Effect, seeds: int) -> str:
     return f"| {effect.name} | {' | '.join(cells)} |"
 
 
-def with_row(page: str, effect: Effect, line: str, seeds: int) -> str:
-    """The page with this row in its table; rows of other effects stay, if those effects still exist."""
-    table = page[page.index(BEGIN) : page.index(END)]
+def with_row(table: str, effect: Effect, line: str, seeds: int) -> str:
+    """The table with this row; rows of other effects stay, if those effects still exist."""
     rows = {name: row for row, name in re.findall(r"^(\| (.*?) \| .*)$", table, flags=re.MULTILINE)}
     rows[effect.name] = line
     head = f"{seeds} seeds each:\n\n| effect | Case A | Case B | Case C |\n|---|---|---|---|\n"
-    body = "".join(rows[each.name] + "\n" for each in EFFECTS if each.name in rows)
-    return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{head}{body}{END}", page, flags=re.DOTALL)
+    return head + "".join(rows[each.name] + "\n" for each in EFFECTS if each.name in rows)
 
 
 def main() -> None:
@@ -134,8 +133,8 @@ def main() -> None:
         line = row(effect, options.seeds)
         print(line, flush=True)
         if options.docs:
-            page = options.docs.read_text(encoding="utf-8")
-            options.docs.write_text(with_row(page, effect, line, options.seeds), encoding="utf-8")
+            _, before, _ = split_at_marks(options.docs, BEGIN, END)
+            write_between(options.docs, BEGIN, END, with_row(before, effect, line, options.seeds))
 
 
 if __name__ == "__main__":

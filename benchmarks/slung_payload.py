@@ -22,7 +22,6 @@ import argparse
 import cmath
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -51,6 +50,7 @@ from gcs.analysis.telemetry import load_telemetry
 from gcs.clients.capture import Capture
 from gcs.clients.firmware_flight import ARDUPILOT, FirmwareFlight
 from gcs.clients.firmware_mission import firmware_items
+from gcs.experiments.marked_text import write_between
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import UdpSocket, unix_us
 from gcs.shell.processes import Processes
@@ -61,7 +61,7 @@ from missions.fileformat import load_mission
 Floats = NDArray[np.float64]
 
 VARIABLE = "PLUMBLINE_ARDUCOPTER"
-BEGIN, END = "<!-- slung payload -->", "<!-- end of slung payload -->"
+BEGIN, END = "<!-- slung payload -->\n", "<!-- end of slung payload -->"
 PICTURE = Path("images/slung-payload.svg")
 CABLES_M = (1.0, 4.0)
 DISTANCE_M, LIMIT_S, SPEEDUP = 12.0, 300.0, 5
@@ -427,10 +427,7 @@ def main() -> None:
         if options.docs and cable_m == CABLES_M[0]:
             draw((firmware_flight, plumbline_flight), cable_m, options.docs.parent / PICTURE)
     if options.docs:
-        text = "\n".join(lines) + "\n"
-        page = options.docs.read_text(encoding="utf-8")
-        updated = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
-        options.docs.write_text(updated, encoding="utf-8")
+        write_between(options.docs, BEGIN, END, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gcs.analysis.record import Record
-from gcs.errors import InputError
 from gcs.experiments.figures.canvas import Scene
 from gcs.experiments.figures.catalogue import DrawnFigure, draw_figures, figures_of
 from gcs.experiments.flight import read_flight
+from gcs.experiments.marked_text import write_between
 from gcs.experiments.page import PAGE_FILE, render_page
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
 from gcs.experiments.results import experiment_record, write_results
@@ -70,7 +70,7 @@ def make_output_directory(out: Path) -> None:
     make_folder(out / FLIGHTS, out)
 
 
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+BEGIN, END = "<!-- results: begin -->\n", "<!-- results: end -->"
 KEY_FIGURES = (
     "fig-4-07-tracking-case-a.png",
     "fig-4-09-psi-case-a.png",
@@ -86,27 +86,11 @@ KEY_FIGURES = (
 _COLOURS = 192  # of a line drawing: halves the file without a visible difference
 
 
-def text_around_tables(page: Path) -> tuple[str, str]:
-    """The text before and after the markers of a page of the documentation; InputError if it has none."""
-    try:
-        text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--docs {page}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"--docs {page}: not a text file in UTF-8") from None
-    head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise InputError(f"--docs {page}: must hold the lines {BEGIN} and {END}")
-    return head, tail
-
-
 def write_docs(page: Path, out: Path, records: Sequence[Record]) -> None:
     """Put the tables between the markers of `page`, and the key figures into images/thesis beside it."""
     from PIL import Image
 
-    head, tail = text_around_tables(page)
-    page.write_text(f"{head}{BEGIN}\n\n{markdown(records)}\n{END}{tail}", encoding="utf-8")
+    write_between(page, BEGIN, END, f"\n{markdown(records)}\n")
     images = page.parent / "images" / "thesis"
     images.mkdir(parents=True, exist_ok=True)
     for file in KEY_FIGURES:

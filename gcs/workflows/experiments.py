@@ -10,15 +10,17 @@ from gcs.batch.programs import ProgramBackend, cores
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running
 from gcs.errors import StoppedError
+from gcs.experiments.marked_text import split_at_marks
 from gcs.experiments.plan import Experiment, experiments
 from gcs.experiments.run import EndedFlight, fly_missing, missing, start
 from gcs.experiments.store import experiment_origin
 from gcs.experiments.table import tables
 from gcs.experiments.thesis import (
+    BEGIN,
+    END,
     FLIGHTS,
     Report,
     make_output_directory,
-    text_around_tables,
     write_docs,
     write_report,
 )
@@ -36,7 +38,9 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
     renew.
     """
     if docs is not None:
-        text_around_tables(docs)  # raises before the flights what would otherwise be raised after them
+        split_at_marks(
+            docs, BEGIN, END
+        )  # raises before the flights what would otherwise be raised after them
     make_output_directory(out)
     plan, flights = experiments(), out / FLIGHTS
     with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from gcs.experiments.marked_text import write_between
 
 ROOT = Path(__file__).parents[2]
 RECORD: dict[str, Any] = json.loads((ROOT / "docs" / "figures.json").read_text(encoding="utf-8"))
@@ -141,7 +142,4 @@ def test_the_page_states_the_figures_that_were_flown(page: str) -> None:
 
 if __name__ == "__main__":
     for name, made in PAGES.items():
-        path = ROOT / name
-        text = path.read_text(encoding="utf-8")
-        inner = f"{BEGIN}{made()}{END}".replace("\\", r"\\")
-        path.write_text(re.sub(f"{BEGIN}.*{END}", inner, text, flags=re.DOTALL), encoding="utf-8")
+        write_between(ROOT / name, BEGIN, END, made())

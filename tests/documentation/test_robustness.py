@@ -7,13 +7,14 @@ To put it into the page: python tests/documentation/test_robustness.py
 from __future__ import annotations
 
 import json
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from gcs.experiments.marked_text import write_between
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "robustness.md"
@@ -186,22 +187,21 @@ MADE = {
 }
 
 
-def block(name: str) -> str:
-    return f"<!-- {name}: make robustness -->\n{MADE[name]()}<!-- end of {name} -->"
+def marks(name: str) -> tuple[str, str]:
+    return f"<!-- {name}: make robustness -->\n", f"<!-- end of {name} -->"
 
 
 @pytest.mark.parametrize("name", MADE)
 def test_the_page_says_what_was_flown(name: str) -> None:
-    assert block(name) in PAGE.read_text(encoding="utf-8"), f"run: python {Path(__file__).name}"
+    begin, end = marks(name)
+    text = PAGE.read_text(encoding="utf-8")
+    assert f"{begin}{MADE[name]()}{end}" in text, f"run: python {Path(__file__).name}"
 
 
 def main() -> None:
     """Put it into the page."""
-    text = PAGE.read_text(encoding="utf-8")
-    for name in MADE:
-        inner = block(name).replace("\\", r"\\")
-        text = re.sub(f"<!-- {name}: .*<!-- end of {name} -->", inner, text, flags=re.DOTALL)
-    PAGE.write_text(text, encoding="utf-8")
+    for name, made in MADE.items():
+        write_between(PAGE, *marks(name), made())
 
 
 if __name__ == "__main__":
