@@ -37,7 +37,7 @@ file:
   vehicle and load rest.
 * `gcs check` judges missions by it: masses, cable, rotors, and the drag of the vehicle.
 * A table `[parameters]` contains parameters of the autopilot with which the vehicle is delivered, like an
-  airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 40 and `MIS_INFEASIBLE` 1: its paths
+  airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 35 and `MIS_INFEASIBLE` 1: its paths
   leave room for unknown effects, and are flown slower where necessary. Parameters that you set take
   precedence.
 
