@@ -29,7 +29,7 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, apply_transposed, axpy, column, cross, norm, sub
+from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, axpy, column, cross, norm, sub
 from autopilot.geometry.s2 import force_along_cable, normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -187,11 +187,11 @@ def _set_relative_rows(
 
 
 @kernel
-def _set_seen_rows(P: Array, row: int, axis: Vec3, load: LoadEstimate, vehicle: VehicleEstimate) -> None:
-    """Set the row of b . (direction of the cable) as a camera has seen it, in body axes: an error of the
-    attitude, and one of the camera's mounting, is one of the direction. `row` is after theirs."""
-    turn = cross(load.q_cable, axis)
-    mounting = apply_transposed(rotation_from_quat(vehicle.quat_wxyz), turn)
+def _set_seen_row(P: Array, row: int, axis: Vec3, q: Vec3, R: Mat3) -> None:
+    """Set the row of b . q as a camera has seen the direction q, in body axes: an error of the attitude, and
+    one of the camera's mounting, is one of the direction. Its variance comes last, from the whole row."""
+    turn = cross(q, axis)
+    mounting = apply_transposed(R, turn)
     for j in range(SIZE):
         value = turn[0] * P[ATTITUDE, j] + turn[1] * P[ATTITUDE + 1, j] + turn[2] * P[ATTITUDE + 2, j]
         value -= mounting[0] * P[MOUNTING, j] + mounting[1] * P[MOUNTING + 1, j]
@@ -211,9 +211,10 @@ def tauten(
     across, along = load.across, cross(load.q_cable, load.across)
     aa, ab, bb = load.covariance
     tracked = load.source == TRACKER
+    seen = not tracked and not is_never_observed(load)
     if not tracked:
         bb += LIFT_OFF_SPEED_STD * LIFT_OFF_SPEED_STD
-    if tracked or is_never_observed(load):
+    if not seen:
         initial_air_std = INITIAL_AIR_SHARE * tuning.air_std
         zero_covariance(P, AIR, 2)
         P[AIR, AIR], P[AIR + 1, AIR + 1] = (
@@ -222,9 +223,11 @@ def tauten(
         )
     if tracked:
         _set_relative_rows(P, DIRECTION, POSITION, across, along, length)
-    elif not is_never_observed(load):
-        _set_seen_rows(P, DIRECTION, across, load, vehicle)
-        _set_seen_rows(P, DIRECTION + 1, along, load, vehicle)
+    elif seen:
+        R = rotation_from_quat(vehicle.quat_wxyz)
+        _set_seen_row(P, DIRECTION, across, load.q_cable, R)
+        _set_seen_row(P, DIRECTION + 1, along, load.q_cable, R)
+        # what is left of the load's variance is independent of these errors
         aa = max(
             0.0, aa - 0.5 * length * length * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
         )

@@ -27,9 +27,7 @@ _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _MAX_ERROR_CHARS = 120  # most characters of an error that are reported
 _MAX_COMPILER_CHARS = 240  # the same for errors of the compiler, which name types before the reason
-
-
-_loading: list[Path] = []  # files of custom classes that are being loaded, in which order
+_loading: list[Path] = []  # files of custom classes that are being loaded; the last one's code runs now
 
 
 class OwnError(ValueError):

@@ -43,7 +43,7 @@ def _parsed(kind: Callable[[str], Number], words: Sequence[str], column: int, wh
     try:
         return kind(words[column])
     except ValueError:
-        what = "a whole number" if column in _WHOLE_COLUMNS else "a number"
+        what = "a whole number" if kind is int else "a number"
         raise FormatError(f"{where}: column {column + 1} is {words[column]!r}; must be {what}") from None
 
 

@@ -38,9 +38,8 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
     renew.
     """
     if docs is not None:
-        split_at_marks(
-            docs, BEGIN, END
-        )  # raises before the flights what would otherwise be raised after them
+        # raises before the flights what would otherwise be raised after them
+        split_at_marks(docs, BEGIN, END)
     make_output_directory(out)
     plan, flights = experiments(), out / FLIGHTS
     with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:

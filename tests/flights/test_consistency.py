@@ -122,6 +122,11 @@ def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tup
         assert 0.8 < total / count / SCALARS[sensor] < 1.2, (sensor, total / count / SCALARS[sensor])
 
 
+GUSTS = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
+REAL_LAB = {"sensors": "lab-real", "vehicle": "bebop-real"}
+WINDY_FIELD = {"sensors": "field", "vehicle": "heavy-real", "settings": GUSTS}
+
+
 def flights(name: str, seeds: tuple[int, ...], **told: Any) -> list[FlightResult]:
     """A mission by name under these conditions, once with each seed."""
     mission = load_mission(name)
@@ -144,8 +149,7 @@ def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
 def test_a_load_without_a_sensor_is_flown_in_gusts(sensors: str) -> None:
     """Measured: 105 and 115 mm at worst of 40 seeds. If the filter expects as much wind on the load as with a
     sensor, half of the flights are lost."""
-    gusts = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
-    blind = flights("case-b", (1, 2, 3), sensors=sensors, settings=gusts)
+    blind = flights("case-b", (1, 2, 3), sensors=sensors, settings=GUSTS)
     assert [flown.outcome for flown in blind] == ["completed"] * 3
     assert max(flown.load_error_max_m for flown in blind) < 0.12
 
@@ -160,7 +164,7 @@ def test_noise_that_the_autopilot_does_not_expect_is_filtered() -> None:
 def test_a_gust_in_a_real_lab_moves_the_load_by_less_than_noise_would_allow() -> None:
     """Measured: 170 mm at worst of 20 seeds; 265 mm if the push is learned as slowly as noise demands."""
     gust = {"SIM_ACT_DELAY_MS": 12.0, "SIM_GUST_E": 5.0, "SIM_GUST_AT_S": 18.0, "SIM_GUST_FOR_S": 2.0}
-    blown = flights("hover", (1, 2, 3), sensors="lab-real", vehicle="bebop-real", settings=gust)
+    blown = flights("hover", (1, 2, 3), settings=gust, **REAL_LAB)
     assert max(flown.load_error_max_m for flown in blown) < 0.2
 
 
@@ -173,16 +177,15 @@ def test_ten_times_the_assumed_drag_is_learned() -> None:
 @pytest.mark.parametrize(
     ("mission", "told", "limit_m"),
     [
-        ("case-b", {"sensors": "lab-real", "vehicle": "bebop-real"}, 0.04),
-        ("case-c", {"sensors": "lab-real", "vehicle": "bebop-real"}, 0.04),
-        ("case-b", {"sensors": "field", "vehicle": "heavy-real"}, 0.2),
-        ("case-c", {"sensors": "field", "vehicle": "heavy-real"}, 0.2),
+        ("case-b", REAL_LAB, 0.04),
+        ("case-c", REAL_LAB, 0.04),
+        ("case-b", WINDY_FIELD, 0.2),
+        ("case-c", WINDY_FIELD, 0.2),
     ],
 )
-def test_real_worlds_are_flown(mission: str, told: dict[str, str], limit_m: float) -> None:
+def test_real_worlds_are_flown(mission: str, told: dict[str, Any], limit_m: float) -> None:
     """Measured, at worst of 20 seeds: 26, 26, 172 and 165 mm. In the field 5 m/s of wind blow, with gusts of
     1 m/s."""
-    gusts = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0} if told["sensors"] == "field" else {}
-    flown = flights(mission, (1, 2), settings=gusts, **told)
+    flown = flights(mission, (1, 2), **told)
     assert [each.outcome for each in flown] == ["completed"] * 2
     assert max(each.load_error_max_m for each in flown) < limit_m

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import chain
 
 from autopilot.geometry.linear import norm
@@ -12,6 +11,7 @@ from autopilot.services.requests import Arm, RunPrearmChecks, Terminate
 from autopilot.supervisor.heading import with_heading_before_flight
 from autopilot.supervisor.machine import transition, try_transition
 from autopilot.supervisor.requests.mission import start_at_current_step
+from autopilot.supervisor.requests.modes import hold
 from autopilot.supervisor.requests.takeoff import start_takeoff
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied
 from autopilot.supervisor.settings import Settings
@@ -50,7 +50,7 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
     """Arm, and begin what was selected; or disarm, in the air by force only, and select nothing."""
     if not request.arm:
         if flight.phase == Phase.DISARMED:
-            return replace(interrupt_mission(flight), action_when_armed=ActionWhenArmed.NOTHING), ACCEPTED
+            return hold(flight, request, view, settings)
         in_air = flight.phase not in ON_GROUND
         if in_air and not request.force:
             return flight, denied("Disarming denied: in the air")

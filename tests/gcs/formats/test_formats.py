@@ -271,6 +271,8 @@ BAD_WAYPOINTS = [
     ("", "line 1"),
     ("QGC WPL 120\n", "must be 'QGC WPL 110'"),
     ("QGC WPL 110\n1\t2\n", "line 2: 2 columns; must be 12"),
+    ("QGC WPL 110\n0 0 3 16.5 0 0 0 0 47 8.5 2 1\n", "line 2: column 4 is '16.5'; must be a whole number"),
+    ("QGC WPL 110\n0 0 3 16 0 0 0 0 a 8.5 2 1\n", "line 2: column 9 is 'a'; must be a number"),
     ("QGC WPL 110\n0 0 3 16 0 0 0 0 x 8.5 2 1\n", "line 2"),
     ("QGC WPL 110\n1 0 3 16 0 0 0 0 47 8.5 2 1\n", "item number 1; must be 0"),
     ("QGC WPL 110\n0 0 3 16 0 0 0 0 470 8.5 2 1\n", "parameter 5"),
