@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from gcs.clients.capture import Capture
@@ -67,11 +67,13 @@ def run_lockstep(
     on_first_message: Callable[[], None],
     page: FlightPage | None = None,
     is_busy: Callable[[], bool] = lambda: False,
+    own_code: Sequence[str] = (),
 ) -> None:
     """Fly until the client has its outcome. `on_first_message` is called at the vehicle's first question.
 
     If a process ends before that, NoVehicleError is raised; if one ends later, that is an outcome. An
     autopilot that is silent while it `is_busy` is computing what was requested; the loop waits for it.
+    `own_code` names the user's classes, for whose answers an idle autopilot may be waiting.
     """
     turns = LockstepTurns()
     truth_queue = TruthQueue()
@@ -97,7 +99,8 @@ def run_lockstep(
                     )
                 wait_reported, last_busy_s = True, time.monotonic()
             if not reason and time.monotonic() - max(last_received_s, last_busy_s) > limit_s:
-                reason = f"the autopilot has sent nothing for {limit_s:.0f} s"
+                awaited = f", perhaps waiting for {' or '.join(own_code)}" if own_code else ""
+                reason = f"the autopilot has sent nothing for {limit_s:.0f} s{awaited}"
             if reason and not started:
                 raise NoVehicleError(reason)
             if reason:

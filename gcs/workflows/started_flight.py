@@ -68,7 +68,8 @@ def fly_started_vehicle(
             page,
         )
         if options.speed is None:
-            run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link, started.processes.are_busy)
+            capture, own_code = Capture(log, LOCKSTEP_BOOT_UNIX_US), tuple(filter(None, options.own))
+            run_lockstep(client, capture, *link, started.processes.are_busy, own_code)
         else:
             run_wall_clock(client, Capture(log, unix_us()), *link)
             client.explain_silence(started.processes.stopped_children())

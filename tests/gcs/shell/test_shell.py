@@ -243,6 +243,21 @@ def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monke
     assert capsys.readouterr().err.count("waiting for the autopilot") == 1
 
 
+def test_an_idle_autopilot_may_wait_for_what_the_user_has_written(new_world, items, tmp_path, monkeypatch):
+    monkeypatch.setattr(loops_module, "SILENCE_LIMIT_S", 0.05)
+    scripted = new_world().vehicle
+    scripted.script = short_flight
+    client = FlightClient(items[:2] + items[-1:], 10.0)
+    path, display = tmp_path / "x.tlog", FlightDisplay("test", quiet=True)
+    with UdpContext() as ground, UdpContext() as truth, StopRequest("") as stop, path.open("wb") as file:
+        LockstepVehicle(scripted, ground, truth, 0, turns=100).start()
+        link = (ground, truth, lambda: "", display, stop, lambda: None)
+        run_lockstep(client, Capture(TlogWriter(file)), *link, own_code=("slow.py:Slow",))
+        ground.send(GOODBYE)
+    assert client.outcome is not None
+    assert client.outcome.reason == "the autopilot has sent nothing for 0 s, perhaps waiting for slow.py:Slow"
+
+
 def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, tmp_path):
     logs = []
     for repeat in (0, 5):
