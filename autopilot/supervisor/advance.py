@@ -41,6 +41,8 @@ WATCHES: tuple[Watch, ...] = (
     watch_setpoints,
 )
 
+_MAX_LEG_ENDS = 20  # in one tick
+
 
 def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The flight at `view.now_us`: the first watch that finds something decides, else the legs continue."""
@@ -60,10 +62,12 @@ def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flig
     had_load = not flight.cable.released
     reached: tuple[int, ...] = ()
     texts: tuple[Text, ...] = ()
-    # a step may take no time at all: continue until one does
-    while flight.phase in IN_AIR and (
-        not flight.legs or leg_time_s(flight, view.now_us) >= flight.legs[0].duration_s
-    ):
+    # a step may take no time at all: continue until one does, or at the next tick
+    for _ in range(_MAX_LEG_ENDS):
+        if flight.phase not in IN_AIR or (
+            flight.legs and leg_time_s(flight, view.now_us) < flight.legs[0].duration_s
+        ):
+            break
         flight = _with_reeled_length(flight)
         if len(flight.legs) > 1:
             ended = flight.leg_start_us + round(flight.legs[0].duration_s * 1e6)

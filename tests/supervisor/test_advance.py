@@ -95,6 +95,18 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
     assert sky.reached == [0, 1]
 
 
+def test_steps_that_take_no_time_do_not_stop_the_clock() -> None:
+    """However many there are, and even if they are repeated without end."""
+    sky = Sky(Takeoff(2.0), Delay(0.0), Speed(1.0))
+    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, repeat_from=1))
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: len(s.reached) > 100)
+    assert sky.reached[:5] == [0, 1, 2, 1, 2]
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+
+
 def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
     sky = Sky(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0))
     sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, repeat_from=1))

@@ -408,6 +408,26 @@ def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
     assert endless_jump_target(items[:-2], located) is None
 
 
+@pytest.mark.parametrize(
+    "repeated",
+    [
+        [item(93, 0.0)],
+        [item(178, 1.0, 1.0, -1.0)],
+        [item(16, frame=6, x=473977420, y=85455940, z=1.5)],
+        [item(16, frame=6, x=473977420, y=85455940, z=1.5), item(115, 90.0)],
+        [item(22, frame=6, z=1.5)],
+        [item(20)],
+    ],
+)
+def test_a_jump_without_end_repeats_what_takes_time(repeated: list[WireItem]) -> None:
+    take_off, jump = item(22, frame=6, z=1.5), item(177, 1.0, -1.0)
+    with pytest.raises(MissionItemError, match="without end repeats must take at least 0.5 s") as refused:
+        located_steps([take_off, *repeated, jump], HOME)
+    assert refused.value.seq == 1 + len(repeated)
+    waited = located_steps([take_off, *repeated, item(93, 0.5), jump], HOME)
+    assert waited[-1].step == Delay(0.5)
+
+
 def test_items_that_turn_the_nose_belong_to_the_step_behind_them() -> None:
     latitude, longitude, _ = geodetic_from_enu((12.0, -7.0, 0.0), HOME)
     there = item(195, frame=6, x=latitude, y=longitude)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.trajectory.timeline import ANYWHERE, state_after
+from autopilot.trajectory.timeline import ANYWHERE, state_after, timeline
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Command, Handling, ItemContext
@@ -24,6 +24,7 @@ _TERM, _FACTOR, _RUN = (
 
 
 ENDLESS = -1  # repetitions of a jump
+_MIN_LAP_S = 0.5  # that an endless jump must take from one time to the next
 
 
 def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
@@ -50,6 +51,9 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
             if times == ENDLESS:
                 if not any(step.last >= target for step in reader.steps):
                     text = "a jump without end must lead back to something that is flown"
+                    raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+                if reader.lap_s(target) < _MIN_LAP_S:
+                    text = f"what a jump without end repeats must take at least {_MIN_LAP_S:g} s"
                     raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
                 reader.add_hold_to_turn(seq - 1)
                 return tuple(reader.steps)
@@ -126,6 +130,13 @@ class _Reader:
         """Add a hold in which the nose turns if no step follows, unless the mission lands anyway."""
         if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
+
+    def lap_s(self, target: int) -> float:
+        """Time (s) of the steps from item `target` on, if they are flown again after the last step."""
+        steps = [located.step for located in self.steps if located.last >= target]
+        entries = timeline(steps, self._state, self._return_to)
+        # in the air a take-off only moves the load
+        return sum(one.transfer_s if isinstance(one.step, Takeoff) else one.duration_s for one in entries)
 
     def _add(self, located: LocatedStep) -> None:
         if self._heading_commands and not isinstance(
