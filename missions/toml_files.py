@@ -122,8 +122,14 @@ class TomlFiles:
         except RecursionError:
             raise self.error([f"{where}: nested too deeply"]) from None
 
-    def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
-        """The table as a validated `spec`."""
+    def record(
+        self,
+        spec: type[Spec],
+        table: Mapping[str, Any],
+        where: str,
+        written: Mapping[str, Any] | None = None,
+    ) -> Spec:
+        """The table as a validated `spec`. `written` is what the file contains of it, if not all."""
         from pydantic import ValidationError  # listing names needs no schema
 
         found = [kind for kind, known in _KINDS.items() if known.marker_key in table]
@@ -132,7 +138,8 @@ class TomlFiles:
         try:
             return spec.model_validate(table)
         except ValidationError as error:
-            raise self.error(problems(error, spec, where, given=table)) from None
+            found_keys = table if written is None else written
+            raise self.error(problems(error, spec, where, given=found_keys)) from None
 
     def _hint(self, given: str) -> str:
         other = other_kind_hint(given, self.kind)

@@ -191,7 +191,7 @@ def _estimator(s: Sample) -> Numbers:
 
 def _status(s: Sample) -> Numbers:
     v = s.snapshot
-    failsafe = v.system_status == mavlink.MAV_STATE_EMERGENCY
+    failsafe = v.system_status in (mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_FLIGHT_TERMINATION)
     return (
         *(_ARMED if v.armed else _DISARMED, _NAV_STATES.get(v.sub_mode, _NAV_STATES[identity.AUTO_LOITER])),
         *(_ROTARY_WING, failsafe),

@@ -476,6 +476,7 @@ class Onboard:
             and self.core.handle_request(reaction[0], self.now_us).result == mavlink.MAV_RESULT_ACCEPTED
         ):
             self._ground.lost = True
+            self.core.replace_flight(replace(self.core.flight, is_failsafe=True))
             self.endpoint.state_changed()
             self.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, LOST_TEXT.format(reaction[1]))
 

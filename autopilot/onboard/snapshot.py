@@ -135,10 +135,10 @@ def reported_mode(flight: Flight) -> tuple[int, int]:
 def system_status(flight: Flight, ready: bool) -> int:
     """MAV_STATE of the flight."""
     if flight.phase == Phase.FAILSAFE:
-        return mavlink.MAV_STATE_EMERGENCY
+        return mavlink.MAV_STATE_FLIGHT_TERMINATION
     if flight.phase == Phase.DISARMED:
         return mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_CALIBRATING
-    return mavlink.MAV_STATE_ACTIVE
+    return mavlink.MAV_STATE_CRITICAL if flight.is_failsafe else mavlink.MAV_STATE_ACTIVE
 
 
 def mission_state(flight: Flight, items: int) -> int:
@@ -193,6 +193,7 @@ class FlightStatus(NamedTuple):
     home_position: Vec3
     fence_enabled: bool
     breach: str
+    last_breach: str
     breaches: int
     breach_us: int
     armed: bool
@@ -215,6 +216,7 @@ def flight_status(flight: Flight, items: int) -> FlightStatus:
         area.home,
         area.fence_enabled,
         area.breach,
+        area.last_breach,
         area.breaches,
         area.breach_us,
         flight.phase not in UNARMED,

@@ -110,6 +110,7 @@ class Snapshot:
 
     fence_enabled: bool = True  # the fence is not switched off
     breach: str = ""  # of the fence; empty: none
+    last_breach: str = ""  # the same of the last breach, over or not
     breaches: int = 0
     breach_us: int = 0
 

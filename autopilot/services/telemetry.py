@@ -189,20 +189,20 @@ def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    too_high = HEIGHT_LIMIT_PARAMETER in s.breach
+    too_high = HEIGHT_LIMIT_PARAMETER in s.last_breach
     kind = mavlink.FENCE_BREACH_MAXALT if too_high else mavlink.FENCE_BREACH_BOUNDARY
     return (
         mavlink.MAVLink_fence_status_message(
             breach_status=1 if s.breach else 0,
             breach_count=min(s.breaches, 65535),
-            breach_type=kind if s.breach else mavlink.FENCE_BREACH_NONE,
+            breach_type=kind if s.last_breach else mavlink.FENCE_BREACH_NONE,
             breach_time=(s.breach_us // 1000) % 2**32,
         ),
     )
 
 
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    seq, total = uint16(s.mission_current), uint16(s.mission_total)
+    seq, total = uint16(s.mission_current), uint16(s.mission_total) if s.mission_total else _UINT16
     in_mission_mode = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
     mission, fence, rally = s.plan_ids
     return (

@@ -155,6 +155,7 @@ class Area:
     fence: Fence = NO_FENCE
     fence_enabled: bool = True  # the fence is not switched off
     breach: str = ""  # why load or vehicle may not be where it is, or where it is about to be
+    last_breach: str = ""  # the same of the last breach, over or not
     breaches: int = 0
     breach_us: int = 0  # when the last one began
 
@@ -179,6 +180,7 @@ class Flight:
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     heading: Heading = HEADING_EAST
     returning: bool = False  # home, or landing there
+    is_failsafe: bool = False  # it was not commanded to do what it does, but reacts to a failure
     # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
     external_arming_problems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 

@@ -22,7 +22,7 @@ from missions.toml_files import format_value
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
     """The true vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
     keys, where = vehicle_keys(name_or_path)
-    found = VEHICLES.record(Vehicle, keys, where)
+    found = VEHICLES.record(Vehicle, keys, where, written=_table(name_or_path)[0])
     problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
     if problems:
         raise VehicleFileError(problems)

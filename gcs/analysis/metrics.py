@@ -122,15 +122,13 @@ def step_numbers(samples: Samples) -> Numbers:
 
 
 def cascade_numbers(telemetry: Telemetry) -> Numbers:
-    """Error functions of the cascade over the mission window; (3-1), (3-8).
-
-    A function that the law does not define is 0 throughout, which no measured error is: None.
-    """
+    """Error functions of the cascade over the mission window; (3-1), (3-8). None: the law does not define
+    it."""
     cascade = telemetry.cascade
     window = in_window(telemetry, cascade.time_s)
     return {
-        "psi_R_max": _statistic(cascade.psi_R[window], np.max) or None,
-        "psi_q_max": _statistic(cascade.psi_q[window], np.max) or None,
+        "psi_R_max": _statistic(cascade.psi_R[window], np.max),
+        "psi_q_max": _statistic(cascade.psi_q[window], np.max),
     }
 
 

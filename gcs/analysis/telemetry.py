@@ -167,10 +167,12 @@ def _filtered(c: Columns) -> FilterTrack:
     return _sorted(FilterTrack(times_s, enu_from_ned(c["x y z"]), velocity_m_s))
 
 
-def _setpoint(c: Columns) -> SetpointTrack:
+def _setpoint(c: Columns, cascade: Columns) -> SetpointTrack:
     requested, requested_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
     if not requested.any():  # the vehicle does not send it: missing extension fields are decoded as zeros
         requested, requested_m_s = c["x y z"], c["vx vy vz"]
+    # a law that commands no direction of the cable states the estimated one
+    has_no_direction = np.isin(c["time_usec"], cascade["time_usec"][~_is_stated(cascade, "psi_q", "e_q")])
     return _sorted(
         SetpointTrack(
             time_s=c["time_usec"] * _MICRO,
@@ -179,7 +181,7 @@ def _setpoint(c: Columns) -> SetpointTrack:
             acceleration_m_s2=enu_from_ned(c["ax ay az"]),
             requested_m=enu_from_ned(requested),
             requested_m_s=enu_from_ned(requested_m_s),
-            q_cable_c=enu_from_ned(c["qx qy qz"]),
+            q_cable_c=np.where(has_no_direction[:, None], np.nan, enu_from_ned(c["qx qy qz"])),
             elapsed_s=c["elapsed"],
             duration_s=c["duration"],
             item=c.integers("seq"),
@@ -190,22 +192,30 @@ def _setpoint(c: Columns) -> SetpointTrack:
 
 
 def _cascade(c: Columns) -> CascadeTrack:
+    """The errors of the cascade; NaN where the law commands no direction of the cable, or no attitude: it
+    states zeros, and no measured error is exactly that."""
+    has_direction, has_attitude = _is_stated(c, "psi_q", "e_q"), _is_stated(c, "psi_r", "e_r")
     return _sorted(
         CascadeTrack(
             time_s=c["time_usec"] * _MICRO,
             e_x=enu_from_ned(c["e_x"]),
             e_v=enu_from_ned(c["e_v"]),
-            e_q=enu_from_ned(c["e_q"]),
-            e_q_dot=enu_from_ned(c["e_q_dot"]),
-            e_R=flu_from_frd(c["e_r"]),
-            e_Omega=flu_from_frd(c["e_omega"]),
-            psi_R=c["psi_r"],
-            psi_q=c["psi_q"],
+            e_q=np.where(has_direction[:, None], enu_from_ned(c["e_q"]), np.nan),
+            e_q_dot=np.where(has_direction[:, None], enu_from_ned(c["e_q_dot"]), np.nan),
+            e_R=np.where(has_attitude[:, None], flu_from_frd(c["e_r"]), np.nan),
+            e_Omega=np.where(has_attitude[:, None], flu_from_frd(c["e_omega"]), np.nan),
+            psi_R=np.where(has_attitude, c["psi_r"], np.nan),
+            psi_q=np.where(has_direction, c["psi_q"], np.nan),
             thrust_n=c["thrust"],
             moment_n_m=flu_from_frd(c["moment"]),
             control_mode=c.integers("control_mode"),
         )
     )
+
+
+def _is_stated(c: Columns, function: str, error: str) -> NDArray[np.bool_]:
+    """(n,) whether an error function and its vector are not both zero."""
+    return np.asarray((c[function] != 0.0) | (c[error] != 0.0).any(axis=1))
 
 
 def _rotors(c: Columns, source: int) -> RotorTrack:
@@ -280,7 +290,9 @@ def _assemble(
         load_truth=_load(load, mavlink.PLUMBLINE_SOURCE_TRUTH),
         load_estimated=_load(load, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
         load_filtered=_filtered(columns[mavlink.MAVLINK_MSG_ID_FILTER_STATE]),
-        setpoint=_setpoint(columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]),
+        setpoint=_setpoint(
+            columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT], columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]
+        ),
         cascade=_cascade(columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]),
         rotors_truth=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_TRUTH),
         rotors_commanded=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_ESTIMATED),

@@ -350,7 +350,7 @@ def test_without_the_inertial_unit_the_rotors_stop_at_once(sensors: str) -> None
     craft.run(at_phase(Phase.FAILSAFE), 1.0)
     assert craft.onboard.now_us - failed_us < 150_000
     craft.run(at_phase(Phase.DISARMED), 5.0)
-    assert craft.texts == ["Flight given up: no reading of the inertial unit", "Disarmed after failsafe"]
+    assert craft.texts == ["Flight given up: no reading of the inertial unit", "Disarmed after termination"]
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_DENIED
 
 
@@ -425,7 +425,7 @@ def test_a_rotor_that_fails_ends_the_flight(rotor: int) -> None:
     set_parameter(craft, "SIM_ENGINE_FAIL", 1 << (rotor - 1))
     craft.run(at_phase(Phase.DISARMED), 10.0)
     craft.tick()
-    assert craft.texts[-1] in ("Disarmed after failsafe", "Landed, disarmed")
+    assert craft.texts[-1] in ("Disarmed after termination", "Landed, disarmed")
     assert not any(craft.world.command)
 
 

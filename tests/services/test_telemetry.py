@@ -186,8 +186,9 @@ def test_a_lost_fix_has_no_dilution(snap):
     ],
 )
 def test_the_kind_of_a_breach_is_stated(snap, breach, kind):
-    (status,) = sent(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, snap(breach=breach))
-    assert (status.breach_status, status.breach_type) == (int(bool(breach)), kind)
+    for now in (breach, ""):  # the last one is stated also when it is over
+        (status,) = sent(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, snap(breach=now, last_breach=breach))
+        assert (status.breach_status, status.breach_type) == (int(bool(now)), kind)
 
 
 def test_the_winch_reports_the_length_of_the_cable_and_its_tension_as_a_weight(snap):

@@ -62,7 +62,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     sky = fenced().airborne()
     farthest = eastward(sky, 12.0)
     assert sky.flight.phase == Phase.HOLD
-    assert sky.texts[-1] == "Fence: outside the fence"
+    assert sky.texts[-1] == "Fence: outside the fence, holding"
     # stopped shortly before the fence: measured 4.89 m
     assert 3.5 < farthest < 5.0
     assert sky.flight.area.breaches == 1
@@ -130,13 +130,13 @@ def test_a_fence_that_is_switched_off_stops_nobody() -> None:
     assert sky.flight.area.breaches == 0
     assert sky.ask(EnableFence(True)).result == ACCEPTED
     sky.wait(0.1)
-    assert sky.texts[-1] == "Fence: outside the fence"
+    assert sky.texts[-1] == "Fence: outside the fence, holding"
 
 
 def test_distance_and_height() -> None:
     sky = fenced(radius_m=3.0).airborne()
     assert eastward(sky, 10.0) < 3.0
-    assert sky.texts[-1] == "Fence: beyond the fence, GF_MAX_HOR_DIST 3 m from home"
+    assert sky.texts[-1] == "Fence: beyond the fence, GF_MAX_HOR_DIST 3 m from home, holding"
     high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED

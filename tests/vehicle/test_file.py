@@ -359,6 +359,11 @@ def test_a_truth_beside_a_belief_is_flown_and_not_believed(tmp_path):
     assert belief_of("heavy") == "heavy"
 
 
+def test_a_key_that_the_belief_has_is_suggested_too(tmp_path):
+    with pytest.raises(VehicleFileError, match="load_mas_kg: unknown key; write load_mass_kg"):
+        loaded(tmp_path, 'believed = "bebop"\nload_mas_kg = 0.2\n')
+
+
 def test_a_vehicle_is_delivered_with_parameters(tmp_path):
     """Its own parameters come before those of its belief; all others have their usual values."""
     (tmp_path / "believed.toml").write_text(BEBOP + "[parameters]\nMIS_SPEED = 2.0\nMIS_ACCEL = 0.5\n")

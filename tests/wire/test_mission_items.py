@@ -421,7 +421,7 @@ def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
 )
 def test_a_jump_without_end_repeats_what_takes_time(repeated: list[WireItem]) -> None:
     take_off, jump = item(22, frame=6, z=1.5), item(177, 1.0, -1.0)
-    with pytest.raises(MissionItemError, match="without end repeats must take at least 0.5 s") as refused:
+    with pytest.raises(MissionItemError, match=r"without end repeats must take at least 0\.5 s") as refused:
         located_steps([take_off, *repeated, jump], HOME)
     assert refused.value.seq == 1 + len(repeated)
     waited = located_steps([take_off, *repeated, item(93, 0.5), jump], HOME)

@@ -84,4 +84,4 @@ def terminate(flight: Flight, request: Terminate, view: View, settings: Settings
     after = try_transition(interrupt_mission(flight), Event.FAIL, view, settings)
     if after is None:
         return flight, ACCEPTED
-    return after, ACCEPTED
+    return after, Verdict(ACCEPTED.result, "Flight terminated by command, rotors stopped", warns=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from autopilot.services.records import Verdict
@@ -58,7 +59,10 @@ def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Deci
     handler = HANDLERS.get(type(request))
     if handler is None:
         return flight, Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
-    return handler(flight, request, view, settings)
+    after, verdict = handler(flight, request, view, settings)
+    if after.is_failsafe and after.legs is not flight.legs:  # now it does as commanded
+        after = replace(after, is_failsafe=False)
+    return after, verdict
 
 
 HANDLERS: dict[type, Handler] = {

@@ -24,7 +24,7 @@ from autopilot.supervisor.watches.failsafe import give_up_flight
 from autopilot.supervisor.watches.watch_result import WatchResult
 
 NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
-FENCE_EVENTS = {2: Event.HOLD, 3: Event.RETURN, 5: Event.LAND}
+FENCE_EVENTS = {2: (Event.HOLD, "holding"), 3: (Event.RETURN, "returning"), 5: (Event.LAND, "landing")}
 STOP_MARGIN = 0.05  # share by which the stopping distance is extended: while the load speeds up, it grows
 
 
@@ -50,14 +50,14 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
         return WatchResult(flight)
     if not why:
         return WatchResult(replace(flight, area=replace(area, breach="")))
-    breached = replace(area, breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
+    breached = replace(area, breach=why, last_breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
     flight = replace(flight, area=breached)
     if limits.action == TERMINATE:
         return give_up_flight(flight, f"fence: {why}")
-    event, texts = FENCE_EVENTS.get(limits.action), ((WARNING, f"Fence: {why}"),)
+    event, action = FENCE_EVENTS.get(limits.action, (None, ""))
     if event is None or (flight.phase, event) not in TRANSITIONS:
-        return WatchResult(flight, None, texts)
-    return WatchResult(interrupt_mission(flight), event, texts)
+        return WatchResult(flight, None, ((WARNING, f"Fence: {why}"),))
+    return WatchResult(interrupt_mission(flight), event, ((WARNING, f"Fence: {why}, {action}"),))
 
 
 def _breach(flight: Flight, view: View, settings: Settings) -> str:

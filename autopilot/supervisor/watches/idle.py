@@ -17,5 +17,5 @@ def watch_idle(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if flight.phase == Phase.ARMED and not flight.mission.waiting and lasted_us > IDLE_DISARM_US:
         return WatchResult(flight, Event.DISARM, ((INFO, "Disarmed: no command received"),))
     if flight.phase == Phase.FAILSAFE and lasted_us > FAILSAFE_DISARM_US:
-        return WatchResult(flight, Event.DISARM, ((WARNING, "Disarmed after failsafe"),))
+        return WatchResult(flight, Event.DISARM, ((WARNING, "Disarmed after termination"),))
     return WatchResult(flight)
