@@ -11,9 +11,9 @@ from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, decimal_from_float32
+from autopilot.wire.statustext import TextWriter
 
 VALUES_PER_TICK = 4
-STATUSTEXT_BYTES = 50
 
 
 class ParameterServer:
@@ -22,6 +22,7 @@ class ParameterServer:
     def __init__(self, table: ParameterTable) -> None:
         self.table = table
         self._outgoing: deque[Any] = deque()
+        self._texts = TextWriter()
 
     def receive(self, message: Any) -> bool:
         """Process a message; True if it changed a value."""
@@ -50,8 +51,7 @@ class ParameterServer:
 
     def send_text(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
         """Send a text to the operators of the vehicle."""
-        line = text.encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
-        self._outgoing.append(mavlink.MAVLink_statustext_message(severity, line))
+        self._outgoing.extend(self._texts.messages(severity, text))
 
     def _set(self, name: str, value: float) -> bool:
         previous = self.table[name]

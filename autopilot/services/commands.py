@@ -64,7 +64,7 @@ REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
-_NO_CHANGE = -1.0  # of a speed
+_NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0  # of a speed
 _NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -282,8 +282,12 @@ def _change_speed(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Change speed: param1 = {call.p[0]:g}; must be 0 or 1, 2 (climb) or 3 (descent)")
     if kind in _VERTICAL_SPEEDS or call.p[1] == _NO_CHANGE:
         return Verdict(ACCEPTED)  # changes nothing, as in a mission: the load is lifted with MIS_LIFT_SPEED
+    if call.p[1] == _DEFAULT_SPEED:
+        return ChangeSpeed(None)
     if not (math.isfinite(call.p[1]) and call.p[1] > 0.0):
-        return _refused(f"Change speed: param2 = {call.p[1]:g} m/s; must be > 0")
+        return _refused(
+            f"Change speed: param2 = {call.p[1]:g} m/s; must be > 0, -1 (no change) or -2 (default)"
+        )
     return ChangeSpeed(call.p[1])
 
 

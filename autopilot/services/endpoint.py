@@ -70,7 +70,6 @@ from autopilot.services.requests import (
 )
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
-from autopilot.services.statustext import TextWriter
 from autopilot.services.stream_frames import BITS, StreamFrames, stream_groups
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import (
@@ -93,6 +92,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
+from autopilot.wire.statustext import TextWriter
 
 LINK_SILENCE_US = 30_000_000  # after this silence a link that was not configured is forgotten
 REACHED_REPETITIONS = 10  # repetitions of the end of a mission, as in PX4

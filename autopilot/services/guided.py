@@ -140,7 +140,7 @@ def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
     w, x, y, z = m.q
     size = math.sqrt(w * w + x * x + y * y + z * z)
     if not 0.5 < size < 2.0:
-        return _refused("Attitude setpoint refused: the quaternion is none")
+        return _refused("Attitude setpoint refused: the quaternion is not of length 1")
     w, x, y, z = w / size, x / size, y / size, z / size
     # minus the third column of the rotation: NED
     up_ned = (-2.0 * (x * z + w * y), -2.0 * (y * z - w * x), -(w * w - x * x - y * y + z * z))

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from autopilot.services.statustext import CHUNK
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import CHUNK
 
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 DIALECT_COMPONENT = mavlink.MAV_COMP_ID_USER1

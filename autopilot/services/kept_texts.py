@@ -12,9 +12,9 @@ from collections.abc import Hashable, Iterable
 from typing import NamedTuple
 
 from autopilot.services.records import Link, Output, Send
-from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import TextWriter
 
 MAX_TEXTS = 50  # kept texts
 TEXT_INTERVAL_US = 4000  # between two texts on a link

@@ -174,9 +174,9 @@ class ChangeAltitude:
 
 @dataclass(frozen=True, slots=True)
 class ChangeSpeed:
-    """Set the peak speed of the load on transfers."""
+    """Set the peak speed of the load on transfers; None: to MIS_SPEED."""
 
-    speed_m_s: float
+    speed_m_s: float | None
 
 
 @dataclass(frozen=True, slots=True)

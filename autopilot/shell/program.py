@@ -62,6 +62,7 @@ from autopilot.shell.storage_worker import StorageWorker
 from autopilot.shell.tick_cost import TickCost
 from autopilot.shell.tick_loop import NO_BATCH, BatchEnd, TickLoop, warm_up
 from autopilot.shell.watched_calls import watched_calls
+from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
@@ -223,7 +224,9 @@ class Program:
                 self.onboard.endpoint.inherit_texts(previous.endpoint)
                 self.restore_areas(areas)
                 self._ground.join(self.onboard)
-                self.onboard.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
+                was_flying = previous.phase != Phase.DISARMED
+                severity = mavlink.MAV_SEVERITY_CRITICAL if was_flying else mavlink.MAV_SEVERITY_NOTICE
+                self.onboard.endpoint.send_text(severity, SIMULATOR_RESTARTED)
             elif silent and (why := refusal_text(datagram)) not in ("", last_refusal):
                 last_refusal = why
                 self._notify(
@@ -499,14 +502,13 @@ def main(
         problems += [problem] if problem else []
         if signing_key is not None:
             _store_signing_key(store, signing_key)
-        boot = LOCKSTEP_BOOT_UNIX_US if lockstep else SteadyClock().unix_us()
-        options = Options(
-            origin, boot, clock_waits=lockstep, log=True, own=own, setup_signing=allow_setup_signing
-        )
-
         problems += store.load_simulator_parameters()[1]
 
         def build(stored: StoredMission | None) -> Onboard:
+            boot = LOCKSTEP_BOOT_UNIX_US if lockstep else SteadyClock().unix_us()
+            options = Options(
+                origin, boot, clock_waits=lockstep, log=True, own=own, setup_signing=allow_setup_signing
+            )
             onboard = Onboard(table, identity_of(table), options, stored, store.card, store.load_signing())
             onboard.restore_simulator_parameters(store.load_simulator_parameters()[0])
             return onboard

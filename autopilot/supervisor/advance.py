@@ -12,7 +12,7 @@ from autopilot.supervisor.heading import advance_heading
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CRITICAL, IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
+from autopilot.supervisor.state import IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
 from autopilot.supervisor.watches.failsafe import watch_failsafe, watch_missing_readings
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
@@ -24,6 +24,7 @@ from autopilot.supervisor.watches.slack import watch_slack
 from autopilot.supervisor.watches.tautening import watch_tautening
 from autopilot.supervisor.watches.touchdown import watch_touchdown
 from autopilot.supervisor.watches.watch_result import Watch
+from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
 
 WATCHES: tuple[Watch, ...] = (
     watch_recovery,
@@ -52,7 +53,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         flight = result.flight
         if result.event is not None:
             flight = transition(flight, result.event, view, settings)
-            if any(severity <= CRITICAL for severity, _ in result.texts):
+            if any(severity <= MAV_SEVERITY_ERROR for severity, _ in result.texts):
                 flight = replace(flight, is_failsafe=True)
         if result.found:
             return flight, Report(result.texts, result.reached)

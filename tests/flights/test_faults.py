@@ -28,6 +28,11 @@ def set_parameter(craft: Craft, name: str, value: float) -> None:
     craft.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
 
 
+def system_status(craft: Craft) -> int:
+    """MAV_STATE of the last heartbeat."""
+    return [m.system_status for m in craft.heard if m.get_type() == "HEARTBEAT"][-1]
+
+
 def under_way(sensors: str = "lab", speed: float = 0.5, lockstep: bool = True, **settings: float) -> Craft:
     """A craft on its mission, with the load hanging and moving at no less than this speed (m/s)."""
     craft = Craft(*ROUTE, sensors=sensors, lockstep=lockstep, **settings)
@@ -358,6 +363,8 @@ def test_a_sensor_that_comes_back_lets_the_vehicle_be_commanded_again() -> None:
     craft = under_way()
     set_parameter(craft, "SIM_SENS_FAIL", POSE)
     craft.run(at_phase(Phase.LOWER), 2.0)
+    craft.wait(0.1)
+    assert system_status(craft) == mavlink.MAV_STATE_CRITICAL
     assert craft.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == ACCEPTED
     craft.tick()
     assert craft.flight.phase == Phase.LOWER, "while it is missing, nothing else is flown"
@@ -366,7 +373,26 @@ def test_a_sensor_that_comes_back_lets_the_vehicle_be_commanded_again() -> None:
     assert craft.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == ACCEPTED
     craft.wait(5.0)
     assert craft.flight.phase == Phase.HOLD
+    assert system_status(craft) == mavlink.MAV_STATE_ACTIVE
     assert norm(craft.truth.v_load) < 0.05
+
+
+def test_a_termination_is_told_and_shown() -> None:
+    craft = under_way()
+    assert craft.command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION, 1.0) == ACCEPTED
+    assert craft.texts == ["Flight terminated by command, rotors stopped"]
+    craft.tick()
+    assert system_status(craft) == mavlink.MAV_STATE_FLIGHT_TERMINATION
+    craft.run(at_phase(Phase.DISARMED), 5.0)
+    assert craft.texts[-1] == "Disarmed after termination"
+
+
+def test_what_the_simulator_refuses_is_told_in_full() -> None:
+    craft = Craft(*ROUTE)
+    craft.wait(1.0)
+    set_parameter(craft, "SIM_ATT_X", 0.1)
+    craft.wait(0.1)
+    assert "".join(craft.texts) == "SIM_ATT_X is fixed while running; restart with --set SIM_ATT_X=0.1"
 
 
 # ---- the ground station

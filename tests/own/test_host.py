@@ -89,6 +89,14 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0), (0.0,), (0.0,)), 1.0)),
         "a row of the attitude has 1 numbers; must be 3",
     ),
+    "sheared": (
+        lambda memory, now: (memory, attitude(((1.0, 0.0, 0.1), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 1.0)),
+        "the attitude is no rotation: its rows must be of length 1, at right angles and right-handed",
+    ),
+    "mirrored": (
+        lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), 1.0)),
+        "the attitude is no rotation",
+    ),
     "kind": (lambda memory, now: (memory, UPWARD._replace(kind=7)), "asks for a kind 7 that there is not"),
     "turned": (
         lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),

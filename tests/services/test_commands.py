@@ -109,6 +109,7 @@ LONG = [
     (241, (), None, OK),
     (178, (1, 2.5, -1), ChangeSpeed(2.5), OK),
     (178, (0, 2.5, -1), ChangeSpeed(2.5), OK),
+    (178, (1, -2, -1), ChangeSpeed(None), OK),
     (178, (1, -1, -1), None, OK),
     (178, (1, 0, -1), None, DENIED),
     (178, (2, 0.1, -1), None, OK),

@@ -18,13 +18,13 @@ from autopilot.services.identity import (
 from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import TimesyncAnswered, Verdict
 from autopilot.services.snapshot import SensorReadings, Snapshot
-from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import STREAMS
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.parameter_table import Parameter, ParameterTable
+from autopilot.wire.statustext import CHUNK
 
 GCS_BEAT = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 

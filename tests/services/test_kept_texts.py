@@ -6,9 +6,9 @@ import re
 
 from autopilot.services.kept_texts import MAX_TEXTS, TEXT_INTERVAL_US, KeptText, KeptTexts
 from autopilot.services.records import Verdict
-from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import TextWriter
 from tests.services.conftest import TICK_US, Rig
 
 WARNING, CRITICAL = mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_CRITICAL

@@ -12,7 +12,16 @@ import pytest
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import LOAD_POSITION, Brake, Creep, Hold, SignalRun, Swing, SwingDamping
 from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
-from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
+from autopilot.services.requests import (
+    Arm,
+    ChangeSpeed,
+    Continue,
+    Land,
+    Pause,
+    ReturnHome,
+    SetCurrent,
+    StartMission,
+)
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.mission import with_plan
@@ -93,6 +102,13 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
     assert sky.flight.mission.done
     assert "Mission complete, holding" in sky.texts
     assert sky.reached == [0, 1]
+
+
+def test_a_speed_is_changed_back() -> None:
+    sky = Sky()
+    for asked, flown in ((0.7, 0.7), (None, sky.settings.motion.speed_m_s)):
+        assert sky.ask(ChangeSpeed(asked)).result == ACCEPTED
+        assert sky.flight.mission.speed_m_s == flown
 
 
 def test_steps_that_take_no_time_do_not_stop_the_clock() -> None:

@@ -71,8 +71,9 @@ def change_altitude(flight: Flight, request: ChangeAltitude, view: View, setting
 
 def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
     """Fly transfers at another speed from now on."""
-    if not MIN_SPEED_M_S <= request.speed_m_s <= MAX_SPEED_M_S:
+    speed_m_s = settings.motion.speed_m_s if request.speed_m_s is None else request.speed_m_s
+    if not MIN_SPEED_M_S <= speed_m_s <= MAX_SPEED_M_S:
         return flight, denied(
-            f"Speed {request.speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
+            f"Speed {speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
         )
-    return replace(flight, mission=replace(flight.mission, speed_m_s=request.speed_m_s)), ACCEPTED
+    return replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s)), ACCEPTED
