@@ -71,7 +71,8 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_NAV_WAYPOINT,
-        "the load is carried there; home itself as item 0 is not flown",
+        "the load is carried there; home itself as item 0 is not flown. The yaw p4 is ignored (CONDITION_YAW "
+        "turns the nose), and so is `autocontinue` of any item",
         _HELD_POINT,
         Waypoint,
         is_default=True,
@@ -159,7 +160,8 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_DO_JUMP,
         f"the items from item p1 on again, p2 times (0 ... {MAX_JUMPS}) or without end (-1): then those "
-        "behind it are never flown. A mission that comes to more than "
+        "behind it are never flown, and the repeated ones must take at least 0.5 s. A mission that comes to "
+        "more than "
         f"{MAX_FLOWN_ITEMS} items with all repetitions is refused",
     ),
     Command(
