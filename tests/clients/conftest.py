@@ -45,9 +45,14 @@ COMPLAINT = re.compile(
 )
 
 
+# MAVSDK asks again after half a second of the wall clock, within which a busy machine may not have answered;
+# what then stays unanswered is a complaint
+ASKED_AGAIN = "sending again, retries to do"
+
+
 def complaints(text: str) -> list[str]:
     """The lines of a client's output that are complaints."""
-    return [line for line in text.splitlines() if COMPLAINT.search(line)]
+    return [line for line in text.splitlines() if COMPLAINT.search(line) and ASKED_AGAIN not in line]
 
 
 Place = tuple[float, float, float]  # east, north, up

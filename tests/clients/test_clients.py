@@ -60,7 +60,10 @@ DISARMED = "DISARMED"
     ],
 )
 def test_what_counts_as_a_complaint(line: str) -> None:
-    assert complaints(f"all well\n{line}\n") == [line]
+    asked_again = (
+        "[03:53:43|Warn ] sending again, retries to do: 5  (MIS_SPEED). (mavlink_parameter_client.cpp:1238)"
+    )
+    assert complaints(f"all well\n{asked_again}\n{line}\n") == [line]
 
 
 class Watched(NamedTuple):
