@@ -138,8 +138,8 @@ class TomlFiles:
         try:
             return spec.model_validate(table)
         except ValidationError as error:
-            found_keys = table if written is None else written
-            raise self.error(problems(error, spec, where, given=found_keys)) from None
+            given = table if written is None else written
+            raise self.error(problems(error, spec, where, given=given)) from None
 
     def _hint(self, given: str) -> str:
         other = other_kind_hint(given, self.kind)

@@ -21,8 +21,8 @@ from missions.toml_files import format_value
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
     """The true vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
-    keys, where = vehicle_keys(name_or_path)
-    found = VEHICLES.record(Vehicle, keys, where, written=_table(name_or_path)[0])
+    table, where = _table(name_or_path)
+    found = VEHICLES.record(Vehicle, _completed(table, where, name_or_path), where, written=table)
     problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
     if problems:
         raise VehicleFileError(problems)
@@ -75,14 +75,19 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
     """The keys of a file, completed by those of the assumed vehicle if it names one; and the place with which
     messages about it begin."""
     table, where = _table(name_or_path)
+    return _completed(table, where, name_or_path), where
+
+
+def _completed(table: dict[str, Any], where: str, name_or_path: str | PathLike[str]) -> dict[str, Any]:
+    """The table of a file, completed by that of the assumed vehicle if it names one."""
     believed = _believed(table, name_or_path)
     if not believed:
-        return table, where
+        return table
     with _errors_naming_reference(where, table):
         keys, other = _table(believed)
     if keys.get("believed"):
         raise VehicleFileError([f"{where}: believed: {other} has a `believed` of its own; name that one"])
-    return {**keys, **table}, where
+    return {**keys, **table}
 
 
 def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:

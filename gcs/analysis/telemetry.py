@@ -167,15 +167,16 @@ def _filtered(c: Columns) -> FilterTrack:
     return _sorted(FilterTrack(times_s, enu_from_ned(c["x y z"]), velocity_m_s))
 
 
-def _setpoint(c: Columns, cascade: Columns) -> SetpointTrack:
+def _setpoint(c: Columns, cascade: CascadeTrack) -> SetpointTrack:
     requested, requested_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
     if not requested.any():  # the vehicle does not send it: missing extension fields are decoded as zeros
         requested, requested_m_s = c["x y z"], c["vx vy vz"]
+    time_s = c["time_usec"] * _MICRO
     # a law that commands no direction of the cable states the estimated one
-    has_no_direction = np.isin(c["time_usec"], cascade["time_usec"][~_is_stated(cascade, "psi_q", "e_q")])
+    has_no_direction = np.isin(time_s, cascade.time_s[np.isnan(cascade.psi_q)])
     return _sorted(
         SetpointTrack(
-            time_s=c["time_usec"] * _MICRO,
+            time_s=time_s,
             position_m=enu_from_ned(c["x y z"]),
             velocity_m_s=enu_from_ned(c["vx vy vz"]),
             acceleration_m_s2=enu_from_ned(c["ax ay az"]),
@@ -286,14 +287,13 @@ def _assemble(
     heartbeat = columns[mavlink.MAVLINK_MSG_ID_HEARTBEAT]
     current = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT
     reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
+    cascade = _cascade(columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS])
     return Telemetry(
         load_truth=_load(load, mavlink.PLUMBLINE_SOURCE_TRUTH),
         load_estimated=_load(load, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
         load_filtered=_filtered(columns[mavlink.MAVLINK_MSG_ID_FILTER_STATE]),
-        setpoint=_setpoint(
-            columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT], columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]
-        ),
-        cascade=_cascade(columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]),
+        setpoint=_setpoint(columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT], cascade),
+        cascade=cascade,
         rotors_truth=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_TRUTH),
         rotors_commanded=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
         attitude_truth=_attitude(

@@ -46,8 +46,8 @@ COMPLAINT = re.compile(
 
 
 # MAVSDK asks again after half a second of the wall clock, within which a busy machine may not have answered;
-# what then stays unanswered is a complaint
-ASKED_AGAIN = "sending again, retries to do"
+# asking a second time is a complaint
+ASKED_AGAIN = "sending again, retries to do: 5 "
 
 
 def complaints(text: str) -> list[str]:

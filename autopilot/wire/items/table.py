@@ -161,8 +161,7 @@ COMMANDS: tuple[Command, ...] = (
         m.MAV_CMD_DO_JUMP,
         f"the items from item p1 on again, p2 times (0 ... {MAX_JUMPS}) or without end (-1): then those "
         "behind it are never flown, and the repeated ones must take at least 0.5 s. A mission that comes to "
-        "more than "
-        f"{MAX_FLOWN_ITEMS} items with all repetitions is refused",
+        f"more than {MAX_FLOWN_ITEMS} items with all repetitions is refused",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
