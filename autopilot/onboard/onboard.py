@@ -87,7 +87,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
-from autopilot.wire.statustext import CHUNK
+from autopilot.wire.statustext import TextReader
 from missions.model import Land, ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
@@ -239,7 +239,7 @@ class Onboard:
         self._version = parameters.version
         self.bad_time_ticks = 0  # ticks in a row that lay in the past or far ahead
         self.restarted = False  # the simulator has restarted; this autopilot is of no use any more
-        self._simulator_text = ""  # the chunks of a text of the simulator so far
+        self._simulator_texts = TextReader()
         self._boot_id: int | None = None  # of the simulator, if it has reported one
         self._received_loss, self._sent_loss = PacketLoss(0), PacketLoss(1)
         self._next_request_us = 0
@@ -491,12 +491,9 @@ class Onboard:
 
     def _handle_simulator_message(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
-            # a long text comes in several messages, of which the last one is not full
-            begun = self._simulator_text + message.text if message.id else message.text
-            is_whole = not message.id or len(message.text) < CHUNK
-            self._simulator_text = "" if is_whole else begun
-            if is_whole:
-                self.endpoint.send_text(message.severity, begun)
+            text = self._simulator_texts.read(message)
+            if text is not None:
+                self.endpoint.send_text(message.severity, text)
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
             self._set_arming_problems("clock", self._punctuality.arming_problems(message, self.tick))

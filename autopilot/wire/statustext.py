@@ -1,6 +1,8 @@
-"""STATUSTEXT: one line for the operator, cut into chunks of 50 bytes if it is longer."""
+"""STATUSTEXT: one line for the operator, cut into chunks of 50 bytes if it is longer, and joined again."""
 
 from __future__ import annotations
+
+from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -27,3 +29,23 @@ class TextWriter:
             mavlink.MAVLink_statustext_message(severity, line[start : start + CHUNK], self._id, number)
             for number, start in enumerate(starts)
         ]
+
+
+class TextReader:
+    """Joins the chunks of texts; those that arrive out of order are left out."""
+
+    def __init__(self) -> None:
+        self._chunks: dict[int, list[str]] = {}  # of the texts that are not complete, by their number
+
+    def read(self, message: Any) -> str | None:
+        """The text that a STATUSTEXT is or completes; None: it is to be continued."""
+        text: str = message.text
+        if not message.id:
+            return text
+        chunks = self._chunks.setdefault(message.id, [])
+        if message.chunk_seq == len(chunks):
+            chunks.append(text)
+        if len(text.encode()) == CHUNK:
+            return None
+        del self._chunks[message.id]
+        return "".join(chunks)

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 from autopilot.wire.codec import FieldReader, Received
 from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import TextReader
 from gcs.clients.modes import mode_name
 
 BOOT_CLOCK = "SYSTEM_TIME"
-_TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
 
 # the beginning of an earlier text that the vehicle sends again on request: number, total, and age
 _RECALLED = re.compile(r"\[(\d+)/(\d+), (-?\d+\.\d) s ago\] (.*)", re.DOTALL)
@@ -96,7 +96,7 @@ class VehicleView:
         self.texts: list[Text] = []
         self.recalled: list[Text] = []  # earlier texts that the vehicle sent again on request
         self.recalled_all = False  # the last of these has come
-        self._chunks: dict[int, list[str]] = {}
+        self._text_reader = TextReader()
 
     def update(self, received: Received, now_us: int) -> None:
         """Process one message of the vehicle."""
@@ -110,15 +110,9 @@ class VehicleView:
             self.latest.put(received)
 
     def _text(self, message: Any, now_us: int) -> None:
-        if not message.id:
-            self._add_text(now_us, message.severity, message.text)
-            return
-        chunks = self._chunks.setdefault(message.id, [])
-        if message.chunk_seq == len(chunks):
-            chunks.append(message.text)
-        if len(message.text.encode()) < _TEXT_LENGTH:
-            self._add_text(now_us, message.severity, "".join(chunks))
-            del self._chunks[message.id]
+        text = self._text_reader.read(message)
+        if text is not None:
+            self._add_text(now_us, message.severity, text)
 
     def _add_text(self, now_us: int, severity: int, text: str) -> None:
         match = _RECALLED.fullmatch(text)
