@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from autopilot.control.drag import Drag
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
+from autopilot.geometry.wide import aligned_zeros
 
 Array = NDArray[np.float64]
 
@@ -276,11 +277,11 @@ def new_history() -> History:
     ring[:, 0] = -np.inf  # the time: long ago
     return History(
         ring,
-        np.zeros((PADDED_SIZE, PADDED_SIZE)),
-        np.zeros((1, PADDED_SIZE)),
+        aligned_zeros(PADDED_SIZE, PADDED_SIZE),
+        aligned_zeros(1, PADDED_SIZE),
         np.zeros((SCALARS, ENTRIES), np.int64),
         np.zeros((SCALARS, ENTRIES)),
-        np.zeros((SCALARS, PADDED_SIZE)),
+        aligned_zeros(SCALARS, PADDED_SIZE),
         np.zeros((SCALARS, 2)),
         np.zeros((SENSORS, 3)),
     )

@@ -6,7 +6,8 @@ a vector of eight doubles with + - *, element by element, so that machine code a
     put_wide(P, i, j, wide_at(P, i, j) + factor * wide_at(P, k, j))      # eight numbers of row i
 
 Arrays are two-dimensional, of float64, contiguous by rows. The numbers from column j to j + 7 must exist: as
-in kernels generally, nothing is checked.
+in kernels generally, nothing is checked. An array of `aligned_zeros` is faster: eight numbers are then in one
+line of the processor's cache.
 """
 
 from __future__ import annotations
@@ -46,6 +47,13 @@ class Wide:
 
     def __rmul__(self, factor: float) -> Wide:
         return Wide(tuple(factor * a for a in self.numbers))
+
+
+def aligned_zeros(rows: int, columns: int) -> Array:
+    """An array of zeros that begins at the start of a cache line."""
+    numbers = np.zeros(rows * columns + WIDTH)
+    first = -numbers.ctypes.data // numbers.itemsize % WIDTH
+    return numbers[first : first + rows * columns].reshape(rows, columns)
 
 
 def wide_at(array: Array, i: int, j: int) -> Wide:

@@ -20,6 +20,7 @@ from autopilot.estimation.records import PADDED_SIZE, RING_COLUMNS, RING_LENGTH,
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.packed import field_offset
+from autopilot.geometry.wide import aligned_zeros
 from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.flight import SweepFlight
 from sitl.world import Floats, WorldRows
@@ -34,20 +35,12 @@ _SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
 # columns of the covariance in lanes: with 32, a row would take 2 KiB, and the numbers of one column would
 # compete for few places of the processor's cache
 _COLUMNS = PADDED_SIZE + 8
-_ALIGNED = 64  # bytes
 _MEMORY, _HEAD, _RESETS = (field_offset(EstimatorState, name) for name in ("memory_s", "head", "resets"))
 _STOP_US, _MODE = field_offset(Stretch, "stop_us"), field_offset(Stretch, "mode")
 _CONTROL_MODE = field_offset(ControlMemory, "control_mode")
 
 
 Indices = NDArray[np.intp]
-
-
-def _aligned(rows: int) -> Floats:
-    """(rows, LANES) zeros that begin at the start of a cache line."""
-    block = np.zeros(rows * LANES + _ALIGNED // 8)
-    first = -block.ctypes.data // 8 % (_ALIGNED // 8)
-    return block[first : first + rows * LANES].reshape(rows, LANES)
 
 
 def _rows_of(flight: SweepFlight) -> dict[str, NDArray[Any]]:
@@ -88,9 +81,11 @@ class LaneMemory:
         end = inbox.start + READING_COLUMNS
         self._offsets = _Offsets(covariance.start, covariance.stop, end, ring_slice.start)
         self._shared = slice(shared.start, slices["shared.command_ring"].stop)
-        lanes = self._lanes = _aligned(shared.start)
-        ring = _aligned(arrays["history.ring"].size)
-        square = self._square = _aligned(PADDED_SIZE * _COLUMNS).reshape(PADDED_SIZE, _COLUMNS, LANES)
+        lanes = self._lanes = aligned_zeros(shared.start, LANES)
+        ring = aligned_zeros(arrays["history.ring"].size, LANES)
+        square = self._square = aligned_zeros(PADDED_SIZE * _COLUMNS, LANES).reshape(
+            PADDED_SIZE, _COLUMNS, LANES
+        )
         common = self._common = np.zeros(self._shared.stop - self._shared.start)
 
         def in_lanes(name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -112,7 +107,9 @@ class LaneMemory:
         lane_rows = {name: in_lanes(name, array) for name, array in arrays.items()}
         history = first.core.rows.history
         scratch = {
-            name: _aligned(getattr(history, name).size).reshape(*getattr(history, name).shape, LANES)
+            name: aligned_zeros(getattr(history, name).size, LANES).reshape(
+                *getattr(history, name).shape, LANES
+            )
             for name in _SCRATCH
         }
         history = history._replace(
