@@ -18,6 +18,7 @@ from autopilot.geometry.addresses import call_at, numbers_at
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, Mat3, Vec3
 from autopilot.geometry.packed import pack, unpack, width
+from autopilot.geometry.so3 import is_rotation
 
 # kinds of command
 WRENCH, FORCE, ATTITUDE, RATES = 0, 1, 2, 3
@@ -74,7 +75,7 @@ class Link(NamedTuple):
     """Addresses; the law does not define a mode whose function is 0."""
 
     row: int
-    alarm: int  # called if the law's command is not a number
+    alarm: int  # called if the law's command is not valid
     load_position: int
     quad_position: int
     load_attitude: int
@@ -89,10 +90,12 @@ LAW_OFFSET = COMMAND_OFFSET + width(Asked)  # from here on the row belongs to th
 
 @kernel
 def is_valid(command: Asked) -> bool:
-    """Whether the kind is a known one and all numbers are finite."""
+    """Whether the kind is a known one, all numbers are finite, and a commanded attitude is a rotation."""
     v, R = command.vector, command.attitude
     rows = R[0][0] + R[0][1] + R[0][2] + R[1][0] + R[1][1] + R[1][2] + R[2][0] + R[2][1] + R[2][2]
-    return WRENCH <= command.kind <= RATES and isfinite(command.thrust + v[0] + v[1] + v[2] + rows)
+    if not (WRENCH <= command.kind <= RATES and isfinite(command.thrust + v[0] + v[1] + v[2] + rows)):
+        return False
+    return command.kind != ATTITUDE or is_rotation(R)
 
 
 @kernel

@@ -33,7 +33,7 @@ from autopilot.estimation.records import Array, EstimatorTuning, ImuReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, dot, norm
 from autopilot.geometry.packed import unpack, width, with_field
-from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.geometry.so3 import is_rotation, rotation_from_quat
 from autopilot.vehicle.layout import MAX_ROTORS
 
 NEVER = -inf  # time of the last reading of a sensor that never sent one
@@ -256,11 +256,6 @@ def _is_number(v: Vec3) -> bool:
 
 
 @kernel
-def _is_unit(v: Vec3) -> bool:
-    return abs(dot(v, v) - 1.0) < UNIT_TOLERANCE
-
-
-@kernel
 def estimate_fault(estimate: Estimate) -> int:
     """What is wrong with a known estimate: VALID if nothing is."""
     s = estimate.state
@@ -269,13 +264,9 @@ def estimate_fault(estimate: Estimate) -> int:
     a_quad_given = not (isnan(s.a_quad[0]) and isnan(s.a_quad[1]) and isnan(s.a_quad[2]))
     if not numbers or (a_quad_given and not _is_number(s.a_quad)):
         return NOT_A_NUMBER
-    if not _is_unit(s.q_cable):
+    if not abs(dot(s.q_cable, s.q_cable) - 1.0) < UNIT_TOLERANCE:
         return NOT_A_UNIT_VECTOR
-    a, b, c = s.R
-    orthogonal = abs(dot(a, b)) + abs(dot(b, c)) + abs(dot(c, a)) < UNIT_TOLERANCE
-    if not (_is_unit(a) and _is_unit(b) and _is_unit(c) and orthogonal):
-        return NOT_A_ROTATION
-    return VALID
+    return VALID if is_rotation(s.R) else NOT_A_ROTATION
 
 
 def fault_text(estimate: Estimate, fault: int) -> str:

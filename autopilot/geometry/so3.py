@@ -12,15 +12,18 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import (
     Mat3,
     Vec3,
+    cross,
     dot,
     mul_transposed,
     norm,
     scale,
+    sub,
     trace,
 )
 
 Quat = tuple[float, float, float, float]
 IDENTITY_QUAT: Quat = (1.0, 0.0, 0.0, 0.0)
+ROTATION_TOLERANCE = 0.01
 
 
 @kernel
@@ -156,6 +159,14 @@ def psi_attitude(R: Mat3, R_d: Mat3) -> float:
 def attitude_error(R: Mat3, R_d: Mat3) -> Vec3:
     """e_R = (R_d^T R - R^T R_d)^vee / 2, (3-3): `vee` takes the skew part."""
     return vee(mul_transposed(R_d, R))
+
+
+@kernel
+def is_rotation(R: Mat3) -> bool:
+    """Whether the rows of R have length 1, are at right angles and right-handed, to ROTATION_TOLERANCE."""
+    a, b, c = R
+    error = max(abs(norm(a) - 1.0), abs(norm(b) - 1.0))
+    return error < ROTATION_TOLERANCE and norm(sub(cross(a, b), c)) < ROTATION_TOLERANCE
 
 
 @kernel

@@ -168,4 +168,8 @@ def _invalid_command_text(command: Asked) -> str:
         return f"asks for a thrust of {command.thrust} N"
     if not all(map(isfinite, command.vector)):
         return f"asks for {command.vector}"
-    return "commands an attitude that is not a number"
+    if not all(isfinite(number) for row in command.attitude for number in row):
+        return "commands an attitude that is not a number"
+    return (
+        "commands an attitude that is no rotation: its rows must be unit vectors, orthogonal and right-handed"
+    )

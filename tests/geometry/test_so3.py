@@ -193,3 +193,25 @@ def test_the_tilt_is_the_angle_of_the_third_axis(seed: int) -> None:
 
 def test_the_tilt_of_an_upright_body_is_no_nan() -> None:
     assert so3.tilt_angle(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0 + 1e-15))) == 0.0
+
+
+NO_ROTATIONS: dict[str, NDArray[np.float64]] = {
+    "longer": np.diag([1.0, 1.02, 1.0]),
+    "sheared": np.array([[1.0, 0.0, 0.02], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+    "mirrored": np.diag([1.0, 1.0, -1.0]),
+    "zero": np.zeros((3, 3)),
+    "no number": np.diag([1.0, 1.0, math.nan]),
+}
+
+
+@given(seeds)
+@many
+def test_a_rotation_is_one_to_a_hundredth(seed: int) -> None:
+    R = rotation(seed).as_matrix()
+    assert so3.is_rotation(rows(R))
+    assert so3.is_rotation(rows(R * 1.004))
+
+
+@pytest.mark.parametrize("kind", NO_ROTATIONS)
+def test_what_is_no_rotation(kind: str) -> None:
+    assert not so3.is_rotation(rows(NO_ROTATIONS[kind] @ rotation(0).as_matrix()))

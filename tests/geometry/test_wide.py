@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.wide import mirror_block, put_wide, transpose_blocks, wide_at
+from autopilot.geometry.wide import aligned_zeros, mirror_block, put_wide, transpose_blocks, wide_at
 
 SIZE = 24
 BLOCKS = [0, 8, 16]
@@ -83,3 +83,10 @@ def test_what_is_above_the_diagonal_is_written_below(i: int, j: int) -> None:
         array = numbers(2)
         function(array, i, j)
         assert array.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("columns", [8, 13, 32])
+def test_an_aligned_array_begins_at_a_cache_line_whatever_was_allocated_before(columns: int) -> None:
+    arrays = [aligned_zeros(3, columns) for _ in range(20)]
+    assert {array.ctypes.data % 64 for array in arrays} == {0}
+    assert all(array.shape == (3, columns) and not array.any() for array in arrays)

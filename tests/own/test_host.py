@@ -91,11 +91,11 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
     ),
     "sheared": (
         lambda memory, now: (memory, attitude(((1.0, 0.0, 0.1), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 1.0)),
-        "the attitude is no rotation: its rows must be of length 1, at right angles and right-handed",
+        "commands an attitude that is no rotation: its rows must be unit vectors, orthogonal",
     ),
     "mirrored": (
         lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), 1.0)),
-        "the attitude is no rotation",
+        "commands an attitude that is no rotation",
     ),
     "kind": (lambda memory, now: (memory, UPWARD._replace(kind=7)), "asks for a kind 7 that there is not"),
     "turned": (
@@ -306,6 +306,17 @@ def test_a_compiled_law_answers_as_python_would() -> None:
 def test_a_compiled_law_that_asks_for_nothing_is_told() -> None:
     with pytest.raises(OwnError, match=r"Law Compiled failed: asks for a thrust of nan N \(test_host\.py"):
         tried(Compiled)
+
+
+class Doubled(Steady):
+    @kernel
+    def load_position(self, memory: Memory, now: Now) -> tuple[Memory, Asked]:
+        return memory, attitude(((2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 2.0)), 1.0)
+
+
+def test_a_compiled_law_cannot_command_an_attitude_that_is_no_rotation() -> None:
+    with pytest.raises(OwnError, match=r"commands an attitude that is no rotation: .*\(test_host\.py"):
+        tried(Doubled)
 
 
 def law_compiled_from(method: Any) -> type:

@@ -1,7 +1,7 @@
 """The custom law: it calls a function at an address for its command (`autopilot.control.law_exchange`).
 
 The law `plumbline` flies the modes that the custom law does not define, and all modes after a command of the
-custom law was not a number. If the custom law commands a force or an attitude, the innermost loop of
+custom law was not valid. If the custom law commands a force or an attitude, the innermost loop of
 `plumbline` flies it and takes delay and lag of the rotors into account. Body rates become a moment by the
 gain k_Omega of `plumbline`, without prediction and lag compensation.
 """
@@ -101,7 +101,7 @@ def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Disturb
 
 @kernel
 def _law_command(law: OwnLaw, function: int, now: Now) -> Asked:
-    """The command of the function; if it is not a number, the alarm is raised."""
+    """The command of the function; if it is not valid, the alarm is raised."""
     law_command = call_law(function, law.link.row, now)
     if not is_valid(law_command):
         call_at(law.link.alarm, law.link.row)
