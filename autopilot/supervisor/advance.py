@@ -24,7 +24,6 @@ from autopilot.supervisor.watches.slack import watch_slack
 from autopilot.supervisor.watches.tautening import watch_tautening
 from autopilot.supervisor.watches.touchdown import watch_touchdown
 from autopilot.supervisor.watches.watch_result import Watch
-from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
 
 WATCHES: tuple[Watch, ...] = (
     watch_recovery,
@@ -53,7 +52,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         flight = result.flight
         if result.event is not None:
             flight = transition(flight, result.event, view, settings)
-            if any(severity <= MAV_SEVERITY_ERROR for severity, _ in result.texts):
+            if result.is_failsafe:
                 flight = replace(flight, is_failsafe=True)
         if result.found:
             return flight, Report(result.texts, result.reached)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Event, Flight, Text, View
+from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
 
 
 class WatchResult(NamedTuple):
@@ -25,6 +26,12 @@ class WatchResult(NamedTuple):
     def found(self) -> bool:
         """Whether there is an event or a text."""
         return self.event is not None or bool(self.texts)
+
+    @property
+    def is_failsafe(self) -> bool:
+        """Whether the event is the reaction to a failure: a text about it is an error or worse."""
+        is_failure = any(severity <= MAV_SEVERITY_ERROR for severity, _ in self.texts)
+        return self.event is not None and is_failure
 
 
 Watch = Callable[[Flight, View, Settings], WatchResult]
