@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,11 @@ from gcs.report.style import (
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Cells, Flights, cells
 
-LAW_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
+_BUILT_IN_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
+_CUSTOM_COLOURS = (PURPLE, RED, INK, GREY)
+# of the first law, the second ...: where curves coincide, the marker of a later law leaves the earlier one
+# visible
+_MARKERS = (("o", 7.0), ("s", 5.0), ("D", 3.5), ("o", 2.0))
 _MAX_NUMBERED_CELLS = 144  # cells of a map; with more, the values are not written into the cells
 _ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colour scale
 
@@ -99,18 +104,18 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
 
     with style():
         figure = new_figure(11.0, 3.7)
-        left, right = figure.subplots(1, 2)
-        for flights in laws:
+        left, right = figure.subplots(1, 2, sharex=True)
+        colours = law_colours([flights.law for flights in laws])
+        for flights, colour, (marker, size) in zip(laws, colours, cycle(_MARKERS), strict=False):
             found = cells(flights, plan, (name,))
-            colour = LAW_COLOURS.get(flights.law, PURPLE)
-            x = found.axes[0]
-            left.plot(x, 100.0 * found.success, "o-", color=colour, markersize=4, label=flights.law)
-            right.plot(x, 1e3 * found.error_median_m, "o-", color=colour, markersize=4)
+            x, line = found.axes[0], {"color": colour, "marker": marker, "markersize": size}
+            left.plot(x, 100.0 * found.success, label=flights.law, **line)
+            right.plot(x, 1e3 * found.error_median_m, **line)
             right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0)
         right.plot([], [], "o-", color=GREY, markersize=4, label="median")
         right.plot([], [], "--", color=GREY, linewidth=1.0, label="worst")
         left.set_ylim(-4.0, 104.0)
-        left.set_title("flights completed (%)")
+        left.set_title("completed (%)")
         right.set_title("greatest load error (mm)")
         right.set_yscale("log")
         right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -121,6 +126,12 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
             draw_legend(ax)
         figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
         save(figure, path)
+
+
+def law_colours(laws: list[str]) -> list[str]:
+    """A colour for each law: custom laws take those that no built-in law has, in turn."""
+    custom = cycle(_CUSTOM_COLOURS)
+    return [_BUILT_IN_COLOURS[law] if law in _BUILT_IN_COLOURS else next(custom) for law in laws]
 
 
 def _label(name: str, units: dict[str, str]) -> str:
