@@ -121,7 +121,8 @@ def averaged_missing_pull(
             return 0.0
     elif load.taut == 0.0:
         if norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length:
-            return before
+            # a gust is over: what it made of the pull is not missing when the cable begins to pull
+            return max(before, -max(load.pull, 0.0))
         return min(before - dt / MISSING_PULL_TIME_S * (load.pull + before), 0.0)
     elif load.tautness_age_s <= LIFTING_S:
         return before
