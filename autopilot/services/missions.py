@@ -22,7 +22,6 @@ Fence and rally points are transferred in the same way, one transfer at a time o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -42,7 +41,7 @@ from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.fence import AREA_READERS
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
@@ -57,11 +56,12 @@ LATE_ITEM_US = 5_000_000  # a last item repeated within this time after the end 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _ALL = mavlink.MAV_MISSION_TYPE_ALL
 _AREAS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
-_ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
-_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
-    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
-    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
+_NOUNS = {
+    _MISSION: "Mission item",
+    mavlink.MAV_MISSION_TYPE_FENCE: "Fence item",
+    mavlink.MAV_MISSION_TYPE_RALLY: "Rally point",
 }
+_ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
 
 _NO_COORDINATE = 2**31 - 1
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to fly to immediately
@@ -232,7 +232,7 @@ class MissionService:
             return [self._item_request()]
         if item is None:
             self._end_upload(mavlink.MAV_MISSION_INVALID_PARAM5_X, now_us)
-            why = f"Mission item {expected}: x or y is no coordinate"
+            why = f"{_NOUNS[upload.kind]} {expected}: x or y is no coordinate"
             return [
                 SendText(mavlink.MAV_SEVERITY_WARNING, why),
                 _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X, upload.kind),
@@ -262,7 +262,7 @@ class MissionService:
             items = (*self._home_items, *items[1:])
         try:
             if kind in _AREAS:
-                _READERS[kind](items, self.home)
+                AREA_READERS[kind](items, self.home)
                 self._end_upload(_ACCEPTED, now_us)
                 cleared = RefusalCleared(_upload_of(kind))
                 return [cleared, *self._replace_area(kind, items), self._accepting_ack(upload.peer, kind)]

@@ -40,10 +40,10 @@ class LocatedStep(NamedTuple):
 
 
 class MissionItemError(ValueError):
-    """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with."""
+    """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with, `noun` names the item."""
 
-    def __init__(self, seq: int, text: str, result: int) -> None:
-        super().__init__(f"mission item {seq}: {text}")
+    def __init__(self, seq: int, text: str, result: int, noun: str = "mission item") -> None:
+        super().__init__(f"{noun} {seq}: {text}")
         self.seq = seq
         self.text = text
         self.result = result
