@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import hypot
 
 from autopilot.geometry.linear import Vec3
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import MissionItemError, WireItem
@@ -156,7 +157,7 @@ def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
         elif item.command == _RETURN:
             fence_items.east_north(seq, item)
         else:
-            text = f"command {item.command} is no part of a fence"
+            text = f"{numbered_name(item.command)} is no part of a fence"
             raise fence_items.error(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
     if corners:
         text = f"the last polygon has {expected} corners, and {len(corners)} came"
@@ -170,7 +171,7 @@ def read_rally(items: Sequence[WireItem], home: Home) -> tuple[Vec3, ...]:
     places: list[Vec3] = []
     for seq, item in enumerate(items):
         if item.command != mavlink.MAV_CMD_NAV_RALLY_POINT:
-            text = f"command {item.command} is no rally point"
+            text = f"{numbered_name(item.command)} is no rally point"
             raise rally_points.error(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
         east, north = rally_points.east_north(seq, item)
         places.append((east, north, 0.0))

@@ -147,7 +147,7 @@ def test_a_polygon_may_have_any_shape_that_does_not_meet_itself(corners):
         ({"x": 0, "y": 0}, m.MAV_MISSION_INVALID_PARAM5_X, "no place is given: latitude and longitude are 0"),
         ({"x": LAT + 10_000_000}, m.MAV_MISSION_INVALID_PARAM5_X, "111 km from home; must be at most 100 km"),
         ({"y": LON - 20_000_000}, m.MAV_MISSION_INVALID_PARAM6_Y, "151 km from home; must be at most 100 km"),
-        ({"command": 16}, m.MAV_MISSION_UNSUPPORTED, "command 16 is no rally point"),
+        ({"command": 16}, m.MAV_MISSION_UNSUPPORTED, "NAV_WAYPOINT (16) is no rally point"),
     ],
 )
 def test_a_rally_point_out_of_reach_is_refused_and_named(rig, as_message, as_item, wrong, result, why):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import HeadingCommand, Step
 
@@ -51,5 +52,6 @@ class MissionItemError(ValueError):
 
 def wrong_frame(seq: int, item: WireItem, allowed: tuple[int, ...]) -> MissionItemError:
     """The error for an item whose frame is not allowed."""
-    text = f"frame {item.frame}; must be {' or '.join(map(str, sorted(allowed)))} for command {item.command}"
+    frames = " or ".join(map(str, sorted(allowed)))
+    text = f"frame {item.frame}; must be {frames} for {numbered_name(item.command)}"
     return MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
