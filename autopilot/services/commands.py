@@ -150,14 +150,14 @@ def _mode_of_pair(main: int, sub: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode(main, sub)
     if mode is None:
         return _refused(context.flavour.mode_refusal(f"Mode {main}/{sub} unknown"))
-    return _supported_mode(mode, SetMode(mode.main, mode.sub), context)
+    return _supported_mode(mode, SetMode(mode.main, mode.sub, None, mode.name), context)
 
 
 def _mode_of_number(number: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode_of_number(number)
     if mode is None:
         return _refused(context.flavour.mode_refusal(f"Mode {number} unknown"))
-    return _supported_mode(mode, SetMode(mode.main, mode.sub, number), context)
+    return _supported_mode(mode, SetMode(mode.main, mode.sub, number, mode.name), context)
 
 
 def _supported_mode(mode: Mode, request: SetMode, context: Context) -> Request | Verdict:
@@ -183,7 +183,7 @@ def _set_standard_mode(call: Call, context: Context) -> Request | Verdict:
     mode = None if standard is None else context.flavour.mode_of_standard(standard)
     if mode is None:
         return Verdict(UNSUPPORTED, f"Set mode: no mode flown is standard mode {call.p[0]:g}")
-    return SetMode(mode.main, mode.sub, mode.custom_mode)
+    return SetMode(mode.main, mode.sub, mode.custom_mode, mode.name)
 
 
 def _start_mission(call: Call, context: Context) -> Request | Verdict:

@@ -62,6 +62,7 @@ class SetMode:
     main: int
     sub: int
     number: int | None = field(default=None, compare=False)  # by which it was requested
+    name: str = field(default="", compare=False)  # of the flavour, for texts
 
 
 @dataclass(frozen=True, slots=True)

@@ -377,6 +377,21 @@ def test_a_mode_that_is_not_flown_is_refused_by_its_name_with_those_that_are(rig
     assert len(text) <= 50 and rig.asked == []
 
 
+@pytest.mark.parametrize(
+    ("flavour", "ask", "name"),
+    [
+        (ARDUPILOT, mavlink.MAVLink_set_mode_message(1, 1, 16), "POSHOLD"),
+        (ARDUPILOT, long(176, (1, 16, 0, 0, 0, 0, 0)), "POSHOLD"),
+        (PX4, long(176, (1, 3, 0, 0, 0, 0, 0)), "POSCTL"),
+        (ARDUPILOT, long(262, (mavlink.MAV_STANDARD_MODE_POSITION_HOLD, 0, 0, 0, 0, 0, 0)), "POSHOLD"),
+    ],
+)
+def test_the_supervisor_knows_the_name_of_the_requested_mode(rig_with, flavour, ask, name):
+    rig = rig_with(identity=Identity(flavour=flavour))
+    rig.replies(ask)
+    assert [request.name for request in rig.asked] == [name]
+
+
 def test_set_current_message_is_answered_by_mission_current(rig):
     rig.changes = {"mission_current": 5, "mission_total": 9, "mission_state": 3}
     rig.poll()

@@ -19,6 +19,7 @@ from autopilot.guidance.setpoint_follower import (
 )
 from autopilot.onboard.snapshot import reported_mode
 from autopilot.services import identity
+from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     Arm,
     FollowAttitude,
@@ -162,7 +163,9 @@ def test_commands_take_over(request_: Any, phase: Phase) -> None:
 
 def test_the_stick_leads_and_is_lost() -> None:
     sky = Sky().airborne()
-    assert sky.ask(POSCTL).result == LATER
+    assert sky.ask(POSCTL) == Verdict(LATER, "POSCTL denied: no MANUAL_CONTROL received")
+    poshold = SetMode(identity.POSCTL, 0, 16, "POSHOLD")
+    assert sky.ask(poshold) == Verdict(LATER, "POSHOLD denied: no MANUAL_CONTROL received")
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 0.1)
     assert sky.ask(POSCTL).result == ACCEPTED
     assert reported_mode(sky.flight) == (identity.POSCTL, 0)

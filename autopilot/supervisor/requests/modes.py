@@ -93,7 +93,9 @@ def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -
         sub_mode = identity.AUTO_MISSION
     handler = MODES.get((main, sub_mode))
     if handler is None:
-        return flight, denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
+        return flight, denied(
+            f"{request.name or f'Mode {main}/{sub_mode}'} denied: not flown by this vehicle"
+        )
     accepts_setpoints = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
     if (
         settings.setpoints.ardupilot_guided
