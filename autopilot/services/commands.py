@@ -64,7 +64,19 @@ REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
+_SPEED_UNCHANGED = (0.0, -1.0)  # of DO_REPOSITION
 _NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0  # of a speed
+# ORBIT_YAW_BEHAVIOUR: the nose points to the centre (True), keeps its heading (False), or does as before
+_ORBIT_YAWS: dict[float, bool | None] = {
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER: True,
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_INITIAL_HEADING: False,
+    mavlink.ORBIT_YAW_BEHAVIOUR_UNCONTROLLED: None,
+    mavlink.ORBIT_YAW_BEHAVIOUR_UNCHANGED: None,
+}
+_ORBIT_YAWS_NOT_OFFERED = (
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TANGENT_TO_CIRCLE,
+    mavlink.ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED,
+)
 _NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -213,13 +225,15 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
     if position is None:
         return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
     east, north, up = (None if math.isnan(value) else value for value in position)
+    speed = None if call.p[0] in _SPEED_UNCHANGED or math.isnan(call.p[0]) else call.p[0]
+    if speed is not None and not 0.0 < speed < math.inf:
+        return _refused(f"Reposition: speed (param1) = {speed:g} m/s; must be > 0, or 0 or -1 (unchanged)")
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
         return Pause()  # ground stations send this for "hold here"
     flags = _as_integer(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-    speed_m_s = call.p[0] if call.p[0] > 0.0 else None
-    return Reposition(east, north, up, change_mode, speed_m_s, yaw)
+    return Reposition(east, north, up, change_mode, speed, yaw)
 
 
 def _yaw(call: Call, context: Context) -> float | None:
@@ -237,9 +251,15 @@ def _orbit(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Orbit: param1 = {call.p[0]:g} m; must be a radius")
     if math.isinf(call.p[1]):
         return _refused("Orbit: param2 must be a speed")
+    behaviour = call.p[2]
+    if behaviour in _ORBIT_YAWS_NOT_OFFERED:
+        text = f"Orbit: yaw behaviour (param3) {behaviour:g} is not offered; 0 (nose to the centre), "
+        return Verdict(UNSUPPORTED, f"{text}1 (heading kept), 2 and 5 (as before) are")
+    if behaviour not in _ORBIT_YAWS and not math.isnan(behaviour):
+        return _refused(f"Orbit: yaw behaviour (param3) = {behaviour:g}; must be 0, 1, 2 or 5")
     east, north, up = (None if math.isnan(value) else value for value in position)
     speed = None if math.isnan(call.p[1]) else call.p[1]
-    return Orbit(call.p[0], speed, east, north, up)
+    return Orbit(call.p[0], speed, east, north, up, faces_centre=_ORBIT_YAWS.get(behaviour))
 
 
 def _change_altitude(call: Call, context: Context) -> Request | Verdict:
@@ -265,7 +285,7 @@ def _loiter_turns(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Loiter: param1 = {call.p[0]:g} turns; must be > 0")
     if call.x == 0.0 and call.y == 0.0:
         call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
-    orbit = _orbit(call._replace(p=(call.p[2], math.nan, 0.0, 0.0)), context)
+    orbit = _orbit(call._replace(p=(call.p[2], math.nan, math.nan, 0.0)), context)
     return replace(orbit, turns=call.p[0]) if isinstance(orbit, Orbit) else orbit
 
 

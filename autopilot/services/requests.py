@@ -156,7 +156,8 @@ class FollowStick:
 @dataclass(frozen=True, slots=True)
 class Orbit:
     """Fly the load round a circle; None: here, at this height, at the speed of transfers. The direction is
-    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise."""
+    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise. The nose
+    points to the centre (`faces_centre`), keeps its present heading (False), or does as before (None)."""
 
     radius_m: float
     speed_m_s: float | None
@@ -164,6 +165,7 @@ class Orbit:
     north_m: float | None
     altitude_m: float | None
     turns: float | None = None  # after which the load is held; None: for ever
+    faces_centre: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

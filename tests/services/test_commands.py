@@ -92,7 +92,22 @@ LONG = [
     (192, (-1, 1, 0, NAN, 200, 0, 5), None, DENIED),
     (192, (-1, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
     (192, (-1, 0, 0, NAN, NAN, NAN, math.inf), None, DENIED),
-    (34, (2, 1, 0, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None), OK),
+    (192, (0, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
+    (192, (NAN, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
+    (192, (2, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True, 2.0), OK),
+    (192, (-2, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
+    (192, (-0.5, 1, 0, NAN, NAN, NAN, NAN), None, DENIED),
+    (192, (math.inf, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
+    (34, (2, 1, 0, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=True), OK),
+    (34, (2, 1, 1, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=False), OK),
+    *[
+        (34, (2, 1, as_before, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None), OK)
+        for as_before in (2, 5, NAN)
+    ],
+    (34, (2, 1, 3, 0, NAN, NAN, NAN), None, UNSUPPORTED),  # along the path
+    (34, (2, 1, 4, 0, NAN, NAN, NAN), None, UNSUPPORTED),  # by a remote control
+    (34, (2, 1, 6, 0, NAN, NAN, NAN), None, DENIED),
+    (34, (2, 1, 0.5, 0, NAN, NAN, NAN), None, DENIED),
     (34, (NAN, 1, 0, 0, NAN, NAN, NAN), None, DENIED),
     (186, (4, 3), ChangeAltitude(4.0), OK),
     (186, (NAN, 3), None, DENIED),
