@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -253,6 +254,20 @@ def test_command_long(rig_with, items, command, params, request_, result):
     replies = rig.replies(long(command, params))
     assert acks(replies) == [(command, result)]
     assert rig.asked == ([] if request_ is None else [request_])
+
+
+@pytest.mark.parametrize(
+    ("command", "params"),
+    [(c, p) for c, p, request_, result in LONG if request_ is None and result == DENIED and c != 512],
+    ids=lambda value: str(value)[:40],
+)
+def test_the_text_of_a_refusal_names_the_parameter_that_is_wrong(rig, command, params):
+    texts = [r for r in rig.replies(long(command, params)) if r.get_type() == "STATUSTEXT"]
+    text = "".join(part.text for part in texts)
+    assert text
+    for number in re.finditer(r"param\d", text):
+        # "speed (param1) = -2 m/s", or "latitude ... (param5 ... param7)"
+        assert re.search(r"\w \((param\d \.\.\. )?$", text[: number.start()]), text
 
 
 @pytest.mark.parametrize(

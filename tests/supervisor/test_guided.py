@@ -223,7 +223,7 @@ def test_the_nose_points_to_the_centre_of_a_circle_or_stays() -> None:
 def test_a_speed_that_cannot_be_flown_refuses_a_reposition(speed: float) -> None:
     sky = Sky().airborne()
     verdict = sky.ask(Reposition(3.0, 0.0, 2.0, True, speed))
-    assert verdict == Verdict(DENIED, f"Reposition denied: {speed:.2f} m/s; must be 0.05 ... 15")
+    assert verdict == Verdict(DENIED, f"Reposition denied: speed {speed:.2f} m/s; must be 0.05 ... 15 m/s")
     assert sky.flight.phase == Phase.HOLD
 
 

@@ -67,7 +67,7 @@ def _circle_problem(flight: Flight, centre: Vec3, radius: float, speed: float, s
         return f"load height {centre[2]:.2f} m, min {MIN_ALTITUDE_M} m"
     if not MIN_CIRCLE_SPEED_M_S <= abs(speed) <= settings.setpoints.max_speed_m_s:
         limits = f"{MIN_CIRCLE_SPEED_M_S:g} ... {settings.setpoints.max_speed_m_s:g} m/s"
-        return f"{speed:.2f} m/s; must be {limits}"
+        return f"speed {speed:.2f} m/s; must be {limits}"
     centripetal = speed * speed / radius
     if centripetal > settings.motion.accel_m_s2:
         return f"{centripetal:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.motion.accel_m_s2:g}"
