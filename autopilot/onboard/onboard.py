@@ -65,6 +65,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import (
     MOTION_REQUESTS,
     ChangeSigningKey,
+    ChangeVehicle,
     Reboot,
     ResetParameters,
     SetHome,
@@ -694,6 +695,11 @@ class Onboard:
         if isinstance(request, ChangeSigningKey):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, ChangeVehicle):
+            if self.armed:
+                text = f"{request.parameter} not set while armed: disarm first"
+                return Verdict(mavlink.MAV_RESULT_DENIED, text)
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(request, ResetParameters):
             if self.armed:

@@ -28,6 +28,7 @@ from autopilot.services.records import (
     SimulatorParameterRequested,
     SimulatorParametersSaved,
 )
+from autopilot.services.requests import ChangeVehicle
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import Layout
 from autopilot.wire.dialect import plumbline as mavlink
@@ -112,6 +113,10 @@ class ParameterService:
                     name, COMPONENT_NOT_FOUND, f"{name} not set: the simulator is silent", peer
                 )
             return [SimulatorParameterRequested(name, value)]
+        if self.table.describe(name).disarmed and value != before:
+            verdict = decide(ChangeVehicle(name))
+            if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+                return self._refused(name, READ_ONLY, verdict.text or f"{name} not set", peer)
         try:
             after = self.table.set(name, value)
         except ParameterError as error:  # in range, but fixed while running

@@ -287,6 +287,13 @@ class RequestCapabilities:
 
 
 @dataclass(frozen=True, slots=True)
+class ChangeVehicle:
+    """Change a parameter that describes a part of the vehicle which does not change in flight."""
+
+    parameter: str
+
+
+@dataclass(frozen=True, slots=True)
 class ChangeSigningKey:
     """Change or remove the key for signed messages; only the signing service knows the new key."""
 
@@ -321,6 +328,7 @@ SupervisorRequest = (
     | RunPrearmChecks
     | Reboot
     | ResetParameters
+    | ChangeVehicle
     | ChangeSigningKey
 )
 EndpointRequest = (
