@@ -20,7 +20,7 @@ from missions.toml_files import format_value
 
 
 class Reference(NamedTuple):
-    """The file of the vehicle that the autopilot assumes, and the place with which messages about it begin."""
+    """The file of the vehicle that the autopilot assumes, and how messages about it begin."""
 
     table: dict[str, Any]
     where: str

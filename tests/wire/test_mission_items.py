@@ -208,7 +208,24 @@ REFUSALS = [
     ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
     ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),
     ([item(211, 1.0, 0.0), item(21, frame=6, x=473977420, y=85455940)], 1, "INVALID", "put a waypoint"),
-    ([item(42600, 1.0, 1.0, 0.5)], 0, "INVALID", "the load's height is not known there"),
+    (
+        [item(42600, 1.0, 1.0, 0.5)],
+        0,
+        "INVALID",
+        "height is not given by any item before it; a waypoint first",
+    ),
+    (
+        [UP, item(31013, 1.0, 0.1, x=1000), item(42600, 1.0, 1.0, 0.5)],
+        2,
+        "INVALID",
+        "height is not known after an attitude run;",
+    ),
+    (
+        [UP, TERM, RUN._replace(x=250), item(42600, 1.0, 1.0, 0.5)],  # cut off in the rise
+        3,
+        "INVALID",
+        "height is not known after signals that end in motion;",
+    ),
     ([UP, item(42600, 3.0, 1.0, 0.5)], 1, "INVALID_PARAM1", "winch = 3"),
     ([UP, item(42600, 1.0, 2.0, 0.5)], 1, "INVALID_PARAM2", "winch action = 2; must be one of 1 length"),
     ([UP, item(42600, 1.0, 1.0, math.nan)], 1, "INVALID_PARAM3", "length = nan m"),

@@ -188,7 +188,8 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_DO_WINCH,
         "the cable gets longer, or shorter for a negative length, where the load hangs. "
-        "Refused where the load's height is not known, as right behind an attitude run: a waypoint first",
+        "Refused where the load's height is not known, as right behind an attitude run or signals that end "
+        "in motion: a waypoint first",
         (
             Choice(1, "winch", "winch", _INSTANCE),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
