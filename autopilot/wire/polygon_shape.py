@@ -50,20 +50,27 @@ def _width_m(places: Any) -> float:
 def _meeting_sides(places: Any) -> tuple[int, int] | None:
     """The first two sides that have a point in common and are not neighbours; side i begins at place i."""
     starts, ends = places, np.roll(places, -1, axis=0)
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    west, south = np.ascontiguousarray(np.minimum(starts, ends).T)
+    east, north = np.ascontiguousarray(np.maximum(starts, ends).T)
     last = len(places) - 1
     for i in range(last - 1):
-        # one row of pairs at a time: all pairs of 2000 sides at once would need a quarter of a gigabyte
-        others = slice(i + 2, last if i == 0 else last + 1)
-        near = np.all((low[others] <= high[i]) & (high[others] >= low[i]), axis=1)
-        if not near.any():
+        # the last side is a neighbour of the first
+        to = last if i == 0 else last + 1
+        near = (
+            (west[i + 2 : to] <= east[i])
+            & (east[i + 2 : to] >= west[i])
+            & (south[i + 2 : to] <= north[i])
+            & (north[i + 2 : to] >= south[i])
+        )
+        others = i + 2 + np.flatnonzero(near)
+        if not others.size:
             continue
         here, there = ends[i] - starts[i], ends[others] - starts[others]
         across = _cross(here, starts[others] - starts[i]) * _cross(here, ends[others] - starts[i])
         along = _cross(there, starts[i] - starts[others]) * _cross(there, ends[i] - starts[others])
-        meeting = np.flatnonzero(near & (across <= 0.0) & (along <= 0.0))
+        meeting = others[(across <= 0.0) & (along <= 0.0)]
         if meeting.size:
-            return i, i + 2 + int(meeting[0])
+            return i, int(meeting[0])
     return None
 
 
