@@ -1,7 +1,8 @@
 """The SIM_* parameters on the simulator link: listed and set by the autopilot, which shows them as its own.
 
 The parameter protocol in its simplest form: PARAM_REQUEST_LIST and PARAM_SET arrive with the answer to a
-tick, PARAM_VALUE is sent with the sensors, a few with each tick.
+tick, PARAM_VALUE is sent with the sensors, a few with each tick. Before the value that stays in force where
+another one was refused come a STATUSTEXT and PARAM_ERROR.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, decimal_from_float32
 from autopilot.wire.statustext import TextWriter
+from sitl.messages import VEHICLE_SYSTEM
 
 VALUES_PER_TICK = 4
 
@@ -59,8 +61,20 @@ class ParameterServer:
             self.table.set(name, value)
         except ParameterError as error:
             self.send_text(str(error))
+            self._outgoing.append(self._error(name, value))
         self._outgoing.append(self._value(name))
         return self.table[name] != previous
+
+    def _error(self, name: str, value: float) -> Any:
+        """PARAM_ERROR for a value that was refused: out of range, or fixed while the simulator runs."""
+        error = mavlink.MAV_PARAM_ERROR_READ_ONLY
+        try:
+            self.table.describe(name).checked(value)
+        except ParameterError:
+            error = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+        return mavlink.MAVLink_param_error_message(
+            VEHICLE_SYSTEM, mavlink.MAV_COMP_ID_AUTOPILOT1, name.encode(), self.table.index(name), error
+        )
 
     def _value(self, name: str) -> Any:
         return mavlink.MAVLink_param_value_message(

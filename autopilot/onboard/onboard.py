@@ -65,6 +65,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import (
     MOTION_REQUESTS,
     ChangeSigningKey,
+    ChangeVehicle,
     Reboot,
     ResetParameters,
     SetHome,
@@ -507,6 +508,11 @@ class Onboard:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
             self._snapshot_source.measured = MeasuredBattery(self.now_us, read_battery_status(message))
             return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_PARAM_ERROR:
+            client = self._simulator_parameters.client_of(message.param_id)
+            if client is not None:
+                self.endpoint.refuse_simulator_parameter(message.param_id, message.error, client)
+            return
         name = self._simulator_parameters.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
@@ -615,8 +621,8 @@ class Onboard:
                     self._set_plan(mission)
                 case AreasChanged(kind, items):
                     self.set_areas(kind, items)
-                case SimulatorParameterRequested(name, value):
-                    self._simulator_parameters.request(name, value)
+                case SimulatorParameterRequested(name, value, client):
+                    self._simulator_parameters.request(name, value, client)
                 case SimulatorParametersSaved(values) if (
                     values
                 ):  # with values that the simulator has not confirmed yet
@@ -694,6 +700,11 @@ class Onboard:
         if isinstance(request, ChangeSigningKey):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, ChangeVehicle):
+            if self.armed:
+                text = f"{request.parameter} not set while armed: disarm first"
+                return Verdict(mavlink.MAV_RESULT_DENIED, text)
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(request, ResetParameters):
             if self.armed:

@@ -1,9 +1,10 @@
 """The simulator's SIM_* parameters, shown to ground stations as if they belonged to the autopilot.
 
 They are learned over the simulator link once it is up. A ground station's PARAM_SET is passed on to the
-simulator; the value that it then reports is in force, and is the answer. These parameters describe a world,
-not the autopilot, and are stored only if PREFLIGHT_STORAGE requests it; then they are set again in every
-simulator that connects.
+simulator; the value that it then reports is in force, and is the answer. If it refuses a value, PARAM_ERROR
+comes before the value in force, and is handed on to the client that sent the refused one. These parameters
+describe a world, not the autopilot, and are stored only if PREFLIGHT_STORAGE requests it; then they are set
+again in every simulator that connects.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from autopilot.services.records import Peer
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_from_float32
 
@@ -31,10 +33,18 @@ class SimulatorParameters:
         self._next_list_request_us = 0
         self._restored: Mapping[str, float] = {}
         self._pending: dict[str, tuple[float, int]] = {}  # value, and when it is next sent
+        self._clients: dict[str, Peer] = {}  # who requested the pending values
 
-    def request(self, name: str, value: float) -> None:
-        """Set a parameter in the simulator."""
+    def request(self, name: str, value: float, client: Peer | None = None) -> None:
+        """Set a parameter in the simulator, for a client or for the vehicle itself."""
         self._pending[name] = (value, 0)
+        self._clients.pop(name, None)
+        if client is not None:
+            self._clients[name] = client
+
+    def client_of(self, name: str) -> Peer | None:
+        """The client whose value of this parameter is still to be answered."""
+        return self._clients.get(name)
 
     @property
     def unanswered(self) -> dict[str, float]:
@@ -46,6 +56,7 @@ class SimulatorParameters:
         restored are kept."""
         pending = self._pending.items()
         self._pending = {name: due for name, due in pending if self._restored.get(name) == due[0]}
+        self._clients.clear()
 
     def restore(self, values: Mapping[str, float]) -> None:
         """Set these values in the simulator as soon as it has reported that it has these parameters."""
@@ -61,6 +72,7 @@ class SimulatorParameters:
         self._received.add(name)
         self._complete = len(self._received) >= message.param_count
         was_requested = self._pending.pop(name, None) is not None
+        self._clients.pop(name, None)
         if name in self._table.remote_names:
             new = self._table[name] != value
             if new:

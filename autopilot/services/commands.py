@@ -64,7 +64,20 @@ REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
+_SPEED_UNCHANGED = (0.0, -1.0)  # of DO_REPOSITION
+_WINCH_ACTIONS = "1 (by a length), 2 (at a rate), 5 (hold) and 6 (retract) are"
 _NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0  # of a speed
+# ORBIT_YAW_BEHAVIOUR: the nose points to the centre (True), keeps its heading (False), or does as before
+_ORBIT_YAWS: dict[float, bool | None] = {
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER: True,
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_INITIAL_HEADING: False,
+    mavlink.ORBIT_YAW_BEHAVIOUR_UNCONTROLLED: None,
+    mavlink.ORBIT_YAW_BEHAVIOUR_UNCHANGED: None,
+}
+_ORBIT_YAWS_NOT_OFFERED = (
+    mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TANGENT_TO_CIRCLE,
+    mavlink.ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED,
+)
 _NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -134,7 +147,7 @@ def _position_enu(call: Call, context: Context) -> Vec3 | None:
 
 def _arm(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] not in (0.0, 1.0):
-        return _refused(f"Arm: param1 = {call.p[0]:g}; must be 1 (arm) or 0 (disarm)")
+        return _refused(f"Arm: action (param1) = {call.p[0]:g}; must be 1 (arm) or 0 (disarm)")
     return Arm(arm=call.p[0] == 1.0, force=call.p[1] in FORCE_ARM)
 
 
@@ -150,14 +163,14 @@ def _mode_of_pair(main: int, sub: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode(main, sub)
     if mode is None:
         return _refused(context.flavour.mode_refusal(f"Mode {main}/{sub} unknown"))
-    return _supported_mode(mode, SetMode(mode.main, mode.sub), context)
+    return _supported_mode(mode, SetMode(mode.main, mode.sub, None, mode.name), context)
 
 
 def _mode_of_number(number: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode_of_number(number)
     if mode is None:
         return _refused(context.flavour.mode_refusal(f"Mode {number} unknown"))
-    return _supported_mode(mode, SetMode(mode.main, mode.sub, number), context)
+    return _supported_mode(mode, SetMode(mode.main, mode.sub, number, mode.name), context)
 
 
 def _supported_mode(mode: Mode, request: SetMode, context: Context) -> Request | Verdict:
@@ -170,9 +183,11 @@ def _set_mode(call: Call, context: Context) -> Request | Verdict:
     flags, number = _as_integer(call.p[0]), _as_integer(call.p[1])
     sub = 0 if math.isnan(call.p[2]) else _as_integer(call.p[2])
     if flags is None or number is None or sub is None or number < 0:
-        return _refused("Set mode: param1 ... param3 must be whole numbers")
+        return _refused("Set mode: flags, main mode and sub-mode (param1 ... param3) must be whole numbers")
     if not flags & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        return Verdict(UNSUPPORTED, "Set mode: only custom modes are known (param1 must have bit 0)")
+        return Verdict(
+            UNSUPPORTED, "Set mode: only custom modes are known; the flags (param1) must have bit 0"
+        )
     if number <= _MODE_BYTE and context.flavour.modes_are_packed:
         return _mode_of_pair(number, sub, context)
     return _mode_of_number(number, context)
@@ -182,8 +197,8 @@ def _set_standard_mode(call: Call, context: Context) -> Request | Verdict:
     standard = _as_integer(call.p[0])
     mode = None if standard is None else context.flavour.mode_of_standard(standard)
     if mode is None:
-        return Verdict(UNSUPPORTED, f"Set mode: no mode flown is standard mode {call.p[0]:g}")
-    return SetMode(mode.main, mode.sub, mode.custom_mode)
+        return Verdict(UNSUPPORTED, f"Set mode: standard mode (param1) {call.p[0]:g} is none of those flown")
+    return SetMode(mode.main, mode.sub, mode.custom_mode, mode.name)
 
 
 def _start_mission(call: Call, context: Context) -> Request | Verdict:
@@ -191,20 +206,20 @@ def _start_mission(call: Call, context: Context) -> Request | Verdict:
         return StartMission(None)
     first = _as_integer(call.p[0])
     if first is None or first < 0:
-        return _refused(f"Mission start: param1 = {call.p[0]:g}; must be an item number")
+        return _refused(f"Mission start: first item (param1) = {call.p[0]:g}; must be an item number")
     return StartMission(first)
 
 
 def _pause_continue(call: Call, context: Context) -> Request | Verdict:
     choice: dict[float, Request] = {0.0: Pause(), 1.0: Continue()}
     request = choice.get(call.p[0])
-    return request or _refused(f"Pause: param1 = {call.p[0]:g}; must be 0 (pause) or 1 (continue)")
+    return request or _refused(f"Pause: action (param1) = {call.p[0]:g}; must be 0 (pause) or 1 (continue)")
 
 
 def _set_current(call: Call, context: Context) -> Request | Verdict:
     seq = _as_integer(call.p[0])
     if seq is None or seq < 0:
-        return _refused(f"Set current item: param1 = {call.p[0]:g}; must be an item number")
+        return _refused(f"Set current item: item (param1) = {call.p[0]:g}; must be an item number")
     return SetCurrent(seq)
 
 
@@ -213,13 +228,15 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
     if position is None:
         return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
     east, north, up = (None if math.isnan(value) else value for value in position)
+    speed = None if call.p[0] in _SPEED_UNCHANGED or math.isnan(call.p[0]) else call.p[0]
+    if speed is not None and not 0.0 < speed < math.inf:
+        return _refused(f"Reposition: speed (param1) = {speed:g} m/s; must be > 0, or 0 or -1 (unchanged)")
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
         return Pause()  # ground stations send this for "hold here"
     flags = _as_integer(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-    speed_m_s = call.p[0] if call.p[0] > 0.0 else None
-    return Reposition(east, north, up, change_mode, speed_m_s, yaw)
+    return Reposition(east, north, up, change_mode, speed, yaw)
 
 
 def _yaw(call: Call, context: Context) -> float | None:
@@ -234,18 +251,27 @@ def _orbit(call: Call, context: Context) -> Request | Verdict:
     if position is None:
         return _refused("Orbit: no such place; must be latitude and longitude of a global frame")
     if not math.isfinite(call.p[0]) or call.p[0] == 0.0:
-        return _refused(f"Orbit: param1 = {call.p[0]:g} m; must be a radius")
+        return _refused(f"Orbit: radius (param1) = {call.p[0]:g} m; must not be 0")
     if math.isinf(call.p[1]):
-        return _refused("Orbit: param2 must be a speed")
+        return _refused(f"Orbit: speed (param2) = {call.p[1]:g} m/s; must be finite")
+    behaviour = call.p[2]
+    if behaviour in _ORBIT_YAWS_NOT_OFFERED:
+        text = f"Orbit: yaw behaviour (param3) {behaviour:g} is not offered; 0 (nose to the centre), "
+        return Verdict(UNSUPPORTED, f"{text}1 (heading kept), 2 and 5 (as before) are")
+    if behaviour not in _ORBIT_YAWS and not math.isnan(behaviour):
+        return _refused(f"Orbit: yaw behaviour (param3) = {behaviour:g}; must be 0, 1, 2 or 5")
     east, north, up = (None if math.isnan(value) else value for value in position)
     speed = None if math.isnan(call.p[1]) else call.p[1]
-    return Orbit(call.p[0], speed, east, north, up)
+    return Orbit(call.p[0], speed, east, north, up, faces_centre=_ORBIT_YAWS.get(behaviour))
 
 
 def _change_altitude(call: Call, context: Context) -> Request | Verdict:
     frame = _as_integer(call.p[1])
     if not math.isfinite(call.p[0]) or frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
-        return _refused("Change altitude: param1 must be m, param2 a global frame")
+        return _refused(
+            f"Change altitude: height (param1) = {call.p[0]:g} m in frame (param2) {call.p[1]:g}; "
+            "must be a number, in one of the frames 0, 3, 5, 6"
+        )
     return ChangeAltitude(call.p[0] - (context.home.altitude_m if frame in _AMSL_FRAMES else 0.0))
 
 
@@ -262,10 +288,10 @@ def _loiter(call: Call, context: Context) -> Request | Verdict:
 
 def _loiter_turns(call: Call, context: Context) -> Request | Verdict:
     if not (math.isfinite(call.p[0]) and call.p[0] > 0.0):
-        return _refused(f"Loiter: param1 = {call.p[0]:g} turns; must be > 0")
+        return _refused(f"Loiter: turns (param1) = {call.p[0]:g}; must be > 0")
     if call.x == 0.0 and call.y == 0.0:
         call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
-    orbit = _orbit(call._replace(p=(call.p[2], math.nan, 0.0, 0.0)), context)
+    orbit = _orbit(call._replace(p=(call.p[2], math.nan, math.nan, 0.0)), context)
     return replace(orbit, turns=call.p[0]) if isinstance(orbit, Orbit) else orbit
 
 
@@ -279,14 +305,17 @@ def _calibrate(call: Call, context: Context) -> Request | Verdict:
 def _change_speed(call: Call, context: Context) -> Request | Verdict:
     kind = _as_integer(call.p[0])
     if kind not in _SPEEDS:
-        return _refused(f"Change speed: param1 = {call.p[0]:g}; must be 0 or 1, 2 (climb) or 3 (descent)")
+        return _refused(
+            f"Change speed: speed type (param1) = {call.p[0]:g}; must be 0 (air), 1 (ground), 2 (climb) "
+            "or 3 (descent)"
+        )
     if kind in _VERTICAL_SPEEDS or call.p[1] == _NO_CHANGE:
         return Verdict(ACCEPTED)  # changes nothing, as in a mission: the load is lifted with MIS_LIFT_SPEED
     if call.p[1] == _DEFAULT_SPEED:
         return ChangeSpeed(None)
     if not (math.isfinite(call.p[1]) and call.p[1] > 0.0):
         return _refused(
-            f"Change speed: param2 = {call.p[1]:g} m/s; must be > 0, -1 (no change) or -2 (default)"
+            f"Change speed: speed (param2) = {call.p[1]:g} m/s; must be > 0, -1 (no change) or -2 (default)"
         )
     return ChangeSpeed(call.p[1])
 
@@ -296,25 +325,33 @@ def _set_home(call: Call, context: Context) -> Request | Verdict:
         return SetHome(None)
     position = _position_enu(call, context)
     if position is None or any(math.isnan(value) for value in position):
-        return _refused("Set home: param5 ... param7 must be latitude, longitude and altitude")
+        return _refused(
+            "Set home: no such place; must be latitude, longitude and altitude (param5 ... param7) of a "
+            "global frame"
+        )
     return SetHome(position)
 
 
 def _terminate(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] != 1.0:
-        return _refused(f"Terminate: param1 = {call.p[0]:g}; must be 1, there is no way back")
+        return _refused(f"Terminate: action (param1) = {call.p[0]:g}; must be 1 (stop the rotors)")
     return Terminate()
 
 
 def _reboot(call: Call, context: Context) -> Request | Verdict:
     choice: dict[float, Request] = {1.0: Reboot(shutdown=False), 2.0: Reboot(shutdown=True)}
-    return choice.get(call.p[0]) or Verdict(UNSUPPORTED)
+    return choice.get(call.p[0]) or Verdict(
+        UNSUPPORTED, f"Reboot: action (param1) {call.p[0]:g} is not offered; 1 (reboot) is"
+    )
 
 
 def _store_parameters(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] in (0.0, 1.0):
         return StoreParameters(save=call.p[0] == 1.0)
-    return ResetParameters() if call.p[0] == 2.0 else Verdict(UNSUPPORTED)
+    if call.p[0] == 2.0:
+        return ResetParameters()
+    text = f"Storage: action (param1) {call.p[0]:g} is not offered"
+    return Verdict(UNSUPPORTED, f"{text}; 0 (load), 1 (save) and 2 (reset) are")
 
 
 def _request_message(call: Call, context: Context) -> Request | Verdict:
@@ -328,7 +365,9 @@ def _set_message_interval(call: Call, context: Context) -> Request | Verdict:
     if message_id is None:
         return Verdict(UNSUPPORTED)
     if not math.isfinite(interval) or (interval < 0.0 and interval != -1.0):
-        return _refused(f"Message interval: param2 = {interval:g} us; must be > 0, 0 (default) or -1 (off)")
+        return _refused(
+            f"Message interval: interval (param2) = {interval:g} us; must be > 0, 0 (default) or -1 (off)"
+        )
     return SetMessageInterval(message_id, math.ceil(interval))
 
 
@@ -343,47 +382,54 @@ def _request_capabilities(call: Call, context: Context) -> Request | Verdict:
 
 def _gripper(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] not in GRIPPERS and not math.isnan(call.p[0]):
-        return _refused(f"Gripper: param1 = {call.p[0]:g}; there is one, 1")
+        return _refused(f"Gripper: gripper (param1) = {call.p[0]:g}; there is one, number 1")
     choice: dict[float, Request | Verdict] = {
         mavlink.GRIPPER_ACTION_RELEASE: Release(),
         mavlink.GRIPPER_ACTION_GRAB: Grab(),
         mavlink.GRIPPER_ACTION_HOLD: Verdict(ACCEPTED),  # the gripper stays as it is
     }
-    return choice.get(call.p[1]) or _refused(f"Gripper: param2 = {call.p[1]:g}; must be 0, 1 or 2")
+    return choice.get(call.p[1]) or _refused(
+        f"Gripper: action (param2) = {call.p[1]:g}; must be 0 (release), 1 (grab) or 2 (hold)"
+    )
 
 
 def _winch(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] not in WINCHES and not math.isnan(call.p[0]):
-        return _refused(f"Winch: param1 = {call.p[0]:g}; there is one, 1")
+        return _refused(f"Winch: winch (param1) = {call.p[0]:g}; there is one, number 1")
     action, length, rate = call.p[1], *map(decimal_from_float32, call.p[2:])
     if action == mavlink.WINCH_RELATIVE_LENGTH_CONTROL:
         if not (math.isfinite(length) and math.isfinite(rate)):
-            return _refused(f"Winch: param3 = {length:g} m at param4 = {rate:g} m/s; must be numbers")
+            return _refused(
+                f"Winch: length (param3) = {length:g} m at rate (param4) = {rate:g} m/s; must be numbers"
+            )
         return Winch(length, abs(rate) if rate else None)
     if action == mavlink.WINCH_RATE_CONTROL:
         if not math.isfinite(rate):
-            return _refused(f"Winch: param4 = {rate:g} m/s; must be a number")
+            return _refused(f"Winch: rate (param4) = {rate:g} m/s; must be a number")
         return Winch(math.copysign(math.inf, rate), abs(rate)) if rate else Winch(0.0)
     if action == mavlink.WINCH_HOLD:
         return Winch(0.0)
     if action == mavlink.WINCH_RETRACT:
         return Winch(-math.inf)
-    return Verdict(UNSUPPORTED, f"Winch: action {call.p[1]:g} is not offered; 1, 2, 5 and 6 are")
+    return Verdict(UNSUPPORTED, f"Winch: action (param2) {call.p[1]:g} is not offered; {_WINCH_ACTIONS}")
 
 
 def _condition_yaw(call: Call, context: Context) -> Request | Verdict:
     angle, rate, sense, relative = call.p
     if not math.isfinite(angle) or abs(angle) > 360.0:
-        return _refused(f"Yaw: param1 = {angle:g} deg; must be -360 ... 360")
+        return _refused(f"Yaw: angle (param1) = {angle:g} deg; must be -360 ... 360 deg")
     if sense not in (-1.0, 0.0, 1.0) or relative not in (0.0, 1.0):
-        return _refused("Yaw: param3 must be -1, 0 or 1, param4 0 (from north) or 1 (from here)")
+        return _refused(
+            f"Yaw: sense (param3) = {sense:g}, from (param4) = {relative:g}; must be "
+            "-1 (counter-clockwise), 0 (the shorter way) or 1 (clockwise), from 0 (north) or 1 (here)"
+        )
     return turn_heading(angle, rate, int(sense), bool(relative))
 
 
 def _roi_location(call: Call, context: Context) -> Request | Verdict:
     position = _position_enu(call._replace(z=0.0), context)
     if position is None or math.isnan(position[0]):
-        return _refused("ROI: param5 and param6 must be latitude and longitude of a global frame")
+        return _refused("ROI: no such place; must be latitude and longitude of a global frame")
     return LookAt(position[0], position[1])
 
 
@@ -394,12 +440,14 @@ def _roi(call: Call, context: Context) -> Request | Verdict:
         return _roi_location(call, context)
     if call.p[0] == mavlink.MAV_ROI_NONE:
         return LookAt(None, None)
-    return Verdict(UNSUPPORTED, f"ROI: param1 = {call.p[0]:g}; 0 (none) and 3 (a place) are offered")
+    return Verdict(
+        UNSUPPORTED, f"ROI: mode (param1) {call.p[0]:g} is not offered; 0 (none) and 3 (a place) are"
+    )
 
 
 def _enable_fence(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] not in (0.0, 1.0):
-        return _refused(f"Fence: param1 = {call.p[0]:g}; must be 0 (off) or 1 (on)")
+        return _refused(f"Fence: action (param1) = {call.p[0]:g}; must be 0 (off) or 1 (on)")
     return EnableFence(call.p[0] == 1.0)
 
 
@@ -418,19 +466,27 @@ def _inject_failure(call: Call, context: Context) -> Request | Verdict:
     unit, kind, instance = _as_integer(call.p[0]), _as_integer(call.p[1]), _as_integer(call.p[2])
     motor = unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR
     if not motor and unit not in _SENSOR_FAILURE_BITS:
-        return Verdict(UNSUPPORTED, "Failure: rotors (unit 101) and sensors (0, 1, 2, 3, 4, 6) can fail")
+        return Verdict(
+            UNSUPPORTED,
+            (
+                f"Failure: unit (param1) {call.p[0]:g} cannot fail; 0 (gyroscope), 1 (accelerometer), "
+                "2 (magnetometer), 3 (barometer), 4 (GNSS), 6 (vehicle pose) and 101 (rotor) can"
+            ),
+        )
     if kind not in (mavlink.FAILURE_TYPE_OK, mavlink.FAILURE_TYPE_OFF):
-        return Verdict(UNSUPPORTED, "Failure: it can be ok (0) or off (1)")
+        return Verdict(
+            UNSUPPORTED, f"Failure: type (param2) {call.p[1]:g} is not offered; 0 (ok) and 1 (off) are"
+        )
     fail = kind == mavlink.FAILURE_TYPE_OFF
     if motor:
         if instance is None or instance not in range(context.rotors + 1):
             return _refused(
-                f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... {context.rotors}, or 0 for all"
+                f"Failure: rotor (param3) = {call.p[2]:g}; must be 1 ... {context.rotors}, or 0 for all"
             )
         every = (1 << context.rotors) - 1
         return InjectFailure("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), fail)
     if instance not in (0, 1):
-        return _refused(f"Failure: param3 = {call.p[2]:g}; there is one of it, 1, or 0 for all")
+        return _refused(f"Failure: instance (param3) = {call.p[2]:g}; must be 1, or 0 for all: there is one")
     return InjectFailure("SIM_SENS_FAIL", _SENSOR_FAILURE_BITS[unit], fail)
 
 

@@ -342,6 +342,10 @@ class VehicleEndpoint:
         """The vehicle itself changed a parameter: send it to all links."""
         self._handle_outputs([Send(None, self._parameters.value_message(name))], [])
 
+    def refuse_simulator_parameter(self, name: str, error: int, client: Peer) -> None:
+        """The simulator refused a value that this client had sent."""
+        self._handle_outputs([self._parameters.refusal_of_simulator(name, error, client)], [])
+
     def datagram(self, link: Link, message: Any, component: int = AUTOPILOT_COMPONENT) -> bytes:
         """One message of a component for a link as a datagram, with the link's next sequence number."""
         return self._links[link].frame((self.identity.system, component), message)

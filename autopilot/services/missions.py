@@ -22,7 +22,6 @@ Fence and rally points are transferred in the same way, one transfer at a time o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -38,11 +37,12 @@ from autopilot.services.records import (
     Send,
     SendText,
 )
-from autopilot.services.requests import ReplaceMission, Reposition
+from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.fence import AREA_READERS
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
@@ -57,14 +57,16 @@ LATE_ITEM_US = 5_000_000  # a last item repeated within this time after the end 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _ALL = mavlink.MAV_MISSION_TYPE_ALL
 _AREAS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
-_ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
-_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
-    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
-    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
+_NOUNS = {
+    _MISSION: "Mission item",
+    mavlink.MAV_MISSION_TYPE_FENCE: "Fence item",
+    mavlink.MAV_MISSION_TYPE_RALLY: "Rally point",
 }
+_ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
 
 _NO_COORDINATE = 2**31 - 1
-_GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to fly to immediately
+# ArduPilot's values of MISSION_ITEM.current outside an upload: fly there now, and change only the height now
+_GUIDED_ITEM, _HEIGHT_ITEM = 2, 3
 _ABOVE_HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _GLOBAL_FRAMES = (*_ABOVE_HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _LOCAL_FRAMES = (
@@ -219,9 +221,8 @@ class MissionService:
     ) -> list[Output]:
         upload = self._upload
         if upload is None or upload.peer != peer:
-            is_guided_item = message.mission_type == _MISSION and message.current == _GUIDED_ITEM
-            if is_guided_item and item is not None:
-                return self._fly_to_item(item, peer, decide)
+            if message.mission_type == _MISSION and message.current in (_GUIDED_ITEM, _HEIGHT_ITEM):
+                return self._fly_to_item(message, item, peer, decide)
             return self._answer_late_item(message, peer, now_us)
         if message.mission_type != upload.kind:
             return []
@@ -232,7 +233,7 @@ class MissionService:
             return [self._item_request()]
         if item is None:
             self._end_upload(mavlink.MAV_MISSION_INVALID_PARAM5_X, now_us)
-            why = f"Mission item {expected}: x or y is no coordinate"
+            why = f"{_NOUNS[upload.kind]} {expected}: x or y is no coordinate"
             return [
                 SendText(mavlink.MAV_SEVERITY_WARNING, why),
                 _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X, upload.kind),
@@ -243,17 +244,25 @@ class MissionService:
             return [self._item_request()]
         return self._complete_upload(upload, now_us, decide)
 
-    def _fly_to_item(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
-        """A single waypoint outside any upload, which is ArduPilot's "go there"."""
-        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
-            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
-        east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)
-        up = item.z if item.frame in _ABOVE_HOME_FRAMES else item.z - self.home.altitude_m
-        verdict = decide(Reposition(east, north, up, True))
+    def _fly_to_item(self, message: Any, item: WireItem | None, peer: Peer, decide: Decide) -> list[Output]:
+        """A single waypoint outside any upload, which is ArduPilot's "go there", or its change of height."""
+        if message.command != mavlink.MAV_CMD_NAV_WAYPOINT or message.frame not in _GLOBAL_FRAMES:
+            frames = ", ".join(map(str, sorted(_GLOBAL_FRAMES)))
+            text = f"{numbered_name(message.command)} in frame {message.frame} refused outside an upload"
+            text += f"; must be {numbered_name(mavlink.MAV_CMD_NAV_WAYPOINT)} in one of {frames}"
+            return _refused_item(peer, text, mavlink.MAV_MISSION_UNSUPPORTED)
+        up = message.z if message.frame in _ABOVE_HOME_FRAMES else message.z - self.home.altitude_m
+        if message.current == _HEIGHT_ITEM:  # its place does not count: MAVProxy sends 0, 0
+            verdict = decide(ChangeAltitude(up))
+        elif item is None:
+            text = "Waypoint refused: x or y is no coordinate"
+            return _refused_item(peer, text, mavlink.MAV_MISSION_INVALID_PARAM5_X)
+        else:
+            east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)
+            verdict = decide(Reposition(east, north, up, True))
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return [_ack(peer, _ACCEPTED)]
-        texts: list[Output] = [SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
-        return [*texts, _ack(peer, mavlink.MAV_MISSION_DENIED)]
+        return _refused_item(peer, verdict.text, mavlink.MAV_MISSION_DENIED)
 
     def _complete_upload(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items have arrived: check them as a whole, and only then replace the mission."""
@@ -262,7 +271,7 @@ class MissionService:
             items = (*self._home_items, *items[1:])
         try:
             if kind in _AREAS:
-                _READERS[kind](items, self.home)
+                AREA_READERS[kind](items, self.home)
                 self._end_upload(_ACCEPTED, now_us)
                 cleared = RefusalCleared(_upload_of(kind))
                 return [cleared, *self._replace_area(kind, items), self._accepting_ack(upload.peer, kind)]
@@ -453,6 +462,12 @@ def _upload_of(kind: int) -> tuple[str, int]:
 def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Output:
     answer = mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind, opaque_id=number)
     return Send(peer.link, answer)
+
+
+def _refused_item(peer: Peer, text: str | None, result: int) -> list[Output]:
+    """The answer to an item outside an upload that is not flown."""
+    texts: list[Output] = [SendText(mavlink.MAV_SEVERITY_WARNING, text)] if text else []
+    return [*texts, _ack(peer, result)]
 
 
 def _item_of_int(m: Any) -> WireItem:

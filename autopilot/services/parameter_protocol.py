@@ -4,7 +4,7 @@ corresponding identity, whole numbers are an INT32.
 Lists are sent at a steady pace on each link; a client that misses an index requests it again. A set is
 answered with the value that is actually stored, to every link if the value has changed, so that no ground
 station shows an old value. The set of a simulator's parameter is answered when the simulator has reported the
-value in force, since only the simulator knows the range.
+value in force, since only the simulator knows the range; its refusal is handed on to the client.
 
 If values are transferred by their bits, as by PX4, a list begins with PX4's `_HASH_CHECK`: a ground station
 that has stored parameters with this hash sends it back, and the list ends there.
@@ -28,6 +28,7 @@ from autopilot.services.records import (
     SimulatorParameterRequested,
     SimulatorParametersSaved,
 )
+from autopilot.services.requests import ChangeVehicle
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import Layout
 from autopilot.wire.dialect import plumbline as mavlink
@@ -111,7 +112,11 @@ class ParameterService:
                 return self._refused(
                     name, COMPONENT_NOT_FOUND, f"{name} not set: the simulator is silent", peer
                 )
-            return [SimulatorParameterRequested(name, value)]
+            return [SimulatorParameterRequested(name, value, peer)]
+        if self.table.describe(name).disarmed and value != before:
+            verdict = decide(ChangeVehicle(name))
+            if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+                return self._refused(name, READ_ONLY, verdict.text or f"{name} not set", peer)
         try:
             after = self.table.set(name, value)
         except ParameterError as error:  # in range, but fixed while running
@@ -227,6 +232,10 @@ class ParameterService:
     def forget(self, link: Link) -> None:
         """Stop the list for a link that no longer exists."""
         self._lists.pop(link, None)
+
+    def refusal_of_simulator(self, name: str, error: int, peer: Peer) -> Output:
+        """PARAM_ERROR for a parameter whose value the simulator has refused; its text is the simulator's."""
+        return _error(name, self.table.index(name), error, peer)
 
     def _refused(self, name: str, error: int, why: str, peer: Peer) -> list[Output]:
         return [

@@ -78,10 +78,11 @@ class ParameterChanged:
 @dataclass(frozen=True, slots=True)
 class SimulatorParameterRequested:
     """A parameter of the simulator is to be set to `value`; the value that the simulator then reports is in
-    force and is sent to the ground stations."""
+    force and is sent to the ground stations. A refusal is sent to `client`, if there is one."""
 
     name: str
     value: float
+    client: Peer | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ def refusals(message: Any, peer: Peer, result: int, mission_result: int) -> list
         case (
             mavlink.MAVLINK_MSG_ID_MISSION_COUNT
             | mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT
+            | mavlink.MAVLINK_MSG_ID_MISSION_ITEM
             | mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST
             | mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL
         ):

@@ -62,6 +62,7 @@ class SetMode:
     main: int
     sub: int
     number: int | None = field(default=None, compare=False)  # by which it was requested
+    name: str = field(default="", compare=False)  # of the flavour, for texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +156,8 @@ class FollowStick:
 @dataclass(frozen=True, slots=True)
 class Orbit:
     """Fly the load round a circle; None: here, at this height, at the speed of transfers. The direction is
-    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise."""
+    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise. The nose
+    points to the centre (`faces_centre`), keeps its present heading (False), or does as before (None)."""
 
     radius_m: float
     speed_m_s: float | None
@@ -163,6 +165,7 @@ class Orbit:
     north_m: float | None
     altitude_m: float | None
     turns: float | None = None  # after which the load is held; None: for ever
+    faces_centre: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,6 +287,13 @@ class RequestCapabilities:
 
 
 @dataclass(frozen=True, slots=True)
+class ChangeVehicle:
+    """Change a parameter that describes a part of the vehicle which does not change in flight."""
+
+    parameter: str
+
+
+@dataclass(frozen=True, slots=True)
 class ChangeSigningKey:
     """Change or remove the key for signed messages; only the signing service knows the new key."""
 
@@ -318,6 +328,7 @@ SupervisorRequest = (
     | RunPrearmChecks
     | Reboot
     | ResetParameters
+    | ChangeVehicle
     | ChangeSigningKey
 )
 EndpointRequest = (

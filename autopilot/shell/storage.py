@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -21,17 +21,13 @@ from autopilot.shell.atomic_file import DamagedError, keep_copy, remove, seal, u
 from autopilot.shell.sd_card import DirectoryCard
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.fence import AREA_READERS
 from autopilot.wire.items import MissionItemError, WireItem
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, parse_text
 from autopilot.wire.signing import Signing
 
 MISSION_FILE = "mission.bin"
 AREA_FILES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence.bin", mavlink.MAV_MISSION_TYPE_RALLY: "rally.bin"}
-_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
-    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
-    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
-}
 PARAMETER_FILE = "parameters.txt"
 SIMULATOR_PARAMETER_FILE = "world.txt"  # parameters of the simulator
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
@@ -123,7 +119,7 @@ class Storage:
                 items = deserialise_items(path.read_bytes())
                 if isinstance(items, CorruptMission):
                     raise DamagedError(items.reason)
-                _READERS[kind](items, home)
+                AREA_READERS[kind](items, home)
                 found[kind] = items
             except FileNotFoundError:
                 continue

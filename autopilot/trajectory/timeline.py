@@ -58,13 +58,13 @@ def cable_length_problem(target_m: float, min_length_m: float, max_length_m: flo
 class MissionState:
     """The state that the steps of a mission change, between two steps.
 
-    `expected` is the best guess of the position; None: the mission may begin anywhere. `known` says that it
-    is where a setpoint comes to rest, and not only a guess: after an attitude run it is unknown how far the
-    load has drifted, and a release leaves the vehicle about a cable length above where the load hung.
+    `expected` is the best guess of the position; None: the mission may begin anywhere. `unknown_after` names
+    what makes it only a guess and not where a setpoint comes to rest: after an attitude run it is unknown how
+    far the load has drifted, and a release leaves the vehicle about a cable length above where the load hung.
     """
 
     expected: Vec3 | None = ZERO
-    known: bool = True
+    unknown_after: str = ""
     cable_m: float | None = None  # None: not given
     released: bool = False
     speed_m_s: float = SPEED_M_S  # peak speed of transfers
@@ -72,11 +72,11 @@ class MissionState:
     @property
     def position(self) -> Vec3 | None:
         """The position of the setpoint; None if it is unknown."""
-        return self.expected if self.known else None
+        return None if self.unknown_after else self.expected
 
 
 AT_ORIGIN = MissionState()
-ANYWHERE = MissionState(expected=None, known=False)
+ANYWHERE = MissionState(expected=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,16 +128,18 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
     match step:
         case Takeoff(altitude_m=altitude):
             if here is None:
-                return replace(before, expected=(0.0, 0.0, altitude), known=True)
+                return replace(before, expected=(0.0, 0.0, altitude), unknown_after="")
             return replace(before, expected=(here[0], here[1], altitude))
         case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
-            return replace(before, expected=(east, north, altitude), known=True)
+            return replace(before, expected=(east, north, altitude), unknown_after="")
         case ReturnHome():
             return before if here is None else replace(before, expected=(home[0], home[1], here[2]))
         case Land():
             # without a load the vehicle may land beside the load that lies there
-            known = before.known and not before.released
-            return before if here is None else replace(before, expected=(here[0], here[1], 0.0), known=known)
+            unknown_after = before.unknown_after or ("a landing beside the load" if before.released else "")
+            if here is None:
+                return before
+            return replace(before, expected=(here[0], here[1], 0.0), unknown_after=unknown_after)
         case Speed(speed_m_s=speed):
             return replace(before, speed_m_s=speed)
         case Winch(length_m=length_change):
@@ -148,13 +150,16 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
             if before.released:
                 return before
             above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
-            return replace(before, expected=above, known=False, released=True)
+            return replace(before, expected=above, unknown_after="a release", released=True)
         case Signals(duration_s=duration, terms=terms):
             x, v, *_ = evaluate(signal_table(terms), duration)
-            known = before.known and dot(v, v) <= AT_REST_M2_S2
-            return replace(before, expected=None if here is None else add(here, x), known=known)
+            moving = dot(v, v) > AT_REST_M2_S2
+            unknown_after = "signals that end in motion" if moving else before.unknown_after
+            return replace(
+                before, expected=None if here is None else add(here, x), unknown_after=unknown_after
+            )
         case AttitudeRun():
-            return replace(before, known=False)
+            return replace(before, unknown_after="an attitude run")
         case Delay():
             return before
     raise AssertionError(step)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
@@ -19,29 +19,57 @@ from autopilot.wire.parameter_table import ParameterError
 from missions.toml_files import format_value
 
 
+class Reference(NamedTuple):
+    """The file of the vehicle that the autopilot assumes, and how messages about it begin."""
+
+    table: dict[str, Any]
+    where: str
+
+
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
     """The true vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
     table, where = _table(name_or_path)
-    found = VEHICLES.record(Vehicle, _completed(table, where, name_or_path), where, written=table)
-    problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
-    if problems:
-        raise VehicleFileError(problems)
-    return found
+    return _vehicle(table, where, _reference(table, where, name_or_path))
 
 
 def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
     """The vehicle that the autopilot assumes, with the parameters of both vehicles (those of the true one
     take precedence); a VehicleFileError says what is wrong with one of them."""
     table, where = _table(name_or_path)
-    believed = _believed(table, name_or_path)
-    if not believed:
-        return load_vehicle(name_or_path)
+    reference = _reference(table, where, name_or_path)
+    own = _vehicle(table, where, reference) if reference is None or "parameters" in table else None
+    return _belief(table, where, reference, own)
+
+
+def load_truth_and_belief(name_or_path: str | PathLike[str]) -> tuple[Vehicle, Vehicle]:
+    """The true vehicle and the one that the autopilot assumes, as the two functions above return them; each
+    file is read once."""
+    table, where = _table(name_or_path)
+    reference = _reference(table, where, name_or_path)
+    true = _vehicle(table, where, reference)
+    return true, _belief(table, where, reference, true)
+
+
+def _vehicle(table: dict[str, Any], where: str, reference: Reference | None) -> Vehicle:
+    """The vehicle of a table, completed by that of the assumed vehicle if it names one."""
+    completed = table if reference is None else {**reference.table, **table}
+    found = VEHICLES.record(Vehicle, completed, where, written=table)
+    problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
+    if problems:
+        raise VehicleFileError(problems)
+    return found
+
+
+def _belief(table: dict[str, Any], where: str, reference: Reference | None, true: Vehicle | None) -> Vehicle:
+    """The assumed vehicle of a table; `true`: the true one, None if it has no parameters of its own."""
+    if reference is None:
+        assert true is not None
+        return true
     with _errors_naming_reference(where, table):
-        belief = load_vehicle(believed)
-    if "parameters" not in table:
+        belief = _vehicle(reference.table, reference.where, None)
+    if true is None:
         return belief
-    own = load_vehicle(name_or_path).parameters
-    return belief.model_copy(update={"parameters": {**belief.parameters, **own}})
+    return belief.model_copy(update={"parameters": {**belief.parameters, **true.parameters}})
 
 
 def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
@@ -75,19 +103,21 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
     """The keys of a file, completed by those of the assumed vehicle if it names one; and the place with which
     messages about it begin."""
     table, where = _table(name_or_path)
-    return _completed(table, where, name_or_path), where
+    reference = _reference(table, where, name_or_path)
+    return (table if reference is None else {**reference.table, **table}), where
 
 
-def _completed(table: dict[str, Any], where: str, name_or_path: str | PathLike[str]) -> dict[str, Any]:
-    """The table of a file, completed by that of the assumed vehicle if it names one."""
+def _reference(table: dict[str, Any], where: str, name_or_path: str | PathLike[str]) -> Reference | None:
+    """What the file of the assumed vehicle says; None if the table names none."""
     believed = _believed(table, name_or_path)
     if not believed:
-        return table
+        return None
     with _errors_naming_reference(where, table):
-        keys, other = _table(believed)
-    if keys.get("believed"):
-        raise VehicleFileError([f"{where}: believed: {other} has a `believed` of its own; name that one"])
-    return {**keys, **table}
+        reference = Reference(*_table(believed))
+    if reference.table.get("believed"):
+        text = f"{where}: believed: {reference.where} has a `believed` of its own; name that one"
+        raise VehicleFileError([text])
+    return reference
 
 
 def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:

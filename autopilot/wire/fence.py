@@ -6,16 +6,17 @@ distance and a height of home. Zones are horizontal areas that apply at any heig
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot
 
 from autopilot.geometry.linear import Vec3
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import MissionItemError, WireItem
-
-EastNorth = tuple[float, float]  # east, north, m
+from autopilot.wire.items.limits import FARTHEST_M
+from autopilot.wire.polygon_shape import EastNorth, shape_problem
 
 _INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 _OUTSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
@@ -85,63 +86,100 @@ class Fence:
 NO_FENCE = Fence()
 
 
-def _east_north(seq: int, item: WireItem, home: Home) -> EastNorth:
-    if item.frame not in _FRAMES:
-        text = f"frame {item.frame}; must be one of 0, 3, 5, 6"
-        raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
-    if abs(item.x) > 900_000_000:
-        raise MissionItemError(seq, "no latitude", mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(item.y) > 1_800_000_000:
-        raise MissionItemError(seq, "no longitude", mavlink.MAV_MISSION_INVALID_PARAM6_Y)
-    east, north, _ = enu_from_geodetic(item.x, item.y, 0, home)
-    return east, north
+class _Items:
+    """The items of one kind of plan; `noun` names one of them in errors."""
+
+    def __init__(self, noun: str, home: Home) -> None:
+        self._noun = noun
+        self._home = home
+
+    def error(self, seq: int, text: str, result: int) -> MissionItemError:
+        """The error that refuses an item."""
+        return MissionItemError(seq, text, result, self._noun)
+
+    def east_north(self, seq: int, item: WireItem) -> EastNorth:
+        """The place of an item; MissionItemError if it has none, or one too far away."""
+        if item.frame not in _FRAMES:
+            text = f"frame {item.frame}; must be one of 0, 3, 5, 6"
+            raise self.error(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+        if abs(item.x) > 900_000_000:
+            raise self.error(seq, "no latitude", mavlink.MAV_MISSION_INVALID_PARAM5_X)
+        if abs(item.y) > 1_800_000_000:
+            raise self.error(seq, "no longitude", mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+        east, north, _ = enu_from_geodetic(item.x, item.y, 0, self._home)
+        distance = hypot(east, north)
+        if distance > FARTHEST_M:
+            if item.x == item.y == 0:
+                text = "no place is given: latitude and longitude are 0"
+            else:
+                text = f"{distance / 1e3:.0f} km from home; must be at most {FARTHEST_M / 1e3:g} km"
+            north_is_wrong = abs(north) >= abs(east)
+            result = (
+                mavlink.MAV_MISSION_INVALID_PARAM5_X
+                if north_is_wrong
+                else mavlink.MAV_MISSION_INVALID_PARAM6_Y
+            )
+            raise self.error(seq, text, result)
+        return east, north
 
 
 def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
     """The fence that the items describe, or MissionItemError for the first that cannot be part of one."""
+    fence_items = _Items("fence item", home)
     zones: list[Zone] = []
     corners: list[EastNorth] = []
     expected, kind = 0, 0
     for seq, item in enumerate(items):
         if corners and item.command != kind:
             text = f"a corner was expected: the polygon before it has {expected} and {len(corners)} came"
-            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+            raise fence_items.error(seq, text, mavlink.MAV_MISSION_INVALID)
         if item.command in _POLYGONS:
             if not item.param1 >= 3.0 or not float(item.param1).is_integer():
                 text = f"a polygon of {item.param1:g} corners; must be 3 or more"
-                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+                raise fence_items.error(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
             if corners and item.param1 != expected:
                 text = f"a polygon of {expected} corners, and one of its corners says {item.param1:g}"
-                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+                raise fence_items.error(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
             kind, expected = item.command, int(item.param1)
-            corners.append(_east_north(seq, item, home))
+            corners.append(fence_items.east_north(seq, item))
             if len(corners) == expected:
+                problem = shape_problem(corners, seq + 1 - expected)
+                if problem:
+                    raise fence_items.error(problem.number, problem.text, mavlink.MAV_MISSION_INVALID)
                 zones.append(Polygon(kind == _INSIDE_POLYGON, tuple(corners)))
                 corners = []
         elif item.command in _CIRCLES:
             if not 0.0 < item.param1 < 1e6:
-                text = f"radius = {item.param1:g} m; must be > 0"
-                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
-            zones.append(Disc(item.command == _INSIDE_CIRCLE, _east_north(seq, item, home), item.param1))
+                text = f"radius = {item.param1:g} m; must be > 0 and < 1000 km"
+                raise fence_items.error(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+            centre = fence_items.east_north(seq, item)
+            zones.append(Disc(item.command == _INSIDE_CIRCLE, centre, item.param1))
         elif item.command == _RETURN:
-            _east_north(seq, item, home)
+            fence_items.east_north(seq, item)
         else:
-            raise MissionItemError(
-                seq, f"command {item.command} is no part of a fence", mavlink.MAV_MISSION_UNSUPPORTED
-            )
+            text = f"{numbered_name(item.command)} is no part of a fence"
+            raise fence_items.error(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
     if corners:
         text = f"the last polygon has {expected} corners, and {len(corners)} came"
-        raise MissionItemError(len(items) - 1, text, mavlink.MAV_MISSION_INVALID)
+        raise fence_items.error(len(items) - 1, text, mavlink.MAV_MISSION_INVALID)
     return Fence(tuple(zones))
 
 
 def read_rally(items: Sequence[WireItem], home: Home) -> tuple[Vec3, ...]:
     """The places that the items name, at the height of the ground, or MissionItemError."""
+    rally_points = _Items("rally point", home)
     places: list[Vec3] = []
     for seq, item in enumerate(items):
         if item.command != mavlink.MAV_CMD_NAV_RALLY_POINT:
-            text = f"command {item.command} is no rally point"
-            raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
-        east, north = _east_north(seq, item, home)
+            text = f"{numbered_name(item.command)} is no rally point"
+            raise rally_points.error(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
+        east, north = rally_points.east_north(seq, item)
         places.append((east, north, 0.0))
     return tuple(places)
+
+
+# by MAV_MISSION_TYPE
+AREA_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
+    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
+    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
+}

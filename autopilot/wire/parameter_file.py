@@ -36,6 +36,7 @@ class ParameterSpec(BaseModel):
     whole: bool = False
     stored: bool = True
     reboot: bool = False
+    disarmed: bool = False
 
     @model_validator(mode="after")
     def _complete(self) -> ParameterSpec:
@@ -54,7 +55,18 @@ class ParameterSpec(BaseModel):
         default = self._default(vehicle)
         low, high = self._limits(default)
         whole = self.whole or self.values is not None or self.bits is not None
-        return Parameter(name, default, low, high, self.unit, self.meaning, whole, self.reboot, self.stored)
+        return Parameter(
+            name,
+            default,
+            low,
+            high,
+            self.unit,
+            self.meaning,
+            integer=whole,
+            fixed=self.reboot,
+            stored=self.stored,
+            disarmed=self.disarmed,
+        )
 
     @property
     def vehicle_keys(self) -> frozenset[str]:

@@ -38,6 +38,7 @@ class Parameter:
     integer: bool = False
     fixed: bool = False  # takes effect at start only
     stored: bool = True  # kept beyond the end of the process
+    disarmed: bool = False  # changed only while the vehicle is disarmed
 
     def __post_init__(self) -> None:
         if len(self.name) > NAME_LENGTH or not _NAME.fullmatch(self.name):

@@ -6,6 +6,7 @@ from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
 
+GAP = "..."  # in place of chunks that were lost
 CHUNK = 50  # STATUSTEXT.text
 _LAST_ID = 0xFFFF
 _MAX_CHUNKS = 256  # STATUSTEXT.chunk_seq is a byte
@@ -32,20 +33,41 @@ class TextWriter:
 
 
 class TextReader:
-    """Joins the chunks of texts; those that arrive out of order are left out."""
+    """Joins the chunks of texts. A missing chunk is replaced by GAP unless it comes late."""
 
     def __init__(self) -> None:
-        self._chunks: dict[int, list[str]] = {}  # of the texts that are not complete, by their number
+        # of the texts that are to be continued, by their number; None: has not come
+        self._chunks: dict[int, list[str | None]] = {}
 
     def read(self, message: Any) -> str | None:
         """The text that a STATUSTEXT is or completes; None: it is to be continued."""
-        text: str = message.text
         if not message.id:
-            return text
-        chunks = self._chunks.setdefault(message.id, [])
-        if message.chunk_seq == len(chunks):
-            chunks.append(text)
-        if len(text.encode()) == CHUNK:
+            return str(message.text)
+        if self.begins_text(message):
+            self._chunks[message.id] = []
+        chunks, seq = self._chunks[message.id], message.chunk_seq
+        chunks += [None] * (seq + 1 - len(chunks))
+        chunks[seq] = message.text
+        if len(message.text.encode()) == CHUNK:
             return None
+        text = self.unfinished(message.id)
         del self._chunks[message.id]
-        return "".join(chunks)
+        return text
+
+    def begins_text(self, message: Any) -> bool:
+        """Whether a STATUSTEXT belongs to none of the texts that are to be continued.
+
+        A sender that was restarted counts its texts from 1 again.
+        """
+        chunks = self._chunks.get(message.id, [])
+        return (
+            not message.id or not chunks or (message.chunk_seq == 0 and chunks[0] not in (None, message.text))
+        )
+
+    def unfinished(self, number: int) -> str:
+        """What has come of a text that is to be continued."""
+        chunks = self._chunks[number]
+        pieces = [GAP if chunk is None else chunk for chunk in chunks]
+        return "".join(
+            piece for i, piece in enumerate(pieces) if chunks[i] is not None or i == 0 or chunks[i - 1]
+        )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from autopilot.wire.codec import Received
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import TextReader
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
 from gcs.analysis.observed import observed_setpoint
@@ -262,18 +263,17 @@ def _snaps(c: Columns) -> SnapTrack:
 
 
 def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
-    """Chunks of one id joined in the order of arrival; a text with id 0 is not joined."""
+    """The texts at the times at which they began, also those whose last chunks are not in the log."""
+    reader = TextReader()
     joined: list[StatusText] = []
-    open_id = 0
+    places: dict[int, int] = {}  # of the texts that are to be continued, by their number
     for unix_us, message in texts:
-        text = message.text
-        text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
-        text = text.rstrip("\0")
-        if message.id and message.id == open_id and message.chunk_seq:
-            joined[-1] = joined[-1]._replace(text=joined[-1].text + text)
-        else:
-            joined.append(StatusText((unix_us - boot_us) * _MICRO, message.severity, text))
-        open_id = message.id
+        if reader.begins_text(message):
+            places[message.id] = len(joined)
+            joined.append(StatusText((unix_us - boot_us) * _MICRO, message.severity, ""))
+        text = reader.read(message)
+        place = places[message.id]
+        joined[place] = joined[place]._replace(text=reader.unfinished(message.id) if text is None else text)
     return tuple(joined)
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-_REFUSAL_WORDS = ("denied", "refused", "rejected", "mission item")  # in the words of vehicles
+# in the words of vehicles
+_REFUSAL_WORDS = ("denied", "refused", "rejected", "mission item", "fence item", "rally point")
 
 _STEM_LENGTH = (
     3  # letters: a vehicle's text that begins with the same letters as the subject names the subject

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from autopilot.wire.command_names import command_name
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients.missions import MissionClear
@@ -20,7 +21,6 @@ from gcs.commands.options import (
     print_table,
     vehicle_option,
 )
-from gcs.formats.items import command_name
 from gcs.formats.missions import is_foreign
 from gcs.shell.link import Address
 from gcs.shell.session import Session

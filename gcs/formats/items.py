@@ -60,15 +60,6 @@ def params_of(item: WireItem) -> list[float]:
     return [*floats, *places, decimal_from_float32(item.z)]
 
 
-def command_name(command: int) -> str:
-    """The name of a command without its prefix, or its number."""
-    for enum in ("PLUMBLINE_COMMAND", "MAV_CMD"):
-        entry = mavlink.enums[enum].get(command)
-        if entry is not None:
-            return str(entry.name).removeprefix("MAV_CMD_").removeprefix("PLUMBLINE_")
-    return str(command)
-
-
 def _scale(frame: int) -> float:
     """The factor of MISSION_ITEM_INT for its coordinates: for degrees, metres, or other numbers."""
     if frame in _GLOBAL:

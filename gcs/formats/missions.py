@@ -6,10 +6,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import Handling, MissionItemError, WireItem, handling_of, located_steps
-from gcs.formats.items import FormatError, command_name
+from autopilot.wire.items import (
+    AREA_COMMANDS,
+    COMMAND,
+    Handling,
+    MissionItemError,
+    WireItem,
+    handling_of,
+    located_steps,
+)
+from gcs.formats.items import FormatError
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, read_waypoints, write_waypoints
 from missions.text_files import TextFileError, text_of
@@ -95,7 +104,7 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
             problems.append((number, f"{_item_title(number, item, where)}: {_advice(item, error.text)}"))
     problems.sort()
     kept = [
-        f"item{'' if len(found) == 1 else 's'} {', '.join(map(str, found))}, {_command_text(command)}: "
+        f"item{'' if len(found) == 1 else 's'} {', '.join(map(str, found))}, {numbered_name(command)}: "
         "kept on the vehicle but not done"
         for command, found in kept_items.items()
     ]
@@ -126,12 +135,7 @@ def _is_not_home(item: WireItem, home: Home) -> bool:
 
 
 def _item_title(number: int, item: WireItem, where: str) -> str:
-    return f"item {number} ({where}), {_command_text(item.command)}"
-
-
-def _command_text(command: int) -> str:
-    name = command_name(command)
-    return name if name == str(command) else f"{name} ({command})"
+    return f"item {number} ({where}), {numbered_name(item.command)}"
 
 
 def _advice(item: WireItem, text: str) -> str:
@@ -145,5 +149,6 @@ def _advice(item: WireItem, text: str) -> str:
 _ALTERNATIVES = {
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "use NAV_TAKEOFF",
     mavlink.MAV_CMD_NAV_VTOL_LAND: "use NAV_LAND",
+    **{number: COMMAND[number].text for number in AREA_COMMANDS},
     mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "use NAV_LAND: landing sets the load down first",
 }

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from autopilot.wire.command_names import command_name
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import MissionItemError, WireItem, located_steps
-from gcs.formats.items import command_name
 from missions.model import (
     AttitudeRun,
     Delay,

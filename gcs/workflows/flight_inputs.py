@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.shell.options import unknown_setting
-from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
@@ -31,7 +31,7 @@ def check_flight_inputs(
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, if a rate
     does not divide the rate that it must divide, or if custom code cannot fly."""
     try:
-        found, believed = load_vehicle(vehicle), load_belief(vehicle)
+        found, believed = load_truth_and_belief(vehicle)
         load_profile(sensors)
     except FileError as error:
         raise input_error(error) from None
@@ -54,8 +54,8 @@ def check_flight_inputs(
 def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
     """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
     in milliseconds, which was probably meant in seconds."""
-    found = load_vehicle(vehicle)
-    tables = sim_parameters(truth_of(found)), parameters_for(load_belief(vehicle), NO_OWN_CODE)
+    found, believed = load_truth_and_belief(vehicle)
+    tables = sim_parameters(truth_of(found)), parameters_for(believed, NO_OWN_CODE)
     units = {name: table.describe(name).unit for table in tables for name in table.names}
     return [
         f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import radians
 
 from autopilot.trajectory.feasibility import VehicleLimits
-from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.file import load_truth_and_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.vehicle.shipped import VehicleFileError
 from gcs.errors import input_error
@@ -14,8 +14,7 @@ from gcs.errors import input_error
 def load_limits(name_or_path: str) -> VehicleLimits:
     """The limits of a shipped vehicle or of a vehicle file; GcsError states what is wrong with it."""
     try:
-        load_vehicle(name_or_path)  # the true vehicle too must be one that can be simulated
-        belief = load_belief(name_or_path)
+        _, belief = load_truth_and_belief(name_or_path)  # the true one too must be one that can be simulated
     except VehicleFileError as error:
         raise input_error(error) from None
     table = autopilot_parameters(belief)

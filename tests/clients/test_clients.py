@@ -168,7 +168,7 @@ def test_mavsdk_turns_the_nose_and_works_the_winch(
 ) -> None:
     told, witness = mavsdk_turns_and_winches()
     # the last output of the plug-in is about an action that no winch here performs
-    assert [line for line in complaints(told.output) if "action 4 is not offered" not in line] == []
+    assert [line for line in complaints(told.output) if "action (param2) 4 is not offered" not in line] == []
     assert "UNSUPPORTED" in told.value["deliver"]
     assert {1, m.MAV_COMP_ID_WINCH} <= set(told.value["components"])
     assert FAILSAFE not in witness.phases

@@ -253,6 +253,28 @@ def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_
     assert craft.worst_error < 0.02
 
 
+@pytest.mark.parametrize(("name", "value"), [("VEH_CABLE_LEN", 1.4), ("VEH_ATT_X", 0.1)])
+def test_what_describes_the_vehicle_for_a_whole_flight_is_set_on_the_ground_only(
+    name: str, value: float
+) -> None:
+    craft = Craft(Takeoff(1.0), Delay(60.0), Land())
+    before = craft.onboard.parameters[name]
+    set_parameter(craft, name, value)
+    craft.tick()
+    assert craft.onboard.parameters[name] == value
+    set_parameter(craft, name, before)
+    craft.begin()
+    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    set_parameter(craft, name, value)
+    craft.wait(0.5)
+    assert craft.onboard.parameters[name] == before
+    assert craft.texts[-1] == f"{name} not set while armed: disarm first"
+    set_parameter(craft, "VEH_LOAD_MASS", 0.11)  # which may differ from one load to the next
+    craft.wait(0.5)
+    assert craft.onboard.parameters["VEH_LOAD_MASS"] == pytest.approx(0.11)
+    assert craft.flight.phase == Phase.MISSION, craft.texts
+
+
 def test_another_law_is_not_taken_in_flight() -> None:
     craft = Craft(Takeoff(1.0), Delay(60.0), Land())
     craft.begin()

@@ -11,9 +11,9 @@ from typing import get_args
 
 import pytest
 
+from autopilot.wire.command_names import command_name
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import COMMANDS, Command, Handling, handling_of
-from gcs.formats.items import command_name
 from missions.model import Sine, Step, Term
 
 PAGE = Path(__file__).parents[2] / "docs" / "missions.md"

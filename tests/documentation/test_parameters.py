@@ -23,6 +23,7 @@ parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground 
 the simulator's parameters beside its own. A change of its own is stored at once and is there again after a
 restart; a change of the world lasts as long as the world, unless PREFLIGHT_STORAGE saves it, and the loss of
 the ground link, `SIM_LOSS_PCT`, ends with the autopilot. Those marked *fixed* take effect at start only.
+Those marked *disarmed* describe what does not change in flight, and are refused while the vehicle is armed.
 Defaults marked *vehicle* are taken from the vehicle file.
 
 This page is made of `autopilot/vehicle/parameters.toml` and `sitl/sim_parameters.toml`.
@@ -54,7 +55,7 @@ def tables(definitions: ParameterFile, table: ParameterTable) -> str:
             if group_of(name) == group:
                 p = table.describe(name)
                 default = f"{p.default:g}" + (" *vehicle*" if spec.vehicle_keys else "")
-                text = p.text + (" (*fixed*)" if p.fixed else "")
+                text = p.text + (" (*fixed*)" if p.fixed else "") + (" (*disarmed*)" if p.disarmed else "")
                 lines.append(f"| `{name}` | {default} | {p.low:g} ... {p.high:g} | {p.unit} | {text} |")
     return "\n".join(lines) + "\n"
 

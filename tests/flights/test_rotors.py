@@ -84,7 +84,7 @@ def test_a_rotor_that_the_vehicle_does_not_have_cannot_fail() -> None:
     craft.wait(0.1)
     assert craft.command(mavlink.MAV_CMD_INJECT_FAILURE, MOTOR, OFF, 7) == mavlink.MAV_RESULT_DENIED
     told = "".join(craft.texts[-2:])  # longer than one STATUSTEXT
-    assert told == "Failure: param3 = 7; must be a rotor, 1 ... 6, or 0 for all"
+    assert told == "Failure: rotor (param3) = 7; must be 1 ... 6, or 0 for all"
 
 
 @pytest.mark.parametrize("delay_ms", [60, 72, 84])

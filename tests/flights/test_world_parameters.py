@@ -70,10 +70,17 @@ def test_a_change_reaches_the_world_and_is_not_stored(world: World) -> None:
     assert world.told("SIM_WIND_E") == 5.0
 
 
-@pytest.mark.parametrize(("name", "value"), [("SIM_CABLE_LEN", 1.0), ("SIM_WIND_E", 900.0)])
+@pytest.mark.parametrize(
+    ("name", "value", "error"),
+    [
+        ("SIM_CABLE_LEN", 1.0, mavlink.MAV_PARAM_ERROR_READ_ONLY),
+        ("SIM_WIND_E", 900.0, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+    ],
+)
 def test_what_the_simulator_refuses_is_taken_back_with_a_reason(
-    world: World, name: str, value: float
+    world: World, name: str, value: float, error: int
 ) -> None:
+    world.onboard.add_link("other")
     before = world.onboard.parameters[name]
     world.set(name, value)
     world.run(4)
@@ -81,6 +88,15 @@ def test_what_the_simulator_refuses_is_taken_back_with_a_reason(
     assert world.told(name) == pytest.approx(before)
     texts = [m.text for m in world.heard if m.get_type() == "STATUSTEXT"]
     assert any(name in text for text in texts), texts
+    errors = [m for m in world.heard if m.get_type() == "PARAM_ERROR"]
+    index = world.onboard.parameters.index(name)
+    assert [(m.target_system, m.target_component, m.param_id, m.param_index, m.error) for m in errors] == [
+        (*GROUND, name, index, error)
+    ], "once, to the client alone"
+    world.heard.clear()
+    world.set("SIM_WIND_N", 1.0)
+    world.run(4)
+    assert not [m for m in world.heard if m.get_type() == "PARAM_ERROR"]
 
 
 def test_a_load_can_grow_heavier_in_flight(world: World) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,22 @@ LONG = [
     (192, (-1, 1, 0, NAN, 200, 0, 5), None, DENIED),
     (192, (-1, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
     (192, (-1, 0, 0, NAN, NAN, NAN, math.inf), None, DENIED),
-    (34, (2, 1, 0, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None), OK),
+    (192, (0, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
+    (192, (NAN, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
+    (192, (2, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True, 2.0), OK),
+    (192, (-2, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
+    (192, (-0.5, 1, 0, NAN, NAN, NAN, NAN), None, DENIED),
+    (192, (math.inf, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
+    (34, (2, 1, 0, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=True), OK),
+    (34, (2, 1, 1, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=False), OK),
+    *[
+        (34, (2, 1, as_before, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None), OK)
+        for as_before in (2, 5, NAN)
+    ],
+    (34, (2, 1, 3, 0, NAN, NAN, NAN), None, UNSUPPORTED),  # along the path
+    (34, (2, 1, 4, 0, NAN, NAN, NAN), None, UNSUPPORTED),  # by a remote control
+    (34, (2, 1, 6, 0, NAN, NAN, NAN), None, DENIED),
+    (34, (2, 1, 0.5, 0, NAN, NAN, NAN), None, DENIED),
     (34, (NAN, 1, 0, 0, NAN, NAN, NAN), None, DENIED),
     (186, (4, 3), ChangeAltitude(4.0), OK),
     (186, (NAN, 3), None, DENIED),
@@ -241,6 +257,20 @@ def test_command_long(rig_with, items, command, params, request_, result):
 
 
 @pytest.mark.parametrize(
+    ("command", "params"),
+    [(c, p) for c, p, request_, result in LONG if request_ is None and result == DENIED and c != 512],
+    ids=lambda value: str(value)[:40],
+)
+def test_the_text_of_a_refusal_names_the_parameter_that_is_wrong(rig, command, params):
+    texts = [r for r in rig.replies(long(command, params)) if r.get_type() == "STATUSTEXT"]
+    text = "".join(part.text for part in texts)
+    assert text
+    for number in re.finditer(r"param\d", text):
+        # "speed (param1) = -2 m/s", or "latitude ... (param5 ... param7)"
+        assert re.search(r"\w \((param\d \.\.\. )?$", text[: number.start()]), text
+
+
+@pytest.mark.parametrize(
     ("command", "params", "result"),
     [(c, p, r) for c, p, _, r in LONG if len(p) <= 4],
     ids=lambda v: str(v)[:40],
@@ -375,6 +405,21 @@ def test_a_mode_that_is_not_flown_is_refused_by_its_name_with_those_that_are(rig
     assert acks(replies) == [(176, DENIED)]
     assert [m.text for m in replies if m.get_type() == "STATUSTEXT"] == [text]
     assert len(text) <= 50 and rig.asked == []
+
+
+@pytest.mark.parametrize(
+    ("flavour", "ask", "name"),
+    [
+        (ARDUPILOT, mavlink.MAVLink_set_mode_message(1, 1, 16), "POSHOLD"),
+        (ARDUPILOT, long(176, (1, 16, 0, 0, 0, 0, 0)), "POSHOLD"),
+        (PX4, long(176, (1, 3, 0, 0, 0, 0, 0)), "POSCTL"),
+        (ARDUPILOT, long(262, (mavlink.MAV_STANDARD_MODE_POSITION_HOLD, 0, 0, 0, 0, 0, 0)), "POSHOLD"),
+    ],
+)
+def test_the_supervisor_knows_the_name_of_the_requested_mode(rig_with, flavour, ask, name):
+    rig = rig_with(identity=Identity(flavour=flavour))
+    rig.replies(ask)
+    assert [request.name for request in rig.asked] == [name]
 
 
 def test_set_current_message_is_answered_by_mission_current(rig):

@@ -230,7 +230,7 @@ NAN = math.nan
 
 def test_guided_commands(rig):
     assert long(rig, m.MAV_CMD_DO_ORBIT, -2.0, 1.0, 0.0, 0.0, NAN, NAN, NAN) == 0
-    assert rig.asked[-1] == Orbit(-2.0, 1.0, None, None, None)
+    assert rig.asked[-1] == Orbit(-2.0, 1.0, None, None, None, faces_centre=True)
     assert long(rig, m.MAV_CMD_DO_ORBIT, 0.0, 1.0, 0.0, 0.0, NAN, NAN, NAN) == m.MAV_RESULT_DENIED
     assert long(rig, m.MAV_CMD_DO_CHANGE_ALTITUDE, 4.0, 3.0) == 0
     assert rig.asked[-1] == ChangeAltitude(4.0)

@@ -19,11 +19,12 @@ from autopilot.services.missions import (
     RETRY_US,
 )
 from autopilot.services.records import MissionChanged, Verdict
-from autopilot.services.requests import ReplaceMission
+from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem, located_steps
 
+LAT, LON = round(Home().latitude_deg * 1e7), round(Home().longitude_deg * 1e7)
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
 
 
@@ -376,6 +377,55 @@ def test_the_home_of_a_file_is_the_vehicles_own_for_clients_of_ardupilot(
 def test_an_item_that_is_not_there(rig_with, items, ask):
     rig = rig_with(items(2))
     assert said(rig.replies(ask(1, 1, 2))) == [(ACK, m.MAV_MISSION_INVALID_SEQUENCE)]
+
+
+# ---- single items outside an upload, as ArduPilot has them
+
+
+def single_item(float_form: bool, **changes: Any) -> Any:
+    """MISSION_ITEM or MISSION_ITEM_INT of a waypoint 10 m north of home and 5 m above it."""
+    item = WireItem(3, 16, 2, 1, 0.0, 0.0, 0.0, 0.0, LAT + 900, LON, 5.0)._replace(**changes)
+    if float_form:
+        return float_message(0, item)
+    return m.MAVLink_mission_item_int_message(target_system=1, target_component=1, seq=0, **item._asdict())
+
+
+@pytest.mark.parametrize("float_form", [False, True])
+def test_a_single_item_is_a_place_or_a_height_to_fly_to(rig, float_form):
+    assert said(rig.replies(single_item(float_form))) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    (go,) = rig.asked
+    assert isinstance(go, Reposition)
+    assert (go.east_m, go.north_m, go.altitude_m) == pytest.approx((0.0, 10.0, 5.0), abs=0.5)
+    # MAVProxy's change of height has no place
+    assert said(rig.replies(single_item(float_form, current=3, x=0, y=0))) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    assert said(rig.replies(single_item(float_form, current=3, frame=0, z=6.5))) == [
+        (ACK, m.MAV_MISSION_ACCEPTED)
+    ]
+    assert rig.asked[1:] == [ChangeAltitude(5.0), ChangeAltitude(6.5)]
+    assert rig.endpoint.mission.items == ()
+
+
+@pytest.mark.parametrize("current", [2, 3])
+@pytest.mark.parametrize("wrong", [{"command": m.MAV_CMD_NAV_LAND}, {"frame": m.MAV_FRAME_LOCAL_NED}])
+def test_a_single_item_that_is_no_waypoint_is_refused_with_a_text(rig, current, wrong):
+    *text, ack = rig.replies(single_item(False, current=current, **wrong))
+    assert (ack.get_type(), ack.type) == (ACK, m.MAV_MISSION_UNSUPPORTED)
+    assert "refused outside an upload" in "".join(part.text for part in text)
+    assert rig.asked == []
+
+
+@pytest.mark.parametrize("current", [2, 3])
+def test_a_single_item_that_cannot_be_flown_now_is_refused_with_the_reason(rig, current):
+    rig.verdict = lambda request: Verdict(m.MAV_RESULT_TEMPORARILY_REJECTED, "Reposition denied: not now")
+    text, ack = rig.replies(single_item(False, current=current))
+    assert (text.text, ack.type) == ("Reposition denied: not now", m.MAV_MISSION_DENIED)
+
+
+def test_a_single_item_of_floats_without_a_place_is_answered(rig):
+    nowhere = single_item(True)
+    nowhere.x = math.inf
+    *text, ack = rig.replies(nowhere)
+    assert text and ack.type == m.MAV_MISSION_INVALID_PARAM5_X
 
 
 # ---- clients that use floats only

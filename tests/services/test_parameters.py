@@ -17,7 +17,8 @@ from autopilot.services.parameter_protocol import (
     TYPE_MISMATCH,
     ParameterService,
 )
-from autopilot.services.records import ParameterChanged, Peer, SimulatorParameterRequested
+from autopilot.services.records import ParameterChanged, Peer, SimulatorParameterRequested, Verdict
+from autopilot.services.requests import ChangeVehicle
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import payload_of
 from autopilot.wire.dialect import plumbline as m
@@ -302,3 +303,25 @@ def test_a_list_waits_until_the_table_is_complete(rig):
     got = listed(rig)
     assert [x.param_id for x in got] == list(rig.table.names)
     assert {x.param_count for x in got} == {len(rig.table.names)}
+
+
+def test_what_describes_the_vehicle_is_changed_only_if_the_supervisor_agrees() -> None:
+    peer = Peer("gcs", 255, 190)
+    table = ParameterTable([Parameter("VEH_LEN", 1.0, 0.1, 9.0, "m", "Length", disarmed=True)])
+    service, asked = ParameterService(table), []
+
+    def refuse(request):
+        asked.append(request)
+        return Verdict(m.MAV_RESULT_DENIED, "VEH_LEN not set: armed")
+
+    text, error, value = service.receive_set(set_(b"VEH_LEN", 2.0), peer, 0, refuse)
+    assert (text.text, error.message.error, value.message.param_value) == (
+        "VEH_LEN not set: armed",
+        READ_ONLY,
+        1.0,
+    )
+    assert asked == [ChangeVehicle("VEH_LEN")] and table["VEH_LEN"] == 1.0
+    (same,) = service.receive_set(set_(b"VEH_LEN", 1.0), peer, 0, refuse)  # the value that it has
+    assert same.message.param_value == 1.0
+    changed = service.receive_set(set_(b"VEH_LEN", 2.0), peer, 0, lambda request: Verdict(0))
+    assert changed[-1] == ParameterChanged("VEH_LEN", 2.0)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import ZERO, norm, sub
+from autopilot.guidance.heading import FacePoint
 from autopilot.guidance.setpoint_follower import (
     UNSPECIFIED,
     PositionSetpoint,
@@ -19,6 +20,7 @@ from autopilot.guidance.setpoint_follower import (
 )
 from autopilot.onboard.snapshot import reported_mode
 from autopilot.services import identity
+from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     Arm,
     FollowAttitude,
@@ -27,6 +29,7 @@ from autopilot.services.requests import (
     Land,
     Orbit,
     Pause,
+    Reposition,
     ReturnHome,
     SetHome,
     SetMode,
@@ -162,7 +165,9 @@ def test_commands_take_over(request_: Any, phase: Phase) -> None:
 
 def test_the_stick_leads_and_is_lost() -> None:
     sky = Sky().airborne()
-    assert sky.ask(POSCTL).result == LATER
+    assert sky.ask(POSCTL) == Verdict(LATER, "POSCTL denied: no MANUAL_CONTROL received")
+    poshold = SetMode(identity.POSCTL, 0, 16, "POSHOLD")
+    assert sky.ask(poshold) == Verdict(LATER, "POSHOLD denied: no MANUAL_CONTROL received")
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 0.1)
     assert sky.ask(POSCTL).result == ACCEPTED
     assert reported_mode(sky.flight) == (identity.POSCTL, 0)
@@ -189,6 +194,37 @@ def test_an_orbit_is_flown_about_its_centre_without_a_stream() -> None:
     sky.wait(20.0)
     x, v = sky.view.x_load, sky.view.v_load
     assert x[0] * v[1] - x[1] * v[0] > 0.0
+
+
+def test_the_nose_points_to_the_centre_of_a_circle_or_stays() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0, faces_centre=True)).result == ACCEPTED
+    sky.wait(20.0)
+    x = sky.view.x_load
+    assert (
+        math.dist(
+            (math.cos(sky.flight.heading.angle), math.sin(sky.flight.heading.angle)),
+            (-x[0] / 2.0, -x[1] / 2.0),
+        )
+        < 0.02
+    )
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED  # as before
+    sky.wait(1.0)
+    assert sky.flight.heading.aim == FacePoint((0.0, 0.0, 0.0))
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0, faces_centre=False)).result == ACCEPTED
+    sky.wait(5.0)
+    assert sky.flight.heading.rate == 0.0
+    refused = sky.flight
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 0.1, faces_centre=True)).result == DENIED
+    assert sky.flight == refused
+
+
+@pytest.mark.parametrize("speed", [0.01, 15.1, 1e9])
+def test_a_speed_that_cannot_be_flown_refuses_a_reposition(speed: float) -> None:
+    sky = Sky().airborne()
+    verdict = sky.ask(Reposition(3.0, 0.0, 2.0, True, speed))
+    assert verdict == Verdict(DENIED, f"Reposition denied: speed {speed:.2f} m/s; must be 0.05 ... 15 m/s")
+    assert sky.flight.phase == Phase.HOLD
 
 
 def test_a_circle_of_so_many_turns_ends_in_a_hold() -> None:

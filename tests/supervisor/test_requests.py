@@ -313,6 +313,20 @@ def test_a_reposition_that_may_not_change_the_mode_needs_a_hold(phase: Phase) ->
     assert verdict.result == LATER
 
 
+@pytest.mark.parametrize(("phase", "where"), [(Phase.DISARMED, "disarmed"), (Phase.ARMED, "on the ground")])
+def test_a_pause_on_the_ground_needs_something_to_pause(phase: Phase, where: str) -> None:
+    idle = Flight(phase=phase)
+    text = f"Pause denied while {where}: nothing is under way"
+    assert decide(idle, R.Pause(), view(), SETTINGS) == (idle, Verdict(LATER, text))
+    chosen = replace(idle, action_when_armed=ActionWhenArmed.MISSION)
+    after, verdict = decide(chosen, R.Pause(), view(), SETTINGS)
+    assert (verdict.result, after.action_when_armed) == (ACCEPTED, ActionWhenArmed.NOTHING)
+    # the mode of hold may be selected at any time
+    assert (
+        decide(idle, R.SetMode(identity.AUTO, identity.AUTO_LOITER), view(), SETTINGS)[1].result == ACCEPTED
+    )
+
+
 @pytest.mark.parametrize("request_", [R.Land(), R.Pause()])
 def test_a_takeoff_that_waits_for_arming_is_taken_back(request_: Any) -> None:
     sky = Sky()

@@ -31,7 +31,7 @@ def over(sky: Sky, usable: bool) -> Sky:
         (WinchRequest(3.0), "a cable of 3.70 m; must be 0.3 ... 3 m (WNC_LEN_MIN, WNC_LEN_MAX)"),
         (WinchRequest(-0.5), "a cable of 0.20 m; must be 0.3 ... 3 m (WNC_LEN_MIN, WNC_LEN_MAX)"),
         (WinchRequest(1.8), "load height 0.20 m, min 0.3 m"),
-        (WinchRequest(0.5, 0.4), "0.40 m/s; must be 0.01 ... 0.3 m/s (WNC_SPEED)"),
+        (WinchRequest(0.5, 0.4), "rate 0.40 m/s; must be 0.01 ... 0.3 m/s (WNC_SPEED)"),
     ],
 )
 def test_what_the_winch_cannot_do_is_denied_with_the_limit(request_: WinchRequest, text: str) -> None:

@@ -66,6 +66,22 @@ def test_where_a_step_leaves_the_load(step: Step, position: tuple[float, float, 
     assert state_after(step, HERE, HOME).position == position
 
 
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        ((RUN,), "an attitude run"),
+        ((UNFINISHED,), "signals that end in motion"),
+        ((RUN, UNFINISHED, Delay(1.0)), "signals that end in motion"),
+        ((RUN, AWAY), "an attitude run"),
+        ((Release(),), "a release"),
+        ((Release(), Waypoint(1.0, 1.0, 2.0), Land()), "a landing beside the load"),
+        ((RUN, Waypoint(1.0, 1.0, 2.0)), ""),
+    ],
+)
+def test_what_makes_the_position_unknown_is_named(steps: tuple[Step, ...], told: str) -> None:
+    assert [entry.after.unknown_after for entry in timeline(steps, HERE)][-1] == told
+
+
 def test_what_else_a_step_changes() -> None:
     assert state_after(Speed(2.0), HERE).speed_m_s == 2.0
     assert state_after(Winch(0.5), HERE).cable_m == pytest.approx(1.2)

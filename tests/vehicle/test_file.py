@@ -8,11 +8,12 @@ from importlib.resources import files
 
 import pytest
 
-from autopilot.vehicle.file import belief_of, load_belief, load_vehicle
+from autopilot.vehicle.file import belief_of, load_belief, load_truth_and_belief, load_vehicle
 from autopilot.vehicle.layout import PLUS
 from autopilot.vehicle.model import ARM_RATIOS, Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
+from gcs.workflows.vehicle_limits import load_limits
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import AIR_KEYS, CHAIN_KEYS, DRIVE_KEYS, truth_of
 
@@ -418,3 +419,20 @@ def test_what_becomes_of_a_share_of_the_greatest_force_wants_one(tmp_path):
     for line in ("battery = true", "esc_steps = 100.0", "thrust_curve = 0.5"):
         said = broken(tmp_path, "rotor_max_n = 1.96", f"rotor_max_n = inf\n{line}")
         assert said.startswith("rotor_max_n = inf; must be finite"), line
+
+
+@pytest.mark.parametrize(("name", "named"), [("heavy", ["heavy"]), ("heavy-real", ["heavy-real", "heavy"])])
+def test_truth_and_belief_are_those_of_two_calls_and_each_file_is_read_once(monkeypatch, name, named):
+    expected = (load_vehicle(name), load_belief(name))
+    read, real = [], type(VEHICLES).read
+
+    def counted(self, name_or_path):
+        read.append(name_or_path)
+        return real(self, name_or_path)
+
+    monkeypatch.setattr(type(VEHICLES), "read", counted)
+    assert load_truth_and_belief(name) == expected
+    assert read == named
+    read.clear()
+    load_limits(name)
+    assert read == named

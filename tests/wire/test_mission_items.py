@@ -191,15 +191,43 @@ def test_each_step_knows_its_items() -> None:
 REFUSALS = [
     # items, item that is refused, MAV_MISSION_RESULT, part of the text
     ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
-    ([item(84, frame=6)], 0, "UNSUPPORTED", "command 84"),
+    ([item(84, frame=6)], 0, "UNSUPPORTED", "NAV_VTOL_TAKEOFF (84) is not flown; use NAV_TAKEOFF,"),
+    ([item(176)], 0, "UNSUPPORTED", "DO_SET_MODE (176): the vehicle cannot do it in a mission"),
+    *(
+        ([UP, item(command, 3.0, frame=6)], 1, "UNSUPPORTED", "list of the fence (mission type 1)")
+        for command in range(5000, 5005)
+    ),
+    (
+        [UP, item(5100, frame=6)],
+        1,
+        "UNSUPPORTED",
+        "it belongs in the list of rally points",
+    ),
     ([item(211, 2.0, 0.0)], 0, "INVALID_PARAM1", "gripper = 2"),
-    ([item(211, 1.0, 3.0)], 0, "INVALID_PARAM2", "gripper action = 3"),
+    ([item(211, 1.0, 3.0)], 0, "INVALID_PARAM2", "gripper action = 3; must be one of 0 release, 1 grab,"),
     ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
     ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),
     ([item(211, 1.0, 0.0), item(21, frame=6, x=473977420, y=85455940)], 1, "INVALID", "put a waypoint"),
-    ([item(42600, 1.0, 1.0, 0.5)], 0, "INVALID", "the load's height is not known there"),
+    (
+        [item(42600, 1.0, 1.0, 0.5)],
+        0,
+        "INVALID",
+        "height is not given by any item before it; a waypoint first",
+    ),
+    (
+        [UP, item(31013, 1.0, 0.1, x=1000), item(42600, 1.0, 1.0, 0.5)],
+        2,
+        "INVALID",
+        "height is not known after an attitude run;",
+    ),
+    (
+        [UP, TERM, RUN._replace(x=250), item(42600, 1.0, 1.0, 0.5)],  # cut off in the rise
+        3,
+        "INVALID",
+        "height is not known after signals that end in motion;",
+    ),
     ([UP, item(42600, 3.0, 1.0, 0.5)], 1, "INVALID_PARAM1", "winch = 3"),
-    ([UP, item(42600, 1.0, 2.0, 0.5)], 1, "INVALID_PARAM2", "winch action = 2; must be one of 1"),
+    ([UP, item(42600, 1.0, 2.0, 0.5)], 1, "INVALID_PARAM2", "winch action = 2; must be one of 1 length"),
     ([UP, item(42600, 1.0, 1.0, math.nan)], 1, "INVALID_PARAM3", "length = nan m"),
     ([UP, item(42600, 1.0, 1.0, 0.5, 2.0)], 1, "INVALID_PARAM4", "rate = 2 m/s"),
     (
@@ -242,7 +270,12 @@ REFUSALS = [
     ([FACTOR, RUN], 0, "INVALID", "must follow a term"),
     ([TERM, FACTOR], 1, "INVALID", "item 0 has no run"),
     ([TERM, item(20), RUN], 0, "INVALID", "item 0 has no run"),
-    ([TERM._replace(frame=6), RUN], 0, "UNSUPPORTED_FRAME", "frame 6; must be 2"),
+    (
+        [TERM._replace(frame=6), RUN],
+        0,
+        "UNSUPPORTED_FRAME",
+        "must be 2 for LOAD_SIGNAL_TERM (31010)",
+    ),
     ([TERM._replace(param1=3.0), RUN], 0, "INVALID_PARAM1", "axis = 3"),
     ([TERM._replace(param1=0.5), RUN], 0, "INVALID_PARAM1", "axis = 0.5"),
     ([TERM._replace(param1=math.nan), RUN], 0, "INVALID_PARAM1", "axis = nan"),

@@ -42,7 +42,7 @@ from autopilot.supervisor.requests.mission import (
     set_current,
     start_mission,
 )
-from autopilot.supervisor.requests.modes import enable_fence, hold, land, return_home, set_home, set_mode
+from autopilot.supervisor.requests.modes import enable_fence, land, pause, return_home, set_home, set_mode
 from autopilot.supervisor.requests.orbit import orbit
 from autopilot.supervisor.requests.payload import grab, release_load, winch
 from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
@@ -72,7 +72,7 @@ HANDLERS: dict[type, Handler] = {
     ReturnHome: return_home,
     SetMode: set_mode,
     StartMission: start_mission,
-    Pause: hold,
+    Pause: pause,
     Continue: continue_mission,
     SetCurrent: set_current,
     ReplaceMission: replace_mission,

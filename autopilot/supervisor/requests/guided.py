@@ -15,7 +15,7 @@ from autopilot.guidance.setpoint_follower import (
     PositionSetpoint,
     SetpointStream,
 )
-from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
+from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick, SetMode
 from autopilot.supervisor.machine import try_transition
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
@@ -48,13 +48,14 @@ def offboard(flight: Flight, request: Any, view: View, settings: Settings) -> De
     return start_guided(flight, SetpointSource.OFFBOARD, "OFFBOARD", view, settings)
 
 
-def position_control(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """POSCTL: follow the stick."""
+def position_control(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
+    """POSCTL, which is POSHOLD to ArduPilot's clients: follow the stick."""
+    name = request.name or "POSCTL"
     if not flight.setpoints.manual.is_fresh(view.now_us, settings.setpoints.manual_loss_us):
-        return flight, temporarily_denied("POSCTL denied: no MANUAL_CONTROL received")
+        return flight, temporarily_denied(f"{name} denied: no MANUAL_CONTROL received")
     if flight.phase in ON_GROUND:
-        return flight, temporarily_denied("POSCTL denied: take off first")
-    return start_guided(flight, SetpointSource.MANUAL, "POSCTL", view, settings)
+        return flight, temporarily_denied(f"{name} denied: take off first")
+    return start_guided(flight, SetpointSource.MANUAL, name, view, settings)
 
 
 def start_guided(

@@ -38,6 +38,15 @@ def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
 
 
+def pause(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """Stop and hold; on the ground, cancel what begins with arming, if there is such a thing."""
+    mission = flight.mission
+    is_idle = flight.action_when_armed == ActionWhenArmed.NOTHING and not (mission.active or mission.waiting)
+    if flight.phase in ON_GROUND and is_idle:
+        return flight, wrong_phase(flight, "Pause", "nothing is under way")
+    return hold(flight, request, view, settings)
+
+
 def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Set the load down where it is, and the vehicle beside it; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
@@ -93,7 +102,9 @@ def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -
         sub_mode = identity.AUTO_MISSION
     handler = MODES.get((main, sub_mode))
     if handler is None:
-        return flight, denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
+        return flight, denied(
+            f"{request.name or f'Mode {main}/{sub_mode}'} denied: not flown by this vehicle"
+        )
     accepts_setpoints = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
     if (
         settings.setpoints.ardupilot_guided

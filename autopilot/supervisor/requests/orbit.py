@@ -8,12 +8,14 @@ from dataclasses import replace
 from autopilot.geometry.linear import Vec3, add, sub
 from autopilot.guidance.setpoint_follower import NEVER_US, Circle
 from autopilot.services.requests import Orbit
+from autopilot.supervisor.heading import with_look_at_aim
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.requests.guided import start_guided
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MIN_ALTITUDE_M
-from autopilot.supervisor.requests.verdicts import Decision, denied, wrong_phase
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import CARRYING, Flight, SetpointSource, View, fence_problem
+from missions.model import LookAt
 
 MIN_RADIUS_M = 0.2
 MIN_CIRCLE_SPEED_M_S = 0.05
@@ -50,7 +52,11 @@ def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Dec
         ends_us = view.now_us + round(1e6 * turning_s)
     circle = Circle(centre, radius, rate, phase, view.now_us, ramp_s, ends_us)
     circling = replace(flight, setpoints=replace(flight.setpoints, circle=circle))
-    return start_guided(circling, SetpointSource.ORBIT, "Orbit", view, settings)
+    circling, verdict = start_guided(circling, SetpointSource.ORBIT, "Orbit", view, settings)
+    if verdict.result == ACCEPTED.result and request.faces_centre is not None:
+        look_at = LookAt(centre[0], centre[1]) if request.faces_centre else LookAt(None, None)
+        circling = with_look_at_aim(circling, look_at, view, settings)
+    return circling, verdict
 
 
 def _circle_problem(flight: Flight, centre: Vec3, radius: float, speed: float, settings: Settings) -> str:
@@ -61,7 +67,7 @@ def _circle_problem(flight: Flight, centre: Vec3, radius: float, speed: float, s
         return f"load height {centre[2]:.2f} m, min {MIN_ALTITUDE_M} m"
     if not MIN_CIRCLE_SPEED_M_S <= abs(speed) <= settings.setpoints.max_speed_m_s:
         limits = f"{MIN_CIRCLE_SPEED_M_S:g} ... {settings.setpoints.max_speed_m_s:g} m/s"
-        return f"{speed:.2f} m/s; must be {limits}"
+        return f"speed {speed:.2f} m/s; must be {limits}"
     centripetal = speed * speed / radius
     if centripetal > settings.motion.accel_m_s2:
         return f"{centripetal:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.motion.accel_m_s2:g}"

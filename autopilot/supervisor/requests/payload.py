@@ -87,7 +87,7 @@ def winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Dec
     speed = settings.winch.speed_m_s if request.speed_m_s is None else request.speed_m_s
     if not MIN_REEL_SPEED_M_S <= speed <= settings.winch.speed_m_s:
         limits = f"{MIN_REEL_SPEED_M_S:g} ... {settings.winch.speed_m_s:g} m/s (WNC_SPEED)"
-        return flight, denied(f"Winch denied: {speed:.2f} m/s; must be {limits}")
+        return flight, denied(f"Winch denied: rate {speed:.2f} m/s; must be {limits}")
     legs, here = stopping_legs(flight, view, settings)
     length = cable_length_at(flight, here, settings)
     target_m = length + request.length_m

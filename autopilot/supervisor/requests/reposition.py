@@ -28,7 +28,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     speed = flight.mission.speed_m_s if request.speed_m_s is None else request.speed_m_s
     if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
         return flight, denied(
-            f"Reposition denied: {speed:.2f} m/s; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
+            f"Reposition denied: speed {speed:.2f} m/s; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g} m/s"
         )
     held, verdict = hold(flight, request, view, settings)
     requested = (request.east_m, request.north_m, request.altitude_m)
@@ -74,6 +74,6 @@ def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Set
     speed_m_s = settings.motion.speed_m_s if request.speed_m_s is None else request.speed_m_s
     if not MIN_SPEED_M_S <= speed_m_s <= MAX_SPEED_M_S:
         return flight, denied(
-            f"Speed {speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g}"
+            f"Speed {speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g} m/s"
         )
     return replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s)), ACCEPTED

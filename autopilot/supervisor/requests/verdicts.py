@@ -38,6 +38,7 @@ def temporarily_denied(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text)
 
 
-def wrong_phase(flight: Flight, request_name: str) -> Verdict:
+def wrong_phase(flight: Flight, request_name: str, reason: str = "") -> Verdict:
     """The request is refused because it cannot be carried out in the present phase."""
-    return temporarily_denied(f"{request_name} denied while {_PHASE_TEXTS[flight.phase]}")
+    text = f"{request_name} denied while {_PHASE_TEXTS[flight.phase]}"
+    return temporarily_denied(f"{text}: {reason}" if reason else text)

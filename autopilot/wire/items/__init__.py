@@ -14,12 +14,12 @@ from autopilot.wire.items.decode import decode_items, endless_jump_target, locat
 from autopilot.wire.items.encode import encode_mission, encode_steps, step_index
 from autopilot.wire.items.heading import turn_heading
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
-from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, handling_of
+from autopilot.wire.items.table import AREA_COMMANDS, COMMAND, COMMANDS, handling_of
 
 __all__ = [
+    "AREA_COMMANDS",
     "COMMAND",
     "COMMANDS",
-    "FLOWN_COMMANDS",
     "Command",
     "Handling",
     "LocatedStep",

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.timeline import ANYWHERE, state_after, timeline
+from autopilot.wire.command_names import command_name, numbered_name
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Command, Handling, ItemContext
 from autopilot.wire.items.fields import choice
 from autopilot.wire.items.limits import MAX_FACTORS, MAX_FLOWN_ITEMS, MAX_JUMPS, MAX_TERMS
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
-from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, handling_of
+from autopilot.wire.items.table import COMMAND, handling_of
 from missions.model import Delay, HeadingCommand, Land, ReturnHome, Signals, Step, Takeoff, Term
 
 _TERM, _FACTOR, _RUN = (
@@ -23,6 +24,14 @@ _TERM, _FACTOR, _RUN = (
 )
 
 
+# for an item that leads somewhere by a command that is not flown
+_SUGGESTED = (
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+    mavlink.MAV_CMD_NAV_LAND,
+)
 ENDLESS = -1  # repetitions of a jump
 _MIN_LAP_S = 0.5  # that an endless jump must take from one time to the next
 
@@ -185,10 +194,9 @@ def _steps(context: ItemContext, row: Command) -> Iterable[Step]:
 
 
 def _refusal_text(command: int) -> str:
+    name = numbered_name(command)
     if command in COMMAND:
-        return f"command {command} cannot be done by this vehicle"
-    plumbline_commands = sorted(row.number for row in COMMANDS if row.mission_frame)
-    flown = ", ".join(map(str, sorted(FLOWN_COMMANDS.difference(plumbline_commands))))
-    return (
-        f"command {command}; must be one of {flown} or {plumbline_commands[0]} ... {plumbline_commands[-1]}"
-    )
+        return f"{name}: {COMMAND[command].text}"
+    if name == f"command {command}":
+        return f"{name} is not one that MAVLink or Plumbline defines"
+    return f"{name} is not flown; use {', '.join(map(command_name, _SUGGESTED))}"

@@ -131,17 +131,21 @@ class Choice:
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any]:
         sent = getattr(item, WIRE_FIELD[self.param - 1])
-        return (self.meanings[choice(seq, self.param, self.name, sent, tuple(self.meanings))],)
+        allowed = f"one of {self._listed()}"
+        return (self.meanings[choice(seq, self.param, self.name, sent, tuple(self.meanings), allowed)],)
 
     def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
         (code,) = (code for code, meaning in self.meanings.items() if meaning == values[0])
         return {WIRE_FIELD[self.param - 1]: float(code)}
 
     def describe(self) -> str:
-        listed = ", ".join(
+        return f"{_label(self.param)} {self.name}: {self._listed()}"
+
+    def _listed(self) -> str:
+        """The numbers, each with its meaning if that is another word."""
+        return ", ".join(
             str(code) if code == meaning else f"{code} {meaning}" for code, meaning in self.meanings.items()
         )
-        return f"{_label(self.param)} {self.name}: {listed}"
 
 
 # PLUMBLINE_LOAD_SIGNAL_TERM.param1 and the sign of the amplitude; ned_from_enu of the unit vectors

@@ -99,9 +99,9 @@ def winch(context: ItemContext) -> Iterator[Step]:
     step = Winch(context["length_m"], context["speed_m_s"])
     end_position = state_after(step, context.state).position
     if end_position is None:
-        raise context.refusal(
-            "the load's height is not known there, as after an attitude run; a waypoint first"
-        )
+        reason = context.state.unknown_after
+        where = f"not known after {reason}" if reason else "not given by any item before it"
+        raise context.refusal(f"the load's height is {where}; a waypoint first")
     if end_position[2] < MIN_REELED_HEIGHT_M:
         at = f"it would leave the load at {end_position[2]:.2f} m"
         text = f"{at}; must be at least {MIN_REELED_HEIGHT_M} m: begin higher, or reel out less"

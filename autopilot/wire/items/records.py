@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from autopilot.wire.command_names import numbered_name
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import HeadingCommand, Step
 
@@ -40,10 +41,10 @@ class LocatedStep(NamedTuple):
 
 
 class MissionItemError(ValueError):
-    """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with."""
+    """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with, `noun` names the item."""
 
-    def __init__(self, seq: int, text: str, result: int) -> None:
-        super().__init__(f"mission item {seq}: {text}")
+    def __init__(self, seq: int, text: str, result: int, noun: str = "mission item") -> None:
+        super().__init__(f"{noun} {seq}: {text}")
         self.seq = seq
         self.text = text
         self.result = result
@@ -51,5 +52,6 @@ class MissionItemError(ValueError):
 
 def wrong_frame(seq: int, item: WireItem, allowed: tuple[int, ...]) -> MissionItemError:
     """The error for an item whose frame is not allowed."""
-    text = f"frame {item.frame}; must be {' or '.join(map(str, sorted(allowed)))} for command {item.command}"
+    frames = " or ".join(map(str, sorted(allowed)))
+    text = f"frame {item.frame}; must be {frames} for {numbered_name(item.command)}"
     return MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)

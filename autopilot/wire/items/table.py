@@ -59,6 +59,15 @@ _BY_LENGTH = m.WINCH_RELATIVE_LENGTH_CONTROL
 _ATTITUDE_OF = {m.PLUMBLINE_CONTROL_QUAD_ATTITUDE: "vehicle", m.PLUMBLINE_CONTROL_LOAD_ATTITUDE: "load"}
 _RIGHT_ANGLE = math.pi / 2.0
 _MS, _US = 1e3, 1e6  # x and y: counts per second
+_FENCE_TEXT = "it belongs in the list of the fence (mission type 1)"
+_AREA_TEXTS = {
+    m.MAV_CMD_NAV_FENCE_RETURN_POINT: _FENCE_TEXT,
+    m.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: _FENCE_TEXT,
+    m.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: _FENCE_TEXT,
+    m.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: _FENCE_TEXT,
+    m.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: _FENCE_TEXT,
+    m.MAV_CMD_NAV_RALLY_POINT: "it belongs in the list of rally points (mission type 2)",
+}
 _NOT_SUPPORTED = "the vehicle cannot do it in a mission, and ignoring it would be unsafe"
 
 COMMANDS: tuple[Command, ...] = (
@@ -179,7 +188,8 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_DO_WINCH,
         "the cable gets longer, or shorter for a negative length, where the load hangs. "
-        "Refused where the load's height is not known, as right behind an attitude run: a waypoint first",
+        "Refused where the load's height is not known, as right behind an attitude run or signals that end "
+        "in motion: a waypoint first",
         (
             Choice(1, "winch", "winch", _INSTANCE),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
@@ -268,6 +278,7 @@ COMMANDS: tuple[Command, ...] = (
         mission_frame=True,
         needs_load=True,
     ),
+    *(Command(number, text, handling=Handling.REFUSED) for number, text in _AREA_TEXTS.items()),
     Command(m.MAV_CMD_DO_SET_MODE, _NOT_SUPPORTED, handling=Handling.REFUSED),
     Command(m.MAV_CMD_DO_SET_HOME, _NOT_SUPPORTED, handling=Handling.REFUSED),
     Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _NOT_SUPPORTED, handling=Handling.REFUSED),
@@ -278,7 +289,7 @@ COMMANDS: tuple[Command, ...] = (
     Command(m.MAV_CMD_COMPONENT_ARM_DISARM, _NOT_SUPPORTED, handling=Handling.REFUSED),
 )
 COMMAND: dict[int, Command] = {row.number: row for row in COMMANDS}
-FLOWN_COMMANDS = frozenset(row.number for row in COMMANDS if row.handling is Handling.FLOWN)
+AREA_COMMANDS = frozenset(_AREA_TEXTS)  # of fence and rally points, which are lists beside the mission
 
 
 def handling_of(command: int) -> Handling:

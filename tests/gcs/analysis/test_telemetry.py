@@ -8,8 +8,10 @@ import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.statustext import CHUNK, GAP, TextWriter
 from autopilot.wire.tlog import read_tlog
 from gcs.analysis.telemetry import load_telemetry, telemetry_of
+from gcs.analysis.tracks import StatusText
 from tests.doubles import recorded_flights as flights
 from tests.gcs import tolerances
 
@@ -93,3 +95,16 @@ def test_a_log_without_plumblines_own_messages_gives_empty_tracks():
     assert found.load_truth.position_m.shape == (0, 3)
     assert found.rotors_commanded.force_n.shape == (0, 4)
     assert found.heartbeat.time_s.tolist() == [0.0]
+
+
+def test_a_log_shows_what_it_has_of_each_text_at_the_time_at_which_it_began() -> None:
+    long = "".join(chr(ord("a") + i % 26) for i in range(3 * CHUNK + 7))
+    messages, other = TextWriter().messages(4, long), TextWriter().messages(2, "Landed")
+    sent = [messages[0], *other, messages[1], messages[3], messages[0], messages[1]]
+    writer = FrameWriter(1, 1)
+    records = [(1_000_000 * i, decode(writer.frame(message))[0][0]) for i, message in enumerate(sent)]
+    assert telemetry_of(records).texts == (
+        StatusText(0.0, 4, long[: 2 * CHUNK] + GAP + long[3 * CHUNK :]),
+        StatusText(1.0, 2, "Landed"),
+        StatusText(4.0, 4, long[: 2 * CHUNK]),  # its end is not in the log
+    )

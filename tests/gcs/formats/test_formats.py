@@ -142,6 +142,14 @@ def test_what_is_refused_is_left_out_and_not_kept() -> None:
     assert [item.command for item in judged.items] == [22, 203, 21]
 
 
+def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() -> None:
+    (line,) = check_plan(read_plan(plan_text(TAKEOFF, simple(5003, 20), simple(21))), HOME).left_out
+    assert line.endswith(
+        "NAV_FENCE_CIRCLE_INCLUSION (5003): cannot be flown; "
+        "it belongs in the list of the fence (mission type 1)"
+    )
+
+
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
     judged = check_plan(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
     assert judged.left_out == judged.kept == []
