@@ -39,7 +39,8 @@ file:
 * A table `[parameters]` contains parameters of the autopilot with which the vehicle is delivered, like an
   airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 35 and `MIS_INFEASIBLE` 1: its paths
   leave room for unknown effects, and are flown slower where necessary. Parameters that you set take
-  precedence.
+  precedence. The table may contain the parameters of a custom law, estimator or planner; flights without this
+  one are then refused.
 
 The truth and the autopilot's model are two sets of the same values. There are three ways to make them
 differ:
