@@ -19,7 +19,7 @@ from plumbline.arguments import (
     file_path,
     items,
     numbers,
-    parameter_mapping,
+    positive,
     setting_arguments,
     shown_value,
     whole_number,
@@ -49,6 +49,7 @@ def sweep(
     sensors: str | Path | Sensors = "lab",
     vehicle: str | Path | Vehicle = "bebop",
     settings: Mapping[str, float] | None = None,
+    timeout_s: float | None = None,
     jobs: int | None = None,
     scheduler: Any = None,
     out: str | Path | None = None,
@@ -61,7 +62,8 @@ def sweep(
     `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
     of `gcs sweep --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings
     (Latin hypercube) instead of the whole grid; of a list it draws the listed values, also if there are two.
-    `settings`: parameters that are the same in all flights.
+    `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
+    of the vehicle's clock; by default one and a half times the expected duration plus a minute.
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
     the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
@@ -94,6 +96,8 @@ def sweep(
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
         for setting in setting_arguments(settings):
             arguments += ["--set", setting]
+        if timeout_s is not None:
+            arguments += ["--timeout", repr(positive("timeout_s", timeout_s))]
         if jobs is not None:
             arguments += ["--jobs", str(whole_number("jobs", jobs, 1))]
         if scheduler is not None:

@@ -82,6 +82,7 @@ class SweepPlan:
     sample: int = 0
     estimator: str = ""  # custom estimator of all flights; empty: the built-in one
     planner: str = ""
+    limit_s: float | None = None  # longest time that a flight may last; None: by its expected duration
 
     def own(self, law: str) -> OwnCode:
         """The custom parts (law, estimator, planner) of a flight with this law."""
@@ -119,8 +120,14 @@ class SweepPlan:
         """The conditions under which the flight is flown."""
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
         law = {"CTL_LAW": float(law_number(case.law))}
-        settings = {**dict(self.settings), **varied, **law}
-        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law))
+        settings = {**self.known_to(case.law, {**dict(self.settings), **varied}), **law}
+        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law), self.limit_s)
+
+    def known_to(self, law: str, settings: Mapping[str, T]) -> dict[str, T]:
+        """Those of the settings (or of other values) by name that a flight with this law takes: not the
+        parameters that only other laws of the plan define."""
+        foreign = _foreign_parameters(self.laws, self.own(law))
+        return {name: value for name, value in settings.items() if name not in foreign}
 
     def to_json(self) -> dict[str, Any]:
         """The plan as plain JSON values."""
@@ -142,6 +149,7 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
         sample=int(values["sample"]),
         estimator=values["estimator"],
         planner=values["planner"],
+        limit_s=values.get("limit_s"),
     )
 
 
@@ -211,6 +219,7 @@ def make_plan(
     settings: Mapping[str, float],
     sample: int,
     own: OwnCode = NO_OWN_CODE,
+    limit_s: float | None = None,
 ) -> SweepPlan:
     """The plan; PlanError states what is wrong with it. The estimator and planner of `own` are those of all
     flights."""
@@ -245,6 +254,7 @@ def make_plan(
         sample,
         own.estimator,
         own.planner,
+        limit_s,
     )
     if plan.flights > MAX_FLIGHTS:
         raise PlanError(f"{plan.flights} flights are too many, {MAX_FLIGHTS} at most; --sample takes a few")

@@ -92,7 +92,8 @@ def base_command(plan: SweepPlan) -> str:
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_part_options(plan.estimator, plan.planner)
-    for setting in flight_settings(plan, {}):
+    words += [] if plan.limit_s is None else ["--timeout", f"{plan.limit_s!r}"]
+    for setting in flight_settings(plan, law, {}):
         words += ["--set", setting]
     return shlex.join(words)
 
