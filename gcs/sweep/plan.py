@@ -10,8 +10,9 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 from autopilot.own.law import law_name, law_number, own_law_reference
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
@@ -31,6 +32,8 @@ from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
+
+T = TypeVar("T")
 
 MAX_FLIGHTS = 10_000_000
 _MAX_VALUES = 10_000
@@ -235,9 +238,11 @@ def make_plan(
     _check_laws(laws)
     for law in laws:
         own_of_law = own._replace(law=own_law_reference(law))
-        _check_values(vehicle, own_of_law, values, settings)
+        foreign = _foreign_parameters(tuple(laws), own_of_law)
+        _check_values(vehicle, own_of_law, [one for one in values if one[0] not in foreign], settings)
         if any(own_of_law):
-            _try_own_code(vehicle, own_of_law, settings)
+            known = {name: value for name, value in settings.items() if name not in foreign}
+            _try_own_code(vehicle, own_of_law, known)
     try:
         load_mission(mission)
         load_profile(sensors)
@@ -259,6 +264,18 @@ def make_plan(
     if plan.flights > MAX_FLIGHTS:
         raise PlanError(f"{plan.flights} flights are too many, {MAX_FLIGHTS} at most; --sample takes a few")
     return plan
+
+
+def own_parameter_names(own: OwnCode) -> frozenset[str]:
+    """The names of the parameters that custom classes define."""
+    return frozenset(parameter.name for one in own.load_classes() for parameter in one.parameters)
+
+
+@lru_cache(maxsize=64)
+def _foreign_parameters(laws: tuple[str, ...], own: OwnCode) -> frozenset[str]:
+    """The parameters that custom classes among `laws` define, but no class of `own`, which flies."""
+    of_laws = (own_parameter_names(OwnCode(own_law_reference(law))) for law in laws)
+    return frozenset().union(*of_laws) - own_parameter_names(own)
 
 
 def _check_laws(laws: Sequence[str]) -> None:

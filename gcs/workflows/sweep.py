@@ -195,7 +195,7 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
                 speed=None,
                 real_time=False,
                 out=directory / REPEATS_FOLDER / one.name,
-                settings=flight_settings(plan, one.varied),
+                settings=flight_settings(plan, one.reference, one.varied),
                 connect=None,
                 quiet=True,
                 force=True,
