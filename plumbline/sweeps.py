@@ -22,6 +22,7 @@ from plumbline.arguments import (
     positive,
     setting_arguments,
     shown_value,
+    values_by_parameter,
     whole_number,
 )
 from plumbline.frames import as_frame, check_kind
@@ -90,7 +91,7 @@ def sweep(
         for law in _laws(laws):
             arguments += ["--law", law_reference(law)]
         arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
-        for name, values in parameter_mapping("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
+        for name, values in values_by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
             arguments += ["--vary", f"{name}={_values(name, values)}"]
         if sample is not None:
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
