@@ -22,8 +22,8 @@ R = TypeVar("R")
 
 _MAX_SHOWN_CHARS = 80  # characters of a value
 _PHRASES = (  # phrases of the command line, and their equivalents in Python
-    (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
+    (r"add --fresh to", "give fresh=True to"),
     (r"--force tries:;?", "force=True tries:"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),
@@ -83,7 +83,7 @@ def reworded_for_python(text: str) -> str:
 
 
 def number(name: str, value: Any) -> float:
-    """A finite number, or `Error`."""
+    """A finite number, or `Error`. True and False are no numbers: they would pass for 1 and 0."""
     try:
         found = math.nan if _is_truth_value(value) else float(value)
     except (TypeError, ValueError, OverflowError):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,6 +55,7 @@ def sweep(
     jobs: int | None = None,
     scheduler: Any = None,
     out: str | Path | None = None,
+    fresh: bool = False,
     quiet: bool = True,
     kind: str = "pandas",
 ) -> Any:
@@ -68,7 +70,8 @@ def sweep(
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
     the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
-    which an interrupted sweep continues; by default nothing is kept. `quiet=False` shows progress on stderr.
+    which an interrupted sweep continues; by default nothing is kept. `fresh=True` discards flights that are
+    there already, also those of another sweep. `quiet=False` shows progress on stderr.
 
     Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
     polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script
@@ -103,6 +106,8 @@ def sweep(
             arguments += ["--jobs", str(whole_number("jobs", jobs, 1))]
         if scheduler is not None:
             arguments += ["--scheduler", _address(scheduler)]
+        if fresh:
+            arguments += ["--fresh"]
         check_kind(kind)
         with errors_for_python():
             _run([*arguments, "--out", str(folder)], quiet)
@@ -136,6 +141,27 @@ def _address(scheduler: Any) -> str:
     return found
 
 
+@contextmanager
+def _stopped_with_us(program: subprocess.Popen[str]) -> Iterator[None]:
+    """Stop the sweep if this context is left by an exception, as by a SIGINT that only this process receives.
+
+    The sweep ends and stores the flights in the air, as after Ctrl-C in its terminal; another exception
+    meanwhile ends it at once. Its workers end with it.
+    """
+    try:
+        yield
+    except BaseException:
+        try:
+            # unlike a second SIGINT it abandons nothing if the terminal has already sent one to all
+            ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # nohup
+            program.send_signal(signal.SIGTERM if ignored else signal.SIGHUP)
+            program.communicate()
+        except BaseException:
+            program.kill()
+            raise
+        raise
+
+
 def _run(arguments: list[str], quiet: bool) -> None:
     """Run `gcs sweep`. Its progress goes to our stderr, and so does, even if `quiet`, all that a law prints.
     If the sweep fails, its last message becomes the text of the error."""
@@ -144,14 +170,16 @@ def _run(arguments: list[str], quiet: bool) -> None:
         assert program.stderr is not None
         messages: list[str] = []
         other_lines: list[str] = []
-        for line in program.stderr:
-            if not line.startswith(_ERROR_PREFIX):
-                other_lines.append(line)
-                sys.stderr.write(line)
-                continue
-            messages.append(line)
-            if len(messages) > 1 and not quiet:
-                sys.stderr.write(messages[-2])
+        with _stopped_with_us(program):
+            for line in program.stderr:
+                if not line.startswith(_ERROR_PREFIX):
+                    other_lines.append(line)
+                    sys.stderr.write(line)
+                    continue
+                messages.append(line)
+                if len(messages) > 1 and not quiet:
+                    sys.stderr.write(messages[-2])
+            program.wait()
     last = messages[-1] if messages else ""
     # without progress, each message is an error; a program that crashes leaves a last line of its traceback
     errors = (messages if quiet else [last]) if messages else other_lines[-1:]
