@@ -18,6 +18,8 @@ from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire import parameter_table as table
 from autopilot.wire.parameter_names import unknown_parameter_text
 
+_LABEL = "the vehicle's parameters."  # begins messages about a parameter with which a vehicle is delivered
+
 
 @contextmanager
 def naming_option(option: str) -> Iterator[None]:
@@ -85,7 +87,7 @@ def parameters_for(
     if unknown and all_known:
         raise VehicleFileError(
             [
-                f"{_label(belief)}{unknown_parameter_text(name, parameter_table.names)}; if it is that of a "
+                f"{_LABEL}{unknown_parameter_text(name, parameter_table.names)}; if it is that of a "
                 "custom law, estimator or planner, fly with this one"
                 for name in unknown
             ]
@@ -100,9 +102,4 @@ def _as_delivered(parameter: table.Parameter, belief: Vehicle) -> table.Paramete
     try:
         return replace(parameter, default=parameter.checked(belief.parameters[parameter.name]))
     except table.ParameterError as error:
-        raise VehicleFileError([f"{_label(belief)}{error}"]) from None
-
-
-def _label(belief: Vehicle) -> str:
-    """Begins the message about a parameter with which the vehicle is delivered."""
-    return f"vehicle {belief.name}: parameters."
+        raise VehicleFileError([f"{_LABEL}{error}"]) from None

@@ -71,11 +71,11 @@ that names the key, the value found and the allowed values. A key without a defa
 |---|---|---|---|---|
 """
 ROTORS = """
-The vehicle must be able to stand, and its load to lie half a cable length beside it: the cable is at least 1.15
-times as long as the attachment is above the resting load. The feet are at most 15 radii of gyration, the root
-of the least moment of inertia over the mass, from the centre of mass: the push of the ground turns a lighter
-body so fast that it tumbles. Where the sizes of the gear are left out, they grow with `arm_m`: an arm of 2.8 m with
-the cable and the inertia of `bebop` is refused for both reasons.
+The vehicle must be able to stand, and its load to lie half a cable length beside it: the cable is at least
+1.16 times as long as the attachment is above the resting load. The feet are at most 15 radii of gyration from
+the centre of mass, where the square of this radius is the least moment of inertia over the mass: the push of
+the ground turns a lighter body so fast that it tumbles. Where the sizes of the gear are left out, they grow
+with `arm_m`: an arm of 2.8 m with the cable and the inertia of `bebop` is refused for both reasons.
 
 ## Rotors
 

@@ -87,7 +87,7 @@ def test_a_vehicle_is_delivered_with_the_parameters_of_its_law() -> None:
     belief = delivered_with("MY_GAIN = 3.0")
     table = parameters_for(belief, law)
     assert table["MY_GAIN"] == table.describe("MY_GAIN").default == 3.0
-    with pytest.raises(VehicleFileError, match=r"^vehicle bebop: parameters\.MY_GAIN: no such .* law"):
+    with pytest.raises(VehicleFileError, match=r"^the vehicle's parameters\.MY_GAIN: no such .* law"):
         parameters_for(belief)
     assert "MY_GAIN" not in parameters_for(belief, all_known=False)
     with pytest.raises(VehicleFileError, match=r"parameters\.MY_GAIN = 9\.0 1/s; must be 0 \.\.\. 5"):
