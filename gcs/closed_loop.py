@@ -14,7 +14,6 @@ from autopilot.onboard.snapshot import Options
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
-from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.wire.convert.geodesy import Home
@@ -22,6 +21,7 @@ from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, ground_turn
 from gcs.closed_ticks import NOTHING, ClosedTicks
+from gcs.expected_flight import expected_flight_s
 from gcs.mission_items import items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -38,6 +38,7 @@ class Conditions:
     seed: int = 1
     settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
     own: OwnCode = NO_OWN_CODE  # references to custom code; a law in it determines CTL_LAW
+    limit_s: float | None = None  # longest time that the flight may last; None: by its expected duration
 
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
@@ -77,7 +78,9 @@ def fly(
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
     simulator = build_simulator(conditions, home)
-    client = client or FlightClient(items_of(mission, home), expected_duration_s(mission))
+    if client is None:
+        expected_s = expected_flight_s(mission, onboard.parameters)
+        client = FlightClient(items_of(mission, home), expected_s, conditions.limit_s)
     capture = Capture(log)
     turns = LockstepTurns()
     ticks = ClosedTicks(onboard, simulator) if watch is None else None

@@ -22,8 +22,8 @@ R = TypeVar("R")
 
 _MAX_SHOWN_CHARS = 80  # characters of a value
 _PHRASES = (  # phrases of the command line, and their equivalents in Python
-    (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
+    (r"add --fresh to", "give fresh=True to"),
     (r"--force tries:;?", "force=True tries:"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),
@@ -83,14 +83,18 @@ def reworded_for_python(text: str) -> str:
 
 
 def number(name: str, value: Any) -> float:
-    """A finite number, or `Error`."""
+    """A finite number, or `Error`. True and False are no numbers: they would pass for 1 and 0."""
     try:
-        found = float(value)
+        found = math.nan if _is_truth_value(value) else float(value)
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
         raise GcsError(f"{name} = {shown_value(value)}; must be a finite number")
     return found
+
+
+def _is_truth_value(value: Any) -> bool:
+    return type(value).__name__ in ("bool", "bool_")  # also numpy's, by its present and its former name
 
 
 def positive(name: str, value: Any) -> float:
@@ -107,7 +111,7 @@ def whole_number(name: str, value: Any, minimum: int, maximum: int | None = None
         found = index(value)
     except TypeError:
         found = minimum - 1
-    if found < minimum or (maximum is not None and found > maximum):
+    if _is_truth_value(value) or found < minimum or (maximum is not None and found > maximum):
         limits = f", {minimum} or more" if maximum is None else f" from {minimum} to {maximum}"
         raise GcsError(f"{name} = {shown_value(value)}; must be a whole number{limits}")
     return found
@@ -164,6 +168,17 @@ def parameter_mapping(name: str, values: Any, example: str) -> Mapping[str, Any]
     return values
 
 
+def values_by_parameter(name: str, values: Any, example: str) -> dict[str, Any]:
+    """As `parameter_mapping`, with the names in capitals; `Error` if two keys are the same parameter."""
+    found: dict[str, Any] = {}
+    for key, value in parameter_mapping(name, values, example).items():
+        known = parameter_name(name, key)
+        if known in found:
+            raise GcsError(f"{name}: {known} is there twice, in capital and small letters; leave one out")
+        found[known] = value
+    return found
+
+
 def parameter_name(where: str, name: Any) -> str:
     """The name of a parameter, which need not exist, in capitals; `Error` if it cannot be a name."""
     if not isinstance(name, str) or not name.isidentifier():
@@ -173,7 +188,7 @@ def parameter_name(where: str, name: Any) -> str:
 
 def setting_arguments(settings: Any) -> tuple[str, ...]:
     """Parameters with their values, as the command line writes them; or `Error`."""
-    found = parameter_mapping("settings", settings, "{'SIM_WIND_E': 3}")
+    found = values_by_parameter("settings", settings, "{'SIM_WIND_E': 3}")
     return tuple(f"{name}={number(f'settings[{name!r}]', value)!r}" for name, value in found.items())
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +20,10 @@ from plumbline.arguments import (
     file_path,
     items,
     numbers,
-    parameter_mapping,
+    positive,
     setting_arguments,
     shown_value,
+    values_by_parameter,
     whole_number,
 )
 from plumbline.frames import as_frame, check_kind
@@ -49,9 +51,11 @@ def sweep(
     sensors: str | Path | Sensors = "lab",
     vehicle: str | Path | Vehicle = "bebop",
     settings: Mapping[str, float] | None = None,
+    timeout_s: float | None = None,
     jobs: int | None = None,
     scheduler: Any = None,
     out: str | Path | None = None,
+    fresh: bool = False,
     quiet: bool = True,
     kind: str = "pandas",
 ) -> Any:
@@ -61,11 +65,13 @@ def sweep(
     `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
     of `gcs sweep --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings
     (Latin hypercube) instead of the whole grid; of a list it draws the listed values, also if there are two.
-    `settings`: parameters that are the same in all flights.
+    `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
+    of the vehicle's clock; by default one and a half times the expected duration plus a minute.
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
     the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
-    which an interrupted sweep continues; by default nothing is kept. `quiet=False` shows progress on stderr.
+    which an interrupted sweep continues; by default nothing is kept. `fresh=True` discards flights that are
+    there already, also those of another sweep. `quiet=False` shows progress on stderr.
 
     Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
     polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script
@@ -88,16 +94,20 @@ def sweep(
         for law in _laws(laws):
             arguments += ["--law", law_reference(law)]
         arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
-        for name, values in parameter_mapping("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
+        for name, values in values_by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
             arguments += ["--vary", f"{name}={_values(name, values)}"]
         if sample is not None:
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
         for setting in setting_arguments(settings):
             arguments += ["--set", setting]
+        if timeout_s is not None:
+            arguments += ["--timeout", repr(positive("timeout_s", timeout_s))]
         if jobs is not None:
             arguments += ["--jobs", str(whole_number("jobs", jobs, 1))]
         if scheduler is not None:
             arguments += ["--scheduler", _address(scheduler)]
+        if fresh:
+            arguments += ["--fresh"]
         check_kind(kind)
         with errors_for_python():
             _run([*arguments, "--out", str(folder)], quiet)
@@ -131,6 +141,27 @@ def _address(scheduler: Any) -> str:
     return found
 
 
+@contextmanager
+def _stopped_with_us(program: subprocess.Popen[str]) -> Iterator[None]:
+    """Stop the sweep if this context is left by an exception, as by a SIGINT that only this process receives.
+
+    The sweep ends and stores the flights in the air, as after Ctrl-C in its terminal; another exception
+    meanwhile ends it at once. Its workers end with it.
+    """
+    try:
+        yield
+    except BaseException:
+        try:
+            # unlike a second SIGINT it abandons nothing if the terminal has already sent one to all
+            ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # nohup
+            program.send_signal(signal.SIGTERM if ignored else signal.SIGHUP)
+            program.communicate()
+        except BaseException:
+            program.kill()
+            raise
+        raise
+
+
 def _run(arguments: list[str], quiet: bool) -> None:
     """Run `gcs sweep`. Its progress goes to our stderr, and so does, even if `quiet`, all that a law prints.
     If the sweep fails, its last message becomes the text of the error."""
@@ -139,14 +170,16 @@ def _run(arguments: list[str], quiet: bool) -> None:
         assert program.stderr is not None
         messages: list[str] = []
         other_lines: list[str] = []
-        for line in program.stderr:
-            if not line.startswith(_ERROR_PREFIX):
-                other_lines.append(line)
-                sys.stderr.write(line)
-                continue
-            messages.append(line)
-            if len(messages) > 1 and not quiet:
-                sys.stderr.write(messages[-2])
+        with _stopped_with_us(program):
+            for line in program.stderr:
+                if not line.startswith(_ERROR_PREFIX):
+                    other_lines.append(line)
+                    sys.stderr.write(line)
+                    continue
+                messages.append(line)
+                if len(messages) > 1 and not quiet:
+                    sys.stderr.write(messages[-2])
+            program.wait()
     last = messages[-1] if messages else ""
     # without progress, each message is an error; a program that crashes leaves a last line of its traceback
     errors = (messages if quiet else [last]) if messages else other_lines[-1:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from autopilot.own.estimator import load_estimator
@@ -14,7 +14,11 @@ from autopilot.own.planner import load_planner
 from autopilot.own.source import OwnError
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire import parameter_table as table
+from autopilot.wire.parameter_names import unknown_parameter_text
+
+_LABEL = "the vehicle's parameters."  # begins messages about a parameter with which a vehicle is delivered
 
 
 @contextmanager
@@ -60,17 +64,42 @@ class OwnSetup:
     values: Mapping[str, float]  # of all parameters
 
 
-def parameters_for(belief: Vehicle, own: OwnCode = NO_OWN_CODE) -> AutopilotParameters:
-    """The autopilot's parameters for a vehicle, with those of the custom classes. OwnError if a class cannot
-    be loaded, or a parameter of it is invalid."""
+def parameters_for(
+    belief: Vehicle, own: OwnCode = NO_OWN_CODE, all_known: bool = True
+) -> AutopilotParameters:
+    """The autopilot's parameters for a vehicle, with those of the custom classes, at the values with which
+    the vehicle is delivered. OwnError if a class cannot be loaded, or a parameter of it is invalid.
+
+    VehicleFileError if the vehicle is delivered with a parameter that neither the autopilot nor a class has,
+    unless there may be classes besides `own` (`all_known` is False).
+    """
     defined: tuple[table.Parameter, ...] = ()
     parameter_table = autopilot_parameters(belief)
     for loaded_class in own.load_classes():
-        defined += loaded_class.parameters
+        defined += tuple(_as_delivered(parameter, belief) for parameter in loaded_class.parameters)
         law = load_law(own.law).name if own.law else ""
         try:
             parameter_table = autopilot_parameters(belief, law, defined)
         except table.ParameterError as error:
             label = f"{loaded_class.reference}: {loaded_class.kind.__name__}.parameters: {error}"
             raise OwnError(f"--{loaded_class.role.lower()} {label}") from None
+    unknown = [name for name in belief.parameters if name not in parameter_table]
+    if unknown and all_known:
+        raise VehicleFileError(
+            [
+                f"{_LABEL}{unknown_parameter_text(name, parameter_table.names)}; if it is that of a "
+                "custom law, estimator or planner, fly with this one"
+                for name in unknown
+            ]
+        )
     return parameter_table
+
+
+def _as_delivered(parameter: table.Parameter, belief: Vehicle) -> table.Parameter:
+    """A parameter of a custom class; its default is the value with which the vehicle is delivered, if any."""
+    if parameter.name not in belief.parameters:
+        return parameter
+    try:
+        return replace(parameter, default=parameter.checked(belief.parameters[parameter.name]))
+    except table.ParameterError as error:
+        raise VehicleFileError([f"{_LABEL}{error}"]) from None

@@ -21,19 +21,22 @@ from autopilot.supervisor.setpoint_source import active_setpoint
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase, View, follow_limits, leg_time_s, setpoint
 from autopilot.supervisor.step_legs import step_legs
+from autopilot.trajectory.slack_cable import (
+    CLEARANCE,
+    SET_DOWN_OFFSET,
+    SLACK_ACCEL,
+    SLACK_SPEED,
+    TOUCH_SPEED,
+)
 from autopilot.trajectory.timeline import return_place
 from missions.model import AttitudeRun, Signals
 
 P = Phase
 
-CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack vehicle moves sideways
-SET_DOWN_OFFSET = 0.5  # how far beside the load the vehicle is set down, in cable lengths
-SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
 BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
-TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
 MIN_LOAD_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
 

@@ -30,7 +30,6 @@ from autopilot.guidance.legs import (
 )
 from autopilot.guidance.setpoint_follower import TrackAttitude
 from autopilot.supervisor.motion import position_mode
-from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CARRYING,
@@ -53,6 +52,7 @@ from autopilot.supervisor.watches.touchdown import (
     STILL_US,
     VEHICLE_DEPTH,
 )
+from autopilot.trajectory.slack_cable import CLEARANCE, TOUCH_SPEED
 
 UNCONTROLLED = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts

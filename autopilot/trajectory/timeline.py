@@ -14,6 +14,7 @@ from math import dist
 
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
 from autopilot.trajectory.signals import evaluate, signal_table
+from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
 from autopilot.trajectory.transfer import transfer_duration
 from missions.model import (
     AttitudeRun,
@@ -30,12 +31,10 @@ from missions.model import (
     Winch,
 )
 
-# Estimates, only for progress bars and time-outs: from arming until the cable is taut, and from the load's
-# touch-down until the rotors stop. Lifting and lowering take place at the speed below or the mission's,
-# whichever is less.
-TAUTEN_S = 10.0
-SET_DOWN_S = 10.0
-VERTICAL_SPEED_M_S = 0.8
+# Estimates, only for progress bars and time-outs: what the autopilot needs, besides the vehicle's motion, to
+# detect that the cable is taut, and the touch-downs of load and vehicle.
+DETECTION_S = 3.0
+USUAL_CABLE_M = 0.7  # of a vehicle whose cable is not given
 REEL_M_S = 0.3  # default speed of a winch
 RELEASE_S = 2.0  # hold after the load was released: the vehicle jumps up and comes back
 # of transfers, by default (MIS_SPEED, MIS_ACCEL)
@@ -52,6 +51,18 @@ def cable_length_problem(target_m: float, min_length_m: float, max_length_m: flo
         return ""
     limits = f"{min_length_m:g} ... {max_length_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
     return f"a cable of {target_m:.2f} m; must be {limits}"
+
+
+@dataclass(frozen=True, slots=True)
+class VerticalSpeeds:
+    """Speeds (m/s) at which the slack cable is pulled taut, and at which the load is lifted and lowered
+    unless the mission's speed is less; the defaults are those of MIS_TAUT_SPEED and MIS_LIFT_SPEED."""
+
+    tauten_m_s: float = 0.15
+    lift_m_s: float = 0.8
+
+
+USUAL_SPEEDS = VerticalSpeeds()
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +122,14 @@ def timeline(
     start: MissionState = AT_ORIGIN,
     home: Vec3 = ZERO,
     accel_m_s2: float = ACCEL_M_S2,
+    vertical: VerticalSpeeds = USUAL_SPEEDS,
 ) -> Iterator[TimelineEntry]:
-    """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`."""
+    """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`; the load is
+    lifted and lowered at `vertical` speeds."""
     before = start
     for item, step in enumerate(steps):
         after = state_after(step, before, home)
-        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2)
+        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2, vertical)
         place = home if isinstance(step, ReturnHome) else None
         yield TimelineEntry(item, step, before, after, moving, moving + waiting, place)
         before = after
@@ -172,15 +185,18 @@ def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
 
 
 def _travel_and_wait_s(
-    step: Step, before: MissionState, after: MissionState, accel: float
+    step: Step, before: MissionState, after: MissionState, accel: float, vertical: VerticalSpeeds
 ) -> tuple[float, float]:
     """Time (s) in which the load travels, and in which it does not."""
     speed, waiting = before.speed_m_s, 0.0
+    cable = USUAL_CABLE_M if before.cable_m is None else before.cable_m
     match step:
         case Takeoff():
-            waiting, speed = TAUTEN_S, min(speed, VERTICAL_SPEED_M_S)
+            waiting = DETECTION_S + tauten_duration_s(cable, vertical.tauten_m_s)
+            speed = min(speed, vertical.lift_m_s)
         case Land():
-            waiting, speed = SET_DOWN_S, min(speed, VERTICAL_SPEED_M_S)
+            waiting = DETECTION_S + set_down_duration_s(cable)
+            speed = min(speed, vertical.lift_m_s)
         case Waypoint(hold_s=hold):
             waiting = hold
         case Winch(speed_m_s=rate):
@@ -194,7 +210,14 @@ def _travel_and_wait_s(
     return transfer_duration(dist(before.expected, after.expected), speed, accel), waiting
 
 
-def expected_duration_s(mission: Mission, speed: float = SPEED_M_S, accel: float = ACCEL_M_S2) -> float:
+def expected_duration_s(
+    mission: Mission,
+    speed: float = SPEED_M_S,
+    accel: float = ACCEL_M_S2,
+    cable_m: float | None = None,
+    vertical: VerticalSpeeds = USUAL_SPEEDS,
+) -> float:
     """Expected seconds from arming to the end of the mission: the sum over its steps."""
-    entries = timeline(mission.steps, MissionState(speed_m_s=speed), accel_m_s2=accel)
+    start = MissionState(speed_m_s=speed, cable_m=cable_m)
+    entries = timeline(mission.steps, start, accel_m_s2=accel, vertical=vertical)
     return sum(entry.duration_s for entry in entries)

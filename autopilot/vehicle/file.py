@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
-from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError
 from missions.toml_files import format_value
 
@@ -79,7 +78,8 @@ def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
 
 
 def _parameter_problems(vehicle: Vehicle) -> Iterator[str]:
-    """What is wrong with the parameters with which a vehicle is delivered."""
+    """What is wrong with the parameters with which a vehicle is delivered. Unknown ones may be those of a
+    custom law, estimator or planner: what flies the vehicle checks them (`autopilot.own.own_code`)."""
     if not vehicle.parameters:
         return
     from autopilot.vehicle.parameters import definitions, vehicle_values
@@ -89,7 +89,7 @@ def _parameter_problems(vehicle: Vehicle) -> Iterator[str]:
         if name not in known and name.startswith("SIM_"):
             yield f"{name}: is the simulator's, and these are the autopilot's; other keys say what is true"
         elif name not in known:
-            yield unknown_parameter_text(name, known)
+            continue
         elif known[name].from_vehicle:
             yield f"{name}: is {known[name].from_vehicle}; write that key instead"
         else:

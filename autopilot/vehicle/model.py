@@ -6,7 +6,7 @@ Body frame FLU, SI; a name ends in its unit. `docs/vehicles.md` is made from thi
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import hypot, inf, isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -16,6 +16,11 @@ from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, MAX_ROTORS, MIN_ROTORS, 
 from autopilot.vehicle.rotors import is_controllable, mixer_table, thrust_and_moment_per_force
 
 MIN_ROTOR_MAX_N = 0.01
+# The load rests at half the length of the cable beside the vehicle: from there the cable reaches this height.
+_RESTING_REACH = 0.75**0.5
+# Distance of the feet from the centre of mass, in radii of gyration. The push of the ground on the feet turns
+# lighter bodies so fast that sub-steps of 0.5 ms cannot resolve it: vehicles tumbled from 17 on.
+_MAX_FEET_RADII = 15.0
 
 # sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are similar
 ARM_RATIOS = {
@@ -298,8 +303,28 @@ class Vehicle(BaseModel):
                 f"rotor_max_n = {self.rotor_max_n:g}; must be finite, because battery, esc_steps or "
                 "thrust_curve say what becomes of a share of it"
             )
+        self._check_rest()
         self._check_rotors()
         return self
+
+    def _check_rest(self) -> None:
+        """Whether vehicle and load can stand and lie on the ground."""
+        height = self.gear_height_m + self.attachment_m[2] - self.load_radius_m
+        highest = _RESTING_REACH * self.cable_length_m
+        if height > highest:
+            raise ValueError(
+                f"cable_length_m = {self.cable_length_m:g}; must be >= {height / _RESTING_REACH:.3g}, so "
+                "that the load can lie beside the vehicle, whose gear_height_m is "
+                f"{self.gear_height_m:g} (half of arm_m where it is left out)"
+            )
+        feet = hypot(self.gear_height_m, self.gear_spread_m, self.gear_spread_m)
+        least = self.quad_mass_kg * (feet / _MAX_FEET_RADII) ** 2
+        if min(self.inertia_kg_m2) < least:
+            raise ValueError(
+                f"inertia_kg_m2 = {list(self.inertia_kg_m2)}; each must be >= {least:.3g} for a vehicle of "
+                f"this mass with feet {feet:.2g} m from its centre, or it tumbles on the ground; check "
+                "arm_m, from which gear_height_m and gear_spread_m follow where they are left out"
+            )
 
     @classmethod
     def _default(cls, key: str) -> Any:

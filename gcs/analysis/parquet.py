@@ -42,6 +42,8 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     attitude, estimated_attitude = telemetry.attitude_truth, telemetry.attitude_estimated
     estimate, setpoint, wind = telemetry.load_estimated, telemetry.setpoint, telemetry.wind
     estimated_quat = linear(estimated_attitude.time_s, estimated_attitude.quat_wxyz, t)
+    acceleration = linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
+    acceleration[np.isnan(samples.desired_m).any(axis=1)] = np.nan  # zero is sent where there is no path
     wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 
     def interpolated(values: Floats) -> Floats:
@@ -66,9 +68,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_component_columns(
             "load_velocity_estimated", "m_s", linear(estimate.time_s, estimate.velocity_m_s, t)
         ),
-        **_component_columns(
-            "load_acceleration_desired", "m_s2", linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
-        ),
+        **_component_columns("load_acceleration_desired", "m_s2", acceleration),
         **_component_columns("cable_true", "", truth.q_cable),
         **_component_columns("cable_estimated", "", linear(estimate.time_s, estimate.q_cable, t)),
         **_component_columns("cable_commanded", "", as_of(setpoint.time_s, setpoint.q_cable_c, t)),

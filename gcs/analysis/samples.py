@@ -31,7 +31,6 @@ ATTITUDE_MODES = (
     mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE,
     mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE,
 )
-_TRACKED_MODES = (*ATTITUDE_MODES, mavlink.PLUMBLINE_CONTROL_LOAD_POSITION)
 PHASE_NAMES = {
     value: entry.name.removeprefix("PLUMBLINE_PHASE_").lower()
     for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
@@ -41,7 +40,10 @@ PHASE_NAMES = {
 
 @dataclass(frozen=True)
 class Samples:
-    """n samples at the stamps of the true load; ENU, SI; NaN (or UNKNOWN) where nothing was received."""
+    """n samples at the stamps of the true load; ENU, SI; NaN (or UNKNOWN) where nothing was received.
+
+    Desired and requested values are also NaN while the cascade tracks no position of the load.
+    """
 
     time_s: Floats  # (n,)
     phase: Ints  # (n,)
@@ -106,14 +108,15 @@ def samples_of(telemetry: Telemetry) -> Samples:
     truth, setpoint, estimate = telemetry.load_truth, telemetry.setpoint, telemetry.load_estimated
     filtered = telemetry.load_filtered
     time_s = truth.time_s
-    # while no law follows the setpoint, the estimate is sent in its place to complete the message
-    tracked = np.isin(_integers_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
+    # while no law follows a position of the load, the estimate is sent in its place to complete the message
+    control_mode = _integers_as_of(telemetry, setpoint.control_mode, time_s)
+    tracked = (control_mode == mavlink.PLUMBLINE_CONTROL_LOAD_POSITION)[:, None]
     # the acceleration is sent too: the desired velocity is therefore also a cubic between stamps
     return Samples(
         time_s=time_s,
         phase=phase_at(telemetry, time_s),
         item=_integers_as_of(telemetry, setpoint.item, time_s),
-        control_mode=_integers_as_of(telemetry, setpoint.control_mode, time_s),
+        control_mode=control_mode,
         in_mission=in_window(telemetry, time_s),
         attached=attached(truth),
         actual_m=truth.position_m,

@@ -33,6 +33,7 @@ from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
+from gcs.expected_flight import time_limit_s
 from gcs.mission_items import in_mission_terms
 from missions.model import Mission
 
@@ -47,8 +48,6 @@ REPORT_MESSAGES = (
 FIND_LIMIT_US = 30_000_000
 READY_LIMIT_US = 20_000_000  # then arming is requested nevertheless, and the vehicle reports what is wrong
 AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the pictures
-TIME_FACTOR = 1.5  # a flight may take this many times the expected time,
-TIME_MARGIN_S = 60.0  # plus this margin
 
 OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
 
@@ -137,7 +136,7 @@ class FlightClient:
         self.connection = Connection(link_timeout_us)
         self.items = tuple(items)
         self._expected_s = expected_s
-        self._limit_s = limit_s if limit_s is not None else expected_s * TIME_FACTOR + TIME_MARGIN_S
+        self._limit_s = time_limit_s(expected_s, limit_s)
         self._operations: list[Operation] = []
         self._parameters: ParameterList | None = None  # while they are being requested
         self._stage_start_us: int | None = None  # the ground station's clock

@@ -23,6 +23,7 @@ from gcs.commands.options import (
     print_json,
     require_options,
     sensors_option,
+    time_limit_option,
     truth_option,
     vehicle_option,
 )
@@ -93,12 +94,7 @@ _STARTED_ONLY = (
     help="Fly a vehicle that is already running, at PORT or HOST:PORT (14550 without a value).",
 )
 @truth_option
-@click.option(
-    "--timeout",
-    "limit_s",
-    type=PositiveType(),
-    help="Give up after NUMBER seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
-)
+@time_limit_option
 @click.option("--force", is_flag=True, help="Fly the mission even if it exceeds the limits of the vehicle.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier flight in --out.")
 @click.option("--view", is_flag=True, help="Show the flight live in a browser; see gcs view.")

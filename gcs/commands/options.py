@@ -338,6 +338,16 @@ def require_options(function: F) -> F:
     return require(junit(function))
 
 
+def time_limit_option(function: F) -> F:
+    """--timeout of commands that fly."""
+    return click.option(
+        "--timeout",
+        "limit_s",
+        type=PositiveType(),
+        help="Give up after NUMBER seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
+    )(function)
+
+
 def fresh_option(function: F) -> F:
     """--fresh of commands that continue where they were stopped; also --overwrite, as in other commands."""
     text = "Fly everything again and discard the results in --out."

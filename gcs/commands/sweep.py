@@ -23,6 +23,7 @@ from gcs.commands.options import (
     print_json,
     require_options,
     sensors_option,
+    time_limit_option,
     vehicle_option,
 )
 from gcs.errors import EXIT_DONE, EXIT_REQUIRED
@@ -68,6 +69,7 @@ from gcs.shell.display import notify, results_to_stdout
     type=WholeNumber(min=1),
     help="Draw this many settings (Latin hypercube) instead of flying the whole grid.",
 )
+@time_limit_option
 @click.option(
     "--jobs",
     type=WholeNumber(min=1),
@@ -103,6 +105,7 @@ def sweep_command(
     settings: tuple[str, ...],
     seeds: int,
     sample: int | None,
+    limit_s: float | None,
     jobs: int | None,
     scheduler: str | None,
     out: Path | None,
@@ -161,6 +164,7 @@ def sweep_command(
         out=out,
         reports=reports,
         table_only=table_only,
+        limit_s=limit_s,
         fresh=fresh,
         quiet=quiet or as_json,
         command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),

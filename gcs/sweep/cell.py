@@ -12,15 +12,14 @@ from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import MissionPlan
 from autopilot.trajectory.prepare import PathLimits
-from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.layout import Layout
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import control_divider
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, encode_mission
-from gcs.clients.flight import TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
+from gcs.expected_flight import expected_flight_s, time_limit_s
 from gcs.sweep.plan import simulator_settings
 from gcs.sweep.wire import wire_of
 from missions.model import Mission
@@ -54,7 +53,9 @@ def cell_of(mission: Mission, conditions: Conditions) -> Cell:
     """The cell to which a flight under these conditions belongs. ValueError if it cannot be flown."""
     settings, own = tuple(conditions.settings.items()), conditions.own
     # custom code may change under the same name: its digests are part of the cache's key
-    return _cell(mission, conditions.vehicle, conditions.sensors, settings, own, own.digests)
+    return _cell(
+        mission, conditions.vehicle, conditions.sensors, settings, own, own.digests, conditions.limit_s
+    )
 
 
 @lru_cache(maxsize=8)
@@ -65,6 +66,7 @@ def _cell(
     set_values: tuple[tuple[str, float], ...],
     own: OwnCode,
     digests: tuple[str, ...],
+    limit_s: float | None,
 ) -> Cell:
     home = Home()
     file = load_vehicle(vehicle)
@@ -84,7 +86,7 @@ def _cell(
         setup=setup,
         plan=_plan(items, setup.settings.limits) if setup.planner is None else _own_plan(items, setup),
         item_count=len(items),
-        limit_us=round(1e6 * (expected_duration_s(mission) * TIME_FACTOR + TIME_MARGIN_S)),
+        limit_us=round(1e6 * time_limit_s(expected_flight_s(mission, table), limit_s)),
         truth=apply_parameters(truth, sim_table),
         layout=file.layout,
         profile=profile,

@@ -26,7 +26,7 @@ from autopilot.onboard.onboard import build_setup
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
-from gcs.sweep.plan import SweepPlan, simulator_settings
+from gcs.sweep.plan import SweepPlan, own_parameter_names, simulator_settings
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
@@ -38,6 +38,7 @@ STABILITY_LIMIT = (
 )  # spectral radius; numbers that the law stores but does not use have eigenvalue 1
 SEARCH_STEPS = 12  # steps of the search from the default value to the end of the range
 BISECTIONS = 6
+CUSTOM_LAW = "not computed"  # in place of the range of a custom law
 SETTLE_TICKS = 500  # in which the memory of a law settles while hovering
 
 
@@ -192,11 +193,13 @@ def linear_range(
     plan: SweepPlan, law: str, name: str, nominal_value: float, limits: tuple[float, float]
 ) -> str:
     """The range of the parameter, within `limits`, in which the linear loop is stable; empty if the parameter
-    is not part of the loop, or the law is a custom one. All other parameters have their defaults, or the
-    values set for all flights."""
-    # parameters of a custom estimator or planner
-    own_parameters = {parameter.name for one in plan.own(law).load_classes() for parameter in one.parameters}
-    if law not in LAWS or name in own_parameters:
+    is not part of the loop, CUSTOM_LAW if the law is a custom one, which is not linearised. All other
+    parameters have their defaults, or the values set for all flights."""
+    # parameters of custom laws, of the estimator and of the planner
+    own_parameters = frozenset().union(*(own_parameter_names(plan.own(other)) for other in plan.laws))
+    if law not in LAWS:
+        return CUSTOM_LAW
+    if name in own_parameters:
         return ""
     fixed = {known: value for known, value in plan.settings if known not in own_parameters}
     fixed["CTL_LAW"] = float(LAWS.index(law))

@@ -10,8 +10,9 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 from autopilot.own.law import law_name, law_number, own_law_reference
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
@@ -31,6 +32,8 @@ from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
+
+T = TypeVar("T")
 
 MAX_FLIGHTS = 10_000_000
 _MAX_VALUES = 10_000
@@ -82,6 +85,7 @@ class SweepPlan:
     sample: int = 0
     estimator: str = ""  # custom estimator of all flights; empty: the built-in one
     planner: str = ""
+    limit_s: float | None = None  # longest time that a flight may last; None: by its expected duration
 
     def own(self, law: str) -> OwnCode:
         """The custom parts (law, estimator, planner) of a flight with this law."""
@@ -119,8 +123,14 @@ class SweepPlan:
         """The conditions under which the flight is flown."""
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
         law = {"CTL_LAW": float(law_number(case.law))}
-        settings = {**dict(self.settings), **varied, **law}
-        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law))
+        settings = {**self.known_to(case.law, {**dict(self.settings), **varied}), **law}
+        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law), self.limit_s)
+
+    def known_to(self, law: str, settings: Mapping[str, T]) -> dict[str, T]:
+        """Those of the settings (or of other values) by name that a flight with this law takes: not the
+        parameters that only other laws of the plan define."""
+        foreign = _foreign_parameters(self.laws, self.own(law))
+        return {name: value for name, value in settings.items() if name not in foreign}
 
     def to_json(self) -> dict[str, Any]:
         """The plan as plain JSON values."""
@@ -142,6 +152,7 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
         sample=int(values["sample"]),
         estimator=values["estimator"],
         planner=values["planner"],
+        limit_s=values.get("limit_s"),
     )
 
 
@@ -211,6 +222,7 @@ def make_plan(
     settings: Mapping[str, float],
     sample: int,
     own: OwnCode = NO_OWN_CODE,
+    limit_s: float | None = None,
 ) -> SweepPlan:
     """The plan; PlanError states what is wrong with it. The estimator and planner of `own` are those of all
     flights."""
@@ -226,9 +238,11 @@ def make_plan(
     _check_laws(laws)
     for law in laws:
         own_of_law = own._replace(law=own_law_reference(law))
-        _check_values(vehicle, own_of_law, values, settings)
+        foreign = _foreign_parameters(tuple(laws), own_of_law)
+        _check_values(vehicle, own_of_law, [one for one in values if one[0] not in foreign], settings)
         if any(own_of_law):
-            _try_own_code(vehicle, own_of_law, settings)
+            known = {name: value for name, value in settings.items() if name not in foreign}
+            _try_own_code(vehicle, own_of_law, known)
     try:
         load_mission(mission)
         load_profile(sensors)
@@ -245,10 +259,23 @@ def make_plan(
         sample,
         own.estimator,
         own.planner,
+        limit_s,
     )
     if plan.flights > MAX_FLIGHTS:
         raise PlanError(f"{plan.flights} flights are too many, {MAX_FLIGHTS} at most; --sample takes a few")
     return plan
+
+
+def own_parameter_names(own: OwnCode) -> frozenset[str]:
+    """The names of the parameters that custom classes define."""
+    return frozenset(parameter.name for one in own.load_classes() for parameter in one.parameters)
+
+
+@lru_cache(maxsize=64)
+def _foreign_parameters(laws: tuple[str, ...], own: OwnCode) -> frozenset[str]:
+    """The parameters that custom classes among `laws` define, but no class of `own`, which flies."""
+    of_laws = (own_parameter_names(OwnCode(own_law_reference(law))) for law in laws)
+    return frozenset().union(*of_laws) - own_parameter_names(own)
 
 
 def _check_laws(laws: Sequence[str]) -> None:

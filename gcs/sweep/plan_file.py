@@ -11,7 +11,13 @@ from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
-_OPTIONS = {"mission": "mission", "laws": "--law", "varied": "--vary", "settings": "--set"}
+_OPTIONS = {
+    "mission": "mission",
+    "laws": "--law",
+    "varied": "--vary",
+    "settings": "--set",
+    "limit_s": "--timeout",
+}
 ENTRIES = ("gcs.sweep.work",)  # modules whose imports are all the code that flies a sweep
 
 

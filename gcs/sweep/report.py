@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections import Counter
+from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         _TEMPLATE,
         _SCRIPTS,
         _STYLES,
-        {"base": base_command(plan), "maps": maps},
+        {"maps": maps},
         title=plan.mission,
         plan=plan,
         command=command,
@@ -86,7 +87,9 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
     """A map for `sweep.js`: cells in the order of the first parameter, then the second."""
     found = cells(flights, plan, names)
     rows = found.shown.ravel().tolist()
+    values = plan.known_to(flights.reference, flights.values)
     return {
+        "base": base_command(plan, flights.reference),
         "law": flights.law,
         "reference": flights.reference,
         "names": names,
@@ -96,17 +99,17 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
         "completed": _json_numbers(100.0 * found.success.ravel()),
         "median": _json_numbers(1e3 * found.error_median_m.ravel()),
         "worst": _json_numbers(1e3 * found.error_worst_m.ravel()),
-        "varied": list(flights.values),
-        "shown": [_flight_record(flights, row) if row >= 0 else None for row in rows],
+        "varied": list(values),
+        "shown": [_flight_record(flights, values, row) if row >= 0 else None for row in rows],
     }
 
 
-def _flight_record(flights: Flights, row: int) -> dict[str, Any]:
+def _flight_record(flights: Flights, varied: Mapping[str, Floats], row: int) -> dict[str, Any]:
     return {
         "index": int(flights.index[row]),
         "seed": int(flights.seed[row]),
         "outcome": flights.outcome[row],
-        "values": [repr(float(values[row])) for values in flights.values.values()],
+        "values": [repr(float(values[row])) for values in varied.values()],
     }
 
 

@@ -80,19 +80,22 @@ def _standout(flights: Flights, kind: str, row: int) -> Standout:
     )
 
 
-def flight_settings(plan: SweepPlan, varied: Mapping[str, float]) -> tuple[str, ...]:
-    """NAME=VALUE for each setting of a flight, with the digits that give exactly the same numbers."""
-    return tuple(f"{name}={value!r}" for name, value in {**dict(plan.settings), **varied}.items())
+def flight_settings(plan: SweepPlan, law: str, varied: Mapping[str, float]) -> tuple[str, ...]:
+    """NAME=VALUE for each setting of a flight with this law, with the digits that give exactly the same
+    numbers."""
+    settings = plan.known_to(law, {**dict(plan.settings), **varied})
+    return tuple(f"{name}={value!r}" for name, value in settings.items())
 
 
-def base_command(plan: SweepPlan) -> str:
-    """The beginning of the commands of all flights; law, seed and varied settings follow.
+def base_command(plan: SweepPlan, law: str) -> str:
+    """The beginning of the commands of all flights with this law; law, seed and varied settings follow.
 
     A sweep does not check whether the vehicle can fly the mission, hence --force.
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_part_options(plan.estimator, plan.planner)
-    for setting in flight_settings(plan, {}):
+    words += [] if plan.limit_s is None else ["--timeout", f"{plan.limit_s!r}"]
+    for setting in flight_settings(plan, law, {}):
         words += ["--set", setting]
     return shlex.join(words)
 
@@ -100,7 +103,7 @@ def base_command(plan: SweepPlan) -> str:
 def repeat_command(plan: SweepPlan, flight: Standout, directory: Path) -> str:
     """The command that flies it again into the directory of the sweep, and overwrites an earlier repeat."""
     words = ["--law", flight.reference, "--seed", str(flight.seed)]
-    for name, value in flight.varied.items():
+    for name, value in plan.known_to(flight.reference, flight.varied).items():
         words += ["--set", f"{name}={value!r}"]
     out = shlex.join(["--out", str(directory / REPEATS_FOLDER / flight.name), "--overwrite"])
-    return f"{base_command(plan)} {shlex.join(words)} {out}"
+    return f"{base_command(plan, flight.reference)} {shlex.join(words)} {out}"

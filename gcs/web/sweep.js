@@ -37,10 +37,10 @@
 
   const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\"'\"'")}'`);
 
-  function commandOf(base, map, shown) {
+  function commandOf(map, shown) {
     const words = ["--law", map.reference, "--seed", String(shown.seed)];
     map.varied.forEach((name, i) => words.push("--set", `${name}=${shown.values[i]}`));
-    return [base, ...words.map(quoted)].join(" ");
+    return [map.base, ...words.map(quoted)].join(" ");
   }
 
   function labelled(map, axis, i) {
@@ -65,7 +65,7 @@
     if (!shown) return;
     box.querySelector("h3").textContent = `Flight ${shown.index}: ${shown.outcome}, law ${map.law}, seed ${shown.seed}`;
     box.querySelector("p").textContent = toldOf(map, i, j);
-    box.querySelector("code").textContent = commandOf(data.base, map, shown);
+    box.querySelector("code").textContent = commandOf(map, shown);
   }
 
   /** Draws the map as wide as its card, or wider where the cells need it. */

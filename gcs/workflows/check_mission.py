@@ -14,6 +14,7 @@ from autopilot.vehicle.file import belief_of, load_belief
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
+from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.mission_items import items_of
 from gcs.workflows.before_flight import unused_planner_text
@@ -93,6 +94,18 @@ def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str
             )
 
 
+def parameter_notes(vehicle: str) -> Iterator[str]:
+    """A line about each parameter with which the vehicle is delivered and that only custom code may have."""
+    belief = load_belief(vehicle)
+    known = autopilot_parameters(belief).names
+    for name in belief.parameters:
+        if name not in known:
+            yield (
+                f"note: parameters.{unknown_parameter_text(name, known)}; if it is that of a custom law, "
+                "estimator or planner, only flights with this one are possible"
+            )
+
+
 def winch_notes(mission: Mission, vehicle: str) -> Iterator[str]:
     """A line about each winch item while the load is carried, which path reports do not include."""
     table = autopilot_parameters(load_belief(vehicle))
@@ -148,7 +161,7 @@ def check_mission(
             "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
             f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
         )
-    warnings += (*winch_notes(mission, vehicle), *notes_after_release(mission))
+    warnings += (*winch_notes(mission, vehicle), *notes_after_release(mission), *parameter_notes(vehicle))
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
     return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings)

@@ -13,7 +13,7 @@ from autopilot.own.source import OwnError
 from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
-from autopilot.vehicle.parameters import apply_settings
+from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
@@ -55,7 +55,7 @@ def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> lis
     """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
     in milliseconds, which was probably meant in seconds."""
     found, believed = load_truth_and_belief(vehicle)
-    tables = sim_parameters(truth_of(found)), parameters_for(believed, NO_OWN_CODE)
+    tables = sim_parameters(truth_of(found)), autopilot_parameters(believed)
     units = {name: table.describe(name).unit for table in tables for name in table.names}
     return [
         f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant"
@@ -87,6 +87,8 @@ def _table(vehicle: Vehicle, own: OwnCode) -> ParameterTable:
         return parameters_for(vehicle, own)
     except OwnError as error:
         raise InputError(str(error)) from None
+    except FileError as error:
+        raise input_error(error) from None
 
 
 def _try_own_code(own: OwnCode, table: ParameterTable, settings: list[tuple[str, float]]) -> None:

@@ -223,7 +223,8 @@ def _finish(
         raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {where}")
     folder.keep()
     if options.real_time and outcome.name != "completed":
-        outcome = outcome.with_reason(slowness_reason(tlog))
+        own_parts = " and ".join(filter(None, options.own))
+        outcome = outcome.with_reason(slowness_reason(tlog, outcome.reason, own_parts))
     try:
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
         record = make_report(

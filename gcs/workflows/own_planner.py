@@ -21,7 +21,7 @@ def own_planner(reference: str, vehicle: str) -> Iterator[Planner]:
     """The planner with its default parameters for a vehicle, and with its calls watched. GcsError if there is
     no such vehicle, or if the planner cannot be loaded."""
     try:
-        values = parameters_for(load_belief(vehicle), OwnCode(planner=reference)).values()
+        values = parameters_for(load_belief(vehicle), OwnCode(planner=reference), all_known=False).values()
         planner = plan_function(load_planner(reference), values)
     except OwnError as error:
         raise InputError(str(error)) from None

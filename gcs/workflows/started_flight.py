@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from autopilot.trajectory.timeline import expected_duration_s
+from autopilot.own.own_code import parameters_for
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.parameters import apply_settings
 from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
+from gcs.expected_flight import expected_flight_s
 from gcs.mission_items import items_of
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import unix_us
 from gcs.shell.processes import STOPPED_LIMIT_S
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
-from gcs.workflows.flight_options import FlightOptions
+from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.vehicle_processes import VehicleProcesses
 from missions.model import Mission
@@ -32,10 +35,17 @@ def flight_client(
     time_stretch = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     return FlightClient(
         items_of(mission, home),
-        expected_duration_s(mission),
+        _expected_s(mission, options),
         options.limit_s,
         round(link_timeout_us * time_stretch),
     )
+
+
+def _expected_s(mission: Mission, options: FlightOptions) -> float:
+    """How long the flight should take with the assumed vehicle and the settings of the options."""
+    table = parameters_for(load_belief(options.vehicle), options.own)
+    apply_settings(table, map(parse_setting, options.settings))
+    return expected_flight_s(mission, table)
 
 
 def fly_started_vehicle(

@@ -66,6 +66,7 @@ class SweepOptions:
     own: OwnCode = NO_OWN_CODE  # custom estimator and planner of all flights
     reports: bool = False  # also of the flights that stand out
     table_only: bool = False  # no page
+    limit_s: float | None = None  # longest time that a flight may last
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
         dict(parse_setting(text) for text in options.settings),
         options.sample or 0,
         options.own,
+        options.limit_s,
     )
     if not options.quiet:
         _print_warnings(plan)
@@ -193,12 +195,12 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
                 speed=None,
                 real_time=False,
                 out=directory / REPEATS_FOLDER / one.name,
-                settings=flight_settings(plan, one.varied),
+                settings=flight_settings(plan, one.reference, one.varied),
                 connect=None,
                 quiet=True,
                 force=True,
                 overwrite=True,
-                limit_s=None,
+                limit_s=plan.limit_s,
                 estimator=plan.estimator,
                 planner=plan.planner,
             ),

@@ -19,6 +19,7 @@ from plumbline.arguments import (
     positive,
     setting_arguments,
     shown_value,
+    values_by_parameter,
     whole_number,
 )
 from plumbline.learning.records import ACTIONS, Reward
@@ -63,9 +64,10 @@ class EnvOptions:
         return name_or_path("sensors", self.sensors)
 
     def __post_init__(self) -> None:
-        for name in ("settings", "randomise", "reward"):
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, {})
+        if self.reward is None:
+            object.__setattr__(self, "reward", {})
+        for name, example in (("settings", "{'SIM_WIND_E': 3}"), ("randomise", "{'SIM_WIND_E': (0, 3)}")):
+            object.__setattr__(self, name, values_by_parameter(name, getattr(self, name), example))
         _one_of("action", self.action, tuple(ACTIONS))
         _one_of("observation", self.observation, OBSERVATIONS)
         _one_of("start", self.start, STARTS)
@@ -82,8 +84,11 @@ class EnvOptions:
             if name not in Reward._fields:
                 hint = did_you_mean(name, Reward._fields)
                 raise GcsError(f"reward: there is no {name!r}; {hint}there are {', '.join(Reward._fields)}")
-            number(f"reward[{name!r}]", weight)
-        for name, limits in parameter_mapping("randomise", self.randomise, "{'SIM_WIND_E': (0, 3)}").items():
+            # the error of the position is divided by the width
+            (positive if name == "width" else number)(f"reward[{name!r}]", weight)
+        for name, limits in self.randomise.items():
+            if name in self.settings:
+                raise GcsError(f"{name} is both in settings and in randomise; leave one of the two out")
             if not _is_range(limits):
                 raise GcsError(f"randomise {name}: {shown_value(limits)}; must be (least, greatest)")
 

@@ -39,7 +39,8 @@ file:
 * A table `[parameters]` contains parameters of the autopilot with which the vehicle is delivered, like an
   airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 35 and `MIS_INFEASIBLE` 1: its paths
   leave room for unknown effects, and are flown slower where necessary. Parameters that you set take
-  precedence.
+  precedence. The table may contain the parameters of a custom law, estimator or planner; flights without this
+  one are then refused.
 
 The truth and the autopilot's model are two sets of the same values. There are three ways to make them
 differ:
@@ -70,6 +71,12 @@ that names the key, the value found and the allowed values. A key without a defa
 |---|---|---|---|---|
 """
 ROTORS = """
+The vehicle must be able to stand, and its load to lie half a cable length beside it: the cable is at least
+1.16 times as long as the attachment is above the resting load. The feet are at most 15 radii of gyration from
+the centre of mass, where the square of this radius is the least moment of inertia over the mass: the push of
+the ground turns a lighter body so fast that it tumbles. Where the sizes of the gear are left out, they grow
+with `arm_m`: an arm of 2.8 m with the cable and the inertia of `bebop` is refused for both reasons.
+
 ## Rotors
 
 Rotors are counted counterclockwise from above, starting at the rear, or to the left of the gap at the rear:

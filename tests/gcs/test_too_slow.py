@@ -49,6 +49,16 @@ def test_commands_that_came_too_late_are_told_with_how_many_there_were(tmp_path:
     assert told(tmp_path, missed=500, **counted) == text
 
 
+def test_custom_code_that_is_too_slow_is_the_cause_and_not_the_machine(tmp_path: Path) -> None:
+    """As the vehicle reports it (tests/own/test_host.py)."""
+    assert told(tmp_path, missed=500).startswith("the machine was too slow: 500 of")
+    named = "Law Slow failed: load_position takes 9.1 ms, and there are 4.0 ms: too slow (slow.py:3); landing"
+    assert slowness_reason(tmp_path / TLOG_FILE, named) == ""
+    assert slowness_reason(tmp_path / TLOG_FILE, "Law Slow failed: ZeroDivisionError (slow.py:3)")
+    shared = slowness_reason(tmp_path / TLOG_FILE, OWN_REASON, "slow.py:Slow")
+    assert shared.startswith("the machine was too slow for slow.py:Slow: 500 of some 10000")
+
+
 @pytest.mark.parametrize(
     "counted", [{"missed": 10}, {"missed": 0}, {"missed": 3, "seconds": 0}, {"missed": 0, "speed": 0.0}]
 )

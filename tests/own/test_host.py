@@ -246,7 +246,26 @@ def test_in_real_time_a_law_must_keep_up(monkeypatch: pytest.MonkeyPatch) -> Non
     try_law(quick, VALUES)
     monkeypatch.setattr(USER_CALL, "clock", lambda: next(clock) * 3.0)
     with pytest.raises(OwnError, match=r"load_position takes \d\.\d ms, and there are 4\.0 ms: too slow"):
-        try_law(quick, VALUES, ticks=300)
+        try_law(quick, VALUES, ticks=26)
+
+
+def test_a_machine_that_stalls_is_not_the_fault_of_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of the first calls lasts for 100 periods, all others for a hundredth of one."""
+    period, readings, now_s = 1.0 / VALUES["CTL_RATE_HZ"], 0, 0.0
+
+    def clock() -> float:
+        nonlocal readings, now_s
+        readings += 1
+        now_s += period * (100.0 if USER_CALL.in_progress is False and stalls() else 0.01)
+        return now_s
+
+    def stalls() -> bool:
+        return 20 <= readings < 23
+
+    monkeypatch.setattr(USER_CALL, "clock", clock)
+    law = law_from_class(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own")
+    try_law(law, VALUES, ticks=300)
+    assert now_s > 100.0 * period
 
 
 # ---- compiled

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,9 @@ import pytest
 from autopilot.own.law import load_law
 from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.own.source import OwnError
-from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.shipped import VehicleFileError
 
 FINE = """
 from plumbline.laws import force
@@ -68,6 +71,29 @@ def test_its_parameters_are_the_autopilots() -> None:
     assert (gain.default, gain.low, gain.high, gain.unit, gain.text) == (2.0, 0.0, 5.0, "1/s", "A gain")
     assert table["CTL_LAW"] == table.describe("CTL_LAW").high
     assert "3 Fine" in table.describe("CTL_LAW").text
+
+
+def test_a_vehicle_is_delivered_with_the_parameters_of_its_law() -> None:
+    """They are unknown in a flight without the law, and checked in one with it."""
+    brought = '    parameters = {"MY_GAIN": Parameter(2.0, 0.0, 5.0, "1/s", "A gain")}\n'
+    written(FINE.replace("import force", "import Parameter, force") + brought)
+    law = OwnCode("mine.py")
+
+    def delivered_with(line: str) -> Vehicle:
+        bebop = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
+        written(f"{bebop}[parameters]\n{line}\n", "tuned.toml")
+        return load_belief("tuned.toml")
+
+    belief = delivered_with("MY_GAIN = 3.0")
+    table = parameters_for(belief, law)
+    assert table["MY_GAIN"] == table.describe("MY_GAIN").default == 3.0
+    with pytest.raises(VehicleFileError, match=r"^the vehicle's parameters\.MY_GAIN: no such .* law"):
+        parameters_for(belief)
+    assert "MY_GAIN" not in parameters_for(belief, all_known=False)
+    with pytest.raises(VehicleFileError, match=r"parameters\.MY_GAIN = 9\.0 1/s; must be 0 \.\.\. 5"):
+        parameters_for(delivered_with("MY_GAIN = 9.0"), law)
+    with pytest.raises(VehicleFileError, match=r"parameters\.MIS_SPED: no such parameter; did you mean MIS"):
+        parameters_for(delivered_with("MIS_SPED = 1.0"), law)
 
 
 WRONG = {

@@ -12,6 +12,7 @@ import pytest
 
 import plumbline
 from plumbline import Land, Mission, Sensors, Takeoff, Term, Vehicle
+from plumbline.arguments import setting_arguments
 from plumbline.flights import Picture
 from plumbline.learning.options import options_of
 from plumbline.learning.vector import LoadVectorEnv
@@ -20,7 +21,9 @@ STEPS = (Takeoff(1.0), Land())
 NEITHER_TEXT_NOR_NUMBER: tuple[Any, ...] = (object(), [object()], {1: 2})
 NO_TEXT: tuple[Any, ...] = (3, 2.5, b"x", *NEITHER_TEXT_NOR_NUMBER)
 NO_NUMBER: tuple[Any, ...] = ("x", b"x", float("nan"), 2**5000, *NEITHER_TEXT_NOR_NUMBER)
+TRUTH_VALUES: tuple[Any, ...] = (True, np.False_)
 NO_MAPPING: tuple[Any, ...] = (3, "x", b"x", [1], [("SIM_WIND_E", 3)], object(), {3: 1}, {"A=1": 2})
+TWICE = {"SIM_WIND_E": 1, "sim_wind_e": 2}
 NO_PATH: tuple[Any, ...] = (3, "", b"x", *NEITHER_TEXT_NOR_NUMBER)
 NO_LIST: tuple[Any, ...] = (3, "x", b"x", object(), {1: 2})
 
@@ -32,18 +35,25 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "fly planner": (lambda v: plumbline.fly("hover", planner=v), NO_TEXT),
     "fly sensors": (lambda v: plumbline.fly("hover", sensors=v), (None, Mission("a", STEPS), *NO_TEXT)),
     "fly vehicle": (lambda v: plumbline.fly("hover", vehicle=v), (None, Mission("a", STEPS), *NO_TEXT)),
-    "fly seed": (lambda v: plumbline.fly("hover", seed=v), (2**70, -1, 1.5, "3", None, [1])),
-    "fly settings": (lambda v: plumbline.fly("hover", settings=v), NO_MAPPING),
-    "fly setting": (lambda v: plumbline.fly("hover", settings={"SIM_WIND_E": v}), (None, *NO_NUMBER)),
+    "fly seed": (lambda v: plumbline.fly("hover", seed=v), (2**70, -1, 1.5, True, "3", None, [1])),
+    "fly settings": (lambda v: plumbline.fly("hover", settings=v), (TWICE, *NO_MAPPING)),
+    "fly setting": (
+        lambda v: plumbline.fly("hover", settings={"SIM_WIND_E": v}),
+        (None, *TRUTH_VALUES, *NO_NUMBER),
+    ),
     "fly timeout": (lambda v: plumbline.fly("hover", timeout_s=v), NO_NUMBER),
     "flight load": (plumbline.Flight.load, (None, *NO_PATH)),
     "sweep mission": (plumbline.sweep, (None, *NO_TEXT)),
-    "sweep vary": (lambda v: plumbline.sweep("hover", vary=v), NO_MAPPING),
+    "sweep vary": (
+        lambda v: plumbline.sweep("hover", vary=v),
+        ({k: [v] for k, v in TWICE.items()}, *NO_MAPPING),
+    ),
     "sweep varied": (
         lambda v: plumbline.sweep("hover", vary={"SIM_WIND_E": v}),
-        (None, 3, "", b"12", {1: 2}, np.array(3)),
+        (None, 3, "", b"12", {1: 2}, np.array(3), [True]),
     ),
     "sweep settings": (lambda v: plumbline.sweep("hover", settings=v), NO_MAPPING),
+    "sweep timeout": (lambda v: plumbline.sweep("hover", timeout_s=v), (0, -1, *NO_NUMBER)),
     "sweep seeds": (lambda v: plumbline.sweep("hover", seeds=v), (0, 1.5, "x", None)),
     "sweep sample": (lambda v: plumbline.sweep("hover", sample=v), (0, 1.5, "x")),
     "sweep laws": (lambda v: plumbline.sweep("hover", laws=v), (None, [], [3], *NO_LIST)),
@@ -71,9 +81,15 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sensors load": (Sensors.load, (None, "", *NO_TEXT)),
     "sensors save": (Sensors.load("lab").save, (None, *NO_PATH)),
     "picture": (Picture(b"").save, (None, "/proc/x.png", "x.svg", "x.pdf", *NO_PATH)),
-    "env settings": (lambda v: options_of({"settings": v}), NO_MAPPING),
-    "env reward": (lambda v: options_of({"reward": v}), ({"crashh": 1}, {"crash": "x"}, *NO_MAPPING)),
-    "env randomise": (lambda v: options_of({"randomise": v}), ({"SIM_WIND_E": 3}, *NO_MAPPING)),
+    "env settings": (lambda v: options_of({"settings": v}), (TWICE, *NO_MAPPING)),
+    "env reward": (
+        lambda v: options_of({"reward": v}),
+        ({"crashh": 1}, {"crash": "x"}, {"width": 0}, {"width": -0.1}, {"alive": True}, *NO_MAPPING),
+    ),
+    "env randomise": (
+        lambda v: options_of({"settings": {"SIM_WIND_N": 1}, "randomise": v}),
+        ({"SIM_WIND_E": 3}, {"sim_wind_n": (0, 3)}, {k: (0, v) for k, v in TWICE.items()}, *NO_MAPPING),
+    ),
     "env rate": (lambda v: options_of({"rate_hz": v}), (None, 0, *NO_NUMBER)),
     "env start": (lambda v: options_of({"start_m": v}), (None, -1, 3.0, *NO_NUMBER)),
     "env limits": (lambda v: options_of({"max_rate_rad_s": v}), (None, 3, (1, 2), (1, 2, 0), "abc")),
@@ -128,6 +144,13 @@ def test_the_error_says_what_was_found_and_what_could_be(call: Callable[[], Any]
     with pytest.raises(plumbline.Error) as told:
         call()
     assert says in str(told.value)
+
+
+def test_names_of_parameters_may_be_in_small_letters() -> None:
+    """As on the command line."""
+    assert setting_arguments({"sim_wind_e": 3, "MIS_SPEED": 2}) == ("SIM_WIND_E=3.0", "MIS_SPEED=2.0")
+    options = options_of({"settings": {"sim_wind_e": 3}, "randomise": {"sim_wind_n": (0, 1)}})
+    assert (options.settings, options.randomise) == ({"SIM_WIND_E": 3}, {"SIM_WIND_N": (0, 1)})
 
 
 def test_a_law_that_is_an_empty_name_is_told_what_could_be() -> None:

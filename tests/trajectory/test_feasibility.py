@@ -10,7 +10,8 @@ from math import cos, inf, pi, radians, sqrt
 import pytest
 
 from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
-from autopilot.trajectory.timeline import SET_DOWN_S, TAUTEN_S, MissionState, expected_duration_s, timeline
+from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
+from autopilot.trajectory.timeline import DETECTION_S, MissionState, expected_duration_s, timeline
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import load_vehicle
 from missions.fileformat import load_mission, shipped
@@ -182,8 +183,9 @@ def test_the_timeline_follows_the_load() -> None:
 
 def test_expected_duration_adds_take_off_and_landing() -> None:
     lift = transfer_duration(2.0, 0.8, 2.0)
+    on_the_ground = 2.0 * DETECTION_S + tauten_duration_s(0.7, 0.15) + set_down_duration_s(0.7)
     assert expected_duration_s(load_mission("hover"), 2.0, 2.0) == pytest.approx(
-        TAUTEN_S + lift + 10.0 + lift + SET_DOWN_S
+        lift + 10.0 + lift + on_the_ground
     )
 
 

@@ -14,6 +14,7 @@ from autopilot.trajectory.timeline import (
     ANYWHERE,
     RELEASE_S,
     MissionState,
+    VerticalSpeeds,
     expected_duration_s,
     return_place,
     state_after,
@@ -202,6 +203,20 @@ def test_what_has_a_duration_counts_with_it():
     assert longer == pytest.approx(67.0)
     held = seconds(Waypoint(5.0, 0.0, 2.0, hold_s=4.0)) - seconds(Waypoint(5.0, 0.0, 2.0))
     assert held == pytest.approx(4.0)
+
+
+def test_a_long_cable_is_tautened_and_set_down_for_minutes():
+    """Measured in flights of `hover` with `bebop` on longer cables: tauten and set_down, in s."""
+    hover = Mission("m", "", "", (), (Takeoff(2.0), Land()))
+    usual = expected_duration_s(hover)
+    for cable_m, tauten_s, set_down_s in ((8.0, 64.2, 59.9), (20.0, 160.8, 148.7)):
+        lift_s = 2.0 * transfer_duration(2.0, 0.8, 1.5)
+        assert expected_duration_s(hover, cable_m=cable_m) == pytest.approx(
+            lift_s + tauten_s + set_down_s, rel=0.05
+        )
+    assert expected_duration_s(hover, cable_m=0.7) == usual < 40.0
+    slow = expected_duration_s(hover, cable_m=10.0, vertical=VerticalSpeeds(0.02, 0.8))
+    assert slow - expected_duration_s(hover, cable_m=10.0) == pytest.approx(4.0 / 0.02 - 4.0 / 0.15)
 
 
 def test_half_the_speed_takes_twice_as_long():

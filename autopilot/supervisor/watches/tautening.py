@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.legs import QUAD_POSITION, Creep, transfer_leg
-from autopilot.supervisor.phase_legs import CLEARANCE, HEIGHT_SIGMAS, SLACK_ACCEL, SLACK_SPEED
+from autopilot.supervisor.phase_legs import HEIGHT_SIGMAS
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CRITICAL,
@@ -20,6 +20,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
+from autopilot.trajectory.slack_cable import CLEARANCE, SLACK_ACCEL, SLACK_SPEED
 
 MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
 LIFTING_TEXT = "Cable taut, lifting the load"

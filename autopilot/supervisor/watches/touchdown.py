@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.guidance.legs import LOAD_POSITION, Creep
-from autopilot.supervisor.phase_legs import TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_time_s
 from autopilot.supervisor.watches.cable_pull import SLACK_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
+from autopilot.trajectory.slack_cable import TOUCH_SPEED
 
 LOAD_DEPTH, VEHICLE_DEPTH = 0.05, 0.15  # m by which the setpoint must be below a load or vehicle that stopped
 # m, ten seconds of sinking: then only the ground can hold the vehicle up, however it trembles

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.parquet import flight_columns
 from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.closed_loop import Conditions, fly
 from missions.fileformat import load_mission
+from tests.doubles import recorded_flights as flights
 
 
 def test_velocity_estimates_command_and_wind_belong_to_the_true_motion(tmp_path: Path) -> None:
@@ -41,3 +43,23 @@ def test_velocity_estimates_command_and_wind_belong_to_the_true_motion(tmp_path:
     for angle in ("roll", "pitch", "yaw"):
         estimated = column(f"vehicle_angle_estimated_{angle}_rad")
         assert estimated == pytest.approx(column(f"vehicle_angle_{angle}_rad"), abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "mode",
+    [mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE, mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE],
+)
+def test_an_attitude_run_has_no_desired_path(mode: int) -> None:
+    flight = flights.flight(4.0, flights.half_sine_step(0.25, 0.5))
+    run = flight.mission & (flight.time_s > flights.BEFORE_S + 1.0) & (flight.time_s < flights.BEFORE_S + 2.0)
+    flight.control_mode[run] = mode
+    telemetry = flight.telemetry()
+    table = flight_columns(telemetry, samples_of(telemetry))
+    assert (table["control_mode"] == mode).sum() == run.sum() > 100
+    columns = ("load_desired_{}_m", "load_asked_{}_m", "load_error_{}_m")
+    columns += ("load_velocity_desired_{}_m_s", "load_acceleration_desired_{}_m_s2")
+    for column in columns:
+        for axis in "xyz":
+            missing = np.isnan(table[column.format(axis)])
+            assert (missing[flight.mission] == run[flight.mission]).all(), column
+    assert np.isfinite(table["load_true_x_m"]).all()

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from gcs.batch.reuse import Origin
+from gcs.sweep.cell import cell_of
+from gcs.sweep.margin import CUSTOM_LAW, linear_range
 from gcs.sweep.plan import (
     PlanError,
     SweepPlan,
@@ -17,6 +19,8 @@ from gcs.sweep.plan import (
     parse_varied,
 )
 from gcs.sweep.plan_file import default_directory, load_command, load_plan, store_plan, sweep_origin
+from gcs.sweep.standouts import base_command, flight_settings
+from missions.fileformat import load_mission
 
 
 def test_ranges_and_lists() -> None:
@@ -105,6 +109,51 @@ def test_every_setting_is_flown_with_every_law_and_seed(short: str) -> None:
     conditions = plan.conditions(cases[-1])
     assert conditions.seed == 2
     assert conditions.settings == {"SIM_WIND_E": 2.0, "NGC_KX": 7.0, "SIM_WIND_N": 1.0, "CTL_LAW": 1.0}
+
+
+OWN_LAW = """
+from plumbline.laws import Parameter, force
+
+class Mine:
+    parameters = {"MY_GAIN": Parameter(2.0, 0.0, 5.0), "MY_OFFSET": Parameter(0.0, -1.0, 1.0)}
+
+    def load_position(self, memory, now):
+        return memory, force((0.0, 0.0, 4.9))
+"""
+
+
+def test_parameters_of_a_custom_law_are_for_the_laws_that_have_them(short: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(OWN_LAW, encoding="utf-8")
+    laws = ["thesis", f"{path}:Mine"]
+    gain = VariedParameter("MY_GAIN", (1.0, 3.0), False)
+    plan = make_plan(short, "bebop", "lab", laws, [1], [gain], {"MY_OFFSET": 0.5, "SIM_WIND_E": 1.0}, 0)
+    flown = [plan.conditions(case).settings for case in plan.cases()]
+    assert flown[0] == flown[1] == {"SIM_WIND_E": 1.0, "CTL_LAW": 0.0}
+    assert [settings["MY_GAIN"] for settings in flown[2:]] == [1.0, 3.0]
+    assert [settings["MY_OFFSET"] for settings in flown[2:]] == [0.5, 0.5]
+    assert flight_settings(plan, laws[0], {"MY_GAIN": 3.0}) == ("SIM_WIND_E=1.0",)
+    assert "MY_OFFSET=0.5" in base_command(plan, laws[1]) and "MY_" not in base_command(plan, laws[0])
+    assert linear_range(plan, laws[0], "MY_GAIN", 2.0, (1.0, 3.0)) == ""
+    assert linear_range(plan, laws[1], "SIM_ACT_DELAY_MS", 0.0, (0.0, 5.0)) == CUSTOM_LAW
+    with pytest.raises(PlanError, match=r"MY_GAIN = 9\.0; must be 0 \.\.\. 5"):
+        make_plan(short, "bebop", "lab", laws, [1], [], {"MY_GAIN": 9.0}, 0)
+    with pytest.raises(PlanError, match="MY_GAIM: no such parameter"):
+        make_plan(short, "bebop", "lab", laws, [1], [], {"MY_GAIM": 1.0}, 0)
+    with pytest.raises(PlanError, match="MY_GAIN: no such parameter"):
+        planned(short, [gain], {})
+
+
+def test_the_time_limit_is_that_of_the_option_or_follows_from_the_cable(short: str) -> None:
+    def limit_s(settings: dict[str, float], limit: float | None = None) -> float:
+        plan = make_plan(short, "bebop", "lab", ["thesis"], [1], [], settings, 0, limit_s=limit)
+        assert from_json(plan.to_json()) == plan
+        assert ("--timeout" in base_command(plan, "thesis")) == (limit is not None)
+        return 1e-6 * cell_of(load_mission(short), plan.conditions(next(plan.cases()))).limit_us
+
+    assert limit_s({}, 17.5) == 17.5
+    # measured: 161 s and 149 s with a slack cable at 20 m, 7 s and 6 s at 0.7 m
+    assert limit_s({"VEH_CABLE_LEN": 20.0}) - limit_s({}) == pytest.approx(1.5 * (310.0 - 13.0), rel=0.02)
 
 
 def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) -> None:

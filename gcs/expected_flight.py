@@ -1,0 +1,27 @@
+"""How long a flight should take, and how long it may take, with the autopilot's parameters."""
+
+from __future__ import annotations
+
+from autopilot.trajectory.timeline import VerticalSpeeds, expected_duration_s
+from autopilot.wire.parameter_table import ParameterTable
+from missions.model import Mission
+
+TIME_FACTOR = 1.5  # a flight may take this many times the expected time,
+TIME_MARGIN_S = 60.0  # plus this margin
+
+
+def expected_flight_s(mission: Mission, table: ParameterTable) -> float:
+    """Expected seconds from arming to the end of the mission, by the autopilot's parameters."""
+    tauten_m_s = min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"])
+    return expected_duration_s(
+        mission,
+        table["MIS_SPEED"],
+        table["MIS_ACCEL"],
+        table["VEH_CABLE_LEN"],
+        VerticalSpeeds(tauten_m_s, table["MIS_LIFT_SPEED"]),
+    )
+
+
+def time_limit_s(expected_s: float, limit_s: float | None = None) -> float:
+    """The longest time (s) that a flight may take: `limit_s` if it is given."""
+    return expected_s * TIME_FACTOR + TIME_MARGIN_S if limit_s is None else limit_s
