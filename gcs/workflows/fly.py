@@ -90,10 +90,6 @@ def fly(
         if options.connect is None:
             laws = (options.law,) if options.firmware is None else ()
             warm_up(flight_parts(laws), options.quiet)
-            if options.firmware is None:
-                check_mission(mission, options)
-            if not options.quiet:
-                notify("starting the simulator and the autopilot")
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
             _page(mission, options, view, stop) as page,
@@ -155,11 +151,18 @@ def _fly_started(
     with start_vehicle(options, out, processes) as started:
         from gcs.workflows.started_flight import fly_started_vehicle  # imported while the programs load
 
+        check_mission(mission, options)
+        _tell_start(options)
         if options.speed is None:
             from gcs.report.warm import load_libraries as load_report
 
             load_report(lambda: started.vehicle.has_datagram)  # a core is idle until the vehicle sends
         return fly_started_vehicle(mission, options, log, started, stop, watch, page)
+
+
+def _tell_start(options: FlightOptions) -> None:
+    if not options.quiet:
+        notify("starting the simulator and the autopilot")
 
 
 def _fly_firmware(
@@ -174,6 +177,7 @@ def _fly_firmware(
 ) -> FlightClient:
     from gcs.workflows.firmware_processes import fly_firmware, start_firmware
 
+    _tell_start(options)
     with start_firmware(program, options, out) as started:
         return fly_firmware(mission, options, program, log, started, stop, watch, page)
 
@@ -216,9 +220,7 @@ def _finish(
         raise GcsError(outcome.reason or "the vehicle said nothing")
     if stop and not client.started:
         raise StoppedError(f"stopped before the vehicle was armed; what it said is in {folder.set_aside()}")
-    if not client.started:
-        if options.real_time:
-            outcome = outcome.with_reason(slowness_reason(tlog))
+    if options.connect is not None and not client.started:
         where = f"what the vehicle said is in {folder.set_aside()}"
         raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {where}")
     folder.keep()
@@ -255,13 +257,8 @@ class FlightFolder:
         self._kept = True
 
     def set_aside(self) -> Path:
-        """Keep what was captured under a name that is not a flight's, and what the programs wrote; the next
-        flight may use the folder."""
+        """Keep what was captured under a name that is not a flight's; the next flight may use the folder."""
         self._kept = True
-        for name in LOGS:
-            log = self._path / name
-            if log.exists() and log.stat().st_size == 0:
-                log.unlink()
         return (self._path / TLOG_FILE).rename(self._path / UNFLOWN_FILE)
 
     def __enter__(self) -> FlightFolder:

@@ -11,22 +11,19 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
-from gcs.clients.flight import Outcome
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
@@ -733,31 +730,6 @@ def test_a_running_vehicle_that_is_armed_already_leaves_the_folder_to_the_next_f
         where = f"what the vehicle said is in {out / 'unflown.tlog'}"
         assert result.stderr.splitlines()[-1] == f"gcs: {told}; {where}"
         assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
-
-
-def test_a_started_vehicle_that_is_not_armed_leaves_what_it_said_and_no_report(tmp_path, monkeypatch):
-    out = tmp_path / "out"
-
-    @contextmanager
-    def start(options, out, processes):
-        (out / "sitl.log").touch()
-        (out / "autopilot.log").write_text("a line")
-        yield SimpleNamespace(vehicle=SimpleNamespace(has_datagram=True))
-
-    def refuse(mission, options, log, *_):
-        frame = FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
-        log.write(1, frame)
-        return SimpleNamespace(started=False, outcome=Outcome("refused", "Arming denied: it rains"))
-
-    monkeypatch.setattr("gcs.workflows.fly.start_vehicle", start)
-    monkeypatch.setattr("gcs.workflows.started_flight.fly_started_vehicle", refuse)
-    for _ in range(2):
-        result = run("fly", "hover", "--out", str(out))
-        assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
-        where = f"what the vehicle said is in {out / 'unflown.tlog'}"
-        told = f"gcs: hover: refused: Arming denied: it rains; {where}"
-        assert result.stderr.splitlines()[-1] == told
-        assert {path.name for path in out.iterdir()} == {"unflown.tlog", "autopilot.log"}
 
 
 def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(
