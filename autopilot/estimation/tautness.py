@@ -8,6 +8,8 @@ acceleration shows beyond the assumed thrust, m_Q (R a) - f R e3.
 
 from __future__ import annotations
 
+from math import sqrt
+
 from autopilot.estimation.covariance import zero_covariance
 from autopilot.estimation.records import (
     AIR,
@@ -42,6 +44,9 @@ KNOWN_SPEED_STD, SPEED_KNOWN_AFTER_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2  # shares of the load's weight: more pull means taut, less means slack
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which a pull does not count
+# Beyond this share of the cable length, with a margin of some deviations of the height, the cable must be
+# taut: less pull is enough there, since a gust upward may hide some of it.
+STRETCHED_DISTANCE, STRETCHED_SIGMAS, STRETCHED_PULL = 1.02, 2.0, 0.5
 PULL_TIME_S = 0.04  # time constant that smooths the measured pull
 # For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a
 # suspended load is assumed to be on the ground: pendulum and length then get little weight.
@@ -299,9 +304,11 @@ def detect_tautness(
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
+        height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+        stretched_from = STRETCHED_DISTANCE * tuning.cable_length + STRETCHED_SIGMAS * height_std
         is_pulling = (
             pull + missing_pull > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
-        )
+        ) or (pull + missing_pull > STRETCHED_PULL * weight and distance > stretched_from)
         load = _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt if is_pulling else 0.0)
         if load.pull_duration_s > PULL_TAUT_S and (
             load.age_s < MAX_DIRECTION_AGE_S or load.age_s == float("inf")

@@ -70,7 +70,11 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
 
 def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:
     """Whether the load is beside the vehicle because it swings on a cable that is shorter than assumed: the
-    cable pulls, long after it should have come taut, and is not as long as a taut cable would be."""
+    cable pulls, long after it should have come taut, and is shorter than a taut cable would be by more than
+    the error of a height that a receiver measures."""
+    distance = norm(sub(view.x_quad, view.x_load))
+    if not distance + HEIGHT_SIGMAS * view.height_std < settings.cable_length_m:
+        return False
     latest_s = LATE_FACTOR * MAX_TAUT_HEIGHT * settings.cable_length_m / settings.motion.taut_speed_m_s
     late = view.now_us - flight.phase_start_us > latest_s * 1e6
     return late and not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
