@@ -310,7 +310,7 @@ def predict(
         state_uncertainty(history, load, state.size),
         imu,
         vibration,
-        averaged_missing_pull(load, vehicle, state.missing_pull, tuning, dt),
+        averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
         state.resets,
         state.memory_s,
         (state.head + 1) % RING_LENGTH,

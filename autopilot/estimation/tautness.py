@@ -41,10 +41,14 @@ SLACK_BELOW = 0.965  # and below which a taut one counts as slack
 # KNOWN_SPEED_STD (m/s), or SPEED_KNOWN_AFTER_S (s) after it came slack: the filter is linear in the
 # direction, which a wrong speed would soon turn far.
 KNOWN_SPEED_STD, SPEED_KNOWN_AFTER_S = 0.2, 1.0
-PULL_TAUT, PULL_SLACK = 0.8, 0.2  # shares of the load's weight: more pull means taut, less means slack
+# shares: more of the load's weight means taut, less of the pull of a load that hangs means slack
+PULL_TAUT, PULL_SLACK = 0.8, 0.2
+MIN_FULL_PULL = 0.5  # share of the load's weight that this pull has at least
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
-PULL_DISTANCE = 0.75  # share of the cable length below which a pull does not count
-# Beyond this share of the cable length, with a margin of some deviations of the height, the cable must be
+# Share of the cable length below which a pull does not count, unless the load is above the ground by this
+# height (m) and some deviations: only the cable can hold it there.
+PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.5, 3.0
+# Beyond this share of the cable length, with a margin of some deviations of the distance, the cable must be
 # taut: less pull is enough there, since a gust upward may hide some of it.
 STRETCHED_DISTANCE, STRETCHED_SIGMAS, STRETCHED_PULL = 1.02, 2.0, 0.5
 PULL_TIME_S = 0.04  # time constant that smooths the measured pull
@@ -116,16 +120,32 @@ def cable_is_unloaded(load: LoadEstimate, memory_s: float, missing_pull: float) 
 
 
 @kernel
+def _may_pull(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
+) -> bool:
+    """Whether a cable that counts as slack, of a load without a tracker, may be what pulls at the vehicle."""
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    is_long = norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length
+    return is_long or load.x_load[2] - tuning.load_height > HELD_HEIGHT + HELD_SIGMAS * height_std
+
+
+@kernel
 def averaged_missing_pull(
-    load: LoadEstimate, vehicle: VehicleEstimate, before: float, tuning: EstimatorTuning, dt: float
+    load: LoadEstimate,
+    vehicle: VehicleEstimate,
+    history: History,
+    before: float,
+    tuning: EstimatorTuning,
+    dt: float,
 ) -> float:
     """Part of the pull that has been missing for long, N: negative where rotors that give less than assumed
-    look like a load. With a camera, a slack cable does not pull while its ends are near each other."""
+    look like a load. With a camera, a slack cable does not pull while its ends are near each other and the
+    load is on the ground."""
     if load.source == TRACKER:
         if load.taut == 0.0:
             return 0.0
     elif load.taut == 0.0:
-        if norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length:
+        if _may_pull(load, vehicle, history, tuning):
             # a gust is over: what it made of the pull is not missing when the cable begins to pull
             return max(before, -max(load.pull, 0.0))
         return min(before - dt / MISSING_PULL_TIME_S * (load.pull + before), 0.0)
@@ -304,10 +324,10 @@ def detect_tautness(
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
-        height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
-        stretched_from = STRETCHED_DISTANCE * tuning.cable_length + STRETCHED_SIGMAS * height_std
+        distance_std = sqrt(history.covariance[POSITION + 2, POSITION + 2] + load.covariance[0])
+        stretched_from = STRETCHED_DISTANCE * tuning.cable_length + STRETCHED_SIGMAS * distance_std
         is_pulling = (
-            pull + missing_pull > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
+            pull + missing_pull > PULL_TAUT * weight and _may_pull(load, vehicle, history, tuning)
         ) or (pull + missing_pull > STRETCHED_PULL * weight and distance > stretched_from)
         load = _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt if is_pulling else 0.0)
         if load.pull_duration_s > PULL_TAUT_S and (
@@ -317,7 +337,9 @@ def detect_tautness(
             x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
             return with_load_position(load, x_load)
         return load
-    is_slack = pull + missing_pull < PULL_SLACK * weight
+    # a gust, or a load lighter than assumed, takes from the pull that is left to fall
+    full_pull = max(weight - max(missing_pull, 0.0), MIN_FULL_PULL * weight)
+    is_slack = pull + min(missing_pull, 0.0) < PULL_SLACK * full_pull
     load = _with_tautness(load, 1.0, load.length, pull, load.pull_duration_s + dt if is_slack else 0.0)
     if load.pull_duration_s > PULL_SLACK_S:
         P = history.covariance
