@@ -48,9 +48,9 @@ PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 # Share of the cable length below which a pull does not count, unless the load is above the ground by this
 # height (m) and some deviations: only the cable can hold it there.
 PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.5, 3.0
-# Beyond this share of the cable length, with a margin of some deviations of the distance, the cable must be
-# taut: less pull is enough there, since a gust upward may hide some of it.
-STRETCHED_DISTANCE, STRETCHED_SIGMAS, STRETCHED_PULL = 1.02, 2.0, 0.5
+# A cable whose upper end is this share of its length above the load, and some deviations of the height, must
+# be taut: less pull is enough there, since the load may be lighter than assumed, and a gust may hide some.
+STRETCHED_HEIGHT, STRETCHED_SIGMAS, STRETCHED_PULL = 1.02, 2.0, 0.4
 PULL_TIME_S = 0.04  # time constant that smooths the measured pull
 # For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a
 # suspended load is assumed to be on the ground: pendulum and length then get little weight.
@@ -127,6 +127,16 @@ def _may_pull(
     height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
     is_long = norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length
     return is_long or load.x_load[2] - tuning.load_height > HELD_HEIGHT + HELD_SIGMAS * height_std
+
+
+@kernel
+def _must_pull(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
+) -> bool:
+    """Whether the vehicle is so high above a load without a tracker that the cable must be taut."""
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    height = vehicle.x_quad[2] - load.x_load[2]
+    return height > STRETCHED_HEIGHT * tuning.cable_length + STRETCHED_SIGMAS * height_std
 
 
 @kernel
@@ -324,11 +334,9 @@ def detect_tautness(
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
-        distance_std = sqrt(history.covariance[POSITION + 2, POSITION + 2] + load.covariance[0])
-        stretched_from = STRETCHED_DISTANCE * tuning.cable_length + STRETCHED_SIGMAS * distance_std
         is_pulling = (
             pull + missing_pull > PULL_TAUT * weight and _may_pull(load, vehicle, history, tuning)
-        ) or (pull + missing_pull > STRETCHED_PULL * weight and distance > stretched_from)
+        ) or (pull + missing_pull > STRETCHED_PULL * weight and _must_pull(load, vehicle, history, tuning))
         load = _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt if is_pulling else 0.0)
         if load.pull_duration_s > PULL_TAUT_S and (
             load.age_s < MAX_DIRECTION_AGE_S or load.age_s == float("inf")

@@ -18,10 +18,17 @@ from autopilot.estimation.records import (
     SIZE,
     TRACKER,
     VELOCITY,
+    ImuReading,
+    LoadEstimate,
     blank_state,
     new_history,
 )
-from autopilot.estimation.tautness import LIFT_OFF_SPEED_STD, tauten
+from autopilot.estimation.tautness import (
+    LIFT_OFF_SPEED_STD,
+    averaged_missing_pull,
+    detect_tautness,
+    tauten,
+)
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross
 from autopilot.geometry.so3 import exp, quat_exp, rotation_from_quat
 from tests.doubles.motion import bebop_tuning
@@ -84,3 +91,87 @@ def test_a_tracked_direction_has_the_error_of_both_positions() -> None:
     before, after = tautened(TRACKER, (0.001, 0.0, 0.0))
     expected = AXES @ rows(before, (POSITION, 3)) @ AXES.T + np.eye(2) * 0.001
     assert rows(after, (DIRECTION, 2)) == pytest.approx(expected / LENGTH**2, rel=1e-9)
+
+
+# ---- taut or slack by the pull alone
+
+DT = 0.004
+TUNING = bebop_tuning()
+WEIGHT = TUNING.load_mass * TUNING.gravity
+THRUST = 4.0
+HEIGHT_STD = 0.01
+
+
+def after(load: LoadEstimate, pull: float, missing: float, height: float, seconds: float) -> LoadEstimate:
+    """A load that a camera sees, with the vehicle level at a height over it and this pull (weights of the
+    load), of which this part has been missing for long."""
+    history = new_history()
+    history.covariance[POSITION + 2, POSITION + 2] = HEIGHT_STD**2
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
+    specific_force = (THRUST - pull * WEIGHT) / TUNING.quad_mass
+    imu = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, specific_force))
+    for _ in range(round(seconds / DT)):
+        load = detect_tautness(load, vehicle, history, imu, THRUST, missing * WEIGHT, TUNING, DT)
+    return load
+
+
+def laid(height_m: float = TUNING.load_height) -> LoadEstimate:
+    """A load whose cable is slack, at this height."""
+    load = blank_state().load
+    return load._replace(
+        x_load=(0.0, 0.0, height_m), q_cable=(0.0, 0.0, -1.0), age_s=0.1, source=CAMERA, length=LENGTH
+    )
+
+
+@pytest.mark.parametrize(
+    ("pull", "missing", "height", "is_taut"),
+    [
+        (1.0, 0.0, 0.99, True),
+        (0.7, 0.0, 0.99, False),  # a gust, or weak rotors: it is not certain that the cable pulls
+        (0.5, 0.0, 1.01, False),
+        (0.5, 0.0, 1.06, True),  # half the weight assumed, or a gust upward
+        (0.3, 0.0, 1.2, False),
+        (1.0, -0.3, 0.99, False),  # rotors weaker than assumed pull as much before
+        (1.0, -0.3, 1.06, True),
+        (1.0, 0.0, 0.5, False),
+    ],
+)
+def test_a_cable_is_taut_by_its_pull_and_height(
+    pull: float, missing: float, height: float, is_taut: bool
+) -> None:
+    assert after(laid(), pull, missing, height, 0.5).taut == is_taut
+
+
+def test_a_load_above_the_ground_hangs_however_near_it_is_estimated() -> None:
+    """Of a cable that a gust made look slack, the load is estimated to stay where it was, in the air."""
+    assert after(laid(2.0), 1.0, 0.0, 0.5, 0.5).taut > 0.0
+    assert after(laid(), 1.0, 0.0, 0.5, 0.5).taut == 0.0
+
+
+@pytest.mark.parametrize("missing", [-0.3, 0.0, 0.35, 0.9])
+def test_a_load_that_comes_to_the_ground_slackens_the_cable_whatever_was_missing(missing: float) -> None:
+    hanging = laid()._replace(taut=1.0, pull=(1.0 - missing) * WEIGHT, tension=WEIGHT)
+    assert after(hanging, -min(missing, 0.0), missing, 1.0, 0.6).taut == 0.0
+    assert after(hanging, 1.0 - missing, missing, 1.0, 0.6).taut == (1.0 if missing < 0.9 else 0.0)
+
+
+def missed(load: LoadEstimate, before: float, height: float, seconds: float) -> float:
+    """What counts as missing, in weights, after this time."""
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
+    missing = before * WEIGHT
+    for _ in range(round(seconds / DT)):
+        missing = averaged_missing_pull(load, vehicle, new_history(), missing, TUNING, DT)
+    return missing / WEIGHT
+
+
+def test_what_a_gust_adds_to_the_pull_is_missing_only_as_long_as_it_blows() -> None:
+    pulled = laid()._replace(pull=0.4 * WEIGHT)
+    learned = missed(pulled, 0.0, 0.6, 8.0)
+    assert learned == pytest.approx(-0.4, abs=0.01)
+    assert missed(pulled, learned, 0.9, 1.0) == learned
+    assert missed(laid()._replace(pull=0.1 * WEIGHT), learned, 0.9, DT) == pytest.approx(-0.1)
+
+
+def test_the_pull_of_a_load_in_the_air_is_not_learned_as_missing() -> None:
+    assert missed(laid(2.0)._replace(pull=WEIGHT), 0.0, 0.5, 8.0) == 0.0
+    assert missed(laid()._replace(pull=WEIGHT), 0.0, 0.5, 8.0) < -0.9

@@ -154,6 +154,26 @@ def test_a_load_without_a_sensor_is_flown_in_gusts(sensors: str) -> None:
     assert max(flown.load_error_max_m for flown in blind) < 0.12
 
 
+# how each of these flights ended when the cable's pull was compared with the weight alone
+LOST = {
+    "never taut after a gust that pulled": ("rtk", 4, {"SIM_WIND_E": 4.0, "SIM_GUST_STD": 1.5}),
+    "never taut in a gust upward": ("rtk", 173, {"SIM_WIND_E": 4.0, "SIM_GUST_STD": 1.5}),
+    "never taut with half the load": ("rtk", 1, {"SIM_LOAD_MASS": 0.05}),
+    "never taut, half the load, no sensor": ("rtk-blind", 1, {"SIM_LOAD_MASS": 0.05}),
+    "pulled where the cable seemed longer": ("gps", 7, {"SIM_WIND_E": 2.0, "SIM_GUST_STD": 0.7}),
+    "never slack after a gust that lifted": ("gps", 83, {"SIM_WIND_E": 4.0, "SIM_GUST_STD": 1.5}),
+}
+
+
+@pytest.mark.parametrize("lost", LOST)
+def test_a_load_is_lifted_and_set_down_in_gusts_and_with_another_mass(lost: str) -> None:
+    sensors, seed, settings = LOST[lost]
+    settings = {"MIS_INFEASIBLE": 1.0, **settings}
+    assert [f.outcome for f in flights("case-b", (seed,), sensors=sensors, settings=settings)] == [
+        "completed"
+    ]
+
+
 def test_noise_that_the_autopilot_does_not_expect_is_filtered() -> None:
     """Measured: 23.7 mm at worst of 20 seeds, and one tick in a thousand saturated."""
     noisy = flights("case-b", (1, 2, 3), settings={"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05})
