@@ -132,9 +132,9 @@ def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
     def made(mission: str, *rest: Any) -> Any:
         make_plan(mission, *rest)  # raises an error if the sweep itself is wrong
-        vehicle, sensors, laws, _, varied, settings, sample, own = rest
+        vehicle, sensors, laws, _, varied, settings, sample, own, limit_s = rest
         few = [replace(one, values=one.values[:2]) for one in varied]
-        return make_plan(short, vehicle, sensors, laws, (1,), few, settings, min(sample, 2), own)
+        return make_plan(short, vehicle, sensors, laws, (1,), few, settings, min(sample, 2), own, limit_s)
 
     monkeypatch.setattr("gcs.shell.processes.Processes.load", lambda processes, name: None)
     monkeypatch.setattr("gcs.workflows.fly.fly", fly)

@@ -107,6 +107,7 @@ REQUESTS: list[Any] = [
     R.Terminate(),
     R.RunPrearmChecks(),
     R.Reboot(False),
+    R.ChangeVehicle("VEH_CABLE_LEN"),
     R.ChangeSigningKey(),
     R.StoreParameters(True),
     R.ResetParameters(),
