@@ -87,7 +87,7 @@ def track(view: View, path: Target) -> None:
     figure = new_figure(9.0, 6.4)
     draw_track(figure, view.samples, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
     figure.text(0.03, 0.945, "Load track", fontsize=12, weight="bold")
-    lines = "dashed: desired · grey: cable, shadow, and the load before and after the mission"
+    lines = "dashed: desired · grey: cable, shadow, and the load while no position is asked for"
     if not view.samples.attached.all():
         lines += " · dotted: the vehicle after the release"
     figure.text(0.03, 0.908, lines, fontsize=9)

@@ -68,21 +68,26 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
     ax.plot(*np.where(outside, np.nan, whole_path).T, color=GREY, linewidth=0.9, alpha=0.7)
     path = samples.actual_m[_thin(np.flatnonzero(mission))]
     ax.plot(path[:, 0], path[:, 1], np.full(len(path), low[2]), color=SHADOW, linewidth=1.6, zorder=0)
-    tracked = _thin(np.flatnonzero(mission & np.isfinite(samples.desired_m).all(axis=1)))
-    if len(tracked) > 1:
+    is_tracked = mission & np.isfinite(samples.desired_m).all(axis=1)
+    tracked = _thin(np.flatnonzero(is_tracked))
+    # no line between two stretches, for example before and after an attitude run
+    stretch = np.cumsum(~is_tracked)[tracked]
+    joined = stretch[1:] == stretch[:-1]
+    if joined.any():
         error_m = np.linalg.norm(samples.error_m[tracked], axis=1)
         scale, unit = length_scale(error_m)
         error = scale * error_m
         path = samples.actual_m[tracked]
-        ax.plot(*samples.desired_m[tracked].T, color=INK, linewidth=0.8, linestyle=(0, (4, 4)), zorder=4)
+        desired = np.insert(samples.desired_m[tracked], np.flatnonzero(~joined) + 1, np.nan, axis=0)
+        ax.plot(*desired.T, color=INK, linewidth=0.8, linestyle=(0, (4, 4)), zorder=4)
         coloured = Line3DCollection(
-            np.stack((path[:-1], path[1:]), axis=1),
+            np.stack((path[:-1], path[1:]), axis=1)[joined],
             cmap="viridis_r",
             norm=Normalize(0.0, max(float(error.max()), 1e-6)),
             linewidths=2.6,
             zorder=3,
         )
-        coloured.set_array(0.5 * (error[:-1] + error[1:]))
+        coloured.set_array(0.5 * (error[:-1] + error[1:])[joined])
         ax.add_collection3d(coloured, autolim=False)
         bar = figure.colorbar(coloured, cax=figure.add_axes(bar_rectangle))
         bar.set_label(f"load position error ({unit})", fontsize=9)

@@ -9,6 +9,9 @@ import pytest
 from autopilot.geometry.linear import norm
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.closed_loop import Conditions
+from gcs.sweep.flight import fly, start_times
+from missions.fileformat import load_mission
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import SETTINGS
@@ -102,3 +105,14 @@ def test_a_load_on_the_ground_is_no_slack_to_catch() -> None:
     craft.begin()
     craft.run(at_phase(Phase.DISARMED), 60.0)
     assert not any("slack" in text.lower() for text in craft.texts)
+
+
+def test_a_catch_that_ends_on_the_ground_ends_the_flight() -> None:
+    """A gust makes the cable of a load that is 0.3 times as heavy as assumed look slack; no sensor sees the
+    load, which therefore seems to stay in the air. The vehicle used to stand there, armed, for ever."""
+    mission = load_mission("square")
+    gusts = {"SIM_GUST_STD": 1.5, "SIM_LOAD_MASS": 0.03}
+    conditions = Conditions(sensors="rtk-blind", settings=gusts)
+    flown = fly(mission, conditions, start_times(mission, conditions))
+    assert flown.outcome == "diverged"
+    assert flown.texts[-1] == "The load fell to the ground: landing"

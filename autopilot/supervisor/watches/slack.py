@@ -18,12 +18,14 @@ from autopilot.supervisor.state import (
     Phase,
     View,
     interrupt_mission,
+    leg_time_s,
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
 
 LIFT_OFF_US = 1_000_000  # time after which a load that is being lifted is off the ground
 ON_GROUND_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
+MIN_FALL_S = 1.0  # of a catch, after which a vehicle that does not move is down
 MIN_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
 SLACK_US = 20_000  # time for which this must be the case
 
@@ -33,8 +35,11 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
-    on_ground = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
-    if isinstance(flight.legs[0], CatchLoad) and on_ground:
+    load_lies = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
+    # a vehicle that is not falling although it should stands on the ground, wherever its load seems to be
+    falling_s = leg_time_s(flight, view.now_us)
+    stands = falling_s > MIN_FALL_S and norm(view.v_quad) < ON_GROUND_SPEED
+    if isinstance(flight.legs[0], CatchLoad) and (load_lies or stands):
         flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
         return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
     if flight.cable.slack_since_us < 0:
