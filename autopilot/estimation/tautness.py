@@ -319,8 +319,8 @@ def detect_tautness(
     share = dt / (PULL_TIME_S + dt)
     measured = measured_pull(load, vehicle, imu, thrust, tuning.quad_mass)
     pull = load.pull + share * (measured - load.pull)
-    distance = norm(sub(load.x_load, vehicle.x_quad))
     if load.source == TRACKER:
+        distance = norm(sub(load.x_load, vehicle.x_quad))
         carries_load = load.taut > 0.0 and pull >= LIFTING_PULL * load.tension
         load = _with_tautness(
             load, load.taut, load.length, pull, load.pull_duration_s + dt if carries_load else 0.0

@@ -35,11 +35,7 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
-    load_lies = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
-    # a vehicle that is not falling although it should stands on the ground, wherever its load seems to be
-    falling_s = leg_time_s(flight, view.now_us)
-    stands = falling_s > MIN_FALL_S and norm(view.v_quad) < ON_GROUND_SPEED
-    if isinstance(flight.legs[0], CatchLoad) and (load_lies or stands):
+    if isinstance(flight.legs[0], CatchLoad) and _is_down(flight, view):
         flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
         return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
     if flight.cable.slack_since_us < 0:
@@ -57,6 +53,14 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     ):
         return WatchResult(flight)
     return _after_catch(flight)
+
+
+def _is_down(flight: Flight, view: View) -> bool:
+    """Whether the fall of a load that is to be caught has ended on the ground: the load lies there, or the
+    vehicle does not fall any more, wherever its load seems to be."""
+    if view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED:
+        return True
+    return leg_time_s(flight, view.now_us) > MIN_FALL_S and norm(view.v_quad) < ON_GROUND_SPEED
 
 
 def _after_catch(flight: Flight) -> WatchResult:
