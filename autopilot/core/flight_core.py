@@ -244,6 +244,7 @@ class FlightCore:
             summary.rotors_lost,
             slot.fault if slot is not None else "",
             bool(self.rows.estimator[_LOAD_AGE] == inf),
+            summary.load_tracked,
         )
 
     # ---- from tick to tick
@@ -539,4 +540,4 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
 _LOAD_AGE = field_offset(EstimatorState, "load") + field_offset(LoadEstimate, "age_s")
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 # before the first reading
-_NO_ESTIMATE_YET = EstimateSummary(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)
+_NO_ESTIMATE_YET = EstimateSummary(_REST, False, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)

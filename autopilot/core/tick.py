@@ -63,6 +63,7 @@ from autopilot.estimation.filter import (
 from autopilot.estimation.inbox import IMU, KIND, READING, ROTOR_SPEEDS, SAMPLE_TIME_US, is_valid_imu
 from autopilot.estimation.records import (
     RECEIVER,
+    TRACKER,
     Array,
     EstimatorState,
     EstimatorTuning,
@@ -140,6 +141,7 @@ class EstimateSummary(NamedTuple):
 
     state: State
     taut: bool
+    load_tracked: bool  # a sensor measures the load's position; else its distance is the assumed length
     tilt_rad: float
     pull_n: float  # of the cable on the vehicle, as measured by the accelerometer
     height_std: float  # m, of heights above home, where a receiver measures them
@@ -290,6 +292,7 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
     summary = EstimateSummary(
         state,
         estimator.load.taut > 0.0,
+        estimator.load.source == TRACKER,
         tilt_angle(state.R),
         measured_pull(control, state, constants),
         estimator.uncertainty.vertical if estimator.vehicle.source == RECEIVER else 0.0,
@@ -490,7 +493,15 @@ def _must_decide(rows: CoreRows, now_us: int) -> bool:
         target = vector_at(rows.targets, at, 0)
     known = summary.vehicle_problem == 0 and (not stretch.load_required or summary.load_problem == 0)
     return may_need_decision(
-        stretch, now_us, summary.state, known, summary.taut, summary.tilt_rad, summary.pull_n, target
+        stretch,
+        now_us,
+        summary.state,
+        known,
+        summary.taut,
+        summary.load_tracked,
+        summary.tilt_rad,
+        summary.pull_n,
+        target,
     )
 
 

@@ -45,6 +45,11 @@ KNOWN_SPEED_STD, SPEED_KNOWN_AFTER_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2
 MIN_FULL_PULL = 0.5  # share of the load's weight that this pull has at least
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
+# The acceleration of a vehicle whose load hangs in the air gives the tension of the pendulum. While that is
+# more than HANGING_TENSION of the load's weight, the cable cannot have come slack, and what takes the pull
+# away is a gust; unless the load was lost, which is certain after LOST_S. A load hangs if it is above the
+# ground by HANGING_HEIGHT (m) and some deviations.
+HANGING_TENSION, LOST_S, HANGING_HEIGHT = 0.5, 1.0, 0.1
 # Share of the cable length below which a pull does not count, unless the load is above the ground by this
 # height (m) and some deviations: only the cable can hold it there.
 PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.5, 3.0
@@ -120,13 +125,19 @@ def cable_is_unloaded(load: LoadEstimate, memory_s: float, missing_pull: float) 
 
 
 @kernel
+def _is_above_ground(load: LoadEstimate, history: History, height: float, tuning: EstimatorTuning) -> bool:
+    """Whether a load without a tracker is above the ground by this height (m) and some deviations."""
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    return load.x_load[2] - tuning.load_height > height + HELD_SIGMAS * height_std
+
+
+@kernel
 def _may_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
 ) -> bool:
     """Whether a cable that counts as slack, of a load without a tracker, may be what pulls at the vehicle."""
-    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
     is_long = norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length
-    return is_long or load.x_load[2] - tuning.load_height > HELD_HEIGHT + HELD_SIGMAS * height_std
+    return is_long or _is_above_ground(load, history, HELD_HEIGHT, tuning)
 
 
 @kernel
@@ -349,7 +360,9 @@ def detect_tautness(
     full_pull = max(weight - max(missing_pull, 0.0), MIN_FULL_PULL * weight)
     is_slack = pull + min(missing_pull, 0.0) < PULL_SLACK * full_pull
     load = _with_tautness(load, 1.0, load.length, pull, load.pull_duration_s + dt if is_slack else 0.0)
-    if load.pull_duration_s > PULL_SLACK_S:
+    is_in_air = _is_above_ground(load, history, HANGING_HEIGHT, tuning)
+    is_hanging = is_in_air and load.tension > HANGING_TENSION * weight
+    if load.pull_duration_s > (LOST_S if is_hanging else PULL_SLACK_S):
         P = history.covariance
         L = load.length
         var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])

@@ -230,6 +230,7 @@ def may_need_decision(
     state: State,
     known: bool,
     taut: bool,
+    load_tracked: bool,
     tilt: float,
     pull: float,
     target: Vec3,
@@ -259,7 +260,7 @@ def may_need_decision(
     pull_share = pull / stretch.load_weight
     if stretch.load_suspended:
         gap = stretch.taut_length - norm(sub(state.x_quad, state.x_load))
-        if not taut or (gap > MIN_GAP and pull_share < SLACK_PULL_SHARE):
+        if not taut or (load_tracked and gap > MIN_GAP and pull_share < SLACK_PULL_SHARE):
             return True
     if stretch.watch == TAUT:
         offset = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)

@@ -204,6 +204,7 @@ class View(NamedTuple):
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     estimator_fault: str = ""  # why the custom estimator does not fly any more
     load_unobserved: bool = False  # no sensor has ever seen the load
+    load_tracked: bool = True  # a sensor measures its position; else its distance is the assumed length
 
 
 class Report(NamedTuple):

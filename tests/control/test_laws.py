@@ -479,7 +479,7 @@ core.replace_flight(
 )
 asked = []
 for now_us in (4000, 8000, 12000):
-    pack(EstimateSummary(state, True, 0.0, weight, 0.0, 0, 0, 0.0, 0), core.rows.summary, 0)
+    pack(EstimateSummary(state, True, True, 0.0, weight, 0.0, 0, 0, 0.0, 0), core.rows.summary, 0)
     core.decide(now_us, 4000)
     control_tick(core.rows, core.law_rows, 0)
     asked.append([core.control.command.thrust, sum(core.forces)])

@@ -155,6 +155,23 @@ def test_a_load_that_comes_to_the_ground_slackens_the_cable_whatever_was_missing
     assert after(hanging, 1.0 - missing, missing, 1.0, 0.6).taut == (1.0 if missing < 0.9 else 0.0)
 
 
+@pytest.mark.parametrize(
+    ("height_m", "tension", "seconds", "is_taut"),
+    [
+        (2.0, 1.0, 0.9, True),  # a gust hides the pull; the vehicle does not fall
+        (2.0, 1.0, 1.2, False),  # the load was lost
+        (2.0, 0.4, 0.4, False),  # the vehicle falls about as fast as the load would
+        (TUNING.load_height + 0.2, 1.0, 0.9, True),
+        (TUNING.load_height + 0.1, 1.0, 0.4, False),  # perhaps on the ground
+    ],
+)
+def test_the_cable_of_a_load_that_hangs_is_not_slack_because_a_gust_hides_its_pull(
+    height_m: float, tension: float, seconds: float, is_taut: bool
+) -> None:
+    hanging = laid(height_m)._replace(taut=1.0, pull=WEIGHT, tension=tension * WEIGHT)
+    assert after(hanging, 0.0, 0.0, 1.0, seconds).taut == is_taut
+
+
 def missed(load: LoadEstimate, before: float, height: float, seconds: float) -> float:
     """What counts as missing, in weights, after this time."""
     vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))

@@ -107,12 +107,26 @@ def test_a_load_on_the_ground_is_no_slack_to_catch() -> None:
     assert not any("slack" in text.lower() for text in craft.texts)
 
 
-def test_a_catch_that_ends_on_the_ground_ends_the_flight() -> None:
-    """A gust makes the cable of a load that is 0.3 times as heavy as assumed look slack; no sensor sees the
-    load, which therefore seems to stay in the air. The vehicle used to stand there, armed, for ever."""
-    mission = load_mission("square")
-    gusts = {"SIM_GUST_STD": 1.5, "SIM_LOAD_MASS": 0.03}
-    conditions = Conditions(sensors="rtk-blind", settings=gusts)
+@pytest.mark.parametrize("speed", [1.0, 3.0])
+def test_of_a_load_that_no_tracker_sees_a_cable_that_is_slack_for_a_moment_is_not_noticed(
+    speed: float,
+) -> None:
+    """The vehicle used to dive after a load of which it does not know where it is: snaps of up to 4 m/s,
+    and the mission was interrupted."""
+    craft, hardest = kicked("rtk", speed)
+    assert hardest < speed
+    assert not any("slack" in text.lower() for text in craft.texts)
+    assert craft.flight.phase == Phase.MISSION
+    craft.run(lambda c: norm(c.truth.v_load) < 0.05, 20.0)
+    assert craft.truth.x_load[2] == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 6, 24])
+def test_a_gust_that_hides_the_pull_of_the_load_makes_no_vehicle_dive(seed: int) -> None:
+    """Gusts of 3 m/s around 5 m/s: of 32 such flights 14 used to be completed, 29 are now."""
+    mission = load_mission("case-b")
+    gusts = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 3.0, "MIS_INFEASIBLE": 1.0}
+    conditions = Conditions(sensors="rtk", seed=seed, settings=gusts)
     flown = fly(mission, conditions, start_times(mission, conditions))
-    assert flown.outcome == "diverged"
-    assert flown.texts[-1] == "The load fell to the ground: landing"
+    assert not any("slack" in text.lower() for text in flown.texts)
+    assert flown.outcome == "completed"

@@ -64,7 +64,15 @@ def asks(flight: Flight, stretch: Stretch, seen: View) -> bool:
     target = ZERO if jet is None else jet[0]
     known = not seen.estimate_problems
     return may_need_decision(
-        stretch, seen.now_us, state, known, seen.taut, seen.tilt_rad, seen.pull_n, target
+        stretch,
+        seen.now_us,
+        state,
+        known,
+        seen.taut,
+        seen.load_tracked,
+        seen.tilt_rad,
+        seen.pull_n,
+        target,
     )
 
 

@@ -80,13 +80,15 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
     note since when the cable is taut.
 
     A gust can hide or imitate a pull, and noise of a tracker a gap of a few millimetres: a small gap counts
-    only if the pull confirms it.
+    only if the pull confirms it. A load that is not tracked has no gap, its cable is taut or slack as the
+    estimator says.
     """
     if isinstance(flight.legs[0], CatchLoad):
         in_condition = view.taut
     else:
         gap = flight.cable.taut_length_m - norm(sub(view.x_quad, view.x_load))
-        is_slack = not view.taut or (gap > MIN_GAP and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
+        has_gap = view.load_tracked and gap > MIN_GAP
+        is_slack = not view.taut or (has_gap and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
         lifting = flight.phase == Phase.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
         on_ground = lifting or (flight.phase == Phase.LOWER and isinstance(flight.legs[0], Creep))
         in_condition = is_slack and not on_ground
