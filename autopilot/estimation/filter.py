@@ -61,7 +61,8 @@ POSITION_STD_TO_FLY = 0.05  # m, with trackers
 FIX_STD_TO_FLY = 0.15  # m, beyond the deviation that a receiver states: margin for coasting or a float fix
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
-LOAD_STD_TO_FLY = 0.1  # m relative to the vehicle, of a load that a camera sees
+# m and rad relative to the vehicle, of a load that no tracker measures: one of them is enough
+LOAD_STD_TO_FLY, CABLE_STD_TO_FLY = 0.1, 0.14
 STATED_STD_FACTOR = 1.2  # times the deviation that the receiver states
 MAX_FIX_AGE_S = 2.0  # for which the IMU bridges a gap between fixes
 MAX_DIRECTION_AGE_S = 1.0  # for which the pendulum bridges a gap between directions to the load
@@ -293,14 +294,12 @@ def load_problem(state: EstimatorState, max_age_s: float) -> int:
         if load.taut == 0.0:  # it stays where it is on the ground, observed or not
             return 0
         if is_never_observed(load):
-            return (
-                0
-                if load.tautness_age_s < PULL_SETTLING_S or uncertainty.load <= LOAD_STD_TO_FLY
-                else LOAD_UNSETTLED
-            )
-        if not load.age_s <= max(max_age_s, MAX_DIRECTION_AGE_S):
+            if load.tautness_age_s < PULL_SETTLING_S:
+                return 0
+        elif not load.age_s <= max(max_age_s, MAX_DIRECTION_AGE_S):
             return NO_LOAD_DIRECTION
-        return 0 if uncertainty.load <= LOAD_STD_TO_FLY else LOAD_UNSETTLED
+        std_limit = max(LOAD_STD_TO_FLY, CABLE_STD_TO_FLY * load.length)
+        return 0 if uncertainty.load <= std_limit else LOAD_UNSETTLED
     if not load.age_s <= max(max_age_s, MAX_LOAD_AGE_S):
         return NO_LOAD
     if load.taut == 0.0:

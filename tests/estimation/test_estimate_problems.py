@@ -36,7 +36,7 @@ LOAD = "load position not settled"
 
 
 def settled(source: float, load_source: float, part: str = "", value: float = 0.0) -> EstimatorState:
-    """An estimate without doubt, its load hanging, in which one part has this value: an age in s, or a
+    """An estimate without doubt, its load hanging on 0.7 m of cable, in which one part has this value: an age in s, or a
     standard deviation in m or rad."""
     state = blank_state()
     doubts = {part: value} if part in Uncertainty._fields else {}
@@ -45,7 +45,7 @@ def settled(source: float, load_source: float, part: str = "", value: float = 0.
     assert not part or doubts or part in (VEHICLE_AGE, LOAD_AGE)
     return state._replace(
         vehicle=state.vehicle._replace(source=source, age_s=vehicle_age_s),
-        load=state.load._replace(source=load_source, age_s=load_age_s, taut=1.0),
+        load=state.load._replace(source=load_source, age_s=load_age_s, taut=1.0, length=0.7),
         uncertainty=NO_DOUBT._replace(**doubts),
         sensor_errors=state.sensor_errors._replace(horizontal_slow_std=PROMISED),
     )
@@ -101,6 +101,18 @@ def test_a_load_that_no_sensor_has_ever_seen_is_flown_by_its_pull(
     state = settled(RECEIVER, CAMERA, "load", uncertainty)
     state = state._replace(load=state.load._replace(age_s=inf, tautness_age_s=tautness_age_s))
     assert estimate_problems(state, OLDEST_S) == words
+
+
+@pytest.mark.parametrize(
+    ("length_m", "last_m"),
+    [(0.3, 0.1), (0.7, 0.1), (2.0, 0.28), (20.0, 2.8)],
+)
+@pytest.mark.parametrize("age_s", [0.1, inf])
+def test_on_a_longer_cable_the_load_may_be_less_certain(age_s: float, length_m: float, last_m: float) -> None:
+    for std_m, words in ((0.999 * last_m, ()), (1.001 * last_m, (LOAD,))):
+        state = settled(RECEIVER, CAMERA, "load", std_m)
+        load = state.load._replace(age_s=age_s, length=length_m, tautness_age_s=9.0)
+        assert estimate_problems(state._replace(load=load), OLDEST_S) == words
 
 
 @pytest.mark.parametrize(
