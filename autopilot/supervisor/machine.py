@@ -65,5 +65,5 @@ def _reset_on_disarm(flight: Flight) -> Flight:
         heading=flight.heading.at_rest(),
         rotors_lost=0,  # whether they turn is detected after the next start
         mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
-        cable=replace(flight.cable, reel_target_m=None),
+        cable=replace(flight.cable, reel_target_m=None, failed_lifts=0),
     )

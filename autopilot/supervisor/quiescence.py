@@ -44,7 +44,7 @@ from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, T
 from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
-from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, MAX_TAUT_HEIGHT
+from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, last_setpoint_height
 from autopilot.supervisor.watches.touchdown import (
     LOAD_DEPTH,
     ON_GROUND_DEPTH,
@@ -52,7 +52,7 @@ from autopilot.supervisor.watches.touchdown import (
     STILL_US,
     VEHICLE_DEPTH,
 )
-from autopilot.trajectory.slack_cable import CLEARANCE, TOUCH_SPEED
+from autopilot.trajectory.slack_cable import TOUCH_SPEED
 
 UNCONTROLLED = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
@@ -186,8 +186,8 @@ def _active_watch(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, fl
     """What is watched for, its level in m, and when it will have been true for long enough."""
     condition_met = flight.condition_since_us >= 0
     if flight.phase == Phase.TAUTEN and len(flight.legs) == 1 and isinstance(leg, Creep):
-        threshold = leg.begin[2] + (MAX_TAUT_HEIGHT - CLEARANCE) * settings.cable_length_m
-        return TAUT, threshold, flight.condition_since_us + PULL_US if condition_met else FOREVER_US
+        end_us = flight.condition_since_us + PULL_US if condition_met else FOREVER_US
+        return TAUT, last_setpoint_height(leg, settings), end_us
     if flight.phase in (Phase.LOWER, Phase.SET_DOWN) and isinstance(leg, Creep):
         end_us = flight.condition_since_us + STILL_US if condition_met else FOREVER_US
         if leg.control_mode == LOAD_POSITION:

@@ -27,6 +27,7 @@ class MotionSettings:
     accel_m_s2: float
     lift_speed_m_s: float
     taut_speed_m_s: float
+    weight_lead_m: float  # of the setpoint over a vehicle whose taut cable pulls with the load's weight
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
     return_altitude_m: float  # least height of the load on the way home
 
@@ -144,6 +145,7 @@ def settings_from(
             accel_m_s2=table["MIS_ACCEL"],
             lift_speed_m_s=table["MIS_LIFT_SPEED"],
             taut_speed_m_s=min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"]),
+            weight_lead_m=load_mass * gravity / table["QP_KZ"] if table["QP_KZ"] > 0.0 else 0.0,
             snap_speed_m_s=table["MIS_SNAP_SPEED"],
             return_altitude_m=table["RTL_RETURN_ALT"],
         ),

@@ -57,6 +57,7 @@ class Event(Enum):
     TAKEOFF = "take off"
     TAKEOFF_ALONE = "take off without a load"
     TAUT = "cable taut"
+    NOT_LIFTED = "cable slack, load not lifted"
     DONE = "legs done"
     STEP = "mission step"
     LAND_STEP = "mission step: land"
@@ -133,6 +134,7 @@ class CableState:
     taut_length_m: float = 0.0  # from load to vehicle when lifting began: the true length of the cable
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack
+    failed_lifts: int = 0  # times that it came slack with the load still on the ground, since arming
 
 
 @dataclass(frozen=True, slots=True)

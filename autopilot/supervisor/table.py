@@ -20,6 +20,7 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.TAUTEN, E.LAND): P.SET_DOWN,
     (P.TAUTEN, E.RETURN): P.SET_DOWN,  # the load lies on the ground, and stays there
     (P.TAUTEN, E.RELEASED): P.LIFT,
+    (P.LIFT, E.NOT_LIFTED): P.TAUTEN,
     (P.LIFT, E.DONE): P.HOLD,
     (P.LIFT, E.STEP): P.MISSION,
     (P.LIFT, E.LAND_STEP): P.LOWER,

@@ -36,8 +36,8 @@ LOAD = "load position not settled"
 
 
 def settled(source: float, load_source: float, part: str = "", value: float = 0.0) -> EstimatorState:
-    """An estimate without doubt, its load hanging on 0.7 m of cable, in which one part has this value: an age in s, or a
-    standard deviation in m or rad."""
+    """An estimate without doubt, its load hanging on 0.7 m of cable, in which one part has this value: an age
+    in s, or a standard deviation in m or rad."""
     state = blank_state()
     doubts = {part: value} if part in Uncertainty._fields else {}
     vehicle_age_s = value if part == VEHICLE_AGE else 0.0

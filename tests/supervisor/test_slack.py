@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from autopilot.guidance.legs import CatchLoad, Hold
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.state import CableState, Flight, Phase, View
-from tests.doubles.sky import SETTINGS, hanging
+from autopilot.supervisor.machine import transition
+from autopilot.supervisor.state import CableState, Event, Flight, Phase, View
+from tests.doubles.sky import SETTINGS, entered, hanging, view
 
 
 def test_noise_alone_starts_no_catch() -> None:
@@ -52,3 +53,20 @@ def test_a_catch_that_ends_on_the_ground_ends_the_flight() -> None:
     flight, report = advance(flight, at(1.2, 0.0), SETTINGS)
     assert flight.phase != Phase.HOLD
     assert [text for _, text in report.texts] == ["The load fell to the ground: landing"]
+
+
+def test_a_load_that_was_not_lifted_is_tried_again_three_times() -> None:
+    """A gust and no load pulled at the vehicle."""
+    flight = entered(Flight(), Phase.LIFT, hanging(), SETTINGS)
+    after: list[tuple[Phase, list[str]]] = []
+    for k in range(1, 5):
+        assert flight.phase == Phase.LIFT
+        for passed_us in (1_100_000, 1_140_000):
+            flight, report = advance(flight, view(k * 2_000_000 + passed_us), SETTINGS)
+        after.append((flight.phase, [text for _, text in report.texts]))
+        if flight.phase == Phase.TAUTEN:
+            flight = transition(flight, Event.TAUT, hanging((k + 1) * 2_000_000), SETTINGS)
+    again = (Phase.TAUTEN, ["Cable slack, the load is not lifted: pulling it taut again"])
+    assert after == [again] * 3 + [(Phase.LIFT, ["Cable slack: falling with the load to catch it"])]
+    disarmed = transition(flight, Event.DISARM, view(20_000_000), SETTINGS)
+    assert disarmed.cable.failed_lifts == 0

@@ -176,6 +176,12 @@ def tautened(phase: Phase) -> Flight:
     return advance(replace(flight, legs=flight.legs[-1:]), hanging(SECOND, HERE), SETTINGS)[0]
 
 
+def not_lifted(phase: Phase) -> Flight:
+    """The cable has been slack for a moment, long after the lift began, and the load lies on the ground."""
+    slack = replace(under_way(phase).cable, slack_since_us=2 * SECOND)
+    return advance(replace(under_way(phase), cable=slack), view(2 * SECOND + 40_000), SETTINGS)[0]
+
+
 def after_last_leg(phase: Phase) -> Flight:
     """A mission ends with its last step, another phase with its last leg."""
     return flown(under_way(phase, Waypoint(3.0, 0.0, 2.0)))
@@ -228,6 +234,7 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.TAKEOFF: taken_off,
     Event.TAKEOFF_ALONE: taken_off_alone,
     Event.TAUT: tautened,
+    Event.NOT_LIFTED: not_lifted,
     Event.DONE: after_last_leg,
     Event.STEP: next_step,
     Event.LAND_STEP: landing_step,

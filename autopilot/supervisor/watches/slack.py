@@ -25,6 +25,7 @@ from autopilot.supervisor.watches.watch_result import WatchResult
 
 LIFT_OFF_US = 1_000_000  # time after which a load that is being lifted is off the ground
 ON_GROUND_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
+MAX_FAILED_LIFTS = 3  # after which a load that does not leave the ground is left there
 MIN_FALL_S = 1.0  # of a catch, after which a vehicle that does not move is down
 MIN_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
 SLACK_US = 20_000  # time for which this must be the case
@@ -44,6 +45,8 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if not isinstance(flight.legs[0], CatchLoad):
         if lasted_us < SLACK_US:
             return WatchResult(flight)
+        if flight.phase == Phase.LIFT and _lies(view) and flight.cable.failed_lifts < MAX_FAILED_LIFTS:
+            return _after_failed_lift(flight)
         cable = replace(flight.cable, slack_since_us=-1)
         catch = CatchLoad(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
         flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
@@ -58,9 +61,21 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
 def _is_down(flight: Flight, view: View) -> bool:
     """Whether the fall of a load that is to be caught has ended on the ground: the load lies there, or the
     vehicle does not fall any more, wherever its load seems to be."""
-    if view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED:
-        return True
-    return leg_time_s(flight, view.now_us) > MIN_FALL_S and norm(view.v_quad) < ON_GROUND_SPEED
+    has_fallen = leg_time_s(flight, view.now_us) > MIN_FALL_S
+    return _lies(view) or (has_fallen and norm(view.v_quad) < ON_GROUND_SPEED)
+
+
+def _lies(view: View) -> bool:
+    """Whether the load seems to lie on the ground."""
+    return view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
+
+
+def _after_failed_lift(flight: Flight) -> WatchResult:
+    """The load is still on the ground, because a gust and no load pulled: the cable is pulled taut again."""
+    failed_lifts = flight.cable.failed_lifts + 1
+    cable = replace(flight.cable, slack_since_us=-1, failed_lifts=failed_lifts)
+    text = "Cable slack, the load is not lifted: pulling it taut again"
+    return WatchResult(replace(flight, cable=cable), Event.NOT_LIFTED, ((WARNING, text),))
 
 
 def _after_catch(flight: Flight) -> WatchResult:

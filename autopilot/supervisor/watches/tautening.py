@@ -25,8 +25,10 @@ from autopilot.trajectory.slack_cable import CLEARANCE, SLACK_ACCEL, SLACK_SPEED
 MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
 LIFTING_TEXT = "Cable taut, lifting the load"
 LIFTING_UNOBSERVED_TEXT = "Cable taut, lifting the load; no load sensor"
-LATE_FACTOR = 2.0  # factor of the time in which the vehicle would rise from the ground to MAX_TAUT_HEIGHT
-MAX_TAUT_HEIGHT = 1.3  # cable lengths over the load at which the cable must have come taut
+LATE_FACTOR = 2.0  # factor of the time in which the setpoint rises from the load to its last height
+# The vehicle's setpoint rises above the cable's length by this share of it, and at least by this share of the
+# lead at which the law pulls with the load's weight: then the cable must have come taut.
+STRETCH_SHARE, LEAD_SHARE = 0.3, 1.3
 
 
 def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResult:
@@ -40,7 +42,9 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
         return WatchResult(
             flight, Event.TAUT, ((INFO, LIFTING_UNOBSERVED_TEXT if view.load_unobserved else LIFTING_TEXT),)
         )
-    at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    at = creep.jet(leg_time_s(flight, view.now_us))[0]
     over = (view.x_load[0], view.x_load[1], at[2])
     if (
         not norm(sub(over, at)) <= MAX_LOAD_OFFSET
@@ -49,8 +53,9 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
             return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
-        return WatchResult(_moved_over_load(flight, view, at, over))
-    if flight.condition_since_us < 0 and at[2] > _max_taut_height(flight, view, settings):
+        return WatchResult(_moved_over_load(flight, view, creep, at, over))
+    last_height = last_setpoint_height(creep, settings) + HEIGHT_SIGMAS * view.height_std
+    if flight.condition_since_us < 0 and at[2] > last_height:
         text = "Cable never taut, landing; check VEH_CABLE_LEN"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
     return WatchResult(flight)
@@ -75,15 +80,13 @@ def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:
     distance = norm(sub(view.x_quad, view.x_load))
     if not distance + HEIGHT_SIGMAS * view.height_std < settings.cable_length_m:
         return False
-    latest_s = LATE_FACTOR * MAX_TAUT_HEIGHT * settings.cable_length_m / settings.motion.taut_speed_m_s
+    latest_s = LATE_FACTOR * max_setpoint_distance(settings) / settings.motion.taut_speed_m_s
     late = view.now_us - flight.phase_start_us > latest_s * 1e6
     return late and not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
 
 
-def _moved_over_load(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
-    """The flight whose rising vehicle is moved from `at` to `over`, above the load."""
-    creep = flight.legs[0]
-    assert isinstance(creep, Creep)
+def _moved_over_load(flight: Flight, view: View, creep: Creep, at: Vec3, over: Vec3) -> Flight:
+    """The flight whose vehicle, which rises by `creep`, is moved from `at` to `over`, above the load."""
     legs = (
         transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
         replace(creep, begin=over),
@@ -91,9 +94,12 @@ def _moved_over_load(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight
     return replace(flight, legs=legs, leg_start_us=view.now_us)
 
 
-def _max_taut_height(flight: Flight, view: View, settings: Settings) -> float:
-    """Height over home (m) at which the rising vehicle must have pulled the cable taut."""
-    creep = flight.legs[0]
-    assert isinstance(creep, Creep)
-    height_margin = HEIGHT_SIGMAS * view.height_std
-    return creep.begin[2] + (MAX_TAUT_HEIGHT - CLEARANCE) * settings.cable_length_m + height_margin
+def max_setpoint_distance(settings: Settings) -> float:
+    """Height of the vehicle's setpoint over the load (m) at which the cable must have come taut."""
+    length = settings.cable_length_m
+    return length + max(STRETCH_SHARE * length, LEAD_SHARE * settings.motion.weight_lead_m)
+
+
+def last_setpoint_height(creep: Creep, settings: Settings) -> float:
+    """The same as a height over home (m), of a vehicle that rises from CLEARANCE above the load."""
+    return creep.begin[2] + max_setpoint_distance(settings) - CLEARANCE * settings.cable_length_m
