@@ -40,8 +40,9 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
 
 def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
     """The function; an unknown argument name raises a TypeError that suggests the nearest name, and a call by
-    a script that is loaded only for its class raises `Error`."""
+    a script that is loaded only for its class raises `Error`, as does a wrong flag (`checked_flags`)."""
     names = tuple(signature(function).parameters)
+    checked = checked_flags(function)
 
     @wraps(function)
     def wrapper(*values: P.args, **named: P.kwargs) -> R:
@@ -51,6 +52,22 @@ def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
                 hint = did_you_mean(name, names)
                 known = ", ".join(names)
                 raise TypeError(f"{function.__name__}: no argument {name!r}; {hint}must be one of {known}")
+        return checked(*values, **named)
+
+    return wrapper
+
+
+def checked_flags(function: Callable[P, R]) -> Callable[P, R]:
+    """The function; an argument whose default is True or False raises `Error` if it is given another value:
+    a text, as "no", would count as True."""
+    parameters = signature(function).parameters
+    flags = {name for name, parameter in parameters.items() if isinstance(parameter.default, bool)}
+
+    @wraps(function)
+    def wrapper(*values: P.args, **named: P.kwargs) -> R:
+        for name, value in (*zip(parameters, values, strict=False), *named.items()):
+            if name in flags and not _is_truth_value(value):
+                raise GcsError(f"{name} = {shown_value(value)}; must be True or False")
         return function(*values, **named)
 
     return wrapper
@@ -83,9 +100,10 @@ def reworded_for_python(text: str) -> str:
 
 
 def number(name: str, value: Any) -> float:
-    """A finite number, or `Error`. True and False are no numbers: they would pass for 1 and 0."""
+    """A finite number, or `Error`. True and False are no numbers, as they would pass for 1 and 0, nor is a
+    text with the digits of one."""
     try:
-        found = math.nan if _is_truth_value(value) else float(value)
+        found = math.nan if _is_truth_value(value) or _is_text(value) else float(value)
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
@@ -95,6 +113,10 @@ def number(name: str, value: Any) -> float:
 
 def _is_truth_value(value: Any) -> bool:
     return type(value).__name__ in ("bool", "bool_")  # also numpy's, by its present and its former name
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str | bytes | bytearray)
 
 
 def positive(name: str, value: Any) -> float:
