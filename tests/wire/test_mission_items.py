@@ -261,6 +261,7 @@ REFUSALS = [
     ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "latitude"),
     ([item(16, frame=6, x=473977420, y=2**31 - 1, z=5.0)], 0, "INVALID_PARAM6_Y", "longitude"),
     ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "north of home"),
+    ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "are 0, so the place may be missing"),
     ([item(178, 7.0, 1.0)], 0, "INVALID_PARAM1", "speed type = 7"),
     ([item(178, 1.0, math.nan)], 0, "INVALID_PARAM2", "speed = nan m/s"),
     ([item(178, 1.0, 0.0)], 0, "INVALID_PARAM2", "speed = 0 m/s"),

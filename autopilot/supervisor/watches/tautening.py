@@ -51,7 +51,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
             return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
         return WatchResult(_moved_over_load(flight, view, at, over))
     if flight.condition_since_us < 0 and at[2] > _max_taut_height(flight, view, settings):
-        text = "Cable never taut, landing; check VEH_CABLE_LEN"
+        text = "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
     return WatchResult(flight)
 
