@@ -380,7 +380,7 @@ def test_frames_of_a_place() -> None:
 def test_the_home_row_of_a_waypoint_file_is_not_flown() -> None:
     latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), HOME)
     row = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, HOME.altitude_m)
-    for first in (row, row._replace(current=0)):
+    for first in (row, row._replace(current=0), row._replace(frame=3, z=0.0), row._replace(frame=6, z=0.0)):
         assert decode_items([first, item(93, 1.0)], HOME) == (Delay(1.0),)
     first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 3.0)
     (step,) = decode_items([first], HOME)
