@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import wraps
-from inspect import signature
+from inspect import Parameter, signature
 from operator import index
 from os import PathLike, fspath
 from pathlib import Path
@@ -41,8 +41,8 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
 def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
     """The function; an unknown argument name raises a TypeError that suggests the nearest name, and a call by
     a script that is loaded only for its class raises `Error`, as does a wrong flag (`checked_flags`)."""
-    names = tuple(signature(function).parameters)
-    checked = checked_flags(function)
+    parameters = signature(function).parameters
+    names = tuple(parameters)
 
     @wraps(function)
     def wrapper(*values: P.args, **named: P.kwargs) -> R:
@@ -52,7 +52,8 @@ def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
                 hint = did_you_mean(name, names)
                 known = ", ".join(names)
                 raise TypeError(f"{function.__name__}: no argument {name!r}; {hint}must be one of {known}")
-        return checked(*values, **named)
+        _check_flags(parameters, values, named)
+        return function(*values, **named)
 
     return wrapper
 
@@ -61,16 +62,22 @@ def checked_flags(function: Callable[P, R]) -> Callable[P, R]:
     """The function; an argument whose default is True or False raises `Error` if it is given another value:
     a text, as "no", would count as True."""
     parameters = signature(function).parameters
-    flags = {name for name, parameter in parameters.items() if isinstance(parameter.default, bool)}
 
     @wraps(function)
     def wrapper(*values: P.args, **named: P.kwargs) -> R:
-        for name, value in (*zip(parameters, values, strict=False), *named.items()):
-            if name in flags and not _is_truth_value(value):
-                raise GcsError(f"{name} = {shown_value(value)}; must be True or False")
+        _check_flags(parameters, values, named)
         return function(*values, **named)
 
     return wrapper
+
+
+def _check_flags(
+    parameters: Mapping[str, Parameter], values: Iterable[object], named: Mapping[str, object]
+) -> None:
+    for name, value in (*zip(parameters, values, strict=False), *named.items()):
+        is_flag = name in parameters and isinstance(parameters[name].default, bool)
+        if is_flag and not _is_truth_value(value):
+            raise GcsError(f"{name} = {shown_value(value)}; must be True or False")
 
 
 def _require_guard(called: str) -> None:

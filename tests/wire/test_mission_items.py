@@ -382,9 +382,10 @@ def test_the_home_row_of_a_waypoint_file_is_not_flown() -> None:
     row = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, HOME.altitude_m)
     for first in (row, row._replace(current=0), row._replace(frame=3, z=0.0), row._replace(frame=6, z=0.0)):
         assert decode_items([first, item(93, 1.0)], HOME) == (Delay(1.0),)
-    first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 3.0)
-    (step,) = decode_items([first], HOME)
-    assert isinstance(step, Waypoint)
+    for height in (0.3, 3.0):
+        first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, height)
+        (step,) = decode_items([first], HOME)
+        assert isinstance(step, Waypoint)
 
 
 def test_a_landing_elsewhere_is_a_transfer_first() -> None:
