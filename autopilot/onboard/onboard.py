@@ -6,7 +6,7 @@ wait until the shell hands them over between two ticks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -197,6 +197,12 @@ def mission_plan(
     repeat_from = endless_jump_target(mission.items, steps)
     aims = tuple(s.heading_commands for s in steps)
     return MissionPlan(flown, sequence, len(mission.items), prepared, aims, repeat_from)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """The first of the numbers, for a text."""
+    more = " ..." if len(numbers) > MAX_LISTED_ITEMS else ""
+    return ", ".join(map(str, numbers[:MAX_LISTED_ITEMS])) + more
 
 
 class Onboard:
@@ -759,12 +765,9 @@ class Onboard:
         """Report rally points that the fence forbids; they may have been uploaded before it."""
         flight, settings = self.core.flight, self.core.settings
         listed = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
-        outside = [str(i) for i, place in listed if fence_problem(flight, place, settings)]
+        outside = [i for i, place in listed if fence_problem(flight, place, settings)]
         if outside:
-            numbers = ", ".join(outside[:MAX_LISTED_ITEMS]) + (
-                " ..." if len(outside) > MAX_LISTED_ITEMS else ""
-            )
-            text = f"Rally points outside the fence: {numbers}; no return leads there"
+            text = f"Rally points outside the fence: {_listed(outside)}; no return leads there"
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def set_storage_losses(self, lost: tuple[str, ...]) -> None:
@@ -795,10 +798,8 @@ class Onboard:
         self._prepare()
         unflown = unflown_items(mission.items)
         if unflown:
-            numbers = ", ".join(map(str, unflown[:MAX_LISTED_ITEMS])) + (
-                " ..." if len(unflown) > MAX_LISTED_ITEMS else ""
-            )
-            self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
+            text = f"Mission items kept, not flown: {_listed(unflown)}"
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
         early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
         landing = next((item for step, item in early if isinstance(step, Land)), None)
         if landing is not None:

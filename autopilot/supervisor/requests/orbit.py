@@ -22,6 +22,7 @@ DEFAULT_RADIUS_M = 2.0  # or more, so that the speed takes at most half of MIS_A
 MIN_CIRCLE_SPEED_M_S = 0.05
 RAMP_SHARE = 4.0  # a circle begins with a quarter of MIS_ACCEL along it
 CIRCLE_POINTS = 72
+_SPEED_DIGITS = 9
 MAX_CIRCLE_S = 1e9
 
 
@@ -69,7 +70,8 @@ def _is_circling(flight: Flight) -> bool:
 
 def _speed(flight: Flight, flown: Circle | None) -> float:
     """The speed for a request that names none: that of the circle being flown, or of transfers."""
-    return flight.mission.speed_m_s if flown is None else flown.radius * abs(flown.rate)
+    # rounded: a speed at its limit must not exceed it by the last bit
+    return flight.mission.speed_m_s if flown is None else round(flown.radius * abs(flown.rate), _SPEED_DIGITS)
 
 
 def _radius(speed: float, flown: Circle | None, settings: Settings) -> float:
