@@ -39,11 +39,12 @@ class Conditions:
     settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
     own: OwnCode = NO_OWN_CODE  # references to custom code; a law in it determines CTL_LAW
     limit_s: float | None = None  # longest time that the flight may last; None: by its expected duration
+    ignored: frozenset[str] = frozenset()  # parameters in the vehicle's file that have no effect
 
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
     """An autopilot for these conditions."""
-    table = parameters_for(load_belief(conditions.vehicle), conditions.own)
+    table = parameters_for(load_belief(conditions.vehicle), conditions.own, ignored=conditions.ignored)
     apply_settings(table, conditions.settings.items())
     table.freeze()
     options = Options(home, LOCKSTEP_BOOT_UNIX_US, own=conditions.own)

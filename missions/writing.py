@@ -45,19 +45,26 @@ def _keys(record: Any) -> dict[str, Any]:
     known = isinstance(record, (*KINDS, Term, Sine))
     for field in fields(record) if known else ():
         value = getattr(record, field.name)
-        if field.name.endswith("_rad") and isinstance(value, Real):
-            table[field.name.removesuffix("_rad") + "_deg"] = _degrees(_number(value))
+        if field.name.endswith("_rad"):
+            found = _plain(value)
+            key = field.name.removesuffix("_rad") + "_deg"
+            table[key] = _degrees(found) if isinstance(found, float) else found
         elif isinstance(value, Sequence) and not isinstance(value, str):
             table |= {field.name: [_keys(part) for part in value]} if value else {}
         elif value is not None:
-            table[field.name] = _number(value) if isinstance(value, Real) else value
+            table[field.name] = _plain(value)
     if isinstance(record, Term) and record.hold_s is None:
         table.pop("fall_s", None)  # the term stays at its top
     return table
 
 
-def _number(value: Real) -> float:
-    """The value as a float; infinite for an integer beyond the range of floats."""
+def _plain(value: Any) -> Any:
+    """A number as a float, infinite for an integer beyond the range of floats; other values as they are. True
+    and False, also numpy's, are no numbers."""
+    if type(value).__name__ in ("bool", "bool_"):
+        return bool(value)
+    if not isinstance(value, Real):
+        return value
     try:
         return float(value)
     except OverflowError:

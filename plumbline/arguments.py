@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import wraps
-from inspect import signature
+from inspect import Parameter, signature
 from operator import index
 from os import PathLike, fspath
 from pathlib import Path
@@ -40,8 +40,9 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
 
 def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
     """The function; an unknown argument name raises a TypeError that suggests the nearest name, and a call by
-    a script that is loaded only for its class raises `Error`."""
-    names = tuple(signature(function).parameters)
+    a script that is loaded only for its class raises `Error`, as does a wrong flag (`checked_flags`)."""
+    parameters = signature(function).parameters
+    names = tuple(parameters)
 
     @wraps(function)
     def wrapper(*values: P.args, **named: P.kwargs) -> R:
@@ -51,9 +52,32 @@ def called_by_scripts(function: Callable[P, R]) -> Callable[P, R]:
                 hint = did_you_mean(name, names)
                 known = ", ".join(names)
                 raise TypeError(f"{function.__name__}: no argument {name!r}; {hint}must be one of {known}")
+        _check_flags(parameters, values, named)
         return function(*values, **named)
 
     return wrapper
+
+
+def checked_flags(function: Callable[P, R]) -> Callable[P, R]:
+    """The function; an argument whose default is True or False raises `Error` if it is given another value:
+    a text, as "no", would count as True."""
+    parameters = signature(function).parameters
+
+    @wraps(function)
+    def wrapper(*values: P.args, **named: P.kwargs) -> R:
+        _check_flags(parameters, values, named)
+        return function(*values, **named)
+
+    return wrapper
+
+
+def _check_flags(
+    parameters: Mapping[str, Parameter], values: Iterable[object], named: Mapping[str, object]
+) -> None:
+    for name, value in (*zip(parameters, values, strict=False), *named.items()):
+        is_flag = name in parameters and isinstance(parameters[name].default, bool)
+        if is_flag and not _is_truth_value(value):
+            raise GcsError(f"{name} = {shown_value(value)}; must be True or False")
 
 
 def _require_guard(called: str) -> None:
@@ -83,9 +107,10 @@ def reworded_for_python(text: str) -> str:
 
 
 def number(name: str, value: Any) -> float:
-    """A finite number, or `Error`. True and False are no numbers: they would pass for 1 and 0."""
+    """A finite number, or `Error`. True and False are no numbers, as they would pass for 1 and 0, nor is a
+    text with the digits of one."""
     try:
-        found = math.nan if _is_truth_value(value) else float(value)
+        found = math.nan if _is_truth_value(value) or _is_text(value) else float(value)
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
@@ -95,6 +120,10 @@ def number(name: str, value: Any) -> float:
 
 def _is_truth_value(value: Any) -> bool:
     return type(value).__name__ in ("bool", "bool_")  # also numpy's, by its present and its former name
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str | bytes | bytearray)
 
 
 def positive(name: str, value: Any) -> float:

@@ -20,6 +20,7 @@ from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
     called_by_scripts,
+    checked_flags,
     errors_for_python,
     file_path,
     positive,
@@ -182,6 +183,7 @@ class Flight:
             pictures[name].draw(view, png)
         return Picture(png.getvalue())
 
+    @checked_flags
     def report(
         self, out: str | Path, quiet: bool = True, pictures: bool = False, *, overwrite: bool = False
     ) -> Path:

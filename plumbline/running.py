@@ -34,6 +34,7 @@ from missions import model
 from missions.nearest import did_you_mean
 from plumbline.arguments import (
     called_by_scripts,
+    checked_flags,
     errors_for_python,
     number,
     parameter_name,
@@ -122,6 +123,7 @@ class RunningVehicle:
 
     # ---- commands
 
+    @checked_flags
     def arm(self, *, force: bool = False, timeout_s: float = 30.0) -> None:
         """Start the rotors. Unless `force`, wait until the vehicle is ready; a vehicle that is not ready in
         time refuses, with the reason."""
@@ -132,10 +134,12 @@ class RunningVehicle:
         self._command(lambda session: command.arm(session.target, force))
         self.wait(lambda state: state.armed is True, limit_s)
 
+    @checked_flags
     def disarm(self, *, force: bool = False) -> None:
         """Stop the rotors. In the air this requires `force`, and the vehicle falls."""
         self._command(lambda session: command.disarm(session.target, force))
 
+    @checked_flags
     def takeoff(self, up_m: float | None = None, *, wait: bool = True, timeout_s: float = 180.0) -> None:
         """Lift the load to a height and hold it there; the default height is MIS_TAKEOFF_ALT.
 
@@ -154,6 +158,7 @@ class RunningVehicle:
         if wait:
             self.wait("holding", limit_s)
 
+    @checked_flags
     def goto(
         self,
         east_m: float,
@@ -178,6 +183,7 @@ class RunningVehicle:
         if wait:
             self.wait(lambda state: _has_arrived(state, place), limit_s)
 
+    @checked_flags
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
         """Set the load down, and the vehicle beside it.
 
@@ -188,6 +194,7 @@ class RunningVehicle:
         if wait:
             self.wait("landed", limit_s)
 
+    @checked_flags
     def upload(
         self,
         mission: str | PathLike[str] | model.Mission,

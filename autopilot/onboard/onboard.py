@@ -6,7 +6,7 @@ wait until the shell hands them over between two ticks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -75,7 +75,7 @@ from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import RestartState
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import MissionPlan, Phase, Report, interrupt_mission
+from autopilot.supervisor.state import MissionPlan, Phase, Report, fence_problem, interrupt_mission
 from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
@@ -100,6 +100,7 @@ _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MAX_LISTED_ITEMS = 8  # items in one text
+MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence when either is uploaded
 MAX_LEAP_US = 5_000_000  # a single tick that lies farther ahead is rejected
 MIN_GAP_US = 500_000  # time without a tick after which a vehicle in the air has long been out of control
 RATE_TICKS = 1  # ticks in which the tick rate is determined
@@ -196,6 +197,12 @@ def mission_plan(
     repeat_from = endless_jump_target(mission.items, steps)
     aims = tuple(s.heading_commands for s in steps)
     return MissionPlan(flown, sequence, len(mission.items), prepared, aims, repeat_from)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """The first of the numbers, for a text."""
+    more = " ..." if len(numbers) > MAX_LISTED_ITEMS else ""
+    return ", ".join(map(str, numbers[:MAX_LISTED_ITEMS])) + more
 
 
 class Onboard:
@@ -752,6 +759,16 @@ class Onboard:
         else:
             area = replace(flight.area, rally=read_rally(items, self._options.home))
         self.core.replace_flight(replace(flight, area=area))
+        self._warn_of_rally()
+
+    def _warn_of_rally(self) -> None:
+        """Report rally points that the fence forbids; they may have been uploaded before it."""
+        flight, settings = self.core.flight, self.core.settings
+        listed = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
+        outside = [i for i, place in listed if fence_problem(flight, place, settings)]
+        if outside:
+            text = f"Rally points outside the fence: {_listed(outside)}; no return leads there"
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def set_storage_losses(self, lost: tuple[str, ...]) -> None:
         """State what cannot be read from the storage: the vehicle is not armed until this is repaired."""
@@ -781,10 +798,8 @@ class Onboard:
         self._prepare()
         unflown = unflown_items(mission.items)
         if unflown:
-            numbers = ", ".join(map(str, unflown[:MAX_LISTED_ITEMS])) + (
-                " ..." if len(unflown) > MAX_LISTED_ITEMS else ""
-            )
-            self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
+            text = f"Mission items kept, not flown: {_listed(unflown)}"
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
         early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
         landing = next((item for step, item in early if isinstance(step, Land)), None)
         if landing is not None:

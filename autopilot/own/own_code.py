@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -65,14 +65,21 @@ class OwnSetup:
 
 
 def parameters_for(
-    belief: Vehicle, own: OwnCode = NO_OWN_CODE, all_known: bool = True
+    belief: Vehicle,
+    own: OwnCode = NO_OWN_CODE,
+    all_known: bool = True,
+    ignored: Collection[str] = (),
 ) -> AutopilotParameters:
     """The autopilot's parameters for a vehicle, with those of the custom classes, at the values with which
     the vehicle is delivered. OwnError if a class cannot be loaded, or a parameter of it is invalid.
 
-    VehicleFileError if the vehicle is delivered with a parameter that neither the autopilot nor a class has,
-    unless there may be classes besides `own` (`all_known` is False).
+    The vehicle counts as delivered without the `ignored` parameters. VehicleFileError if it is delivered with
+    a parameter that neither the autopilot nor a class has, unless there may be classes besides `own`
+    (`all_known` is False).
     """
+    if ignored:
+        kept = {name: value for name, value in belief.parameters.items() if name not in ignored}
+        belief = belief.model_copy(update={"parameters": kept})
     defined: tuple[table.Parameter, ...] = ()
     parameter_table = autopilot_parameters(belief)
     for loaded_class in own.load_classes():

@@ -16,6 +16,8 @@ from autopilot.geometry.linear import Vec3
 from autopilot.services.identity import SUPPORTED_MODES, Flavour, Identity, Mode
 from autopilot.services.records import Announce, Decide, Output, Peer, RefusalCleared, Send, SendText, Verdict
 from autopilot.services.requests import (
+    MAX_SPEED_M_S,
+    MIN_SPEED_M_S,
     Arm,
     ChangeAltitude,
     ChangeSpeed,
@@ -65,6 +67,7 @@ _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
 _SPEED_UNCHANGED = (0.0, -1.0)  # of DO_REPOSITION
+_SPEED_LIMITS = f"{MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g} m/s"
 _WINCH_ACTIONS = "1 (by a length), 2 (at a rate), 5 (hold) and 6 (retract) are"
 _NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0  # of a speed
 # ORBIT_YAW_BEHAVIOUR: the nose points to the centre (True), keeps its heading (False), or does as before
@@ -229,8 +232,9 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
         return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
     east, north, up = (None if math.isnan(value) else value for value in position)
     speed = None if call.p[0] in _SPEED_UNCHANGED or math.isnan(call.p[0]) else call.p[0]
-    if speed is not None and not 0.0 < speed < math.inf:
-        return _refused(f"Reposition: speed (param1) = {speed:g} m/s; must be > 0, or 0 or -1 (unchanged)")
+    if speed is not None and not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
+        text = f"Reposition: speed (param1) = {speed:g} m/s; must be {_SPEED_LIMITS}"
+        return _refused(f"{text}, or 0 or -1 (unchanged)")
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
         return Pause()  # ground stations send this for "hold here"
@@ -250,8 +254,9 @@ def _orbit(call: Call, context: Context) -> Request | Verdict:
     position = _position_enu(call, context)
     if position is None:
         return _refused("Orbit: no such place; must be latitude and longitude of a global frame")
-    if not math.isfinite(call.p[0]) or call.p[0] == 0.0:
-        return _refused(f"Orbit: radius (param1) = {call.p[0]:g} m; must not be 0")
+    if math.isinf(call.p[0]) or call.p[0] == 0.0:
+        text = f"Orbit: radius (param1) = {call.p[0]:g} m; must be a number other than 0"
+        return _refused(f"{text}, or NaN (the present or default one)")
     if math.isinf(call.p[1]):
         return _refused(f"Orbit: speed (param2) = {call.p[1]:g} m/s; must be finite")
     behaviour = call.p[2]
@@ -261,8 +266,8 @@ def _orbit(call: Call, context: Context) -> Request | Verdict:
     if behaviour not in _ORBIT_YAWS and not math.isnan(behaviour):
         return _refused(f"Orbit: yaw behaviour (param3) = {behaviour:g}; must be 0, 1, 2 or 5")
     east, north, up = (None if math.isnan(value) else value for value in position)
-    speed = None if math.isnan(call.p[1]) else call.p[1]
-    return Orbit(call.p[0], speed, east, north, up, faces_centre=_ORBIT_YAWS.get(behaviour))
+    radius, speed = (None if math.isnan(value) else value for value in call.p[:2])
+    return Orbit(radius, speed, east, north, up, faces_centre=_ORBIT_YAWS.get(behaviour))
 
 
 def _change_altitude(call: Call, context: Context) -> Request | Verdict:
@@ -313,10 +318,9 @@ def _change_speed(call: Call, context: Context) -> Request | Verdict:
         return Verdict(ACCEPTED)  # changes nothing, as in a mission: the load is lifted with MIS_LIFT_SPEED
     if call.p[1] == _DEFAULT_SPEED:
         return ChangeSpeed(None)
-    if not (math.isfinite(call.p[1]) and call.p[1] > 0.0):
-        return _refused(
-            f"Change speed: speed (param2) = {call.p[1]:g} m/s; must be > 0, -1 (no change) or -2 (default)"
-        )
+    if not MIN_SPEED_M_S <= call.p[1] <= MAX_SPEED_M_S:
+        text = f"Change speed: speed (param2) = {call.p[1]:g} m/s; must be {_SPEED_LIMITS}"
+        return _refused(f"{text}, or -1 (no change) or -2 (default)")
     return ChangeSpeed(call.p[1])
 
 

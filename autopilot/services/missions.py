@@ -4,6 +4,7 @@ Upload, seen from the vehicle (one at a time; the old mission stays in force unt
 are checked):
 
     idle       COUNT n > 0          ask for item 0                        -> receiving
+               an item              fly there (`current` 2, 3), else ACK ERROR -> idle
     receiving  requested item       ask for the next one                  -> receiving
                the last item        check all; ACK; mission replaced      -> idle
                an item before it    nothing (a duplicate)                 -> receiving
@@ -223,7 +224,7 @@ class MissionService:
         if upload is None or upload.peer != peer:
             if message.mission_type == _MISSION and message.current in (_GUIDED_ITEM, _HEIGHT_ITEM):
                 return self._fly_to_item(message, item, peer, decide)
-            return self._answer_late_item(message, peer, now_us)
+            return self._answer_item_without_upload(message, peer, now_us)
         if message.mission_type != upload.kind:
             return []
         expected = len(upload.items)
@@ -292,17 +293,24 @@ class MissionService:
         """The acknowledgement of a plan that is now in force."""
         return _ack(peer, _ACCEPTED, kind, self._plan_id(kind))
 
-    def _answer_late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
-        ended = self._ended
+    def _answer_item_without_upload(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
+        """An item of the upload that has just ended is repeated because a message was lost: the last one is
+        acknowledged again. Any other is an error of the client, unless another client uploads."""
+        ended, kind = self._ended, message.mission_type
         if (
             ended
             and ended.peer == peer
-            and message.seq == ended.count - 1
-            and message.mission_type == ended.kind
+            and message.seq < ended.count
+            and kind == ended.kind
             and now_us - ended.at_us <= LATE_ITEM_US
         ):
-            return [self._repeated_ack(ended)]
-        return []
+            return [self._repeated_ack(ended)] if message.seq == ended.count - 1 else []
+        if self._upload:
+            return []
+        if kind not in _NOUNS:
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        text = f"{_NOUNS[kind]} {message.seq} refused: no upload is under way; MISSION_COUNT begins one"
+        return _refused_item(peer, text, mavlink.MAV_MISSION_ERROR, kind)
 
     def _repeated_ack(self, ended: _EndedUpload) -> Output:
         if ended.result == _ACCEPTED:
@@ -464,10 +472,10 @@ def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Outp
     return Send(peer.link, answer)
 
 
-def _refused_item(peer: Peer, text: str | None, result: int) -> list[Output]:
+def _refused_item(peer: Peer, text: str | None, result: int, kind: int = _MISSION) -> list[Output]:
     """The answer to an item outside an upload that is not flown."""
     texts: list[Output] = [SendText(mavlink.MAV_SEVERITY_WARNING, text)] if text else []
-    return [*texts, _ack(peer, result)]
+    return [*texts, _ack(peer, result, kind)]
 
 
 def _item_of_int(m: Any) -> WireItem:

@@ -106,7 +106,10 @@ class ParameterService:
         try:
             self.table.describe(name).checked(value)
         except ParameterError as error:
-            return self._refused(name, OUT_OF_RANGE, str(error), peer)
+            why = str(error)
+            if name in self.table.remote_names:
+                why = f"{name} = {value:g}; must be a number in its range, which the simulator knows"
+            return self._refused(name, OUT_OF_RANGE, why, peer)
         if name in self.table.remote_names:
             if self.simulator_silent:
                 return self._refused(

@@ -13,6 +13,8 @@ from autopilot.geometry.linear import Vec3
 from autopilot.wire.items import LocatedStep
 from missions.model import LookAt, TurnHeading
 
+MIN_SPEED_M_S, MAX_SPEED_M_S = 0.05, 15.0  # of transfers
+
 
 @dataclass(frozen=True, slots=True)
 class Arm:
@@ -155,11 +157,13 @@ class FollowStick:
 
 @dataclass(frozen=True, slots=True)
 class Orbit:
-    """Fly the load round a circle; None: here, at this height, at the speed of transfers. The direction is
-    clockwise seen from above; a negative radius or a negative speed makes it counter-clockwise. The nose
-    points to the centre (`faces_centre`), keeps its present heading (False), or does as before (None)."""
+    """Fly the load round a circle. None: radius, speed and centre of the circle that is being flown; without
+    one the vehicle's radius, the speed of transfers, and a centre here. A height of None is the present one.
+    The direction is clockwise seen from above; a negative radius or a negative speed makes it
+    counter-clockwise. The nose points to the centre (`faces_centre`), keeps its present heading (False), or
+    does as before (None)."""
 
-    radius_m: float
+    radius_m: float | None
     speed_m_s: float | None
     east_m: float | None
     north_m: float | None

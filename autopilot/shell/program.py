@@ -429,6 +429,12 @@ def _address_or_none(text: str) -> Address | None:
     multiple=True,
     help="Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.",
 )
+@click.option(
+    "--ignore",
+    metavar="NAME",
+    multiple=True,
+    help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
+)
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
@@ -460,6 +466,7 @@ def main(
     estimator: str,
     planner: str,
     settings: tuple[tuple[str, float], ...],
+    ignore: tuple[str, ...],
     home: Home | None,
     storage: Path | None,
     signing_key: bytes | None,
@@ -479,7 +486,7 @@ def main(
     worker = BackgroundWorker()
     try:
         own = OwnCode(own_law_reference(law or DEFAULT_LAW), estimator, planner)
-        table = parameters_for(load_belief(vehicle), own)
+        table = parameters_for(load_belief(vehicle), own, ignored=[name.upper() for name in ignore])
         check_names(settings, table.names)
         store = Storage(storage or user_state_path("plumbline"))
         if not lockstep:

@@ -6,7 +6,7 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from math import dist, hypot
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, carry_leg, transfer_leg
@@ -19,7 +19,15 @@ from autopilot.guidance.setpoint_follower import (
 from autopilot.supervisor.motion import AT_REST, carry, commanded_motion, position_mode, stopping_legs
 from autopilot.supervisor.setpoint_source import active_setpoint
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, Phase, View, follow_limits, leg_time_s, setpoint
+from autopilot.supervisor.state import (
+    Flight,
+    Phase,
+    View,
+    fence_problem,
+    follow_limits,
+    leg_time_s,
+    setpoint,
+)
 from autopilot.supervisor.step_legs import step_legs
 from autopilot.trajectory.slack_cable import (
     CLEARANCE,
@@ -38,6 +46,7 @@ TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
 HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
+MAX_RALLY_CHECKS = 8  # of the nearest rally points: large fences take a tenth of a millisecond for each
 MIN_LOAD_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
 
 
@@ -77,12 +86,19 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _stop_above_ground(flight, view, settings)
-    goal = return_place(here, flight.area.home, flight.area.rally)
+    goal = _return_goal(flight, here, settings)
     min_height = settings.motion.return_altitude_m
     if here[2] < min_height and hypot(goal[0] - here[0], goal[1] - here[1]) > HOME_RADIUS:
         up = (here[0], here[1], min_height)
         legs, here = (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
     return (*legs, carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
+
+
+def _return_goal(flight: Flight, here: Vec3, settings: Settings) -> Vec3:
+    """Home or a nearer rally point; one that the fence forbids does not count, as with ArduPilot."""
+    nearest = sorted(flight.area.rally, key=lambda place: dist(place[:2], here[:2]))[:MAX_RALLY_CHECKS]
+    allowed = [place for place in nearest if not fence_problem(flight, place, settings)]
+    return return_place(here, flight.area.home, allowed)
 
 
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:

@@ -47,6 +47,8 @@ _REPORT_SAMPLES = 4001
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
+# A path is too fast for its cable if this share of the length needs less than this share of the force.
+_SHORTER_CABLE, _SMALLER_FORCE = 0.25, 0.5
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
 _MULTIPLE_FROM = 3.0  # from here on an excess is reported as a multiple
@@ -317,8 +319,10 @@ def _survey(entry: TimelineEntry, limits: VehicleLimits) -> Peaks | None:
 
 
 def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
+    length_advice = _length_advice(entry, extremes, limits)
+
     def violation(quantity: str, worst: Extreme, limit: float, finding: str, advice: str = "") -> Violation:
-        advice = advice or _advice(entry, worst.time_s)
+        advice = advice or f"{length_advice}{_advice(entry, worst.time_s)}"
         text = f"{_item_label(entry)}: at {worst.time_s:.1f} s {finding}; {advice}"
         return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
@@ -369,6 +373,19 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
             f"the vehicle leans {angle:.0f} deg; the limit is {bound:.0f} deg ({angle - bound:.0f} deg over)"
         )
         yield violation("tilt", tilt, limits.tilt_max_rad, finding)
+
+
+def _length_advice(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> str:
+    """The advice to shorten the cable if the forces are a multiple of the limits because of its length: the
+    vehicle has to swing about the load. Else an empty string."""
+    worst = extremes.rotor_high.value
+    if not (isinstance(entry.step, Signals) and worst > _MULTIPLE_FROM * limits.vehicle.rotor_max_n):
+        return ""
+    length_m = limits.body.cable_length
+    shorter = limits.body._replace(cable_length=_SHORTER_CABLE * length_m)
+    if survey_signals(entry.step, entry.begin, shorter).rotor_high.value > _SMALLER_FORCE * worst:
+        return ""
+    return f"shorten cable_length_m, {length_m:g} m, on which the load swings too slowly for this path; or "
 
 
 def _jumps(item: int, step: Signals) -> Iterator[Violation]:

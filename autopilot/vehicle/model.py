@@ -303,6 +303,8 @@ class Vehicle(BaseModel):
                 f"rotor_max_n = {self.rotor_max_n:g}; must be finite, because battery, esc_steps or "
                 "thrust_curve say what becomes of a share of it"
             )
+        if not self.esc_steps.is_integer():
+            raise ValueError(f"esc_steps = {self.esc_steps:g}; must be a whole number")
         self._check_rest()
         self._check_rotors()
         return self

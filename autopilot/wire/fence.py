@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import hypot
 
 from autopilot.geometry.linear import Vec3
@@ -125,6 +126,12 @@ class _Items:
 
 def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
     """The fence that the items describe, or MissionItemError for the first that cannot be part of one."""
+    return _read_fence(tuple(items), home)
+
+
+@lru_cache(maxsize=1)
+def _read_fence(items: tuple[WireItem, ...], home: Home) -> Fence:
+    """The same; cached, as an upload is checked before it is acknowledged, and read when it is taken over."""
     fence_items = _Items("fence item", home)
     zones: list[Zone] = []
     corners: list[EastNorth] = []

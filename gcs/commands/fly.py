@@ -45,6 +45,7 @@ _STARTED_ONLY = (
     "speed",
     "real_time",
     "settings",
+    "ignore",
 )  # options that have no effect on a vehicle that is already running
 
 
@@ -80,6 +81,13 @@ _STARTED_ONLY = (
     type=SettingType(),
     multiple=True,
     help="Set a parameter of the simulator (SIM_*) or of the autopilot; repeatable.",
+)
+@click.option(
+    "--ignore",
+    metavar="NAME",
+    multiple=True,
+    callback=lambda ctx, param, names: tuple(name.strip().upper() for name in names),
+    help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
 )
 @click.option(
     "--out",
@@ -118,6 +126,7 @@ def fly_command(
     speed: float | None,
     real_time: bool,
     settings: tuple[str, ...],
+    ignore: tuple[str, ...],
     out: Path | None,
     connect: Address | None,
     truth_at: Address | None,
@@ -170,7 +179,7 @@ def fly_command(
         if connect is not None or real_time:
             other = "--real-time" if real_time else "--connect"
             raise click.UsageError(f"--autopilot and {other} exclude each other", ctx)
-        for name in ("law", "estimator", "planner"):
+        for name in ("law", "estimator", "planner", "ignore"):
             if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
                 raise click.UsageError(f"--{name} is for our own autopilot; --autopilot brings its own", ctx)
         from gcs.workflows.firmware_processes import firmware_program
@@ -240,6 +249,7 @@ def fly_command(
         planner=planner or "",
         truth_at=truth_at,
         pictures=pictures,
+        ignored=ignore,
     )
     run = f"gcs fly {mission}"
     with junit_on_error(run, junit):

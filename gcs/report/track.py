@@ -58,7 +58,10 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
         ax.set_axis_off()
         ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
         return
-    low, high = _set_limits(ax, samples, np.flatnonzero(mission if mission.any() else known))
+    is_tracked = mission & (np.abs(samples.desired_m) < _FAR_M).all(axis=1)
+    central = mission if mission.any() else known
+    places = (samples.actual_m[central], samples.vehicle_m[central], samples.desired_m[is_tracked])
+    low, high = _set_limits(ax, np.concatenate(places))
     _fill_rectangle(figure, ax, rectangle, low, high)
 
     shown = _thin(np.flatnonzero(known))
@@ -68,7 +71,6 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
     ax.plot(*np.where(outside, np.nan, whole_path).T, color=GREY, linewidth=0.9, alpha=0.7)
     path = samples.actual_m[_thin(np.flatnonzero(mission))]
     ax.plot(path[:, 0], path[:, 1], np.full(len(path), low[2]), color=SHADOW, linewidth=1.6, zorder=0)
-    is_tracked = mission & np.isfinite(samples.desired_m).all(axis=1)
     tracked = _thin(np.flatnonzero(is_tracked))
     # no line between two stretches, for example before and after an attitude run
     stretch = np.cumsum(~is_tracked)[tracked]
@@ -93,7 +95,7 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
         bar.set_label(f"load position error ({unit})", fontsize=9)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=8, length=0)
-    _draw_vehicles(ax, samples, np.flatnonzero(mission if mission.any() else known), low, high)
+    _draw_vehicles(ax, samples, np.flatnonzero(central), low, high)
     # the box is turned: its corners may be outside the rectangle of the axes, at which Matplotlib would cut
     for artist in (*ax.lines, *ax.collections):
         artist.set_clip_on(False)
@@ -103,10 +105,9 @@ def _thin(index: Indices) -> Indices:
     return index[:: max(1, len(index) // _POINTS)]
 
 
-def _set_limits(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
-    """Set the limits around load and vehicle, to scale unless the scene is very long; return the least and
+def _set_limits(ax: Any, points: Floats) -> tuple[Floats, Floats]:
+    """Set the limits around the points (n, 3), to scale unless the scene is very long; return the least and
     the greatest corner."""
-    points = np.concatenate((samples.actual_m[shown], samples.vehicle_m[shown]))
     points = points[(np.abs(points) < _FAR_M).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(1.1 * (high - low), _MIN_SIDE_M)

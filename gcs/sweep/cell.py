@@ -54,7 +54,14 @@ def cell_of(mission: Mission, conditions: Conditions) -> Cell:
     settings, own = tuple(conditions.settings.items()), conditions.own
     # custom code may change under the same name: its digests are part of the cache's key
     return _cell(
-        mission, conditions.vehicle, conditions.sensors, settings, own, own.digests, conditions.limit_s
+        mission,
+        conditions.vehicle,
+        conditions.sensors,
+        settings,
+        own,
+        own.digests,
+        conditions.limit_s,
+        conditions.ignored,
     )
 
 
@@ -67,10 +74,11 @@ def _cell(
     own: OwnCode,
     digests: tuple[str, ...],
     limit_s: float | None,
+    ignored: frozenset[str],
 ) -> Cell:
     home = Home()
     file = load_vehicle(vehicle)
-    table = parameters_for(load_belief(vehicle), own)
+    table = parameters_for(load_belief(vehicle), own, ignored=ignored)
     apply_settings(table, set_values)
     truth = truth_of(file)
     sim_table = sim_parameters(truth)

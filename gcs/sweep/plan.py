@@ -124,13 +124,25 @@ class SweepPlan:
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
         law = {"CTL_LAW": float(law_number(case.law))}
         settings = {**self.known_to(case.law, {**dict(self.settings), **varied}), **law}
-        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law), self.limit_s)
+        return Conditions(
+            self.vehicle,
+            self.sensors,
+            case.seed,
+            settings,
+            self.own(case.law),
+            self.limit_s,
+            self.foreign_to(case.law),
+        )
 
     def known_to(self, law: str, settings: Mapping[str, T]) -> dict[str, T]:
         """Those of the settings (or of other values) by name that a flight with this law takes: not the
         parameters that only other laws of the plan define."""
-        foreign = _foreign_parameters(self.laws, self.own(law))
+        foreign = self.foreign_to(law)
         return {name: value for name, value in settings.items() if name not in foreign}
+
+    def foreign_to(self, law: str) -> frozenset[str]:
+        """The parameters that only other laws of the plan define; flights with this law ignore them."""
+        return _foreign_parameters(self.laws, self.own(law))
 
     def to_json(self) -> dict[str, Any]:
         """The plan as plain JSON values."""
@@ -239,10 +251,11 @@ def make_plan(
     for law in laws:
         own_of_law = own._replace(law=own_law_reference(law))
         foreign = _foreign_parameters(tuple(laws), own_of_law)
-        _check_values(vehicle, own_of_law, [one for one in values if one[0] not in foreign], settings)
+        known_values = [one for one in values if one[0] not in foreign]
+        _check_values(vehicle, own_of_law, foreign, known_values, settings)
         if any(own_of_law):
             known = {name: value for name, value in settings.items() if name not in foreign}
-            _try_own_code(vehicle, own_of_law, known)
+            _try_own_code(vehicle, own_of_law, foreign, known)
     try:
         load_mission(mission)
         load_profile(sensors)
@@ -289,9 +302,9 @@ def _check_laws(laws: Sequence[str]) -> None:
             raise PlanError(f"--law {law}: another law has the name {name}, too; give it `name = ...`")
 
 
-def _try_own_code(vehicle: str, own: OwnCode, settings: Mapping[str, float]) -> None:
+def _try_own_code(vehicle: str, own: OwnCode, foreign: frozenset[str], settings: Mapping[str, float]) -> None:
     """PlanError if custom code fails in the trial before the flights."""
-    table = parameters_for(load_belief(vehicle), own)
+    table = parameters_for(load_belief(vehicle), own, ignored=foreign)
     apply_settings(table, settings.items())
     try:
         with watched_calls():
@@ -306,12 +319,16 @@ def _error_lines(error: ValueError) -> tuple[str, ...]:
 
 
 def _check_values(
-    vehicle: str, own: OwnCode, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
+    vehicle: str,
+    own: OwnCode,
+    foreign: frozenset[str],
+    values: Sequence[tuple[str, float]],
+    settings: Mapping[str, float],
 ) -> None:
     """PlanError unless all these values can be set; those of `settings` do not vary."""
     try:
         world = sim_parameters(load_truth(vehicle))
-        table = parameters_for(load_belief(vehicle), own)
+        table = parameters_for(load_belief(vehicle), own, ignored=foreign)
     except ValueError as error:
         raise PlanError(*_error_lines(error)) from None
     for name, value in values:

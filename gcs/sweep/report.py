@@ -168,7 +168,7 @@ def _law(flights: Flights) -> dict[str, Any]:
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
     """Parameter tables of the simulator, and of the autopilot with each law."""
     belief = load_belief(plan.vehicle)
-    tables = (parameters_for(belief, own) for own in dict.fromkeys(map(plan.own, plan.laws)))
+    tables = (parameters_for(belief, plan.own(law), ignored=plan.foreign_to(law)) for law in plan.laws)
     return (sim_parameters(load_truth(plan.vehicle)), *tables)
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from autopilot.vehicle.file import load_belief
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Flights, flights_by_law
 from gcs.sweep.store import Store
-from gcs.workflows.flight_options import own_part_options
+from gcs.workflows.flight_options import ignore_options, own_part_options
 
 REPEATS_FOLDER = "flights"  # in a sweep's directory: flights that were flown again, each with a report
 
@@ -87,6 +88,12 @@ def flight_settings(plan: SweepPlan, law: str, varied: Mapping[str, float]) -> t
     return tuple(f"{name}={value!r}" for name, value in settings.items())
 
 
+def ignored_parameters(plan: SweepPlan, law: str) -> tuple[str, ...]:
+    """Parameters in the vehicle's file that have no effect in flights with this law."""
+    foreign = plan.foreign_to(law)
+    return tuple(name for name in load_belief(plan.vehicle).parameters if name in foreign) if foreign else ()
+
+
 def base_command(plan: SweepPlan, law: str) -> str:
     """The beginning of the commands of all flights with this law; law, seed and varied settings follow.
 
@@ -94,6 +101,7 @@ def base_command(plan: SweepPlan, law: str) -> str:
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_part_options(plan.estimator, plan.planner)
+    words += ignore_options(ignored_parameters(plan, law))
     words += [] if plan.limit_s is None else ["--timeout", f"{plan.limit_s!r}"]
     for setting in flight_settings(plan, law, {}):
         words += ["--set", setting]

@@ -20,7 +20,7 @@ def check_options(options: FlightOptions) -> list[str]:
     from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings
 
     settings = list(map(parse_setting, options.settings))
-    check_flight_inputs(options.vehicle, options.sensors, settings, options.own)
+    check_flight_inputs(options.vehicle, options.sensors, settings, options.own, options.ignored)
     warnings = [f"--set {line}" for line in setting_warnings(options.vehicle, settings)]
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings

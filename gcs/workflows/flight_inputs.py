@@ -6,7 +6,7 @@ module of the ground station knows both tables of parameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
@@ -26,17 +26,22 @@ from sitl.vehicles.truth import truth_of
 
 
 def check_flight_inputs(
-    vehicle: str, sensors: str, settings: Iterable[tuple[str, float]], own_parts: OwnCode = NO_OWN_CODE
+    vehicle: str,
+    sensors: str,
+    settings: Iterable[tuple[str, float]],
+    own_parts: OwnCode = NO_OWN_CODE,
+    ignored: Collection[str] = (),
 ) -> None:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, if a rate
-    does not divide the rate that it must divide, or if custom code cannot fly."""
+    does not divide the rate that it must divide, or if custom code cannot fly. `ignored`: parameters in the
+    vehicle's file that have no effect."""
     try:
         found, believed = load_truth_and_belief(vehicle)
         load_profile(sensors)
     except FileError as error:
         raise input_error(error) from None
     given = list(settings)
-    autopilot, simulator = _table(believed, own_parts), sim_parameters(truth_of(found))
+    autopilot, simulator = _table(believed, own_parts, ignored), sim_parameters(truth_of(found))
     for name, value in given:
         table = simulator if name.startswith(SIMULATOR_PREFIX) and name not in autopilot else autopilot
         if name not in table:
@@ -82,9 +87,9 @@ def split_settings(
     return simulator_part, [(name, value) for name, value in given if name not in simulator]
 
 
-def _table(vehicle: Vehicle, own: OwnCode) -> ParameterTable:
+def _table(vehicle: Vehicle, own: OwnCode, ignored: Collection[str]) -> ParameterTable:
     try:
-        return parameters_for(vehicle, own)
+        return parameters_for(vehicle, own, ignored=ignored)
     except OwnError as error:
         raise InputError(str(error)) from None
     except FileError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -44,6 +45,7 @@ class FlightOptions:
     planner: str = ""
     truth_at: Address | None = None  # where the simulator of `connect` sends the truth
     pictures: bool = False  # all pictures of the report, not only that of its page
+    ignored: tuple[str, ...] = ()  # parameters in the vehicle's file that have no effect
 
     @property
     def own(self) -> OwnCode:
@@ -58,6 +60,7 @@ class FlightOptions:
             return " ".join([*words, "--truth", str(self.truth_at)] if self.truth_at else words)
         if self.firmware is None:
             words += ["--law", self.law, *own_part_options(self.estimator, self.planner)]
+            words += ignore_options(self.ignored)
         else:
             words += ["--autopilot", f"{self.firmware.kind}={self.firmware.path}"]
         words += ["--sensors", self.sensors, "--vehicle", self.vehicle]
@@ -81,6 +84,11 @@ def own_part_options(estimator: str, planner: str) -> list[str]:
     """The words of a command line for a custom estimator and planner, if there are any."""
     words = ["--estimator", estimator] if estimator else []
     return [*words, "--planner", planner] if planner else words
+
+
+def ignore_options(ignored: Iterable[str]) -> list[str]:
+    """The words of a command line for parameters in the vehicle's file that have no effect."""
+    return [word for name in ignored for word in ("--ignore", name)]
 
 
 def parse_setting(text: str) -> tuple[str, float]:

@@ -37,9 +37,17 @@ def fly_in_process(
             if display.due:
                 display.update(client.progress)
 
+        conditions = Conditions(
+            options.vehicle,
+            options.sensors,
+            options.seed,
+            settings,
+            options.own,
+            ignored=frozenset(options.ignored),
+        )
         return fly(
             mission,
-            Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
+            conditions,
             log,
             client=client,
             on_turn=show,

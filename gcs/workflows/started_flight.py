@@ -43,7 +43,7 @@ def flight_client(
 
 def _expected_s(mission: Mission, options: FlightOptions) -> float:
     """How long the flight should take with the assumed vehicle and the settings of the options."""
-    table = parameters_for(load_belief(options.vehicle), options.own)
+    table = parameters_for(load_belief(options.vehicle), options.own, ignored=options.ignored)
     apply_settings(table, map(parse_setting, options.settings))
     return expected_flight_s(mission, table)
 

@@ -21,7 +21,14 @@ from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import SweepResult, sweep
-from gcs.sweep.standouts import REPEATS_FOLDER, Standout, flight_settings, repeat_command, stored_standouts
+from gcs.sweep.standouts import (
+    REPEATS_FOLDER,
+    Standout,
+    flight_settings,
+    ignored_parameters,
+    repeat_command,
+    stored_standouts,
+)
 from gcs.sweep.store import TABLE_FILE
 from gcs.workflows.before_flight import planner_warnings
 from gcs.workflows.flight_inputs import setting_warnings
@@ -203,6 +210,7 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
                 limit_s=plan.limit_s,
                 estimator=plan.estimator,
                 planner=plan.planner,
+                ignored=ignored_parameters(plan, one.reference),
             ),
             lambda record, outcome: None,
         )

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_options import SIMULATOR_PREFIX, FlightOptions, own_part_options
+from gcs.workflows.flight_options import SIMULATOR_PREFIX, FlightOptions, ignore_options, own_part_options
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
@@ -88,7 +88,7 @@ def _start(
     processes.start("sitl", [*world, *pace, *both, *simulator_settings, "--quiet"], out / SIMULATOR_LOG)
     link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_OTHER_STATIONS]
     home = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
-    own = own_part_options(options.estimator, options.planner)
+    own = [*own_part_options(options.estimator, options.planner), *ignore_options(options.ignored)]
     processes.start(
         "autopilot", [*home, *own, *link, *both, *autopilot_settings, "--quiet"], out / AUTOPILOT_LOG
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +115,7 @@ def _three_positive(name: str, values: Any) -> None:
 
 def _is_range(limits: Any) -> bool:
     try:
-        low, high = limits
-        return bool(isfinite(low) and isfinite(high) and low <= high)
-    except (TypeError, ValueError):
+        low, high = numbers("limits", limits)
+    except (GcsError, ValueError):
         return False
+    return low <= high

@@ -27,9 +27,11 @@ ASKED = FlightOptions(
     limit_s=None,
 )
 
+IGNORING = replace(ASKED, ignored=("MY_GAIN", "MY_OFFSET"))
+
 
 def test_the_recorded_command_gives_the_options_back() -> None:
-    for options in (ASKED, replace(ASKED, force=True), replace(ASKED, speed=2.0, real_time=True)):
+    for options in (ASKED, replace(ASKED, force=True), replace(ASKED, speed=2.0, real_time=True), IGNORING):
         program, command, *words = shlex.split(options.command_line())
         assert (program, command) == ("gcs", "fly")
         fly = gcs.get_command(click.Context(gcs), command)
@@ -37,5 +39,6 @@ def test_the_recorded_command_gives_the_options_back() -> None:
         given = fly.make_context(command, words).params
         assert given["mission"] == options.mission
         assert tuple(given["settings"]) == options.settings
+        assert given["ignore"] == options.ignored
         for name in ("law", "sensors", "vehicle", "seed", "speed", "real_time", "force"):
             assert given[name] == getattr(options, name), name

@@ -22,6 +22,10 @@ def moment(craft: Craft) -> CoreSnapshot:
     return seen
 
 
+def kept_texts(craft: Craft) -> list[str]:
+    return [kept.text for kept in craft.onboard.endpoint.kept_texts.texts]
+
+
 def test_before_the_first_tick_nothing_was_sensed() -> None:
     assert moment(Craft()).readings is None
 
@@ -86,6 +90,27 @@ def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:
 def test_a_fence_of_parameters_is_shown_as_present(limit: str) -> None:
     assert not moment(Craft()).sensors_present & GEOFENCE
     assert moment(Craft(**{limit: 20.0})).sensors_present & GEOFENCE
+
+
+def test_rally_points_outside_the_fence_are_told_whichever_comes_first() -> None:
+    """In any order of uploads, and not where the fence has no effect."""
+    origin = (473977420, 85455940)
+    rally = tuple(
+        WireItem(3, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0, origin[0] + x, origin[1], 0.0) for x in (0, 900)
+    )
+    disc = (WireItem(3, 5003, 0, 1, 5.0, 0.0, 0.0, 0.0, *origin, 0.0),)
+    fence_kind, rally_kind = mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY
+    first, second = ((rally_kind, rally), (fence_kind, disc))
+    for order in ((first, second), (second, first)):
+        craft = Craft()
+        for kind, items in order:
+            assert not [text for text in kept_texts(craft) if "Rally" in text]
+            craft.onboard.set_areas(kind, items)
+        assert "Rally points outside the fence: 1; no return leads there" in kept_texts(craft)
+    craft = Craft(GF_ACTION=0.0)
+    for kind, items in (first, second):
+        craft.onboard.set_areas(kind, items)
+    assert not [text for text in kept_texts(craft) if "Rally" in text]
 
 
 def test_a_fence_that_is_uploaded_is_shown_as_present_until_it_is_cleared() -> None:

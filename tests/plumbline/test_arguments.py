@@ -20,7 +20,8 @@ from plumbline.learning.vector import LoadVectorEnv
 STEPS = (Takeoff(1.0), Land())
 NEITHER_TEXT_NOR_NUMBER: tuple[Any, ...] = (object(), [object()], {1: 2})
 NO_TEXT: tuple[Any, ...] = (3, 2.5, b"x", *NEITHER_TEXT_NOR_NUMBER)
-NO_NUMBER: tuple[Any, ...] = ("x", b"x", float("nan"), 2**5000, *NEITHER_TEXT_NOR_NUMBER)
+NO_NUMBER: tuple[Any, ...] = ("x", "5", b"5", float("nan"), 2**5000, *NEITHER_TEXT_NOR_NUMBER)
+NO_TRUTH_VALUE: tuple[Any, ...] = (None, 0, 1.0, "no", b"x", *NEITHER_TEXT_NOR_NUMBER)
 TRUTH_VALUES: tuple[Any, ...] = (True, np.False_)
 NO_MAPPING: tuple[Any, ...] = (3, "x", b"x", [1], [("SIM_WIND_E", 3)], object(), {3: 1}, {"A=1": 2})
 TWICE = {"SIM_WIND_E": 1, "sim_wind_e": 2}
@@ -42,6 +43,8 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
         (None, *TRUTH_VALUES, *NO_NUMBER),
     ),
     "fly timeout": (lambda v: plumbline.fly("hover", timeout_s=v), NO_NUMBER),
+    "fly force": (lambda v: plumbline.fly("hover", force=v), NO_TRUTH_VALUE),
+    "fly quiet": (lambda v: plumbline.fly("hover", quiet=v), NO_TRUTH_VALUE),
     "flight load": (plumbline.Flight.load, (None, *NO_PATH)),
     "sweep mission": (plumbline.sweep, (None, *NO_TEXT)),
     "sweep vary": (
@@ -54,6 +57,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     ),
     "sweep settings": (lambda v: plumbline.sweep("hover", settings=v), NO_MAPPING),
     "sweep timeout": (lambda v: plumbline.sweep("hover", timeout_s=v), (0, -1, *NO_NUMBER)),
+    "sweep fresh": (lambda v: plumbline.sweep("hover", fresh=v), NO_TRUTH_VALUE),
     "sweep seeds": (lambda v: plumbline.sweep("hover", seeds=v), (0, 1.5, "x", None)),
     "sweep sample": (lambda v: plumbline.sweep("hover", sample=v), (0, 1.5, "x")),
     "sweep laws": (lambda v: plumbline.sweep("hover", laws=v), (None, [], [3], *NO_LIST)),
@@ -69,7 +73,15 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "mission assumptions": (lambda v: Mission("a", STEPS, assumptions=v), (None, [3], *NO_LIST)),
     "mission load": (Mission.load, (None, "", *NO_TEXT)),
     "mission save": (Mission("a", STEPS).save, (None, "/proc/x.toml", *NO_PATH)),
-    "step": (lambda v: Mission("a", (Takeoff(v), Land())), (None, *NO_NUMBER)),
+    "step": (lambda v: Mission("a", (Takeoff(v), Land())), (None, *TRUTH_VALUES, *NO_NUMBER)),
+    "waypoint": (
+        lambda v: Mission("a", (STEPS[0], plumbline.Waypoint(v, 0.0, 1.0), STEPS[1])),
+        (None, *TRUTH_VALUES, *NO_NUMBER),
+    ),
+    "attitude": (
+        lambda v: Mission("a", (STEPS[0], plumbline.AttitudeRun("load", v, 0.0, 2.0), STEPS[1])),
+        (None, *TRUTH_VALUES, *NO_NUMBER),
+    ),
     "term": (lambda v: Mission("a", (STEPS[0], plumbline.Signals(3.0, (v,)), Land())), (None, 3, "x")),
     "terms": (
         lambda v: Mission("a", (STEPS[0], plumbline.Signals(3.0, (Term(v, v, v, v, v, v),)), Land())),
@@ -88,7 +100,14 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     ),
     "env randomise": (
         lambda v: options_of({"settings": {"SIM_WIND_N": 1}, "randomise": v}),
-        ({"SIM_WIND_E": 3}, {"sim_wind_n": (0, 3)}, {k: (0, v) for k, v in TWICE.items()}, *NO_MAPPING),
+        (
+            {"SIM_WIND_E": 3},
+            {"SIM_WIND_E": (True, 3)},
+            {"SIM_WIND_E": "12"},
+            {"sim_wind_n": (0, 3)},
+            {k: (0, v) for k, v in TWICE.items()},
+            *NO_MAPPING,
+        ),
     ),
     "env rate": (lambda v: options_of({"rate_hz": v}), (None, 0, *NO_NUMBER)),
     "env start": (lambda v: options_of({"start_m": v}), (None, -1, 3.0, *NO_NUMBER)),
@@ -116,6 +135,11 @@ def test_what_cannot_be_taken_is_an_error_of_one_line(
 @pytest.mark.parametrize(
     ("call", "says"),
     [
+        (lambda: plumbline.fly("hover", force="no"), "force = 'no'; must be True or False"),  # type: ignore[arg-type]
+        (
+            lambda: Mission("a", (STEPS[0], plumbline.AttitudeRun("load", "x", 0.0, 2.0), STEPS[1])),  # type: ignore[arg-type]
+            'items[1].tilt_north_deg = "x"; must be a number',
+        ),
         (lambda: plumbline.fly("hover", seed=2**70), "seed = 1180591620717411303424; must be a whole number"),
         (
             lambda: plumbline.fly("hover", settings=[1]),

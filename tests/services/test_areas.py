@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 
 from autopilot.services.mission_store import deserialise_items, serialise
 from autopilot.services.records import AreasChanged, MissionChanged
+from autopilot.wire import fence as fence_module
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Polygon, read_fence, read_rally
 from autopilot.wire.items import MissionItemError, WireItem
 from autopilot.wire.statustext import TextReader
+from tests.doubles.craft import Craft
 
 HOME = Home()
 LAT, LON = round(HOME.latitude_deg * 1e7), round(HOME.longitude_deg * 1e7)
@@ -163,6 +165,17 @@ def test_a_large_polygon_is_checked_without_a_stop():
     began = time.process_time()
     assert len(read_fence(polygon(*ring), HOME).zones) == 1
     assert time.process_time() - began < 1.0
+
+
+def test_a_fence_that_is_accepted_is_taken_over_without_another_check(monkeypatch):
+    checked = []
+    monkeypatch.setattr(fence_module, "shape_problem", lambda corners, first: checked.append(first))
+    craft, corners = Craft(), polygon((-3, -3), (-3, 4), (4, 4), (4, -3))
+    craft.send(m.MAVLink_mission_count_message(1, 1, len(corners), FENCE))
+    for seq, corner in enumerate(corners):
+        craft.send(m.MAVLink_mission_item_int_message(1, 1, seq, **corner._asdict(), mission_type=FENCE))
+    assert len(craft.flight.area.fence.zones) == 1
+    assert checked == [0]
 
 
 def test_items_of_another_kind_do_not_slip_in(rig, as_message):

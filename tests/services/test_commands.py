@@ -99,6 +99,7 @@ LONG = [
     (192, (-2, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
     (192, (-0.5, 1, 0, NAN, NAN, NAN, NAN), None, DENIED),
     (192, (math.inf, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
+    (192, (0.01, 1, 0, NAN, NAN, NAN, 5), None, DENIED),
     (34, (2, 1, 0, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=True), OK),
     (34, (2, 1, 1, 0, NAN, NAN, NAN), Orbit(2.0, 1.0, None, None, None, faces_centre=False), OK),
     *[
@@ -109,7 +110,11 @@ LONG = [
     (34, (2, 1, 4, 0, NAN, NAN, NAN), None, UNSUPPORTED),  # by a remote control
     (34, (2, 1, 6, 0, NAN, NAN, NAN), None, DENIED),
     (34, (2, 1, 0.5, 0, NAN, NAN, NAN), None, DENIED),
-    (34, (NAN, 1, 0, 0, NAN, NAN, NAN), None, DENIED),
+    (34, (NAN, NAN, NAN, 0, NAN, NAN, NAN), Orbit(None, None, None, None, None), OK),
+    (34, (-2, -1, NAN, 0, NAN, NAN, NAN), Orbit(-2.0, -1.0, None, None, None), OK),  # the sign is a direction
+    (34, (0, 1, 0, 0, NAN, NAN, NAN), None, DENIED),
+    (34, (math.inf, 1, 0, 0, NAN, NAN, NAN), None, DENIED),
+    (34, (2, math.inf, 0, 0, NAN, NAN, NAN), None, DENIED),
     (186, (4, 3), ChangeAltitude(4.0), OK),
     (186, (NAN, 3), None, DENIED),
     (186, (4, 1), None, DENIED),

@@ -158,15 +158,21 @@ def test_a_lost_ack_is_said_again_for_the_last_item(rig, items, as_message):
     upload(rig, sent, as_message)
     assert said(rig.replies(as_message(2, sent[2]))) == [(ACK, m.MAV_MISSION_ACCEPTED)]
     assert said(rig.replies(as_message(1, sent[1]))) == []
-    assert said(rig.replies(as_message(2, sent[2]), system=77)) == []
+    assert rig.replies(as_message(2, sent[2]), system=77)[-1].type == m.MAV_MISSION_ERROR
     rig.now_us += LATE_ITEM_US + 1
-    assert said(rig.replies(as_message(2, sent[2]))) == []
+    assert rig.replies(as_message(2, sent[2]))[-1].type == m.MAV_MISSION_ERROR
     assert len(rig.events) == 1
 
 
-def test_items_without_an_upload_are_ignored(rig, items, as_message):
-    assert said(rig.replies(as_message(0, items(1)[0]))) == []
+@pytest.mark.parametrize("current", [0, 1, 4])
+def test_items_without_an_upload_are_errors(rig, items, as_message, current):
+    *texts, ack = rig.replies(as_message(0, items(1)[0]._replace(current=current)))
+    assert said([ack]) == [(ACK, m.MAV_MISSION_ERROR)]
+    told = "".join(text.text for text in texts)
+    assert told == "Mission item 0 refused: no upload is under way; MISSION_COUNT begins one"
     assert rig.endpoint.mission.items == ()
+    rig.send(count(2), link="other", system=77)
+    assert rig.replies(as_message(0, items(1)[0])) == [], "another client uploads"
 
 
 def test_a_new_count_begins_again(rig, items, as_message):

@@ -272,8 +272,11 @@ def test_what_the_simulator_is_asked_for_is_answered_when_it_has_said_what_holds
     assert rig.replies(set_(b"SIM_WIND_E", 500.0)) == []
     assert rig.events == [SimulatorParameterRequested("SIM_WIND_E", 500.0)]
     assert rig.table["SIM_WIND_E"] == 0.5
-    refusal = {x.get_type() for x in rig.replies(set_(b"SIM_WIND_E", 2e9))}
-    assert refusal == {"STATUSTEXT", "PARAM_ERROR", "PARAM_VALUE"}
+    for value, shown in ((2e9, "2e+09"), (math.nan, "nan")):
+        refusal = rig.replies(set_(b"SIM_WIND_E", value))
+        assert {x.get_type() for x in refusal} == {"STATUSTEXT", "PARAM_ERROR", "PARAM_VALUE"}
+        told = "".join(x.text for x in refusal if x.get_type() == "STATUSTEXT")
+        assert told == f"SIM_WIND_E = {shown}; must be a number in its range, which the simulator knows"
     rig.table.set("SIM_WIND_E", 3.0)
     rig.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, 2, *(0.0,) * 6))
     assert SimulatorParameterRequested("SIM_WIND_E", 0.5) in rig.events

@@ -182,6 +182,18 @@ def test_no_arming_outside() -> None:
     assert verdict.text == "outside the fence"
 
 
+def test_a_return_does_not_lead_to_a_rally_point_that_the_fence_forbids() -> None:
+    rally = ((6.0, 0.0, 0.0), (0.0, 3.0, 0.0), (2.0, 2.0, 0.0))  # outside, in the exclusion zone, allowed
+    for action, nearest in ((1, (2.0, 2.0)), (0, (6.0, 0.0))):
+        sky = fenced(action=action).airborne()
+        sky.ask(Reposition(4.5, 0.0, 2.0, True))
+        sky.wait(8.0)
+        sky.flight = replace(sky.flight, area=replace(sky.flight.area, rally=rally))
+        assert sky.ask(ReturnHome()).result == ACCEPTED
+        sky.run(lambda sky: sky.flight.phase == Phase.LOWER)
+        assert norm(sub(sky.view.x_load, (*nearest, 2.0))) < 0.01
+
+
 def test_a_return_leads_to_the_nearest_rally_point() -> None:
     sky = Sky().airborne()
     sky.flight = replace(sky.flight, area=replace(sky.flight.area, rally=((4.0, 0.0, 0.0), (20.0, 0.0, 0.0))))

@@ -219,6 +219,37 @@ def test_the_nose_points_to_the_centre_of_a_circle_or_stays() -> None:
     assert sky.flight == refused
 
 
+def test_a_circle_without_numbers_is_that_being_flown_or_the_vehicles() -> None:
+    sky = Sky().airborne()
+    here = sky.view.x_load
+    assert sky.ask(Orbit(None, None, None, None, None)).result == ACCEPTED
+    circle = sky.flight.setpoints.circle
+    assert circle is not None and circle.centre == pytest.approx(here)
+    speed = sky.flight.mission.speed_m_s
+    assert abs(circle.rate) * circle.radius == pytest.approx(speed)
+    assert speed * speed / circle.radius <= 0.5 * SETTINGS.motion.accel_m_s2 + 1e-9
+    assert sky.ask(Orbit(-3.0, 0.5, 1.0, 2.0, 3.0)).result == ACCEPTED
+    sky.wait(5.0)
+    assert sky.ask(Orbit(None, None, None, None, 4.0)).result == ACCEPTED
+    circle = sky.flight.setpoints.circle
+    assert circle is not None
+    assert (circle.centre, circle.radius) == ((1.0, 2.0, 4.0), 3.0)
+    assert circle.rate == pytest.approx(0.5 / 3.0)  # counter-clockwise, as before
+
+
+@pytest.mark.parametrize(
+    ("orbit", "reason"),
+    [
+        (Orbit(1e9, 1.0, None, None, None), "radius 1e+09 m; must be 0.2 ... 100000 m"),
+        (Orbit(2.0, 1.0, 1e9, None, None), "centre more than 100000 m from home"),
+        (Orbit(2.0, 1.0, None, None, 0.1), "load height 0.10 m, min 0.3 m"),
+        (Orbit(2.0, math.nan, None, None, None), "speed nan m/s; must be 0.05 ... 5 m/s"),
+    ],
+)
+def test_the_refusal_of_a_circle_names_what_is_wrong(orbit: Orbit, reason: str) -> None:
+    assert Sky().airborne().ask(orbit) == Verdict(DENIED, f"Orbit denied: {reason}")
+
+
 @pytest.mark.parametrize("speed", [0.01, 15.1, 1e9])
 def test_a_speed_that_cannot_be_flown_refuses_a_reposition(speed: float) -> None:
     sky = Sky().airborne()

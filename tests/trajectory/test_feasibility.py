@@ -103,6 +103,16 @@ def test_a_large_excess_is_a_multiple_of_the_limit() -> None:
     assert re.search(r"\([\d.]+ times the limit\)", violation.text), violation.text
 
 
+def test_a_cable_too_long_for_a_path_is_named() -> None:
+    """A load on 8 m of cable swings in 5.7 s, and Case C in 1.5 s."""
+    case_c, cable = load_mission("case-c"), "shorten cable_length_m, 8 m"
+    long_cable = replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update={"cable_length_m": 8.0}))
+    assert all(cable in violation.text for violation in check(case_c, long_cable))
+    fast = mission(Signals(1.0, (Term("x", 5.0, rise_s=0.5, hold_s=0.0, fall_s=0.5),)))
+    found = check(fast, LIMITS)
+    assert found and not any("cable_length_m" in violation.text for violation in found)
+
+
 def test_a_jump_of_position_and_of_velocity() -> None:
     jump = Term("x", 0.5, 1.0, 0.0, None, 0.0)
     kick = Term("y", 0.5, 2.0, 0.0, 6.0, 0.0, (Sine(3.0, 0.0, 2.0),))

@@ -223,6 +223,7 @@ BROKEN = [
         AT_LAST + rotors((0.1, 0.1), (0.1, 0.2), (0.2, 0.1), (0.2, 0.2)),
         "rotor places and spins: the vehicle cannot be held level with these",
     ),
+    (AT_LAST, AT_LAST + "esc_steps = 1.5\n", "esc_steps = 1.5; must be a whole number"),
     (AT_LAST, AT_LAST + rotors((9, 1)), "rotor[0].x_m = 9; must be >= -5 and <= 5"),
     (AT_LAST, AT_LAST + "[[rotor]]\nx_m = 1\ny_m = 1\n", "rotor[0].spin is missing"),
     (AT_LAST, AT_LAST + '[[rotor]]\nx = 1\ny_m = 1\nspin = "+"\n', "rotor[0].x: unknown key; write x_m"),

@@ -261,6 +261,7 @@ REFUSALS = [
     ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "latitude"),
     ([item(16, frame=6, x=473977420, y=2**31 - 1, z=5.0)], 0, "INVALID_PARAM6_Y", "longitude"),
     ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "north of home"),
+    ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "are 0, so the place may be missing"),
     ([item(178, 7.0, 1.0)], 0, "INVALID_PARAM1", "speed type = 7"),
     ([item(178, 1.0, math.nan)], 0, "INVALID_PARAM2", "speed = nan m/s"),
     ([item(178, 1.0, 0.0)], 0, "INVALID_PARAM2", "speed = 0 m/s"),
@@ -379,11 +380,12 @@ def test_frames_of_a_place() -> None:
 def test_the_home_row_of_a_waypoint_file_is_not_flown() -> None:
     latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), HOME)
     row = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, HOME.altitude_m)
-    for first in (row, row._replace(current=0)):
+    for first in (row, row._replace(current=0), row._replace(frame=3, z=0.0), row._replace(frame=6, z=0.0)):
         assert decode_items([first, item(93, 1.0)], HOME) == (Delay(1.0),)
-    first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 3.0)
-    (step,) = decode_items([first], HOME)
-    assert isinstance(step, Waypoint)
+    for height in (0.3, 3.0):
+        first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, height)
+        (step,) = decode_items([first], HOME)
+        assert isinstance(step, Waypoint)
 
 
 def test_a_landing_elsewhere_is_a_transfer_first() -> None:

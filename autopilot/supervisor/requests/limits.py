@@ -4,4 +4,3 @@ from __future__ import annotations
 
 MIN_ALTITUDE_M = 0.3
 MAX_DISTANCE_M = 100_000.0
-MIN_SPEED_M_S, MAX_SPEED_M_S = 0.05, 15.0

@@ -8,10 +8,16 @@ from dataclasses import replace
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.heading import TurnTo, unwrap_near
 from autopilot.guidance.legs import Hold, carry_leg
-from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
+from autopilot.services.requests import (
+    MAX_SPEED_M_S,
+    MIN_SPEED_M_S,
+    ChangeAltitude,
+    ChangeSpeed,
+    Reposition,
+)
 from autopilot.supervisor.heading import with_aim
 from autopilot.supervisor.motion import with_control_modes
-from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MAX_SPEED_M_S, MIN_ALTITUDE_M, MIN_SPEED_M_S
+from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MIN_ALTITUDE_M
 from autopilot.supervisor.requests.modes import hold
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, temporarily_denied, wrong_phase
 from autopilot.supervisor.settings import Settings

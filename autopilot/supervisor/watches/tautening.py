@@ -56,7 +56,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
         return WatchResult(_moved_over_load(flight, view, creep, at, over))
     last_height = last_setpoint_height(creep, settings) + HEIGHT_SIGMAS * view.height_std
     if flight.condition_since_us < 0 and at[2] > last_height:
-        text = "Cable never taut, landing; check VEH_CABLE_LEN"
+        text = "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
     return WatchResult(flight)
 

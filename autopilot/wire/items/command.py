@@ -16,6 +16,7 @@ from autopilot.wire.items.limits import HOME_ITEM_RADIUS_M
 from autopilot.wire.items.records import (
     ABSOLUTE_FRAMES,
     FRAME_MISSION,
+    GLOBAL_FRAMES,
     PLACE_FRAMES,
     MissionItemError,
     WireItem,
@@ -88,13 +89,17 @@ class ItemContext:
         return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
 
     def is_home_item(self) -> bool:
-        """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not."""
+        """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not. Above
+        home its height is 0: a greater one is that of a waypoint over home."""
         item = self.item
-        if self.seq != 0 or item.frame not in ABSOLUTE_FRAMES:
+        if self.seq != 0 or item.frame not in GLOBAL_FRAMES:
             return False
         place = enu_from_geodetic(item.x, item.y, 0, self.home)
-        height = item.z - self.home.altitude_m
-        return math.hypot(place[0], place[1]) < HOME_ITEM_RADIUS_M and abs(height) < HOME_ITEM_RADIUS_M
+        if item.frame in ABSOLUTE_FRAMES:
+            at_home = abs(item.z - self.home.altitude_m) < HOME_ITEM_RADIUS_M
+        else:
+            at_home = item.z == 0.0
+        return at_home and math.hypot(place[0], place[1]) < HOME_ITEM_RADIUS_M
 
     def refusal(self, text: str, result: int = mavlink.MAV_MISSION_INVALID) -> MissionItemError:
         """The error that refuses this item."""

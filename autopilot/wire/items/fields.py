@@ -29,6 +29,7 @@ WIRE_FIELD = ("param1", "param2", "param3", "param4", "x", "y", "z")
 _WHOLE = (5, 6)
 _INT32_MAX = 2**31 - 1
 _COUNTS = {1e3: "ms", 1e6: "us"}  # units of x and y by counts per second
+_NO_PLACE_HINT = "; latitude and longitude are 0, so the place may be missing"
 _PARAM_RESULT = (
     mavlink.MAV_MISSION_INVALID_PARAM1,
     mavlink.MAV_MISSION_INVALID_PARAM2,
@@ -178,7 +179,9 @@ class Place:
     attributes: ClassVar[tuple[str, ...]] = ("east_m", "north_m")
 
     def read(self, seq: int, item: WireItem, home: Home) -> tuple[float, float]:
+        hint = ""
         if item.frame in GLOBAL_FRAMES:
+            hint = _NO_PLACE_HINT if item.x == item.y == 0 else ""
             check(seq, 5, "latitude", item.x * 1e-7, "deg", -90.0, 90.0)
             check(seq, 6, "longitude", item.y * 1e-7, "deg", -180.0, 180.0)
             east, north, _ = enu_from_geodetic(item.x, item.y, 0, home)
@@ -186,8 +189,8 @@ class Place:
             east, north, _ = enu_from_ned((item.x / 1e4, item.y / 1e4, 0.0))
         else:
             raise wrong_frame(seq, item, PLACE_FRAMES)
-        check(seq, 5, "place north of home", north, "m", -FARTHEST_M, FARTHEST_M)
-        check(seq, 6, "place east of home", east, "m", -FARTHEST_M, FARTHEST_M)
+        check(seq, 5, "place north of home", north, "m", -FARTHEST_M, FARTHEST_M, hint)
+        check(seq, 6, "place east of home", east, "m", -FARTHEST_M, FARTHEST_M, hint)
         return east, north
 
     def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
@@ -240,12 +243,15 @@ class Height:
         return "z height"
 
 
-def check(seq: int, param: int, name: str, value: float, unit: str, low: float, high: float) -> float:
-    """`value`, a float32, as the decimal that was entered, if it lies within its limits; NaN does not."""
+def check(
+    seq: int, param: int, name: str, value: float, unit: str, low: float, high: float, hint: str = ""
+) -> float:
+    """`value`, a float32, as the decimal that was entered, if it lies within its limits; NaN does not. `hint`
+    ends the text of the refusal."""
     decimal = decimal_from_float32(value)
     if low <= decimal <= high:
         return decimal
-    text = f"{name} = {value:.7g} {unit}; must be {low:.7g} ... {high:.7g}"
+    text = f"{name} = {value:.7g} {unit}; must be {low:.7g} ... {high:.7g}{hint}"
     raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
 
 

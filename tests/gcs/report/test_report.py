@@ -8,6 +8,7 @@ import math
 import os
 import re
 import signal
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from rich.console import Console
 
 from gcs.analysis.definitions import GROUPS, METRICS
 from gcs.analysis.record import FlightMeta, Record, jsonable
+from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import style
 from gcs.report.build import ReportError, build_report, load_meta
 from gcs.report.plots import PICTURES
 from gcs.report.table import record_table
-from gcs.report.track import snapshots
+from gcs.report.track import draw_track, snapshots
 from tests.doubles import recorded_flights as flights
 
 META = FlightMeta(
@@ -355,6 +357,21 @@ def test_snapshots_stand_apart():
     assert sorted(snapshots(path, 0.2)) == [0, 25, 50, 75, 100]
     assert snapshots(path[:1], 0.2) == [0]
     assert snapshots(path[:0], 0.2) == []
+
+
+def test_the_track_shows_the_whole_desired_path_however_far_the_load_is_from_it(tmp_path):
+    tlog = flights.case_b(duration_s=6.0).write(tmp_path / "flight.tlog")
+    samples = samples_of(load_telemetry(tlog))
+    desired_m = samples.desired_m + np.linspace(0.0, 9.0, len(samples.desired_m))[:, None]
+    far = replace(samples, desired_m=desired_m)
+    figure = style.new_figure(6.0, 6.0)
+    draw_track(figure, far, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    axes = figure.axes[0]
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    drawn = desired_m[far.in_mission]
+    drawn = drawn[np.isfinite(drawn).all(axis=1)]
+    assert len(drawn) > 100
+    assert (drawn >= limits[:, 0]).all() and (drawn <= limits[:, 1]).all()
 
 
 def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from autopilot.wire.convert.geodesy import Home
 from gcs.batch.reuse import Origin
+from gcs.closed_loop import build_onboard
 from gcs.sweep.cell import cell_of
 from gcs.sweep.margin import CUSTOM_LAW, linear_range
 from gcs.sweep.plan import (
@@ -19,6 +22,7 @@ from gcs.sweep.plan import (
     parse_varied,
 )
 from gcs.sweep.plan_file import default_directory, load_command, load_plan, store_plan, sweep_origin
+from gcs.sweep.report import write_report
 from gcs.sweep.standouts import base_command, flight_settings
 from missions.fileformat import load_mission
 
@@ -142,6 +146,35 @@ def test_parameters_of_a_custom_law_are_for_the_laws_that_have_them(short: str, 
         make_plan(short, "bebop", "lab", laws, [1], [], {"MY_GAIM": 1.0}, 0)
     with pytest.raises(PlanError, match="MY_GAIN: no such parameter"):
         planned(short, [gain], {})
+
+
+def test_a_vehicle_is_delivered_with_the_parameters_of_one_law_among_others(
+    short: str, tmp_path: Path
+) -> None:
+    """The built-in laws fly it without them, and the law that has them with them."""
+    law, vehicle = f"{tmp_path / 'mine.py'}:Mine", str(tmp_path / "tuned.toml")
+    (tmp_path / "mine.py").write_text(OWN_LAW, encoding="utf-8")
+    bebop = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
+
+    def plan_with(line: str, *laws: str) -> SweepPlan:
+        Path(vehicle).write_text(f"{bebop}[parameters]\n{line}\n", encoding="utf-8")
+        return make_plan(short, vehicle, "lab", laws, [1], [], {}, 0)
+
+    plan = plan_with("MY_GAIN = 3.0", "thesis", law)
+    conditions = [plan.conditions(case) for case in plan.cases()]
+    assert [sorted(one.ignored) for one in conditions] == [["MY_GAIN", "MY_OFFSET"], []]
+    built_in, own = (build_onboard(one, Home()).parameters for one in conditions)
+    assert "MY_GAIN" not in built_in and own["MY_GAIN"] == 3.0
+    cell_of(load_mission(short), conditions[0])
+    store_plan(tmp_path / "sweep", plan, "gcs sweep", origin(plan))
+    assert write_report(tmp_path / "sweep", plan).is_file()
+    assert "--ignore MY_GAIN" in base_command(plan, "thesis") and "--ignore" not in base_command(plan, law)
+    with pytest.raises(PlanError, match=r"MY_GAIN = 9\.0; must be 0 \.\.\. 5"):
+        plan_with("MY_GAIN = 9.0", "thesis", law)
+    with pytest.raises(PlanError, match="MY_GAIN: no such parameter"):
+        plan_with("MY_GAIN = 3.0", "thesis")
+    with pytest.raises(PlanError, match="MY_GAIM: no such parameter"):
+        plan_with("MY_GAIM = 3.0", "thesis", law)
 
 
 def test_the_time_limit_is_that_of_the_option_or_follows_from_the_cable(short: str) -> None:

@@ -125,6 +125,13 @@ def test_each_effect_is_reached_by_one_parameter(bebop, name):
     assert apply(bebop, table) == bebop
 
 
+def test_a_count_is_a_whole_number(bebop):
+    table = sim_parameters(bebop)
+    for name in ("SIM_ESC_STEPS", "SIM_CBL_LINKS", "SIM_BAT_CELLS"):
+        with pytest.raises(ParameterError, match=f"{name} = 1.5; must be a whole number"):
+            table.set(name, 1.5)
+
+
 @pytest.mark.parametrize("name", ["bebop-real", "heavy-real"])
 def test_parameters_start_from_what_a_real_vehicle_has(name):
     """Except for the rounding of capacity and charge."""
