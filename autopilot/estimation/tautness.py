@@ -45,11 +45,10 @@ KNOWN_SPEED_STD, SPEED_KNOWN_AFTER_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2
 MIN_FULL_PULL = 0.5  # share of the load's weight that this pull has at least
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
-# The acceleration of a vehicle whose load hangs in the air gives the tension of the pendulum. While that is
-# more than HANGING_TENSION of the load's weight, the cable cannot have come slack, and what takes the pull
-# away is a gust; unless the load was lost, which is certain after LOST_S. A load hangs if it is above the
-# ground by HANGING_HEIGHT (m) and some deviations.
-HANGING_TENSION, LOST_S, HANGING_HEIGHT = 0.5, 1.0, 0.1
+# What takes the pull of a load away that is above the ground by IN_AIR_HEIGHT (m) and some deviations is a
+# gust, or a slack cable that pulls again before anything could be done about it, as nothing shows where the
+# load falls; unless it was lost, which is certain after LOST_S.
+IN_AIR_HEIGHT, LOST_S = 0.1, 1.0
 # Share of the cable length below which a pull does not count, unless the load is above the ground by this
 # height (m) and some deviations: only the cable can hold it there.
 PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.5, 3.0
@@ -360,9 +359,8 @@ def detect_tautness(
     full_pull = max(weight - max(missing_pull, 0.0), MIN_FULL_PULL * weight)
     is_slack = pull + min(missing_pull, 0.0) < PULL_SLACK * full_pull
     load = _with_tautness(load, 1.0, load.length, pull, load.pull_duration_s + dt if is_slack else 0.0)
-    is_in_air = _is_above_ground(load, history, HANGING_HEIGHT, tuning)
-    is_hanging = is_in_air and load.tension > HANGING_TENSION * weight
-    if load.pull_duration_s > (LOST_S if is_hanging else PULL_SLACK_S):
+    is_in_air = _is_above_ground(load, history, IN_AIR_HEIGHT, tuning)
+    if load.pull_duration_s > (LOST_S if is_in_air else PULL_SLACK_S):
         P = history.covariance
         L = load.length
         var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])

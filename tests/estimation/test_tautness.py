@@ -156,19 +156,18 @@ def test_a_load_that_comes_to_the_ground_slackens_the_cable_whatever_was_missing
 
 
 @pytest.mark.parametrize(
-    ("height_m", "tension", "seconds", "is_taut"),
+    ("height_m", "seconds", "is_taut"),
     [
-        (2.0, 1.0, 0.9, True),  # a gust hides the pull; the vehicle does not fall
-        (2.0, 1.0, 1.2, False),  # the load was lost
-        (2.0, 0.4, 0.4, False),  # the vehicle falls about as fast as the load would
-        (TUNING.load_height + 0.2, 1.0, 0.9, True),
-        (TUNING.load_height + 0.1, 1.0, 0.4, False),  # perhaps on the ground
+        (2.0, 0.9, True),  # a gust hides the pull, or the load is in the air for a moment
+        (2.0, 1.2, False),  # the load was lost
+        (TUNING.load_height + 0.2, 0.9, True),
+        (TUNING.load_height + 0.1, 0.4, False),  # perhaps on the ground
     ],
 )
-def test_the_cable_of_a_load_that_hangs_is_not_slack_because_a_gust_hides_its_pull(
-    height_m: float, tension: float, seconds: float, is_taut: bool
+def test_the_cable_of_a_load_in_the_air_is_not_slack_because_its_pull_is_gone_for_a_moment(
+    height_m: float, seconds: float, is_taut: bool
 ) -> None:
-    hanging = laid(height_m)._replace(taut=1.0, pull=WEIGHT, tension=tension * WEIGHT)
+    hanging = laid(height_m)._replace(taut=1.0, pull=WEIGHT, tension=WEIGHT)
     assert after(hanging, 0.0, 0.0, 1.0, seconds).taut == is_taut
 
 
