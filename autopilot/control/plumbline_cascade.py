@@ -25,6 +25,7 @@ What the thesis filters is computed here:
 * The rotors are commanded F - D, which cancels the air's force D on the vehicle as far as it is known.
 * While the load is lifted, it is followed more slowly: the bandwidths of load and cable are multiplied by
   `pace`.
+* Load attitude begins with q_c and three derivatives in place of A.
 * f' is the derivative of f = F . R e_3, computed at the tick before: f' = F' . R e_3 + F . (W x R e_3) with
   W = R Omega.
 
@@ -43,12 +44,13 @@ from autopilot.control.load_attitude import (
     DirectionCommand,
     DirectionResult,
     load_attitude_force,
+    normal_force_held,
     normal_force_tracking,
     thrust_along,
 )
 from autopilot.control.load_motion import LoadMotion, load_motion
 from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes, attitude_moment
-from autopilot.control.records import Command, Jet, Reference, State, Vehicle
+from autopilot.control.records import Command, HeadingReference, Jet, Reference, State, Vehicle
 from autopilot.control.thesis_cascade import attitude_towards
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import (
@@ -82,7 +84,7 @@ _MIN_SINE = 1e-2
 _MAX_LEAN_TANGENT = 2.7
 _MIN_LIFT = 0.2
 # of the pull along the cable: the greatest force across it for errors, besides that for the reference
-_MAX_ACROSS_SHARE = 0.7
+MAX_ACROSS_SHARE = 0.7
 _MAX_RATE = 15.0  # rad/s
 _PACE_RISE_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
 _FULL_RANGE_TIME = 0.1  # s, shortest time in which the thrust is assumed to pass through its whole range
@@ -165,14 +167,14 @@ def with_pace(gains: PlumblineGains, pace: float) -> PlumblineGains:
 
 @kernel
 def commanded_attitude(
-    F: Vec3, F_dot: Vec3, F_ddot: Vec3, reference: Reference, state: State, vehicle: Vehicle
+    F: Vec3, F_dot: Vec3, F_ddot: Vec3, heading: HeadingReference, state: State, vehicle: Vehicle
 ) -> AttitudeCommand:
     """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
 
     Without the rates where F vanishes, lies along the heading or leans more than the vehicle may.
     """
     zero: Vec3 = (0.0, 0.0, 0.0)
-    b1_d = reference.b1_d
+    b1_d = heading.b1_d
     sideways = norm((F[0], F[1], 0.0))
     upward = max(F[2], _MIN_LIFT * vehicle.quad_mass * vehicle.gravity)
     if sideways > _MAX_LEAN_TANGENT * upward:
@@ -183,7 +185,7 @@ def commanded_attitude(
     n = norm(F)
     if n < _MIN_FORCE or norm(cross(F, b1_d)) < _MIN_SINE * n:
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
-    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, reference.b1_d_dot, reference.b1_d_ddot)
+    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, heading.b1_d_dot, heading.b1_d_ddot)
     J = max(vehicle.inertia[0], vehicle.inertia[1])
     return AttitudeCommand(
         attitude.R_c,
@@ -272,7 +274,7 @@ def commanded_force(
     along = dot(state.q_cable, direction.F)
     pull = scale(along, state.q_cable)
     reference_force = reference_force_across(state.q_cable, jet, vehicle)
-    across = smooth_limit(sub(sub(direction.F, pull), reference_force), _MAX_ACROSS_SHARE * norm(position.A))
+    across = smooth_limit(sub(sub(direction.F, pull), reference_force), MAX_ACROSS_SHARE * norm(position.A))
     return CommandedForce(sub(add3(pull, reference_force, across), air), position, direction, q_c)
 
 
@@ -301,6 +303,31 @@ def shifted_force(
 
 
 @kernel
+def angular_acceleration(state: State, moment: Vec3, vehicle: Vehicle) -> Vec3:
+    """Omega', rad/s^2, body, under this moment (N m)."""
+    J, W = vehicle.inertia, state.omega_body
+    torque = sub(moment, cross(W, times(J, W)))
+    return (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
+
+
+@kernel
+def differences(F_before: Vec3, F: Vec3, F_after: Vec3) -> tuple[Vec3, Vec3]:
+    """F' and F'' (N/s, N/s^2) from F, and from F a DIFFERENCE_STEP before and after."""
+    F_dot = scale(0.5 / DIFFERENCE_STEP, sub(F_after, F_before))
+    F_ddot = scale(1.0 / (DIFFERENCE_STEP * DIFFERENCE_STEP), sub(add(F_after, F_before), scale(2.0, F)))
+    return F_dot, F_ddot
+
+
+@kernel
+def commanded_thrust_rate(F: Vec3, F_dot: Vec3, state: State, vehicle: Vehicle) -> float:
+    """f', N/s: the derivative of F . R e_3, no faster than the rotors pass through their range."""
+    b3 = column(state.R, 2)
+    b3_dot = cross(apply(state.R, state.omega_body), b3)
+    limit = vehicle.thrust_per_force * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    return min(limit, max(-limit, dot(F_dot, b3) + dot(F, b3_dot)))
+
+
+@kernel
 def load_position(
     memory: PlumblineMemory,
     state: State,
@@ -325,9 +352,7 @@ def load_position(
     commanded = commanded_force(state, motion, air, jet, memory.integral, gains, vehicle)
     F, position, direction = commanded.F, commanded.position, commanded.direction
 
-    J, W = vehicle.inertia, state.omega_body
-    torque = sub(moment, cross(W, times(J, W)))
-    angular_accel: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
+    angular_accel = angular_acceleration(state, moment, vehicle)
     F_after = shifted_force(
         state,
         motion,
@@ -356,15 +381,12 @@ def load_position(
         push,
         vehicle,
     )
-    F_dot = scale(0.5 / DIFFERENCE_STEP, sub(F_after, F_before))
-    F_ddot = scale(1.0 / (DIFFERENCE_STEP * DIFFERENCE_STEP), sub(add(F_after, F_before), scale(2.0, F)))
-
-    attitude = commanded_attitude(F, F_dot, F_ddot, reference, state, vehicle)
+    F_dot, F_ddot = differences(F_before, F, F_after)
+    heading = HeadingReference(reference.b1_d, reference.b1_d_dot, reference.b1_d_ddot)
+    attitude = commanded_attitude(F, F_dot, F_ddot, heading, state, vehicle)
     result = attitude_moment(
         state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
     )
-    b3 = column(state.R, 2)
-    b3_dot = cross(apply(state.R, state.omega_body), b3)
     command = Command(
         thrust_along(F, state.R),
         result.moment,
@@ -384,7 +406,92 @@ def load_position(
     integral_force = norm(times(gains.k_i, integral))
     if integral_force > MAX_INTEGRAL_SHARE * weight:
         integral = scale(MAX_INTEGRAL_SHARE * weight / integral_force, integral)
-    max_thrust_rate = vehicle.thrust_per_force * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
-    thrust_rate = min(max_thrust_rate, max(-max_thrust_rate, dot(F_dot, b3) + dot(F, b3_dot)))
     pace = min(1.0, memory.pace + period / _PACE_RISE_TIME)
-    return PlumblineMemory(thrust_rate, integral, pace), command
+    return PlumblineMemory(commanded_thrust_rate(F, F_dot, state, vehicle), integral, pace), command
+
+
+@kernel
+def shifted_direction(command: DirectionCommand, q_c_dddot: Vec3, h: float) -> DirectionCommand:
+    """The commanded direction h seconds later, extrapolated from its three derivatives."""
+    q_c, q_c_dot, q_c_ddot = command.q_c, command.q_c_dot, command.q_c_ddot
+    return DirectionCommand(
+        normalise(add3(q_c, scale(h, q_c_dot), scale(0.5 * h * h, q_c_ddot))),
+        add3(q_c_dot, scale(h, q_c_ddot), scale(0.5 * h * h, q_c_dddot)),
+        axpy(h, q_c_dddot, q_c_ddot),
+    )
+
+
+@kernel
+def held_direction(
+    state: State, q_c: DirectionCommand, pull: float, gains: PlumblineGains, vehicle: Vehicle
+) -> DirectionResult:
+    """F of (3-31) with (3-32) scaled by `pull`, N; its part across the cable is limited."""
+    direction = load_attitude_force(
+        state.q_cable,
+        state.q_cable_dot,
+        q_c,
+        normal_force_held(state.q_cable, q_c.q_c, pull),
+        gains.k_q,
+        gains.k_omega,
+        vehicle.quad_mass,
+        vehicle.cable_length,
+    )
+    along = scale(dot(state.q_cable, direction.F), state.q_cable)
+    across = smooth_limit(sub(direction.F, along), MAX_ACROSS_SHARE * abs(pull))
+    return DirectionResult(add(along, across), direction.e_q, direction.e_q_dot, direction.psi_q)
+
+
+@kernel
+def load_attitude(
+    memory: PlumblineMemory,
+    state: State,
+    q_c: DirectionCommand,
+    q_c_dddot: Vec3,
+    b1_d: Vec3,
+    pull: float,
+    thrust: float,
+    moment: Vec3,
+    gains: PlumblineGains,
+    drag: Drag,
+    push: Vec3,
+    vehicle: Vehicle,
+) -> tuple[PlumblineMemory, Command]:
+    """Load attitude mode: q follows q_c (3-31), (3-36), with (3-32) scaled by `pull` in N.
+
+    `thrust`, N, `moment`, N m, and `push`, N, as in `load_position`.
+    """
+    air = add(drag_force(state.v_quad, drag), push)
+    motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
+    angular_accel = angular_acceleration(state, moment, vehicle)
+    h = DIFFERENCE_STEP
+    after = shifted_state(state, motion, angular_accel, h, vehicle)
+    before = shifted_state(state, motion, angular_accel, -h, vehicle)
+    direction = held_direction(state, q_c, pull, gains, vehicle)
+    F = direction.F
+    F_dot, F_ddot = differences(
+        held_direction(before, shifted_direction(q_c, q_c_dddot, -h), pull, gains, vehicle).F,
+        F,
+        held_direction(after, shifted_direction(q_c, q_c_dddot, h), pull, gains, vehicle).F,
+    )
+    zero: Vec3 = (0.0, 0.0, 0.0)
+    heading = HeadingReference(b1_d, zero, zero)
+    attitude = commanded_attitude(F, F_dot, F_ddot, heading, state, vehicle)
+    result = attitude_moment(
+        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
+    )
+    command = Command(
+        thrust_along(F, state.R),
+        result.moment,
+        zero,
+        zero,
+        direction.e_q,
+        direction.e_q_dot,
+        result.e_R,
+        result.e_Omega,
+        result.psi_R,
+        direction.psi_q,
+        q_c.q_c,
+        attitude.R_c,
+    )
+    thrust_rate = commanded_thrust_rate(F, F_dot, state, vehicle)
+    return PlumblineMemory(thrust_rate, memory.integral, memory.pace), command

@@ -30,8 +30,11 @@ from autopilot.control.laws import build_law, chosen_law
 from autopilot.control.laws import plumbline as law_file
 from autopilot.control.laws.interface import kernels_of, law_of
 from autopilot.control.laws.plumbline import PlumblineLaw
+from autopilot.control.load_attitude import DirectionCommand, load_attitude_force, normal_force_held
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
 from autopilot.control.records import Cable, Jet, Reference, State, Vehicle
+from autopilot.geometry.linear import Vec3
+from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import evaluate, signal_table
@@ -86,6 +89,7 @@ def compiled() -> SimpleNamespace:
         commanded_attitude=plumbline.commanded_attitude,
         commanded_force=plumbline.commanded_force,
         load_position=plumbline.load_position,
+        load_attitude=plumbline.load_attitude,
         lag_gain=rotor_lag.lag_gain,
         compensate_lag=rotor_lag.compensate_lag,
         actuation_constants=actuation.actuation_constants,
@@ -603,6 +607,119 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
         agree(drift, np.array(state.x_load), ROUNDING)
 
 
+def direction_jets(path: Array, t: float) -> tuple[DirectionCommand, Vec3]:
+    """The direction of a polynomial path at t, with three derivatives."""
+
+    def at(t: float) -> DirectionCommand:
+        return DirectionCommand(*unit_derivatives(*polynomial(path, t)[:3]))
+
+    third = differences(lambda h: at(t + h).q_c_ddot)[0]
+    return at(t), (float(third[0]), float(third[1]), float(third[2]))
+
+
+def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """Load attitude asks for F of (3-31) with (3-32), and for the moment of F', F'' along the model, while
+    the commanded direction moves."""
+    rng = np.random.default_rng(37)
+    h, rate, pull = 1e-3, 10.0, 5.3
+    for size in (1.0, 3.0):
+        q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
+        w = np.cross(q, 0.05 * size * rng.normal(size=3))
+        R = model.rodrigues(0.03 * size * rng.normal(size=3))
+        y0 = model.pack(rng.normal(size=3), rng.normal(size=3), q, w, R, 0.3 * size * rng.normal(size=3))
+        M = 0.002 * rng.normal(size=3)
+        path = np.zeros((7, 3))
+        path[:4] = [[0.0, 0.0, -1.0], *(0.2 * rng.normal(size=(3, 3)))]
+        path[3] *= 3.0
+
+        def command(t: float) -> Any:
+            y, steps = y0, 2  # noqa: B023
+            for n in range(steps):
+                y = model.rk4(y, 5.0 + rate * (n + 0.5) * t / steps, M, vehicle, t / steps)  # noqa: B023
+            state = model.state_of(y, vehicle)
+            q_c, q_c_dddot = direction_jets(path, t)  # noqa: B023
+            memory = law.start()._replace(thrust_rate=rate)
+            return (
+                state,
+                q_c,
+                *law.load_attitude(
+                    memory,
+                    state,
+                    q_c,
+                    q_c_dddot,
+                    EAST,
+                    pull,
+                    5.0 + rate * t,
+                    model.vec(M),  # noqa: B023
+                    GAINS,
+                    CALM_AIR,
+                    ZERO,
+                    vehicle,
+                ),
+            )
+
+        said = {k: command(k * h) for k in (-2, -1, 0, 1, 2)}
+        R_c = {k: np.array(c.R_c) for k, (*_, c) in said.items()}
+        axes = {k: R_c[k][:, 2] for k in said}
+        F = {k: c.thrust / (axes[k] @ np.array(s.R)[:, 2]) * axes[k] for k, (s, *_, c) in said.items()}
+        state, q_c, memory, found = said[0]
+        wanted = load_attitude_force(
+            state.q_cable,
+            state.q_cable_dot,
+            q_c,
+            normal_force_held(state.q_cable, q_c.q_c, pull),
+            GAINS.k_q,
+            GAINS.k_omega,
+            vehicle.quad_mass,
+            vehicle.cable_length,
+        )
+        q = np.array(state.q_cable)
+        along = (q @ np.array(wanted.F)) * q
+        across = np.array(wanted.F) - along
+        limit = plumbline.MAX_ACROSS_SHARE * pull
+        agree(F[0], along + across / (1.0 + (across @ across / limit**2) ** 2) ** 0.25, ROUNDING)
+        assert (found.e_q, found.e_q_dot, found.psi_q) == (wanted.e_q, wanted.e_q_dot, wanted.psi_q)
+        F_dot = (F[-2] - 8 * F[-1] + 8 * F[1] - F[2]) / (12 * h)
+        b3 = np.array(state.R)[:, 2]
+        b3_dot = np.array(state.R) @ np.cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
+        assert memory.thrust_rate == pytest.approx(F_dot @ b3 + F[0] @ b3_dot, abs=ALONG)
+        R_dot = (R_c[-2] - 8 * R_c[-1] + 8 * R_c[1] - R_c[2]) / (12 * h)
+        R_ddot = (-R_c[-2] + 16 * R_c[-1] - 30 * R_c[0] + 16 * R_c[1] - R_c[2]) / (12 * h * h)
+        rates = attitude_from_rates(model.mat(R_c[0]), model.mat(R_dot), model.mat(R_ddot))
+        expected = attitude_moment(
+            state.R, state.omega_body, rates, GAINS.k_R, GAINS.k_Omega, 1.0, vehicle.inertia
+        )
+        # the fourth derivative of the direction is left out
+        agree(found.moment, np.array(expected.moment), 2e-4)
+
+
+def wind_does_not_turn_the_direction(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """While thrust and lean balance wind and drag, the cable of a load in steady flight hangs still."""
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    push, v = np.array([0.4, -0.3, 0.0]), np.array([1.0, 2.0, 0.0])
+    F = np.array([0.0, 0.0, weight]) - push - np.array(law.drag_force(model.vec(v), BEBOP_DRAG))
+    b3 = model.unit(F)
+    b1 = model.unit(np.array(EAST) - b3[0] * b3)
+    R = np.column_stack([b1, np.cross(b3, b1), b3])
+    state = level_state(model)._replace(R=model.mat(R), v_load=model.vec(v), v_quad=model.vec(v))
+    memory, command = law.load_attitude(
+        law.start(),
+        state,
+        DirectionCommand((0.0, 0.0, -1.0), ZERO, ZERO),
+        ZERO,
+        EAST,
+        weight,
+        float(np.linalg.norm(F)),
+        ZERO,
+        GAINS,
+        BEBOP_DRAG,
+        model.vec(push),
+        vehicle,
+    )
+    agree(command.e_Omega, np.zeros(3), 1e-7)
+    assert memory.thrust_rate == pytest.approx(0.0, abs=1e-7)
+
+
 def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The belief against a simulation in which each command acts from the instant it is in force, for delays
     of whole ticks and of fractions; no more commands are stored than the delay requires."""
@@ -928,6 +1045,8 @@ PROOFS: tuple[Callable[..., None], ...] = (
     the_reference_goes_on,
     the_state_goes_on,
     forces_are_differentiated,
+    directions_are_followed,
+    wind_does_not_turn_the_direction,
     rotors_follow_as_wanted,
     rotors_are_believed_as_they_are,
     what_is_predicted_comes,
@@ -941,15 +1060,15 @@ PROOFS: tuple[Callable[..., None], ...] = (
 # flips that change nothing, each with the reason
 HARMLESS = {
     f"{plumbline.__name__}: commanded_attitude: cross(F, b1_d) [0]": "only its length is used",
-    f"{plumbline.__name__}: load_position: sub(add(F_after, F_before), scale(2.0, F)) [1]": "along F",
-    f"{plumbline.__name__}: load_position: scale(2.0, F) [0]": "along F, where F'' turns nothing",
+    f"{plumbline.__name__}: differences: sub(add(F_after, F_before), scale(2.0, F)) [1]": "along F",
+    f"{plumbline.__name__}: differences: scale(2.0, F) [0]": "along F, where F'' turns nothing",
     **{
-        f"{plumbline.__name__}: load_position: {term}": "Omega' hardly moves F''"
+        f"{plumbline.__name__}: angular_acceleration: {term}": "Omega' hardly moves F''"
         for term in ("sub(moment, cross(W, times(J, W))) [1]", "cross(W, times(J, W)) [0]")
     },
     **{
         f"{plumbline.__name__}: {where}: vehicle.rotor_max - vehicle.rotor_min [right]": "least force 0"
-        for where in ("commanded_attitude", "load_position")
+        for where in ("commanded_attitude", "commanded_thrust_rate")
     },
     f"{torque_observer.__name__}: torque_constants: vehicle.rotor_max - vehicle.rotor_min [right]": "so too",
 }

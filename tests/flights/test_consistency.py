@@ -175,6 +175,13 @@ def test_a_load_is_lifted_and_set_down_in_gusts_and_with_another_mass(lost: str)
     ]
 
 
+def test_the_load_is_swung_outdoors() -> None:
+    """Measured: 73 mm at worst of 16 seeds. With the filters of the thesis half of them were lost."""
+    swung = flights("load-attitude", (2, 3), sensors="field", vehicle="bebop-real")
+    assert [flown.outcome for flown in swung] == ["completed"] * 2
+    assert max(flown.load_error_max_m for flown in swung) < 0.1
+
+
 def test_noise_that_the_autopilot_does_not_expect_is_filtered() -> None:
     """Measured: 23.7 mm at worst of 20 seeds, and one tick in a thousand saturated."""
     noisy = flights("case-b", (1, 2, 3), settings={"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05})

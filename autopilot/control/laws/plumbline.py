@@ -3,9 +3,8 @@ rotors' lag is compensated.
 
 state, commands on their way -> state when the command takes effect -> law -> lag inverted -> command
 
-Load position is flown with exact derivatives (`autopilot.control.plumbline_cascade`). The other modes,
-which are flown only briefly, are the loops of the thesis's cascade with its filters and the gains of the
-design.
+Load position and load attitude are flown with exact derivatives (`autopilot.control.plumbline_cascade`). The
+other two modes are the loops of the thesis's cascade with its filters and the gains of the design.
 """
 
 from __future__ import annotations
@@ -28,15 +27,17 @@ from autopilot.control.drag import Drag, drag_force
 from autopilot.control.laws import thesis
 from autopilot.control.laws.interface import Kernels, Law
 from autopilot.control.records import Cable, Command, Jet, Reference, State, Vehicle, with_cable_length
-from autopilot.control.thesis_cascade import ThesisMemory
+from autopilot.control.thesis_cascade import ThesisMemory, filtered_direction
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, scale, sub
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, norm, scale, sub
 from autopilot.geometry.packed import Row, with_field
 from autopilot.wire.parameter_table import ParameterTable
 
 # pace at which load and cable are followed when the load leaves the ground; height (m) of the full pace
 LIFTOFF_PACE, FULL_PACE_HEIGHT = 0.5, 0.7
+# rad/s^3: a commanded direction whose acceleration changes faster has jumped, and has no derivative
+MAX_DIRECTION_JERK = 300.0
 
 
 class PlumblineConstants(NamedTuple):
@@ -62,6 +63,7 @@ class PlumblineMemory(NamedTuple):
     """The memory of load position and that of the other modes."""
 
     position: cascade.PlumblineMemory
+    q_c_ddot: Vec3  # 1/s^2, of load attitude at its last tick
     other_modes: ThesisMemory
 
 
@@ -191,7 +193,7 @@ def compensated_command(
 @kernel
 def start(law: PlumblineLaw, state: State, x_d: Vec3, v_d: Vec3) -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is assumed to be steady."""
-    return PlumblineMemory(cascade.start(), thesis.start(law.other_modes, state, x_d, v_d))
+    return PlumblineMemory(cascade.start(), ZERO, thesis.start(law.other_modes, state, x_d, v_d))
 
 
 @kernel
@@ -238,7 +240,7 @@ def load_position(
         constants.period,
         with_load_mass(constants.vehicle, observed.load_mass),
     )
-    return PlumblineMemory(position, memory.other_modes), compensated_command(
+    return with_field(memory, "position", position), compensated_command(
         demand, prediction, observed, constants
     )
 
@@ -268,7 +270,7 @@ def quad_position(
         others.filters,
         constants.vehicle,
     )
-    return PlumblineMemory(memory.position, other), compensated_command(
+    return with_field(memory, "other_modes", other), compensated_command(
         demand, prediction, observed, constants
     )
 
@@ -285,13 +287,31 @@ def load_attitude(
     observed: DisturbanceEstimate,
     cable: Cable,
 ) -> tuple[PlumblineMemory, Command]:
-    """The cable's direction follows q_d under a given pull (N)."""
+    """The cable's direction follows q_d, passed through the filter of the thesis, under a given pull (N)."""
     constants = with_cable(law, cable).constants
     prediction = state_at_effect(state, 1.0, actuation, observed, constants)
-    other, demand = thesis.load_attitude(
-        law.other_modes, memory.other_modes, prediction.state, q_d, b1_d, pull, actuation, observed, cable
+    other = memory.other_modes
+    direction, q_c = filtered_direction(other.direction, q_d, law.other_modes.filters.direction)
+    q_c_dddot = scale(1.0 / constants.period, sub(q_c.q_c_ddot, memory.q_c_ddot))
+    if norm(q_c_dddot) > MAX_DIRECTION_JERK:
+        q_c_dddot = ZERO
+    drag, push = drag_and_push(state, 1.0, observed, constants)
+    position, demand = cascade.load_attitude(
+        memory.position,
+        prediction.state,
+        q_c,
+        q_c_dddot,
+        b1_d,
+        pull,
+        prediction.thrust,
+        add(prediction.moment, observed.torque.total),
+        constants.gains,
+        drag,
+        push,
+        with_load_mass(constants.vehicle, observed.load_mass),
     )
-    return PlumblineMemory(memory.position, other), compensated_command(
+    other = with_field(other, "direction", direction)
+    return PlumblineMemory(position, q_c.q_c_ddot, other), compensated_command(
         demand, prediction, observed, constants
     )
 
@@ -313,7 +333,7 @@ def quad_attitude(
     other, demand = thesis.quad_attitude(
         law.other_modes, memory.other_modes, prediction.state, R_d, thrust, actuation, observed, cable
     )
-    return PlumblineMemory(memory.position, other), compensated_command(
+    return with_field(memory, "other_modes", other), compensated_command(
         demand, prediction, observed, constants
     )
 
