@@ -359,6 +359,20 @@ def test_single_commands(live):
     assert not vehicle.armed
 
 
+@pytest.mark.parametrize("words", [["resume"], ["mode", "auto"], ["mode", "takeoff"], ["start"]])
+def test_what_begins_when_the_vehicle_is_armed_says_so(live, words):
+    _, port = live
+    result = run(*words, "--connect", port)
+    assert result.stdout.endswith("accepted; it begins when the vehicle is armed: gcs arm\n"), result.output
+    assert run("arm", "--connect", port).exit_code == EXIT_DONE
+    assert run(*words, "--connect", port).stdout.endswith(": accepted\n")
+
+
+def test_a_vehicle_without_a_mission_has_no_items(live):
+    _, port = live
+    assert json.loads(run("status", "--json", "--connect", port).stdout)["mission_items"] == 0
+
+
 def test_a_refusal_is_one_line_with_the_reason(live):
     vehicle, port = live
     original = vehicle.on_command_long
