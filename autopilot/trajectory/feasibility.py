@@ -193,7 +193,8 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
     if found:
         return found
     for entry in _timeline(mission, limits):
-        if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < MIN_HEIGHT_M:
+        carries_load = isinstance(entry.step, Takeoff | Waypoint) and not entry.before.released
+        if carries_load and entry.end[2] < MIN_HEIGHT_M:
             text = (
                 f"{_item_label(entry)}: the load would be carried {entry.end[2]:.2f} m above "
                 f"the ground; it must be at least {MIN_HEIGHT_M:g} m: raise altitude_m"

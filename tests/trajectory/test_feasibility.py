@@ -26,6 +26,7 @@ from missions.model import (
     Delay,
     Land,
     Mission,
+    Release,
     ReturnHome,
     Signals,
     Sine,
@@ -221,6 +222,12 @@ def test_a_short_move_takes_the_time_of_every_move_and_passes(distance_m: float,
     move_s = min_move_duration(LIMITS.vehicle.cable_length_m, LIMITS.vehicle.gravity_m_s2)
     reports = paths(short, LIMITS, shaped=shaped)
     assert [report.duration_s for report in reports if report.item in (1, 2)] == [move_s, move_s]
+
+
+def test_a_vehicle_without_its_load_may_fly_lower_than_one_that_carries_it() -> None:
+    low = Waypoint(1.0, 0.0, 0.2)
+    assert [violation.quantity for violation in check(mission(low), LIMITS)] == ["height"]
+    assert [str(violation) for violation in check(mission(Release(), low), LIMITS)] == []
 
 
 def test_a_transfer_that_an_autopilot_lengthens_passes() -> None:
