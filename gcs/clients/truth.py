@@ -78,8 +78,6 @@ class TruthFilter:
                 f"nothing comes at {where}: the vehicle's simulator sends its truth to the gcs fly that "
                 "started it, or to another port (name it by --truth PORT), or it is stopped"
             )
-        if not self._sources and self._silence_reason:
-            return f"the vehicle did not answer which simulator it flies in; {self._silence_reason}"
         if not self._sources:
             return f"no simulator sends its truth to {where}; {_OTHER}"
         if self._run is not None:

@@ -51,12 +51,6 @@ def test_a_vehicle_that_does_not_say_has_the_one_world_of_the_port_that_somebody
     assert named.select([(run(9), OTHER), (status(1), OURS)]) == [], "which of the two is not known"
 
 
-def test_a_vehicle_that_answers_nothing_is_the_reason_before_a_port_at_which_nothing_was_read_yet() -> None:
-    truth = TruthFilter(AT, port_is_given=True)
-    truth.set_vehicle_run(None, silence_reason="its key is missing")
-    assert truth.missing == "the vehicle did not answer which simulator it flies in; its key is missing"
-
-
 def test_a_simulator_that_the_vehicle_has_named_and_that_is_silent_stands_still_or_tells_elsewhere() -> None:
     truth = TruthFilter(AT, port_is_given=False)
     truth.set_vehicle_run(7)
