@@ -229,7 +229,7 @@ def _travel_and_wait_s(
     distance = dist(before.expected, after.expected)
     travelling = transfer_duration(distance, speed, accel)
     if distance > 0.0 and not isinstance(step, Winch):
-        travelling = max(travelling, min_move_duration(cable, gravity))
+        travelling = max(travelling, min_move_duration(max(cable, 0.0), gravity))
     return travelling, waiting
 
 
