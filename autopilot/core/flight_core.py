@@ -51,7 +51,7 @@ from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
 from autopilot.geometry.packed import field_offset, pack, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, jets_ahead
-from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, min_move_duration, winch_hold_height
+from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, winch_hold_height
 from autopilot.own.estimator import load_estimator
 from autopilot.own.host import Host
 from autopilot.own.law import load_law
@@ -63,6 +63,7 @@ from autopilot.supervisor.recovery import RestartState, abort_flight, resume_fli
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Report, Text, View, leg_time_s, needs_load_estimate
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
 

@@ -6,7 +6,7 @@ A leg is data. The supervisor strings legs together; the flight core gets its se
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import comb, inf, pi, sqrt
+from math import comb, inf, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
@@ -22,9 +22,6 @@ LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
 LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 
-MIN_MOVE_PERIODS = (
-    1.2  # a move of the load takes at least this many periods of its pendulum, however short it is
-)
 CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
 DAMPING_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
 MIN_RAMP_S = 0.3  # in which the winch comes to its rate
@@ -421,16 +418,6 @@ Leg = (
 def requested_jet(leg: Leg, t: float) -> Jet:
     """The requested motion where the leg flies a shaped one; otherwise the motion that it flies."""
     return leg.requested(t) if isinstance(leg, SignalRun) else leg.jet(t)
-
-
-def min_move_duration(cable_length: float, gravity: float) -> float:
-    """Least duration (s) of a move that carries the load.
-
-    With a limit of the acceleration alone, a short move would be quick: 5 cm would take 0.7 s, and its higher
-    derivatives would turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at
-    0.7 m of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
-    """
-    return MIN_MOVE_PERIODS * 2.0 * pi * sqrt(cable_length / gravity)
 
 
 def brake_leg(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import cos, inf, radians
 
 from autopilot.guidance.heading import HeadingLimits
-from autopilot.guidance.legs import min_move_duration
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
 from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, AutopilotParameters
 from autopilot.vehicle.rotors import allocation_columns, control_authority

@@ -27,7 +27,7 @@ from autopilot.trajectory.peaks import (
     survey_signals,
     survey_transfer,
 )
-from autopilot.trajectory.prepare import REFUSE, PathLimits, prepare, shaped_path
+from autopilot.trajectory.prepare import REFUSE, PathLimits, min_transfer_s, prepare, shaped_path
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.shaping import ShapedSignals, path_jets
@@ -186,13 +186,15 @@ class Violation:
 def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list[Violation]:
     """All limits of the vehicle that the mission breaks, step by step; empty if it can be flown.
 
-    `shaped`: an autopilot that shapes its paths flies the signals; they pass if a path near them is possible.
+    `shaped`: an autopilot that shapes its paths flies it: signals pass if a path near them is possible, and
+    transfers take longer where rotors, cable or tilt require it.
     """
     found: list[Violation] = _hover_violations(limits)
     if found:
         return found
     for entry in _timeline(mission, limits):
-        if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < MIN_HEIGHT_M:
+        carries_load = isinstance(entry.step, Takeoff | Waypoint) and not entry.before.released
+        if carries_load and entry.end[2] < MIN_HEIGHT_M:
             text = (
                 f"{_item_label(entry)}: the load would be carried {entry.end[2]:.2f} m above "
                 f"the ground; it must be at least {MIN_HEIGHT_M:g} m: raise altitude_m"
@@ -214,7 +216,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                     text = f"{_item_label(entry)}: {problem}; {_bounds_text(limits)}"
                     found.append(Violation(entry.item, "shaping", inf, limits.max_shaping_m, 0.0, text))
                 continue
-        extremes = _survey(entry, limits)
+        extremes = _survey(entry, limits, shaped)
         if extremes is not None:
             found += _violations_along(entry, extremes, limits)
     return found
@@ -273,8 +275,9 @@ def paths(
             extremes = survey_path(times, sample_path(path.table, times), 0.0, shaping.body)
             duration_s = float(times[-1] - times[0])
         else:
-            extremes = _survey(entry, limits)
-            duration_s = entry.duration_s if isinstance(entry.step, AttitudeRun) else entry.transfer_s
+            extremes = _survey(entry, limits, shaped)
+            is_run = isinstance(entry.step, AttitudeRun)
+            duration_s = entry.duration_s if is_run else _transfer_s(entry, limits, shaped)
         if extremes is not None:
             reports.append(_path_report(entry, duration_s, distance, extremes, slowed))
     return reports
@@ -305,16 +308,22 @@ def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
 
 def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
     start = MissionState(cable_m=limits.vehicle.cable_length_m, speed_m_s=limits.speed_m_s)
-    return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2)
+    gravity_m_s2 = limits.vehicle.gravity_m_s2
+    return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2, gravity_m_s2=gravity_m_s2)
 
 
-def _survey(entry: TimelineEntry, limits: VehicleLimits) -> Peaks | None:
+def _transfer_s(entry: TimelineEntry, limits: VehicleLimits, shaped: bool) -> float:
+    """Duration (s) of the transfer of a step as it is flown."""
+    return max(entry.transfer_s, min_transfer_s(entry, limits.shaping)) if shaped else entry.transfer_s
+
+
+def _survey(entry: TimelineEntry, limits: VehicleLimits, shaped: bool = False) -> Peaks | None:
     if isinstance(entry.step, Signals):
         return survey_signals(entry.step, entry.begin, limits.body)
     if isinstance(entry.step, AttitudeRun):
         return survey_attitude(entry.step, entry.begin[2], limits.body)
     if entry.transfer_s > 0.0:
-        return survey_transfer(entry.begin, entry.end, entry.transfer_s, limits.body)
+        return survey_transfer(entry.begin, entry.end, _transfer_s(entry, limits, shaped), limits.body)
     return None
 
 

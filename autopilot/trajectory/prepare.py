@@ -79,7 +79,7 @@ def prepare(
     notes: list[str] = []
     refusal = ""
     start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
-    entries = tuple(timeline(steps, start, home, limits.accel_m_s2))
+    entries = tuple(timeline(steps, start, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
     if planner is None:
         segments = _waypoint_segments(entries, limits)
     else:
@@ -102,22 +102,20 @@ def prepare(
                 refusal = refusal or f"item {item}: {result.problem}"
             notes.append(f"Item {item}: {result.problem}")
         paths.append(unshaped_signals(step) if result.problem else result.path)
-    min_durations_s = tuple(_min_transfer_times(entries, limits)) if limits.shape_paths else ()
+    min_durations_s = tuple(min_transfer_s(entry, limits) for entry in entries) if limits.shape_paths else ()
     return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s)
 
 
-def _min_transfer_times(entries: Sequence[TimelineEntry], limits: PathLimits) -> Iterator[float]:
-    """For each step the least time (s) of its transfer within the bounds; 0 if they need no longer one."""
-    for entry in entries:
-        duration = entry.transfer_s
-        if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
-            yield 0.0
-            continue
-        for _ in range(_LENGTHENING_TRIES):
-            if _transfer_fits(survey_transfer(entry.begin, entry.end, duration, limits.body), limits.bounds):
-                break
-            duration *= _LENGTHENING
-        yield 0.0 if duration == entry.transfer_s else duration
+def min_transfer_s(entry: TimelineEntry, limits: PathLimits) -> float:
+    """Least time (s) of the transfer of a step within the bounds; 0 if they need no longer one."""
+    duration = entry.transfer_s
+    if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
+        return 0.0
+    for _ in range(_LENGTHENING_TRIES):
+        if _transfer_fits(survey_transfer(entry.begin, entry.end, duration, limits.body), limits.bounds):
+            break
+        duration *= _LENGTHENING
+    return 0.0 if duration == entry.transfer_s else duration
 
 
 def _transfer_fits(peaks: Peaks, bounds: Bounds) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import dist
+from math import dist, pi, sqrt
 
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
 from autopilot.trajectory.signals import evaluate, signal_table
@@ -39,6 +39,9 @@ REEL_M_S = 0.3  # default speed of a winch
 RELEASE_S = 2.0  # hold after the load was released: the vehicle jumps up and comes back
 # of transfers, by default (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
+# a move of the load takes at least this many periods of its pendulum, however short it is
+MIN_MOVE_PERIODS = 1.2
+GRAVITY_M_S2 = 9.81
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
@@ -51,6 +54,16 @@ def cable_length_problem(target_m: float, min_length_m: float, max_length_m: flo
         return ""
     limits = f"{min_length_m:g} ... {max_length_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
     return f"a cable of {target_m:.2f} m; must be {limits}"
+
+
+def min_move_duration(cable_length: float, gravity: float) -> float:
+    """Least duration (s) of a move that carries the load.
+
+    With a limit of the acceleration alone, a short move would be quick: 5 cm would take 0.7 s, and its higher
+    derivatives would turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at
+    0.7 m of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
+    """
+    return MIN_MOVE_PERIODS * 2.0 * pi * sqrt(cable_length / gravity)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +136,14 @@ def timeline(
     home: Vec3 = ZERO,
     accel_m_s2: float = ACCEL_M_S2,
     vertical: VerticalSpeeds = USUAL_SPEEDS,
+    gravity_m_s2: float = GRAVITY_M_S2,
 ) -> Iterator[TimelineEntry]:
-    """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`; the load is
-    lifted and lowered at `vertical` speeds."""
+    """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`, and take at
+    least `min_move_duration`; the load is lifted and lowered at `vertical` speeds."""
     before = start
     for item, step in enumerate(steps):
         after = state_after(step, before, home)
-        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2, vertical)
+        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2, vertical, gravity_m_s2)
         place = home if isinstance(step, ReturnHome) else None
         yield TimelineEntry(item, step, before, after, moving, moving + waiting, place)
         before = after
@@ -185,7 +199,12 @@ def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
 
 
 def _travel_and_wait_s(
-    step: Step, before: MissionState, after: MissionState, accel: float, vertical: VerticalSpeeds
+    step: Step,
+    before: MissionState,
+    after: MissionState,
+    accel: float,
+    vertical: VerticalSpeeds,
+    gravity: float,
 ) -> tuple[float, float]:
     """Time (s) in which the load travels, and in which it does not."""
     speed, waiting = before.speed_m_s, 0.0
@@ -207,7 +226,11 @@ def _travel_and_wait_s(
             return 0.0, duration
     if before.expected is None or after.expected is None:
         return 0.0, waiting
-    return transfer_duration(dist(before.expected, after.expected), speed, accel), waiting
+    distance = dist(before.expected, after.expected)
+    travelling = transfer_duration(distance, speed, accel)
+    if distance > 0.0 and not isinstance(step, Winch):
+        travelling = max(travelling, min_move_duration(max(cable, 0.0), gravity))
+    return travelling, waiting
 
 
 def expected_duration_s(

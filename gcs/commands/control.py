@@ -84,8 +84,11 @@ def pause_command(address: Address) -> None:
 @click.command("resume")
 @connect_option
 def resume_command(address: Address) -> None:
-    """Continue a paused mission."""
-    _send(address, lambda session: command.resume(session.target))
+    """Continue a paused mission.
+
+    A disarmed vehicle accepts the command and starts its mission when it is armed.
+    """
+    _send(address, lambda session: command.resume(session.target), needs_arming=True)
 
 
 @click.command("takeoff", context_settings={"ignore_unknown_options": True})  # -1 is a number here
@@ -162,4 +165,8 @@ def mode_command(name: str, address: Address) -> None:
     (both mean hold), auto (mission), poshold (position) and rtl (return) are understood too. With ArduPilot's
     identity (MAV_IDENTITY 1) there are no modes offboard and takeoff.
     """
-    _send(address, lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))
+    _send(
+        address,
+        lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]),
+        needs_arming=ALIASES.get(name, name) in ("mission", "takeoff"),
+    )

@@ -21,6 +21,7 @@ from autopilot.wire.items import (
 from gcs.formats.items import FormatError
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, read_waypoints, write_waypoints
+from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
 PLAN_ENDING = ".plan"
@@ -96,7 +97,7 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
             kept_items.setdefault(item.command, []).append(number)
     while True:
         try:
-            located_steps([one.item for one in remaining], home)
+            steps = located_steps([one.item for one in remaining], home)
             break
         except MissionItemError as error:
             place = min(max(error.seq, 0), len(remaining) - 1)
@@ -108,6 +109,10 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
         "kept on the vehicle but not done"
         for command, found in kept_items.items()
     ]
+    landing = next((step.last for step in steps if isinstance(step.step, Land)), len(remaining))
+    if after := numbers[landing + 1 :]:
+        places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
+        kept.append(f"{places}: not flown; the mission ends with the landing of item {numbers[landing]}")
     return CheckedPlan(
         tuple(one.item for one in remaining), [*(line for _, line in problems), *plan.not_converted], kept
     )

@@ -246,13 +246,16 @@ def make_plan(
             raise PlanError(f"{name} is both varied and set; leave one of the two out")
     if sample and not varied:
         raise PlanError("--sample draws the values of --vary, and there is none")
-    values = [*((v.name, value) for v in varied for value in v.values), *settings.items()]
     _check_laws(laws)
     for law in laws:
         own_of_law = own._replace(law=own_law_reference(law))
         foreign = _foreign_parameters(tuple(laws), own_of_law)
+        world, table = _tables(vehicle, own_of_law, foreign)
+        if sample:
+            varied = [_drawable(one, world, table) for one in varied]
+        values = [*((one.name, value) for one in varied for value in one.values), *settings.items()]
         known_values = [one for one in values if one[0] not in foreign]
-        _check_values(vehicle, own_of_law, foreign, known_values, settings)
+        _check_values(world, table, known_values, settings)
         if any(own_of_law):
             known = {name: value for name, value in settings.items() if name not in foreign}
             _try_own_code(vehicle, own_of_law, foreign, known)
@@ -318,19 +321,36 @@ def _error_lines(error: ValueError) -> tuple[str, ...]:
     return error.problems if isinstance(error, FileError) else (str(error),)
 
 
-def _check_values(
-    vehicle: str,
-    own: OwnCode,
-    foreign: frozenset[str],
-    values: Sequence[tuple[str, float]],
-    settings: Mapping[str, float],
-) -> None:
-    """PlanError unless all these values can be set; those of `settings` do not vary."""
+def _tables(vehicle: str, own: OwnCode, foreign: frozenset[str]) -> tuple[ParameterTable, ParameterTable]:
+    """The parameters of simulator and autopilot; PlanError states what is wrong with the vehicle."""
     try:
         world = sim_parameters(load_truth(vehicle))
         table = parameters_for(load_belief(vehicle), own, ignored=foreign)
     except ValueError as error:
         raise PlanError(*_error_lines(error)) from None
+    return world, table
+
+
+def _drawable(varied: VariedParameter, world: ParameterTable, table: ParameterTable) -> VariedParameter:
+    """What is drawn from a range: whole numbers, if the parameter takes no others."""
+    owner = world if varied.name in world else table
+    low, high = min(varied.values), max(varied.values)
+    if not (varied.continuous and varied.name in owner and owner.describe(varied.name).integer):
+        return varied
+    if not (low.is_integer() and high.is_integer()):
+        return varied
+    if high - low >= _MAX_VALUES:
+        raise PlanError(f"--vary {varied.name}={low:g}:{high:g}: more than {_MAX_VALUES} whole numbers")
+    return VariedParameter(varied.name, tuple(map(float, range(int(low), int(high) + 1))), False)
+
+
+def _check_values(
+    world: ParameterTable,
+    table: ParameterTable,
+    values: Sequence[tuple[str, float]],
+    settings: Mapping[str, float],
+) -> None:
+    """PlanError unless all these values can be set; those of `settings` do not vary."""
     for name, value in values:
         if name == "SIM_LOSS_PCT":
             raise PlanError(

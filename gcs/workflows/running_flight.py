@@ -45,8 +45,14 @@ def fly_running(
         with Session(address) as session:
             session.find_with_truth(truth)
             client = flight_client(mission, options, vehicle_home(session))
+            world = session.view.latest.get("SIM_BOOT")
         if truth.missing:
             notify(f"the report will not contain the simulator's truth: {truth.missing}")
+        if world is not None and world.released:
+            notify(
+                "the vehicle released its load before: it flies the mission without it, and the figures of "
+                "the load remain empty; a restart of sitl and autopilot gives the load back"
+            )
         _fly(client, mission, options, address, truth, log, stop, watch, page)
         return client, truth.missing
 

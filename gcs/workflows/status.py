@@ -28,6 +28,8 @@ _STATUS_MESSAGES = {
     "ROTOR_STATE",
 }
 
+_NO_MISSION = 0xFFFF  # in the field `total` of MISSION_CURRENT
+
 _SEVERITIES = {
     value: str(entry.name).removeprefix("MAV_SEVERITY_").lower()
     for value, entry in mavlink.enums["MAV_SEVERITY"].items()
@@ -125,6 +127,11 @@ def text_records(texts: list[Text]) -> list[dict[str, Any]]:
     ]
 
 
+def _mission_items(total: int) -> int | None:
+    """The number of items in the field of MISSION_CURRENT, whose 0 means that the vehicle does not count."""
+    return {0: None, _NO_MISSION: 0}.get(total, total)
+
+
 def status_record(view: VehicleView) -> dict[str, Any]:
     """Keys of `gcs status --json` except the texts; None for what the vehicle has not sent."""
     load = view.latest.get("LOAD_STATE")
@@ -143,7 +150,7 @@ def status_record(view: VehicleView) -> dict[str, Any]:
         "time_s": None if view.time_us is None else view.time_us * 1e-6,
         "mission": view.mission_state,
         "mission_item": None if current is None else current.seq,
-        "mission_items": None if current is None else current.total,
+        "mission_items": None if current is None else _mission_items(current.total),
         "load_east_m": None if load is None else load.y,
         "load_north_m": None if load is None else load.x,
         "load_up_m": None if load is None else -load.z,

@@ -120,7 +120,9 @@ class ScriptedVehicle:
                 )
             )
             self.send(
-                mavlink.MAVLink_mission_current_message(self.item, len(self.mission), self.mission_state)
+                mavlink.MAVLink_mission_current_message(
+                    self.item, len(self.mission) or 0xFFFF, self.mission_state
+                )
             )
         if self._upload is not None and now_us - self._asked_us >= self.ASK_US:
             self._ask()

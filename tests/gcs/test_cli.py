@@ -359,6 +359,20 @@ def test_single_commands(live):
     assert not vehicle.armed
 
 
+@pytest.mark.parametrize("words", [["resume"], ["mode", "auto"], ["mode", "takeoff"], ["start"]])
+def test_what_begins_when_the_vehicle_is_armed_says_so(live, words):
+    _, port = live
+    result = run(*words, "--connect", port)
+    assert result.stdout.endswith("accepted; it begins when the vehicle is armed: gcs arm\n"), result.output
+    assert run("arm", "--connect", port).exit_code == EXIT_DONE
+    assert run(*words, "--connect", port).stdout.endswith(": accepted\n")
+
+
+def test_a_vehicle_without_a_mission_has_no_items(live):
+    _, port = live
+    assert json.loads(run("status", "--json", "--connect", port).stdout)["mission_items"] == 0
+
+
 def test_a_refusal_is_one_line_with_the_reason(live):
     vehicle, port = live
     original = vehicle.on_command_long
@@ -730,6 +744,24 @@ def test_a_running_vehicle_that_is_armed_already_leaves_the_folder_to_the_next_f
         where = f"what the vehicle said is in {out / 'unflown.tlog'}"
         assert result.stderr.splitlines()[-1] == f"gcs: {told}; {where}"
         assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
+
+
+@pytest.mark.parametrize("released", [0, 1])
+def test_a_vehicle_that_released_its_load_before_is_told_of(live, tmp_path, monkeypatch, released):
+    vehicle, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    vehicle.armed = True
+    receive = vehicle.on_command_long
+
+    def answer(message):
+        receive(message)
+        if message.param1 == mavlink.MAVLINK_MSG_ID_SIM_BOOT:
+            boot = mavlink.MAVLink_sim_boot_message(0, 1, [0.0] * 4, 0.0, 0, released)
+            vehicle.out.append(vehicle.dialect_writer.frame(boot))
+
+    vehicle.on_command_long = answer
+    result = run("fly", "hover", "--connect", port, "--out", str(tmp_path / "out"))
+    assert ("released its load before: it flies the mission without it" in result.stderr) == released
 
 
 def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(

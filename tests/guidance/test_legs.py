@@ -30,13 +30,13 @@ from autopilot.guidance.legs import (
     SwingDamping,
     brake_leg,
     carry_leg,
-    min_move_duration,
     path_stop_leg,
     reel_leg,
     transfer_leg,
 )
 from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory.shaping import shape, unshaped_signals
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.trajectory.waypoint_path import PathSegment, plan_waypoint_path
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters

@@ -18,7 +18,6 @@ import pytest
 from autopilot.control.records import State
 from autopilot.core.flight_core import with_cable_now
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
-from autopilot.guidance.legs import min_move_duration
 from autopilot.guidance.setpoint_follower import UNSPECIFIED
 from autopilot.services import identity
 from autopilot.services.records import Verdict
@@ -44,6 +43,7 @@ from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import UNCONTROLLED, Stretch, may_need_decision, next_stretch
 from autopilot.supervisor.state import Flight, Phase, Report, View, setpoint
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence
 from missions import model

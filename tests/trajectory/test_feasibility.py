@@ -5,13 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, inf, pi, radians, sqrt
+from math import cos, degrees, inf, pi, radians, sqrt
 
 import pytest
 
-from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
+from autopilot.trajectory.feasibility import VehicleLimits, check, paths, peaks
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
-from autopilot.trajectory.timeline import DETECTION_S, MissionState, expected_duration_s, timeline
+from autopilot.trajectory.timeline import (
+    DETECTION_S,
+    MissionState,
+    expected_duration_s,
+    min_move_duration,
+    timeline,
+)
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import load_vehicle
 from missions.fileformat import load_mission, shipped
@@ -20,6 +26,7 @@ from missions.model import (
     Delay,
     Land,
     Mission,
+    Release,
     ReturnHome,
     Signals,
     Sine,
@@ -205,3 +212,33 @@ def test_a_vehicle_that_cannot_hover_is_not_advised_to_fly_slower() -> None:
     assert found.value > found.limit == pytest.approx(heavy.usable_thrust_n)
     assert "it cannot hover; lower load_mass_kg, or raise rotor_max_n" in found.text
     assert "speed_m_s" not in found.text
+
+
+@pytest.mark.parametrize("shaped", [True, False])
+@pytest.mark.parametrize("distance_m", [1e-3, 0.02, 0.06, 0.1])
+def test_a_short_move_takes_the_time_of_every_move_and_passes(distance_m: float, shaped: bool) -> None:
+    short = mission(Waypoint(distance_m, 0.0, 2.0, 1.0), ReturnHome())
+    assert [str(violation) for violation in check(short, LIMITS, shaped)] == []
+    move_s = min_move_duration(LIMITS.vehicle.cable_length_m, LIMITS.vehicle.gravity_m_s2)
+    reports = paths(short, LIMITS, shaped=shaped)
+    assert [report.duration_s for report in reports if report.item in (1, 2)] == [move_s, move_s]
+
+
+def test_a_vehicle_without_its_load_may_fly_lower_than_one_that_carries_it() -> None:
+    low = Waypoint(1.0, 0.0, 0.2)
+    assert [violation.quantity for violation in check(mission(low), LIMITS)] == ["height"]
+    assert [str(violation) for violation in check(mission(Release(), low), LIMITS)] == []
+
+
+def test_a_transfer_that_an_autopilot_lengthens_passes() -> None:
+    # the vehicle would tilt beyond its limit of 45 degrees, since 12 m/s^2 is more than gravity
+    limits = VehicleLimits(load_vehicle("bebop"), accel_m_s2=12.0)
+    fast = mission(Speed(15.0), Waypoint(40.0, 0.0, 2.0, 1.0))
+    assert "tilt" in [violation.quantity for violation in check(fast, limits)]
+    assert [str(violation) for violation in check(fast, limits, shaped=True)] == []
+    (straight, lengthened) = (
+        next(report for report in paths(fast, limits, shaped=shaped) if report.item == 2)
+        for shaped in (False, True)
+    )
+    assert lengthened.duration_s > straight.duration_s
+    assert lengthened.tilt_deg < degrees(limits.tilt_max_rad) < straight.tilt_deg

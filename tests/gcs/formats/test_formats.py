@@ -150,6 +150,13 @@ def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() ->
     )
 
 
+def test_items_behind_the_first_landing_are_named() -> None:
+    again = read_plan(plan_text(TAKEOFF, simple(208, 2), WAYPOINTS[0], simple(21), TAKEOFF, simple(21)))
+    assert check_plan(again, HOME).kept == [
+        "items 4 to 5: not flown; the mission ends with the landing of item 3"
+    ]
+
+
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
     judged = check_plan(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
     assert judged.left_out == judged.kept == []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.wire.convert.geodesy import Home
 from gcs.batch.reuse import Origin
 from gcs.closed_loop import build_onboard
@@ -185,8 +186,11 @@ def test_the_time_limit_is_that_of_the_option_or_follows_from_the_cable(short: s
         return 1e-6 * cell_of(load_mission(short), plan.conditions(next(plan.cases()))).limit_us
 
     assert limit_s({}, 17.5) == 17.5
-    # measured: 161 s and 149 s with a slack cable at 20 m, 7 s and 6 s at 0.7 m
-    assert limit_s({"VEH_CABLE_LEN": 20.0}) - limit_s({}) == pytest.approx(1.5 * (310.0 - 13.0), rel=0.02)
+    # measured: 161 s and 149 s with a slack cable at 20 m, 7 s and 6 s at 0.7 m; lift and descent take the
+    # least time of a move
+    moves_s = 2.0 * (min_move_duration(20.0, 9.81) - min_move_duration(0.7, 9.81))
+    longer_s = limit_s({"VEH_CABLE_LEN": 20.0}) - limit_s({})
+    assert longer_s == pytest.approx(1.5 * (310.0 - 13.0 + moves_s), rel=0.02)
 
 
 def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) -> None:
@@ -201,6 +205,14 @@ def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) ->
     assert [int((value - 1.0) / 2.0 * 40) for value in wind] == list(range(40))
     assert sorted(case.varied[1] for case in cases) == [0.0] * 20 + [10.0] * 20
     assert list(from_json(plan.to_json()).cases()) == cases
+
+
+def test_of_a_parameter_that_takes_whole_numbers_only_such_are_drawn(short: str) -> None:
+    plan = planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.0, 4.0), True)], {}, sample=20)
+    drawn = [case.varied[0] for case in plan.cases()]
+    assert sorted(drawn) == [one for one in (0.0, 1.0, 2.0, 3.0, 4.0) for _ in range(4)]
+    with pytest.raises(PlanError, match=r"SIM_ENGINE_FAIL = 0.5; must be a whole number"):
+        planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.5, 4.0), True)], {}, sample=20)
 
 
 def origin(plan: SweepPlan, version: str = "1", code: str = "code") -> Origin:
