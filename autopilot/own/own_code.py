@@ -94,8 +94,8 @@ def parameters_for(
     if unknown and all_known:
         raise VehicleFileError(
             [
-                f"{_LABEL}{unknown_parameter_text(name, parameter_table.names)}; if it is that of a "
-                "custom law, estimator or planner, fly with this one"
+                f"{_LABEL}{unknown_parameter_text(name, parameter_table.names)}; fly with the custom law, "
+                f"estimator or planner that has it, or without it: gcs fly --ignore {name}"
                 for name in unknown
             ]
         )
