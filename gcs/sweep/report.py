@@ -14,13 +14,13 @@ from autopilot.own.own_code import parameters_for
 from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
-from gcs.folders import PAGE_FILE
+from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import Flights, cells, completion_range, flights_by_law
-from gcs.sweep.standouts import REPEATS_FOLDER, Standout, base_command, repeat_command, stored_standouts
+from gcs.sweep.standouts import Standout, base_command, repeat_command, stored_standouts
 from gcs.sweep.store import Store
 from gcs.web.page import render
 from sitl.vehicles.sim_parameters import sim_parameters

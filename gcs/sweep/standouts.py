@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from autopilot.vehicle.file import load_belief
+from gcs.folders import REPEATS_FOLDER
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Flights, flights_by_law
 from gcs.sweep.store import Store
 from gcs.workflows.flight_options import ignore_options, own_part_options
-
-REPEATS_FOLDER = "flights"  # in a sweep's directory: flights that were flown again, each with a report
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
 from gcs.errors import GcsError, InputError, disk_problem, write_error
-from gcs.folders import SUMMARY_FILE, TLOG_FILE, check_no_other_results
+from gcs.folders import (
+    PAGE_FILE,
+    PLAN_FILE,
+    REPEATS_FOLDER,
+    SUMMARY_FILE,
+    TLOG_FILE,
+    check_no_other_results,
+)
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
@@ -66,6 +73,11 @@ def find_log(source: Path) -> Path:
     """The given log, or the log in the given directory."""
     tlog = source / TLOG_FILE if source.is_dir() else source
     allowed = f"must be a .tlog, or a directory that holds {TLOG_FILE}"
+    if not tlog.exists() and (source / PLAN_FILE).exists():
+        raise InputError(
+            f"{source}: holds a sweep, which keeps no telemetry; its {PAGE_FILE} compares its flights, and "
+            f"gcs sweep --reports repeats those that stand out in {source / REPEATS_FOLDER}"
+        )
     if not tlog.is_file():
         raise InputError(f"{tlog}: {'not a file' if tlog.exists() else 'no such file'}; {allowed}")
     if next(read_tlog(tlog), None) is None:

@@ -14,7 +14,7 @@ from autopilot.own.own_code import NO_OWN_CODE, OwnCode
 from gcs.batch.pool import dask_cluster, local_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
-from gcs.folders import PAGE_FILE
+from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied
@@ -22,7 +22,6 @@ from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import SweepResult, sweep
 from gcs.sweep.standouts import (
-    REPEATS_FOLDER,
     Standout,
     flight_settings,
     ignored_parameters,

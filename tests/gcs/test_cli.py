@@ -186,6 +186,14 @@ def test_what_holds_no_telemetry_makes_no_report(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["flight.parquet"]
 
 
+def test_no_flight_is_reported_of_a_folder_of_a_sweep(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_text("{}")
+    for words in (("report", str(tmp_path)), ("compare", str(tmp_path), str(tmp_path))):
+        text = one_line(run(*words), EXIT_USAGE)
+        assert "holds a sweep, which keeps no telemetry" in text
+        assert f"gcs sweep --reports repeats those that stand out in {tmp_path / 'flights'}" in text
+
+
 def test_a_height_is_given_either_way_and_once():
     assert "give one" in one_line(run("takeoff", "5", "--altitude", "5"), EXIT_USAGE)
 
