@@ -58,10 +58,15 @@ def _keys(record: Any) -> dict[str, Any]:
     return table
 
 
+def is_truth_value(value: Any) -> bool:
+    """Whether this is True or False, also numpy's, by its present and its former name."""
+    return type(value).__name__ in ("bool", "bool_")
+
+
 def _plain(value: Any) -> Any:
     """A number as a float, infinite for an integer beyond the range of floats; other values as they are. True
     and False, also numpy's, are no numbers."""
-    if type(value).__name__ in ("bool", "bool_"):
+    if is_truth_value(value):
         return bool(value)
     if not isinstance(value, Real):
         return value

@@ -16,6 +16,7 @@ from typing import Any, ParamSpec, TypeVar
 from autopilot.own.source import file_being_loaded
 from gcs.errors import GcsError
 from missions.nearest import did_you_mean
+from missions.writing import is_truth_value
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -76,7 +77,7 @@ def _check_flags(
 ) -> None:
     for name, value in (*zip(parameters, values, strict=False), *named.items()):
         is_flag = name in parameters and isinstance(parameters[name].default, bool)
-        if is_flag and not _is_truth_value(value):
+        if is_flag and not is_truth_value(value):
             raise GcsError(f"{name} = {shown_value(value)}; must be True or False")
 
 
@@ -110,16 +111,12 @@ def number(name: str, value: Any) -> float:
     """A finite number, or `Error`. True and False are no numbers, as they would pass for 1 and 0, nor is a
     text with the digits of one."""
     try:
-        found = math.nan if _is_truth_value(value) or _is_text(value) else float(value)
+        found = math.nan if is_truth_value(value) or _is_text(value) else float(value)
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
         raise GcsError(f"{name} = {shown_value(value)}; must be a finite number")
     return found
-
-
-def _is_truth_value(value: Any) -> bool:
-    return type(value).__name__ in ("bool", "bool_")  # also numpy's, by its present and its former name
 
 
 def _is_text(value: Any) -> bool:
@@ -140,7 +137,7 @@ def whole_number(name: str, value: Any, minimum: int, maximum: int | None = None
         found = index(value)
     except TypeError:
         found = minimum - 1
-    if _is_truth_value(value) or found < minimum or (maximum is not None and found > maximum):
+    if is_truth_value(value) or found < minimum or (maximum is not None and found > maximum):
         limits = f", {minimum} or more" if maximum is None else f" from {minimum} to {maximum}"
         raise GcsError(f"{name} = {shown_value(value)}; must be a whole number{limits}")
     return found

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, add, column, cross, dot, scale, sub
 from autopilot.geometry.s2 import direction_error, direction_rate_error, psi_direction
@@ -84,6 +85,23 @@ def normal_force_held(q_cable: Vec3, q_c: Vec3, pull: float) -> Vec3:
     the printed law.
     """
     return scale(-pull * dot(q_c, q_cable), q_cable)
+
+
+@kernel
+def held_attitude_force(
+    state: State, command: DirectionCommand, pull: float, k_q: float, k_omega: float, vehicle: Vehicle
+) -> DirectionResult:
+    """F of (3-31) for the load attitude mode, with F_n of `normal_force_held`."""
+    return load_attitude_force(
+        state.q_cable,
+        state.q_cable_dot,
+        command,
+        normal_force_held(state.q_cable, command.q_c, pull),
+        k_q,
+        k_omega,
+        vehicle.quad_mass,
+        vehicle.cable_length,
+    )
 
 
 @kernel

@@ -43,8 +43,8 @@ from autopilot.control.drag import Drag, drag_force
 from autopilot.control.load_attitude import (
     DirectionCommand,
     DirectionResult,
+    held_attitude_force,
     load_attitude_force,
-    normal_force_held,
     normal_force_tracking,
     thrust_along,
 )
@@ -328,6 +328,38 @@ def commanded_thrust_rate(F: Vec3, F_dot: Vec3, state: State, vehicle: Vehicle) 
 
 
 @kernel
+def command_of(
+    F: Vec3,
+    attitude: AttitudeCommand,
+    e_x: Vec3,
+    e_v: Vec3,
+    direction: DirectionResult,
+    q_c: Vec3,
+    state: State,
+    gains: PlumblineGains,
+    vehicle: Vehicle,
+) -> Command:
+    """The command (3-35), (3-36) that exerts F, with the errors that F corrects."""
+    result = attitude_moment(
+        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
+    )
+    return Command(
+        thrust_along(F, state.R),
+        result.moment,
+        e_x,
+        e_v,
+        direction.e_q,
+        direction.e_q_dot,
+        result.e_R,
+        result.e_Omega,
+        result.psi_R,
+        direction.psi_q,
+        q_c,
+        attitude.R_c,
+    )
+
+
+@kernel
 def load_position(
     memory: PlumblineMemory,
     state: State,
@@ -384,22 +416,8 @@ def load_position(
     F_dot, F_ddot = differences(F_before, F, F_after)
     heading = HeadingReference(reference.b1_d, reference.b1_d_dot, reference.b1_d_ddot)
     attitude = commanded_attitude(F, F_dot, F_ddot, heading, state, vehicle)
-    result = attitude_moment(
-        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
-    )
-    command = Command(
-        thrust_along(F, state.R),
-        result.moment,
-        position.e_x,
-        position.e_v,
-        direction.e_q,
-        direction.e_q_dot,
-        result.e_R,
-        result.e_Omega,
-        result.psi_R,
-        direction.psi_q,
-        commanded.q_c.q_c,
-        attitude.R_c,
+    command = command_of(
+        F, attitude, position.e_x, position.e_v, direction, commanded.q_c.q_c, state, gains, vehicle
     )
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     integral = axpy(period, position.e_x, memory.integral)
@@ -426,16 +444,7 @@ def held_direction(
     state: State, q_c: DirectionCommand, pull: float, gains: PlumblineGains, vehicle: Vehicle
 ) -> DirectionResult:
     """F of (3-31) with (3-32) scaled by `pull`, N; its part across the cable is limited."""
-    direction = load_attitude_force(
-        state.q_cable,
-        state.q_cable_dot,
-        q_c,
-        normal_force_held(state.q_cable, q_c.q_c, pull),
-        gains.k_q,
-        gains.k_omega,
-        vehicle.quad_mass,
-        vehicle.cable_length,
-    )
+    direction = held_attitude_force(state, q_c, pull, gains.k_q, gains.k_omega, vehicle)
     along = scale(dot(state.q_cable, direction.F), state.q_cable)
     across = smooth_limit(sub(direction.F, along), MAX_ACROSS_SHARE * abs(pull))
     return DirectionResult(add(along, across), direction.e_q, direction.e_q_dot, direction.psi_q)
@@ -474,24 +483,7 @@ def load_attitude(
         held_direction(after, shifted_direction(q_c, q_c_dddot, h), pull, gains, vehicle).F,
     )
     zero: Vec3 = (0.0, 0.0, 0.0)
-    heading = HeadingReference(b1_d, zero, zero)
-    attitude = commanded_attitude(F, F_dot, F_ddot, heading, state, vehicle)
-    result = attitude_moment(
-        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
-    )
-    command = Command(
-        thrust_along(F, state.R),
-        result.moment,
-        zero,
-        zero,
-        direction.e_q,
-        direction.e_q_dot,
-        result.e_R,
-        result.e_Omega,
-        result.psi_R,
-        direction.psi_q,
-        q_c.q_c,
-        attitude.R_c,
-    )
+    attitude = commanded_attitude(F, F_dot, F_ddot, HeadingReference(b1_d, zero, zero), state, vehicle)
+    command = command_of(F, attitude, zero, zero, direction, q_c.q_c, state, gains, vehicle)
     thrust_rate = commanded_thrust_rate(F, F_dot, state, vehicle)
     return PlumblineMemory(thrust_rate, memory.integral, memory.pace), command

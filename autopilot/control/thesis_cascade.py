@@ -42,8 +42,8 @@ from autopilot.control.command_filter import (
 )
 from autopilot.control.load_attitude import (
     DirectionCommand,
+    held_attitude_force,
     load_attitude_force,
-    normal_force_held,
     normal_force_tracking,
     thrust_along,
 )
@@ -242,16 +242,7 @@ def load_attitude(
     """Load attitude mode: q follows q_d (3-31), (3-36), with (3-32) scaled by `pull` in N."""
     zero: Vec3 = (0.0, 0.0, 0.0)
     direction_memory, q_c = filtered_direction(memory.direction, q_d, filters.direction)
-    direction = load_attitude_force(
-        state.q_cable,
-        state.q_cable_dot,
-        q_c,
-        normal_force_held(state.q_cable, q_c.q_c, pull),
-        gains.k_q,
-        gains.k_omega,
-        vehicle.quad_mass,
-        vehicle.cable_length,
-    )
+    direction = held_attitude_force(state, q_c, pull, gains.k_q, gains.k_omega, vehicle)
     memory, command = quad_attitude(
         ThesisMemory(memory.reference, direction_memory, memory.b1, memory.b2, memory.b3),
         state,

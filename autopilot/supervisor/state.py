@@ -186,6 +186,11 @@ class Flight:
     # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
     external_arming_problems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def is_circling(self) -> bool:
+        """Whether it flies round a circle."""
+        return self.phase == Phase.GUIDED and self.setpoints.source == SetpointSource.ORBIT
+
 
 class View(NamedTuple):
     """What the supervisor sees of the world at a tick: estimates, ENU from home."""

@@ -168,7 +168,8 @@ def _law(flights: Flights) -> dict[str, Any]:
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
     """Parameter tables of the simulator, and of the autopilot with each law."""
     belief = load_belief(plan.vehicle)
-    tables = (parameters_for(belief, plan.own(law), ignored=plan.foreign_to(law)) for law in plan.laws)
+    kinds = dict.fromkeys((plan.own(law), plan.foreign_to(law)) for law in plan.laws)
+    tables = (parameters_for(belief, own, ignored=foreign) for own, foreign in kinds)
     return (sim_parameters(load_truth(plan.vehicle)), *tables)
 
 

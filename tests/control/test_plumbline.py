@@ -30,7 +30,7 @@ from autopilot.control.laws import build_law, chosen_law
 from autopilot.control.laws import plumbline as law_file
 from autopilot.control.laws.interface import kernels_of, law_of
 from autopilot.control.laws.plumbline import PlumblineLaw
-from autopilot.control.load_attitude import DirectionCommand, load_attitude_force, normal_force_held
+from autopilot.control.load_attitude import DirectionCommand, held_attitude_force
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
 from autopilot.control.records import Cable, Jet, Reference, State, Vehicle
 from autopilot.geometry.linear import Vec3
@@ -63,6 +63,7 @@ H = 5e-4  # s, of the differences
 # five-point differences: H^4/30 times a fifth derivative of up to 1e5; rounding 1e-15 / H^2 times 10 N
 DIFFERENCE = 1e-7
 SECOND_DIFFERENCE = 5e-6
+STEP = 1e-3  # s, of differences of what is commanded
 # of differences over 2 ms along the motion: 4e-6/12 of fourth derivatives of up to 1e3
 ALONG = 1e-3
 ROUNDING = 1e-9  # sixth derivatives of 1e3, a hundred operations
@@ -543,6 +544,33 @@ def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle
     agree(memory.integral, expected, ROUNDING)
 
 
+def commands_are_differentiated(
+    said: dict[int, tuple[State, Any, Any]], gains: Any, model: SimpleNamespace, vehicle: Vehicle
+) -> Array:
+    """f' and the moment at 0 against differences of what is commanded along a motion; returns F at 0.
+
+    `said`: state, memory and command at this many STEPs.
+    """
+    h = STEP
+    R_c = {k: np.array(c.R_c) for k, (_, _, c) in said.items()}
+    axes = {k: R_c[k][:, 2] for k in said}
+    F = {k: c.thrust / (axes[k] @ np.array(s.R)[:, 2]) * axes[k] for k, (s, _, c) in said.items()}
+    state, memory, found = said[0]
+    F_dot = (F[-2] - 8 * F[-1] + 8 * F[1] - F[2]) / (12 * h)
+    b3 = np.array(state.R)[:, 2]
+    b3_dot = np.array(state.R) @ np.cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
+    assert memory.thrust_rate == pytest.approx(F_dot @ b3 + F[0] @ b3_dot, abs=ALONG)
+    R_dot = (R_c[-2] - 8 * R_c[-1] + 8 * R_c[1] - R_c[2]) / (12 * h)
+    R_ddot = (-R_c[-2] + 16 * R_c[-1] - 30 * R_c[0] + 16 * R_c[1] - R_c[2]) / (12 * h * h)
+    rates = attitude_from_rates(model.mat(R_c[0]), model.mat(R_dot), model.mat(R_ddot))
+    expected = attitude_moment(
+        state.R, state.omega_body, rates, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
+    )
+    # ten times the truncation of differences over 2 ms; also what a fourth derivative that is left out adds
+    agree(found.moment, np.array(expected.moment), 2e-4)
+    return np.asarray(F[0])
+
+
 def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """f' and the moment are those of F', F'' along the model, off the path and in motion.
 
@@ -550,7 +578,6 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
     """
     gains, rate = GAINS._replace(k_i=(20.0, 20.0, 20.0)), 10.0
     rng = np.random.default_rng(34)
-    h = 1e-3
     # the last case swings and turns so much that Omega' matters
     for size, turning in ((1.0, 1.0), (1.0, 1.0), (6.0, 20.0)):
         q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
@@ -586,23 +613,9 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
                 vehicle,
             )
 
-        said = {k: command(k * h) for k in (-2, -1, 0, 1, 2)}
-        R_c = {k: np.array(c.R_c) for k, (_, _, c) in said.items()}
-        axes = {k: R_c[k][:, 2] for k in said}
-        F = {k: c.thrust / (axes[k] @ np.array(s.R)[:, 2]) * axes[k] for k, (s, _, c) in said.items()}
-        state, memory, found = said[0]
-        F_dot = (F[-2] - 8 * F[-1] + 8 * F[1] - F[2]) / (12 * h)
-        b3 = np.array(state.R)[:, 2]
-        b3_dot = np.array(state.R) @ np.cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
-        assert memory.thrust_rate == pytest.approx(F_dot @ b3 + F[0] @ b3_dot, abs=ALONG)
-        R_dot = (R_c[-2] - 8 * R_c[-1] + 8 * R_c[1] - R_c[2]) / (12 * h)
-        R_ddot = (-R_c[-2] + 16 * R_c[-1] - 30 * R_c[0] + 16 * R_c[1] - R_c[2]) / (12 * h * h)
-        rates = attitude_from_rates(model.mat(R_c[0]), model.mat(R_dot), model.mat(R_ddot))
-        expected = attitude_moment(
-            state.R, state.omega_body, rates, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
-        )
-        # ten times the truncation of differences over 2 ms
-        agree(found.moment, np.array(expected.moment), 2e-4)
+        said = {k: command(k * STEP) for k in (-2, -1, 0, 1, 2)}
+        state, memory, _ = said[0]
+        commands_are_differentiated(said, gains, model, vehicle)
         drift = (np.array(memory.integral) - slid) / TICK
         agree(drift, np.array(state.x_load), ROUNDING)
 
@@ -621,7 +634,7 @@ def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicl
     """Load attitude asks for F of (3-31) with (3-32), and for the moment of F', F'' along the model, while
     the commanded direction moves."""
     rng = np.random.default_rng(37)
-    h, rate, pull = 1e-3, 10.0, 5.3
+    rate, pull = 10.0, 5.3
     for size in (1.0, 3.0):
         q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
         w = np.cross(q, 0.05 * size * rng.normal(size=3))
@@ -641,7 +654,6 @@ def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicl
             memory = law.start()._replace(thrust_rate=rate)
             return (
                 state,
-                q_c,
                 *law.load_attitude(
                     memory,
                     state,
@@ -658,39 +670,18 @@ def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicl
                 ),
             )
 
-        said = {k: command(k * h) for k in (-2, -1, 0, 1, 2)}
-        R_c = {k: np.array(c.R_c) for k, (*_, c) in said.items()}
-        axes = {k: R_c[k][:, 2] for k in said}
-        F = {k: c.thrust / (axes[k] @ np.array(s.R)[:, 2]) * axes[k] for k, (s, *_, c) in said.items()}
-        state, q_c, memory, found = said[0]
-        wanted = load_attitude_force(
-            state.q_cable,
-            state.q_cable_dot,
-            q_c,
-            normal_force_held(state.q_cable, q_c.q_c, pull),
-            GAINS.k_q,
-            GAINS.k_omega,
-            vehicle.quad_mass,
-            vehicle.cable_length,
+        said = {k: command(k * STEP) for k in (-2, -1, 0, 1, 2)}
+        F = commands_are_differentiated(said, GAINS, model, vehicle)
+        state, _, found = said[0]
+        wanted = held_attitude_force(
+            state, direction_jets(path, 0.0)[0], pull, GAINS.k_q, GAINS.k_omega, vehicle
         )
         q = np.array(state.q_cable)
         along = (q @ np.array(wanted.F)) * q
         across = np.array(wanted.F) - along
         limit = plumbline.MAX_ACROSS_SHARE * pull
-        agree(F[0], along + across / (1.0 + (across @ across / limit**2) ** 2) ** 0.25, ROUNDING)
+        agree(F, along + across / (1.0 + (across @ across / limit**2) ** 2) ** 0.25, ROUNDING)
         assert (found.e_q, found.e_q_dot, found.psi_q) == (wanted.e_q, wanted.e_q_dot, wanted.psi_q)
-        F_dot = (F[-2] - 8 * F[-1] + 8 * F[1] - F[2]) / (12 * h)
-        b3 = np.array(state.R)[:, 2]
-        b3_dot = np.array(state.R) @ np.cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
-        assert memory.thrust_rate == pytest.approx(F_dot @ b3 + F[0] @ b3_dot, abs=ALONG)
-        R_dot = (R_c[-2] - 8 * R_c[-1] + 8 * R_c[1] - R_c[2]) / (12 * h)
-        R_ddot = (-R_c[-2] + 16 * R_c[-1] - 30 * R_c[0] + 16 * R_c[1] - R_c[2]) / (12 * h * h)
-        rates = attitude_from_rates(model.mat(R_c[0]), model.mat(R_dot), model.mat(R_ddot))
-        expected = attitude_moment(
-            state.R, state.omega_body, rates, GAINS.k_R, GAINS.k_Omega, 1.0, vehicle.inertia
-        )
-        # the fourth derivative of the direction is left out
-        agree(found.moment, np.array(expected.moment), 2e-4)
 
 
 def wind_does_not_turn_the_direction(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:

@@ -123,11 +123,10 @@ def _accept_setpoint(
     flight = replace(
         flight, setpoints=replace(flight.setpoints, offboard=SetpointStream(setpoint, view.now_us))
     )
-    circling = flight.phase == Phase.GUIDED and flight.setpoints.source == SetpointSource.ORBIT
     if (
         not settings.setpoints.ardupilot_guided
         or not flight.accepts_setpoints
-        or not (flight.phase == Phase.HOLD or circling)
+        or not (flight.phase == Phase.HOLD or flight.is_circling)
     ):
         return flight
     return start_guided(flight, SetpointSource.OFFBOARD, "Setpoint", view, settings)[0]

@@ -14,7 +14,7 @@ from autopilot.supervisor.requests.guided import start_guided
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MIN_ALTITUDE_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Phase, SetpointSource, View, fence_problem
+from autopilot.supervisor.state import CARRYING, Flight, SetpointSource, View, fence_problem
 from missions.model import LookAt
 
 MIN_RADIUS_M = 0.2
@@ -31,7 +31,7 @@ def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Dec
     if flight.phase not in CARRYING:
         return flight, wrong_phase(flight, "Orbit")
     here = commanded_motion(flight, view, settings)[0]
-    flown = flight.setpoints.circle if _is_circling(flight) else None
+    flown = flight.setpoints.circle if flight.is_circling else None
     around = here if flown is None else flown.centre
     centre: Vec3 = (
         around[0] if request.east_m is None else request.east_m,
@@ -62,10 +62,6 @@ def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Dec
         look_at = LookAt(centre[0], centre[1]) if request.faces_centre else LookAt(None, None)
         circling = with_look_at_aim(circling, look_at, view, settings)
     return circling, verdict
-
-
-def _is_circling(flight: Flight) -> bool:
-    return flight.phase == Phase.GUIDED and flight.setpoints.source == SetpointSource.ORBIT
 
 
 def _speed(flight: Flight, flown: Circle | None) -> float:
