@@ -85,7 +85,9 @@ _MAX_LEAN_TANGENT = 2.7
 _MIN_LIFT = 0.2
 # of the pull along the cable: the greatest force across it for errors, besides that for the reference
 MAX_ACROSS_SHARE = 0.7
-_MAX_RATE = 15.0  # rad/s
+# rad/s with a force of the whole weight, less with a smaller one: noise turns the direction of a small force
+# faster than rotors can follow
+_MAX_RATE = 9.0
 _PACE_RISE_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
 _FULL_RANGE_TIME = 0.1  # s, shortest time in which the thrust is assumed to pass through its whole range
 
@@ -187,9 +189,10 @@ def commanded_attitude(
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
     attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, heading.b1_d_dot, heading.b1_d_ddot)
     J = max(vehicle.inertia[0], vehicle.inertia[1])
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     return AttitudeCommand(
         attitude.R_c,
-        limit_length(attitude.Omega_c, _MAX_RATE),
+        limit_length(attitude.Omega_c, _MAX_RATE * min(1.0, n / weight)),
         limit_length(
             attitude.Omega_c_dot,
             0.5 * vehicle.moment_per_force * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J,

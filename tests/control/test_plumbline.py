@@ -32,7 +32,7 @@ from autopilot.control.laws.interface import kernels_of, law_of
 from autopilot.control.laws.plumbline import PlumblineLaw
 from autopilot.control.load_attitude import DirectionCommand, held_attitude_force
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
-from autopilot.control.records import Cable, Jet, Reference, State, Vehicle
+from autopilot.control.records import Cable, HeadingReference, Jet, Reference, State, Vehicle
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
@@ -451,6 +451,17 @@ def what_errors_ask_for_is_bounded(law: SimpleNamespace, model: SimpleNamespace,
     assert np.linalg.norm(law.smooth_limit((300.0, 0.0, 400.0), 5.0)) == pytest.approx(5.0, rel=1e-6)
     agree(law.limit_length(v, 0.5), np.array(v), ROUNDING)
     agree(law.limit_length(v, 0.25), np.array([0.15, 0.0, -0.2]), ROUNDING)
+
+
+def a_small_force_turns_slowly(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """Omega_c is that of F up to 9 rad/s times the force in weights; its direction is kept beyond."""
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    heading = HeadingReference((1.0, 0.0, 0.0), ZERO, ZERO)
+    for share, rate, expected in ((2.0, 8.0, 8.0), (2.0, 20.0, 9.0), (0.5, 4.0, 4.0), (0.5, 8.0, 4.5)):
+        n = share * weight
+        F_dot = (0.6 * rate * n, 0.8 * rate * n, 0.0)
+        found = law.commanded_attitude((0.0, 0.0, n), F_dot, ZERO, heading, level_state(model), vehicle)
+        agree(found.Omega_c, np.array([-0.8 * expected, 0.6 * expected, 0.0]), ROUNDING)
 
 
 def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -1032,6 +1043,7 @@ PROOFS: tuple[Callable[..., None], ...] = (
     what_the_path_needs_across_is_not_bounded,
     wind_is_leaned_against,
     what_errors_ask_for_is_bounded,
+    a_small_force_turns_slowly,
     falling_is_bounded,
     the_reference_goes_on,
     the_state_goes_on,

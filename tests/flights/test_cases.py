@@ -47,8 +47,14 @@ def test_a_heavy_load_is_lifted_outdoors_by_a_vehicle_that_is_not_as_it_is_belie
     assert (found["load_error_max_m"] or 1.0) < 0.15  # measured: 103 mm
 
 
+def test_noise_does_not_overturn_a_vehicle_where_its_path_leaves_little_thrust() -> None:
+    """Case C takes rotors of `heavy` down to 1.9 of 12 N; seed 15 was lost as Omega_c followed the noise."""
+    found = flown("case-c", Conditions(vehicle="heavy", sensors="field", seed=15))
+    assert (found["load_error_max_m"] or 1.0) < 0.4  # measured: 234 mm
+
+
 def test_it_flies_a_figure_eight_slower_than_asked_by_the_parameters_it_is_delivered_with() -> None:
-    """With the reserve that `heavy` leaves, the load would be lost."""
+    """With the reserve that `heavy` leaves, the load strays by 0.7 m, or is lost."""
     windy = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
     found = flown("case-c", Conditions(vehicle="heavy-real", sensors="field", settings=windy))
     assert (found["load_error_max_m"] or 1.0) < 0.2  # measured: 119 to 132 mm
