@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from gcs.recorded.column_map import ColumnMap, MapError, load_map
-from gcs.recorded.estimates import filter_rows
+from gcs.recorded.estimates import filter_rows, filtered_estimates
 from gcs.recorded.identification import identify_load, tracked_length
 from gcs.recorded.motion import distances, motion_of
 from gcs.recorded.recording import RecordingError, read_recording
@@ -43,7 +43,9 @@ def score_flight(path: Path, columns: ColumnMap) -> tuple[dict[str, Any], tuple[
     motion = motion_of(read_recording(path, columns), columns)
     model = columns.load_model(float(np.nanmedian(distances(motion))))
     rows = filter_rows(motion, model)
-    scores = (*score_ahead(motion, rows, model), score_pose_alone(motion, rows, model))
+    by_load = filtered_estimates(rows, model, load=True, tilt=True)
+    by_pose = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
+    scores = (*score_ahead(motion, rows, model, by_load), score_pose_alone(motion, model, by_pose))
     swing = next(one for one in identify_load(motion, model, ("length_m",)) if one.name == "length_m")
     tracked = tracked_length(motion, columns.attachment.below_m)
     below = columns.attachment.below_m

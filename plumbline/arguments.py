@@ -131,6 +131,14 @@ def positive(name: str, value: Any) -> float:
     return found
 
 
+def not_negative(name: str, value: Any) -> float:
+    """A finite number, 0 or more, or `Error`."""
+    found = number(name, value)
+    if found < 0.0:
+        raise GcsError(f"{name} = {shown_value(value)}; must be 0 or more")
+    return found
+
+
 def whole_number(name: str, value: Any, minimum: int, maximum: int | None = None) -> int:
     """A whole number from `minimum` to `maximum`, or `Error`."""
     try:

@@ -36,6 +36,7 @@ from plumbline.arguments import (
     called_by_scripts,
     checked_flags,
     errors_for_python,
+    not_negative,
     number,
     parameter_name,
     positive,
@@ -258,11 +259,13 @@ class RunningVehicle:
         """Wait until a condition holds, and return the state in which it held.
 
         `until`: one of `ready`, `holding`, `mission complete` and `landed` (disarmed), a function of the
-        state, or a number of seconds of the vehicle's clock. `Error` if the condition does not hold within
-        `timeout_s` seconds of the vehicle's clock, or if the vehicle is disarmed or falls silent before.
+        state, or a number of seconds (0 or more) of the vehicle's clock. `Error` if the condition does not
+        hold within `timeout_s` seconds of the vehicle's clock (for a number of seconds there is no limit), or
+        if the vehicle is disarmed or falls silent before.
         """
         condition, what = self._condition(until)
-        limit_s = math.inf if isinstance(until, int | float) else positive("timeout_s", timeout_s)
+        checked_s = positive("timeout_s", timeout_s)
+        limit_s = math.inf if isinstance(until, int | float) else checked_s
         return self._in_thread(lambda: self._watch(condition, what, limit_s))
 
     def _condition(self, until: str | float | Condition) -> tuple[Condition, str]:
@@ -273,7 +276,7 @@ class RunningVehicle:
                 )
             return _NAMED_CONDITIONS[until], f"{until!r}"
         if isinstance(until, int | float):
-            clock, awaited_s = _Clock(), number("wait", until)
+            clock, awaited_s = _Clock(), not_negative("wait", until)
             return lambda state: clock.elapsed_s(state) >= awaited_s, f"{awaited_s:g} s"
         if not callable(until):
             known = ", ".join(_NAMED_CONDITIONS)

@@ -86,7 +86,8 @@ def try_planner(planner: OwnPlanner, parameters: Mapping[str, float]) -> None:
         try:
             plan(route)
         except PlanError as error:
-            raise OwnError(f"{planner.reference}: {error}") from None
+            route_text = ", ".join(f"({', '.join(f'{x:g}' for x in point)})" for point in points)
+            raise OwnError(f"{planner.reference}: on a trial route {route_text}: {error}") from None
 
 
 def try_all(own: OwnCode, parameters: Mapping[str, float]) -> None:

@@ -187,11 +187,12 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
     """All limits of the vehicle that the mission breaks, step by step; empty if it can be flown.
 
     `shaped`: an autopilot that shapes its paths flies it: signals pass if a path near them is possible, and
-    transfers take longer where rotors, cable or tilt require it.
+    transfers take longer where rotors, cable or tilt require it. Paths through waypoints do so in any case.
     """
     found: list[Violation] = _hover_violations(limits)
     if found:
         return found
+    flown_through = frozenset() if shaped else _flown_through(mission, limits)
     for entry in _timeline(mission, limits):
         carries_load = isinstance(entry.step, Takeoff | Waypoint) and not entry.before.released
         if carries_load and entry.end[2] < MIN_HEIGHT_M:
@@ -216,10 +217,17 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                     text = f"{_item_label(entry)}: {problem}; {_bounds_text(limits)}"
                     found.append(Violation(entry.item, "shaping", inf, limits.max_shaping_m, 0.0, text))
                 continue
-        extremes = _survey(entry, limits, shaped)
+        extremes = _survey(entry, limits, shaped or entry.item in flown_through)
         if extremes is not None:
             found += _violations_along(entry, extremes, limits)
     return found
+
+
+def _flown_through(mission: Mission, limits: VehicleLimits) -> frozenset[int]:
+    """The items along a path through waypoints, which takes as long as the limits require with every law."""
+    shaping = limits.shaping._replace(shape_paths=False)
+    prepared = prepare(mission.steps, range(len(mission.steps)), shaping)
+    return frozenset(item for item, path in enumerate(prepared.paths) if isinstance(path, PathSegment))
 
 
 def _bounds_text(limits: VehicleLimits) -> str:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 FILE = "metrics.toml"
 UNKNOWN = "–"
+_LOST = ("diverged", "lost")  # outcomes
 _ONE_METRE = 1.0  # lengths of this or more are shown in metres, not in millimetres
 
 
@@ -56,13 +57,23 @@ class Metric(_StrictModel):
         return self.unit if self.shown is None else self.shown
 
 
+def is_lost(record: Mapping[str, Any]) -> bool:
+    """Whether the mission ended with the loss of the vehicle or its load, after which no path is followed."""
+    return record.get("outcome") in _LOST
+
+
 class Group(_StrictModel):
-    """Figures that are shown together. `window` is the part of the flight that they cover; `note` is for the
-    documentation."""
+    """Figures that are shown together. `window` is the part of the flight that they cover, `window_if_lost`
+    that of a flight that was lost, if it is another; `note` is for the documentation."""
 
     title: str
     window: str = ""
+    window_if_lost: str = ""
     note: str = ""
+
+    def window_of(self, record: Mapping[str, Any]) -> str:
+        """The part of this flight that the figures cover."""
+        return (self.window_if_lost if is_lost(record) else "") or self.window
 
 
 class MetricFile(_StrictModel):

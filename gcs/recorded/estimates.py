@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -89,11 +90,14 @@ def predictions(
     horizons_s: tuple[float, ...],
     *,
     tilt: bool,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Prediction]:
-    """Predictions from rows `starts` on, by the vehicle's motion alone; stops where the rows end."""
+    """Predictions from rows `starts` on, by the vehicle's motion alone; stops where the rows end. `progress`
+    receives the number of predictions that are done, and of all."""
     windows = []
     work = np.zeros((WORK + SIZE, SIZE))
-    for begin in starts:
+    for done, begin in enumerate(starts):
+        progress(done, len(starts))
         ends = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
         if ends[-1] >= len(rows.time_s):
             break

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcs.recorded.estimates import FilterRows, filtered_estimates, load_position, predictions
+from gcs.recorded.estimates import Estimates, FilterRows, load_position, predictions
 from gcs.recorded.load_model import LoadModel
 from gcs.recorded.motion import Motion
 from gcs.recorded.smoothing import Floats
 
 HORIZONS_S = (2.0, 5.0)
-ROWS_BETWEEN_PREDICTIONS = 15  # between the beginnings of predictions
+ROWS_BETWEEN_PREDICTIONS = 15  # between the beginnings of predictions, and
+INTERVAL_S = 0.5  # at least: predictions that begin closer to each other tell the same
 SETTLED_ROWS = 90  # with a measured load that the filter uses before the first prediction
 BOUND_95 = 5.991  # chi-square of two degrees of freedom
 
@@ -38,16 +40,24 @@ class Score(NamedTuple):
         return float(np.mean(known < BOUND_95)) if known.size else float("nan")
 
 
-def score_ahead(motion: Motion, rows: FilterRows, model: LoadModel) -> tuple[Score, ...]:
-    """Predictions that begin every `ROWS_BETWEEN_PREDICTIONS` rows, for each horizon, compared with the
-    measured load.
+def score_ahead(
+    motion: Motion,
+    rows: FilterRows,
+    model: LoadModel,
+    estimates: Estimates,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[Score, ...]:
+    """Predictions that begin every `ROWS_BETWEEN_PREDICTIONS` rows, or every `INTERVAL_S` if that is more
+    rows, for each horizon, compared with the measured load.
 
-    Each begins with the estimate from load and vehicle up to this row, and continues with the vehicle's
-    motion and attitude alone. Predictions across a break, whose duration is unknown, are left out.
+    Each begins with the estimate from load and vehicle up to this row (`estimates`), and continues with the
+    vehicle's motion and attitude alone. Predictions across a break, whose duration is unknown, are left out.
+    `progress` receives the number of predictions that are done, and of all.
     """
-    estimates = filtered_estimates(rows, model, load=True, tilt=True)
-    starts = np.arange(SETTLED_ROWS, len(rows.time_s), ROWS_BETWEEN_PREDICTIONS)
-    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=True)
+    step_s = float(np.median(np.diff(rows.time_s)))
+    interval = max(ROWS_BETWEEN_PREDICTIONS, round(INTERVAL_S / step_s))
+    starts = np.arange(SETTLED_ROWS, len(rows.time_s), interval)
+    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=True, progress=progress)
     breaks = np.cumsum(motion.times.broken)
     windows = [one for one in windows if breaks[one.begin] == breaks[one.ends[-1]]]
     scores = []
@@ -59,12 +69,11 @@ def score_ahead(motion: Motion, rows: FilterRows, model: LoadModel) -> tuple[Sco
     return tuple(scores)
 
 
-def score_pose_alone(motion: Motion, rows: FilterRows, model: LoadModel) -> Score:
-    """Smoothed estimates of the whole flight from the pose alone, compared with the measured load."""
-    found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
-    at = np.arange(len(rows.time_s))
-    covariance = found.covariances[:, [0, 0, 1], [0, 1, 1]]
-    return _score(motion, model, at, found.states[:, :2], covariance)
+def score_pose_alone(motion: Motion, model: LoadModel, estimates: Estimates) -> Score:
+    """Smoothed `estimates` of the whole flight from the pose alone, compared with the measured load."""
+    at = np.arange(len(motion.time_s))
+    covariance = estimates.covariances[:, [0, 0, 1], [0, 1, 1]]
+    return _score(motion, model, at, estimates.states[:, :2], covariance)
 
 
 def _score(

@@ -6,7 +6,7 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from gcs.analysis.definitions import HEADLINE, METRICS, Metric, known_groups
+from gcs.analysis.definitions import HEADLINE, METRICS, Metric, is_lost, known_groups
 from gcs.analysis.record import FlightMeta, Record
 from gcs.report.plots import PICTURES, headline
 from gcs.report.replay import Json
@@ -25,6 +25,7 @@ SCRIPTS = (
     "plots.js",
     "replay.js",
 )
+_ERRORS = ("load_error_max_m", "load_error_rms_m")
 STYLES = (*PLOT_STYLES, "page.css", "charts.css", "transport.css", "stage.css")
 
 
@@ -72,7 +73,7 @@ def _figures(record: Record, replay: Json) -> list[Json]:
     worst = replay["worst"]
     return [
         {
-            "label": label,
+            "label": f"{label} until the loss" if is_lost(record) and name in _ERRORS else label,
             "value": METRICS[name].formatted(record),
             "time": worst["time"] if worst and name == "load_error_max_m" else None,
         }
@@ -84,7 +85,11 @@ def _figures(record: Record, replay: Json) -> list[Json]:
 def _groups(record: Record) -> list[dict[str, Any]]:
     """The groups of figures, each with the figures that are known."""
     return [
-        {"title": group.title, "window": group.window, "rows": [_row(metric, record) for metric in metrics]}
+        {
+            "title": group.title,
+            "window": group.window_of(record),
+            "rows": [_row(metric, record) for metric in metrics],
+        }
         for group, metrics in known_groups(record)
     ]
 

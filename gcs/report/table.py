@@ -29,6 +29,6 @@ def record_table(record: Record) -> Table:
             value = Text(metric.formatted(record))
             if metric.name == "outcome":
                 value.stylize(_OUTCOME_STYLES.get(str(record[metric.name]), "bold yellow"))
-            head = (group.title, group.window)[i] if i < 2 else ""
+            head = (group.title, group.window_of(record))[i] if i < 2 else ""
             table.add_row(head, metric.label, value, end_section=i == len(known) - 1)
     return table

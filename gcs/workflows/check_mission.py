@@ -16,6 +16,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
+from gcs.expected_flight import expected_flight_s, time_limit_s
 from gcs.mission_items import items_of
 from gcs.workflows.before_flight import unused_planner_text
 from gcs.workflows.flyable_marks import mark_flyable
@@ -60,7 +61,7 @@ def _winch_items(
     mission: Mission, table: AutopilotParameters
 ) -> Iterator[tuple[TimelineEntry, Winch, float]]:
     """Each winch item, and the length of the cable after it."""
-    for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
+    for entry in timeline(mission.steps, _start(table)):
         if isinstance(entry.step, Winch) and entry.after.cable_m is not None:
             yield entry, entry.step, entry.after.cable_m
 
@@ -92,6 +93,29 @@ def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str
                 f"control, and {vehicle} differs from what the autopilot assumes ({believed}): below "
                 f"{min_share} % such a flight may be lost; {MORE_MARGIN} plans it slower"
             )
+
+
+def timeout_warnings(mission: Mission, reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
+    """A line if the paths take so much longer than the mission asks for that `gcs fly` would give up."""
+    table = autopilot_parameters(load_belief(vehicle))
+    expected_s = expected_flight_s(mission, table)
+    limit_s = time_limit_s(expected_s)
+    moves_s = {entry.item: _move_s(entry) for entry in timeline(mission.steps, _start(table))}
+    flown_s = expected_s + sum(report.duration_s - moves_s[report.item] for report in reports)
+    if flown_s > limit_s:
+        yield (
+            f"warning: along these paths the flight takes about {flown_s:.0f} s, and gcs fly gives up after "
+            f"{limit_s:.0f} s: add --timeout {time_limit_s(flown_s):.0f}"
+        )
+
+
+def _move_s(entry: TimelineEntry) -> float:
+    """The part of a step's duration (s) that a path report gives as it is flown."""
+    return entry.duration_s if isinstance(entry.step, Signals | AttitudeRun) else entry.transfer_s
+
+
+def _start(table: AutopilotParameters) -> MissionState:
+    return MissionState(cable_m=table["VEH_CABLE_LEN"], speed_m_s=table["MIS_SPEED"])
 
 
 def parameter_notes(vehicle: str) -> Iterator[str]:
@@ -155,7 +179,7 @@ def check_mission(
     mission = load(name_or_path)
     found = [*violations(mission, vehicle, not as_asked), *winch_violations(mission, vehicle)]
     reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
-    warnings = tuple(margin_warnings(reports, vehicle))
+    warnings = (*margin_warnings(reports, vehicle), *timeout_warnings(mission, reports, vehicle))
     if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
         warnings += (
             "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "

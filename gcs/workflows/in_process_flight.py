@@ -13,6 +13,7 @@ from gcs.closed_loop import Conditions, fly
 from gcs.shell.display import FlightDisplay
 from gcs.workflows.before_flight import check_mission, check_options, planner_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
+from gcs.workflows.refused_settings import with_blamed_settings
 from gcs.workflows.started_flight import flight_client
 from gcs.workflows.warmup import in_process_parts, warm_up
 from missions.model import Mission
@@ -45,10 +46,5 @@ def fly_in_process(
             options.own,
             ignored=frozenset(options.ignored),
         )
-        return fly(
-            mission,
-            conditions,
-            log,
-            client=client,
-            on_turn=show,
-        )
+        outcome = fly(mission, conditions, log, client=client, on_turn=show)
+    return with_blamed_settings(outcome, options)

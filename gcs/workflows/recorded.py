@@ -14,11 +14,13 @@ from gcs.shell.display import StepDisplay, notify_if_slow
 
 if TYPE_CHECKING:
     from gcs.recorded.column_map import ColumnMap
+    from gcs.recorded.estimates import Estimates, FilterRows
     from gcs.recorded.identification import Identified
     from gcs.recorded.load_model import LoadModel
     from gcs.recorded.motion import Motion
 
 REPLAYS_FOLDER = Path("replays")
+_READING_TEXT = "reading the recording"
 _MAX_DISTANCE_M = 200.0  # of a load from its vehicle: cables are shorter
 PLUMBLINE_MAP = "telemetry"  # column map of Plumbline's own logs
 
@@ -38,23 +40,19 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     )
 
     path = find_recording(path)
-    with StepDisplay("reading the recording", quiet, long=True) as display:
-        display.update(0, 0)
+    with notify_if_slow(_READING_TEXT, quiet):
         column_map, motion, model = _read(path, columns)
-        _require_load(path, motion)
+    _require_load(path, motion)
+    with StepDisplay("fitting predictions of the load", quiet, long=True) as display:
         duration_s = float(motion.time_s[-1] - motion.time_s[0])
         if duration_s < MIN_DURATION_S:
             raise InputError(
                 f"{path}: carries the load for {duration_s:.1f} s; at least {MIN_DURATION_S:.0f} s are "
                 "needed to identify anything"
             )
-
-        def report_progress(done: int, total: int) -> None:
-            display.update(done, total, "fitting predictions of the load")
-
         try:
             identify_vehicle(motion, model)  # too little motion is reported before the load is fitted
-            load = identify_load(motion, model, column_map.identify.parameters, report_progress)
+            load = identify_load(motion, model, column_map.identify.parameters, display.update)
             known = {one.name: one.value for one in load if one.is_determined}
             vehicle = identify_vehicle(motion, model._replace(**known))
         except (NoLoadError, TooLittleMotionError) as error:
@@ -81,11 +79,12 @@ def replay(
         map_warning,
     )
     from gcs.recorded.replay_files import write_picture, write_table
-    from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
     path = find_recording(path)
-    with notify_if_slow("estimating the load", quiet):
+    with notify_if_slow(_READING_TEXT, quiet):
         _, motion, model = _read(path, columns)
+    with StepDisplay("estimating the load", quiet, long=True) as display:
+        display.update(0, 0)
         rows = filter_rows(motion, model)
         load_is_measured = bool(np.isfinite(motion.load).all())
         doubt = length_warning(motion) if load_is_measured else ""
@@ -93,34 +92,53 @@ def replay(
         if load_is_measured and not doubt and record["duration_s"] >= MIN_DURATION_S:
             with suppress(TooLittleMotionError):
                 record["doubt"] = map_warning(identify_vehicle(motion, model))
-        if load_is_measured:
-            squares = filtered_estimates(rows, model, load=True, tilt=True).squares
-            record["innovations"] = {
-                name: {
-                    "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
-                    "refused": int(np.sum(each < 0.0)),
-                }
-                for name, each in (("load", squares[:, 0]), ("attitude", squares[:, 1]))
-            }
-            for horizon, score in zip(HORIZONS_S, score_ahead(motion, rows, model), strict=True):
-                record[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
-            pose_alone = score_pose_alone(motion, rows, model)
-            record["pose_alone"] = {
-                "median_m": pose_alone.median_m,
-                "nees_per_axis": float(np.mean(pose_alone.square) / 2.0),
-                "inside_95": pose_alone.inside,
-            }
         found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
+        if load_is_measured:
+            record |= _scores(motion, rows, model, found, display)
         load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
         sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
-    folder = out or REPLAYS_FOLDER / name_of(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_table(folder / "load.csv", motion, load, sd)
-        write_picture(folder / "load.png", motion, load, sd)
-    except OSError as error:
-        raise write_error(error, folder) from None
+        display.update(0, 0, "writing table and picture")
+        folder = out or REPLAYS_FOLDER / name_of(path)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_table(folder / "load.csv", motion, load, sd)
+            write_picture(folder / "load.png", motion, load, sd)
+        except OSError as error:
+            raise write_error(error, folder) from None
     return record, folder
+
+
+def _scores(
+    motion: Motion, rows: FilterRows, model: LoadModel, by_pose: Estimates, display: StepDisplay
+) -> dict[str, Any]:
+    """The scores of a load that was measured; `by_pose`: its smoothed estimates from the pose alone."""
+    from gcs.recorded.estimates import filtered_estimates
+    from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
+
+    by_load = filtered_estimates(rows, model, load=True, tilt=True)
+    scores: dict[str, Any] = {
+        "innovations": {
+            name: {
+                "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
+                "refused": int(np.sum(each < 0.0)),
+            }
+            for name, each in (("load", by_load.squares[:, 0]), ("attitude", by_load.squares[:, 1]))
+        }
+    }
+
+    def report_progress(done: int, total: int) -> None:
+        display.update(done, total, "predicting the load")
+
+    ahead = score_ahead(motion, rows, model, by_load, report_progress)
+    for horizon, score in zip(HORIZONS_S, ahead, strict=True):
+        scores[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
+    pose_alone = score_pose_alone(motion, model, by_pose)
+    scores["pose_alone"] = {
+        "median_m": pose_alone.median_m,
+        "nees_per_axis": float(np.mean(pose_alone.square) / 2.0),
+        "inside_95": pose_alone.inside,
+    }
+    return scores
 
 
 def find_recording(source: Path) -> Path:

@@ -10,7 +10,7 @@ from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
-from gcs.errors import GcsError, RefusedError
+from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import FlightDisplay, notify
 from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session
@@ -39,11 +39,14 @@ def fly_running(
     """Fly with the vehicle at `address`; if the flight is stopped early, command it to hold, or to land if it
     cannot hold yet.
 
-    Also returns why there is no truth of the vehicle's world; empty if there is.
+    Also returns why there is no truth of the vehicle's world; empty if there is. NoVehicleError if the key is
+    missing without which the vehicle heeds no message.
     """
     with TruthLink(options.truth_at) as truth:
         with Session(address) as session:
             session.find_with_truth(truth)
+            if session.unanswered_reason:  # it would not answer anything else either
+                raise NoVehicleError(f"{mission.name}: not flown: {session.unanswered_reason}")
             client = flight_client(mission, options, vehicle_home(session))
             world = session.view.latest.get("SIM_BOOT")
         if truth.missing:

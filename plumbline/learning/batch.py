@@ -52,6 +52,23 @@ Numbers = NDArray[np.int64]
 _MIN_TICKS_PER_THREAD = 2000  # ticks per thread from which on another thread is worthwhile
 
 
+def _copied(
+    scenario: Scenario, count: int, threads: int, attributes: dict[str, Any], memory: Batch
+) -> Episodes:
+    """Episodes with these attributes, and with a memory that lacks what belongs to a process."""
+    episodes = Episodes(scenario, count, threads)
+    own = episodes._batch
+    vars(episodes).update(attributes, _batch=_with_code_of(memory, own.code, own.estimators))
+    return episodes
+
+
+def _with_code_of(batch: Batch, code: Code, estimators: EstimatorRows | None) -> Batch:
+    """The memory with this machine code, and with the law of these estimators, which may hold an address."""
+    if estimators is None:
+        return batch._replace(code=code)
+    return batch._replace(code=code, estimators=batch.estimators._replace(law=estimators.law))
+
+
 class Episodes:
     """`count` episodes of a scenario. `ends`, `rewards` and `observations` are those of the last step."""
 
@@ -83,6 +100,15 @@ class Episodes:
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy, also in another process, goes on where this one is; it has machine code and threads of its
+        own."""
+        of_process = ("_run", "_pool", "_batch")
+        attributes = {name: value for name, value in vars(self).items() if name not in of_process}
+        estimators = self._batch.estimators
+        memory = _with_code_of(self._batch, Code(0, 0), estimators and estimators._replace(law=None))
+        return _copied, (self.scenario, self.count, self._threads, attributes, memory)
 
     # ---- steps
 

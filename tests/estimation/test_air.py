@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 
 from autopilot.control.drag import GUST_RANDOM_WALK, GUST_TIME_S
 from autopilot.estimation.air import air_walk, predict_air
+from autopilot.estimation.covariance import decay_factor
 from autopilot.estimation.records import AIR, CAMERA, PADDED_SIZE, TRACKER, blank_state
 from autopilot.geometry.linear import ZERO
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import truth_of
 from tests.doubles.motion import bebop_tuning
 
 TICK_S = 0.02
@@ -20,6 +25,18 @@ TUNING = bebop_tuning()._replace(air_walk=0.003, load_drag=0.0)
 TAUT = blank_state().load._replace(
     taut=1.0, source=TRACKER, v_load=ZERO, age_s=0.0, tautness_age_s=float("inf")
 )
+
+
+@pytest.mark.parametrize("acceleration", ["EST_AIR", "EST_PUSH"])
+def test_an_acceleration_by_the_air_returns_to_zero_with_all_parameters_that_are_allowed(
+    acceleration: str,
+) -> None:
+    """With a deviation of 1e-6 m/s^2 the state grew 18,000 times from sample to sample."""
+    table = autopilot_parameters(load_vehicle("bebop"))
+    std, walk = table.describe(f"{acceleration}_STD"), table.describe(f"{acceleration}_WALK")
+    slowest_s = 1.0 / sim_parameters(truth_of(load_vehicle("bebop"))).describe("SIM_RATE_HZ").low
+    assert 0.0 <= decay_factor(std.low, walk.high, slowest_s) < 1.0
+    assert decay_factor(std.high, walk.low, slowest_s) == 1.0
 
 
 def covariance(air_std: float) -> NDArray[np.float64]:

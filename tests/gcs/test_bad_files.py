@@ -78,6 +78,17 @@ def estimator(body: str, parameters: str = "") -> str:
     return ESTIMATOR.format(body=body, parameters=parameters)
 
 
+# fails on the routes of `square`, not on those of the trial before a flight
+PICKY = """
+from plumbline.examples.minimum_snap import MinimumSnap
+class Mine(MinimumSnap):
+    def plan(self, route):
+        if route.points[0][2] != 1.0:
+            raise SystemExit(3)
+        return super().plan(route)
+"""
+
+
 def planner(body: str, parameters: str = "") -> str:
     return PLANNER.format(body=body, parameters=parameters)
 
@@ -194,9 +205,14 @@ def test_a_mission_is_checked_with_a_planner() -> None:
     assert not found["violations"]
     assert [path["item"] for path in found["paths"]] == [0, 2, 3, 4, 5]
 
+    failed = "Planner Mine failed: SystemExit: 3 (mine.py:9)"
     Path("mine.py").write_text(planner("raise SystemExit(3)"), encoding="utf-8")
     code, line = told_of("check", "square", "--planner", "mine.py:Mine")
-    assert "square: item " in line and "Planner Mine failed: SystemExit: 3 (mine.py:9)" in line
+    assert line == f"gcs: --planner mine.py:Mine: on a trial route (0, 0, 1), (2, 0, 1): {failed}"
+    assert code == EXIT_USAGE
+    Path("picky.py").write_text(PICKY, encoding="utf-8")
+    code, line = told_of("check", "square", "--planner", "picky.py:Mine")
+    assert line == f"gcs: square: item 2: {failed.replace('mine.py:9', 'picky.py:6')}"
     assert code == EXIT_ERROR
     assert told_of("check", "square", "--planner", "nofile.py:Mine")[0] == EXIT_USAGE
     assert told_of("check", "square", "--as-asked", "--planner", "mine.py:Mine")[0] == EXIT_USAGE

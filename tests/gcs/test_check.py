@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory import feasibility
 from autopilot.trajectory.feasibility import PathReport
@@ -17,15 +18,19 @@ from autopilot.trajectory.transfer import PEAK_SPEED
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE, InputError
+from gcs.errors import EXIT_DONE, EXIT_USAGE, InputError
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
     margin_warnings,
     notes_after_release,
+    path_reports,
+    timeout_warnings,
     winch_notes,
     winch_violations,
 )
+from gcs.workflows.flight_inputs import check_flight_inputs
+from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
@@ -150,3 +155,47 @@ def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Pa
 def test_limits_are_those_that_the_autopilot_shapes_to() -> None:
     shaping = load_limits("heavy-real").shaping
     assert shaping == path_limits(autopilot_parameters(load_belief("heavy-real")), True)
+
+
+PLANNERS = """
+from plumbline.examples.minimum_snap import MinimumSnap
+from plumbline.planners import slower
+
+class Leisurely(MinimumSnap):
+    def plan(self, route):
+        path = super().plan(route)
+        return slower(path, 2000.0 * (len(route.points) - 1) / path.passes_s[-1])
+
+class Slow(MinimumSnap):
+    def plan(self, route):
+        return slower(super().plan(route), 40.0)
+"""
+
+
+@pytest.fixture
+def planners(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.py"
+    path.write_text(PLANNERS, encoding="utf-8")
+    return path
+
+
+def test_a_planner_is_refused_as_a_flight_refuses_it(planners: Path) -> None:
+    """Each leg of `square` alone takes 2000 s, which a path may; a flight first tries a path of two legs."""
+    planner = f"{planners}:Leisurely"
+    with pytest.raises(InputError) as refusal:
+        check_flight_inputs("bebop", "lab", [], OwnCode(planner=planner))
+    result = CliRunner().invoke(gcs, ["check", "square", "--planner", planner], prog_name="gcs")
+    assert (result.exit_code, result.stderr) == (EXIT_USAGE, f"gcs: {refusal.value}\n")
+    assert "on a trial route (0, 0, 1), (2, 0, 1), (2, 2, 1.5): Planner Leisurely failed: " in result.stderr
+    assert "the path ends at 4000 s" in result.stderr
+
+
+def test_paths_that_outlast_the_time_limit_of_a_flight_are_told_with_what_to_add(planners: Path) -> None:
+    result = CliRunner().invoke(gcs, ["check", "square", "--planner", f"{planners}:Slow"], prog_name="gcs")
+    assert result.exit_code == EXIT_DONE
+    warning = result.stdout.splitlines()[-1]
+    assert warning.startswith(
+        "warning: along these paths the flight takes about 931 s, and gcs fly gives up "
+    )
+    assert warning.endswith("add --timeout 1456")
+    assert not list(timeout_warnings(load("square"), path_reports(load("square"), "bebop"), "bebop"))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
 import sys
 import warnings
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -108,6 +111,34 @@ def test_the_same_seed_is_the_same_episode() -> None:
 
     assert episode(4) == episode(4)
     assert episode(4)[0] != episode(5)[0]
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_a_pickled_copy_goes_on_where_its_original_is(options: dict[str, Any]) -> None:
+    env = gymnasium.make(LOAD_TRACKING, **options)
+    envs = gymnasium.make_vec(LOAD_TRACKING, 2, vectorization_mode="vector_entry_point", **options)
+    for one in (env, envs):
+        action = one.action_space.sample()
+        one.reset(seed=3)
+        one.step(action)
+        copy = pickle.loads(pickle.dumps(one))
+        for _ in range(5):
+            assert np.array_equal(one.step(action)[0], copy.step(action)[0])
+        again = [each.reset()[0] for each in (one, copy)]
+        assert np.array_equal(*again), "the same random numbers follow"
+        copy.close()
+        one.close()
+
+
+@pytest.mark.parametrize("observation", ["truth", "estimate"])
+def test_another_process_goes_on_with_a_pickled_environment(observation: str, tmp_path: Path) -> None:
+    env = gymnasium.make(HOVER, observation=observation)
+    env.reset(seed=3)
+    path = tmp_path / "env"
+    path.write_bytes(pickle.dumps(env))
+    program = f"import pickle; env = pickle.load(open({str(path)!r}, 'rb')); print(env.step({[0.1] * 4})[0])"
+    told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert told.stdout.strip() == str(env.step(np.full(4, 0.1))[0])
 
 
 def test_statistics_of_gymnasium_count_episodes() -> None:

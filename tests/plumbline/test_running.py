@@ -43,6 +43,9 @@ ARGUMENTS: dict[str, tuple[Any, str]] = {
     "upload vehicle": (lambda: UNMET.upload("hover", vehicle=3), "vehicle = 3; must be a name"),  # type: ignore[arg-type]
     "wait": (lambda: UNMET.wait(None), "wait None: must be one of ready, holding,"),  # type: ignore[arg-type]
     "wait for ever": (lambda: UNMET.wait(float("inf")), "wait = inf; must be a finite number"),
+    "wait for nan": (lambda: UNMET.wait(float("nan")), "wait = nan; must be a finite number"),
+    "wait for the past": (lambda: UNMET.wait(-1), "wait = -1; must be 0 or more"),
+    "wait limit of a time": (lambda: UNMET.wait(3.0, -1.0), "timeout_s = -1.0; must be greater than 0"),
     "wait limit": (lambda: UNMET.wait("ready", "long"), "timeout_s = 'long'; must be a finite number"),  # type: ignore[arg-type]
 }
 

@@ -165,6 +165,17 @@ def test_a_transfer_too_fast() -> None:
     assert found[0].text.endswith("lower speed_m_s or the acceleration of transfers")
 
 
+def test_a_chain_of_waypoints_is_not_judged_as_stops_at_each() -> None:
+    """Every law flies one path through them, planned within the limits; from stop to stop it is too fast."""
+    hasty = replace(LIMITS, accel_m_s2=8.0)
+    chain = (Speed(8.0), Waypoint(4.0, 0.0, 2.0), Waypoint(8.0, 0.0, 2.0), Waypoint(12.0, 0.0, 2.0))
+    assert [str(violation) for violation in check(mission(*chain), hasty)] == []
+    flown = [path for path in paths(mission(*chain), hasty, shaped=False) if path.item > 1]
+    assert max(path.rotor_high_n for path in flown) < hasty.vehicle.rotor_max_n
+    stops = [replace(step, hold_s=1.0) if isinstance(step, Waypoint) else step for step in chain]
+    assert {violation.item for violation in check(mission(*stops), hasty)} == {2, 3, 4}
+
+
 @pytest.mark.parametrize("controlled", ["vehicle", "load"])
 def test_attitude_runs(controlled: str) -> None:
     gentle = AttitudeRun(controlled, 0.0, radians(10.0), 1.2)

@@ -134,3 +134,24 @@ def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_ca
     assert told[0].startswith("gcs: only what the vehicle sends by itself is captured, without truth: ")
     assert NO_KEY in told[0]
     assert list(read_tlog(log))
+
+
+def test_a_flight_by_a_running_vehicle_asks_for_its_key_and_not_for_another_truth_port(
+    live, monkeypatch, tmp_path
+):
+    vehicle, port = live
+    signs(vehicle, KEY, timestamp_of(unix_us()))
+    vehicle.on_command_long = lambda message: None
+    home = mavlink.MAVLink_home_position_message(
+        473977420, 85455940, 0, 0, 0, 0, [1.0, 0.0, 0.0, 0.0], 0, 0, 0
+    )
+    beat = vehicle.heartbeat
+    vehicle.heartbeat = lambda: (beat(), vehicle.send(home))  # a vehicle sends its home by itself
+    monkeypatch.setattr("gcs.clients.command.RETRY_US", 10_000)
+    out = tmp_path / "flight"
+    words = ["fly", "square", "--connect", port, "--out", str(out)]
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
+    assert result.stderr.splitlines()[-1].startswith(f"gcs: square: not flown: {NO_KEY}name the file")
+    assert "--truth" not in result.stderr
+    assert not out.exists()

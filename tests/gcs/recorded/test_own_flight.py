@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from gcs.closed_loop import Conditions, fly
 from gcs.commands.options import display_name
 from gcs.errors import EXIT_USAGE
 from gcs.recorded.column_map import load_map
+from gcs.recorded.estimates import filter_rows, filtered_estimates
 from gcs.recorded.identification import (
     Identified,
     identify_load,
@@ -26,6 +28,8 @@ from gcs.recorded.identification import (
 )
 from gcs.recorded.motion import motion_of
 from gcs.recorded.recording import read_recording
+from gcs.recorded.scoring import score_ahead
+from gcs.shell import display as display_module
 from gcs.workflows.recorded import name_of
 from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff
@@ -110,6 +114,30 @@ def test_the_load_is_known_from_the_vehicle_alone(flown: Path, tmp_path: Path) -
     error = np.linalg.norm(table[:, 1:4] - table[:, 6:9], axis=1)
     assert np.median(error) == pytest.approx(alone["median_m"], abs=2e-6)
     assert (tmp_path / "replay" / "load.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_long_replay_tells_what_it_is_doing(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock_s = count(0.0, 20.0)  # by which every line is due
+    monkeypatch.setattr(display_module.time, "monotonic", lambda: next(clock_s))
+    asked = ["replay", str(flown), "--out", str(tmp_path / "replay")]
+    lines = CliRunner().invoke(gcs, asked, prog_name="gcs").stderr.splitlines()
+    assert lines[0] == "gcs: estimating the load"
+    assert lines[-1] == "gcs: writing table and picture"
+    assert len(lines) > 10
+    assert all(line.startswith("gcs: predicting the load: ") for line in lines[1:-1])
+
+
+def test_of_many_rows_a_second_not_every_fifteenth_begins_a_prediction(flown: Path) -> None:
+    """125 rows/s: predictions that begin 0.1 s apart took a minute more for half an hour of flight."""
+    columns = load_map("telemetry")
+    motion = motion_of(read_recording(flown, columns), columns)
+    model = columns.load_model(load_vehicle("bebop").cable_length_m)
+    rows = filter_rows(motion, model)
+    estimates = filtered_estimates(rows, model, load=True, tilt=True)
+    score = score_ahead(motion, rows, model, estimates)[0]
+    assert np.diff(rows.time_s[score.rows]) == pytest.approx(0.5, abs=0.02)  # two rows
 
 
 @pytest.mark.parametrize(("hold_s", "says"), [(1.0, "at least 20 s are needed"), (60.0, "moves too little")])

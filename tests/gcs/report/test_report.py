@@ -192,6 +192,22 @@ def test_figures_say_of_which_part_of_the_flight_they_are(page, built):
     assert "given up" not in text
 
 
+def test_figures_of_a_lost_flight_say_that_they_end_with_the_loss(built, tmp_path):
+    out, record, _ = built
+    table = printed({**record, "outcome": "diverged"})
+    meta = replace(META, outcome="diverged", reason="the load fell")
+    lost = build_report(out / "flight.tlog", tmp_path, meta)
+    parser = Page()
+    parser.feed((tmp_path / "report.html").read_text(encoding="utf-8"))
+    text = " ".join(parser.text)
+    for group in ("Load position error", "Vehicle and cable", "Rotors"):
+        assert re.search(rf"{group} .*\n *until the flight was lost", table)
+        assert re.search(rf"{group}\s+until the flight was lost", text)
+    for label in ("greatest load error", "RMS load error"):
+        assert f"{label} until the loss" in text
+    assert lost["load_error_max_m"] == record["load_error_max_m"]
+
+
 def test_groups_in_which_nothing_happened_are_left_out(page, built):
     for text in (" ".join(page.text), printed(built[1])):
         for group, metrics in GROUPS:
