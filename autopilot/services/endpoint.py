@@ -735,6 +735,7 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,
             m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,
             m.MAVLINK_MSG_ID_MANUAL_CONTROL: guided.receive_stick,
+            m.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: guided.receive_channels,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
             m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,

@@ -25,6 +25,8 @@ _RATE_BITS = 0x7  # of an attitude setpoint: about forward, right, down
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis does not exist
+_NOT_OVERRIDDEN = (0, 65535)  # of a channel: given back, ignored
+_PULSE_CENTRE_US, _PULSE_RANGE_US, _PULSE_MARGIN_US = 1500, 500, 200
 
 _BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
 _LOCAL_FRAMES = (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_OFFSET_NED, *_BODY_FRAMES)
@@ -160,6 +162,22 @@ def read_stick(m: Any) -> FollowStick | Verdict:
     return FollowStick((axes[0], -axes[1], vertical), -axes[2])
 
 
+def read_channels(m: Any) -> FollowStick | Verdict | None:
+    """RC_CHANNELS_OVERRIDE as ArduPilot assigns it: 1 roll, 2 pitch (low: forward), 3 throttle, 4 yaw; None:
+    none of them is overridden.
+
+    1000 ... 2000 us, centred at 1500; a channel that is not overridden is centred.
+    """
+    pulses = (m.chan1_raw, m.chan2_raw, m.chan3_raw, m.chan4_raw)
+    if all(pulse in _NOT_OVERRIDDEN for pulse in pulses):
+        return None
+    offsets_us = [0 if pulse in _NOT_OVERRIDDEN else pulse - _PULSE_CENTRE_US for pulse in pulses]
+    if max(map(abs, offsets_us)) > _PULSE_RANGE_US + _PULSE_MARGIN_US:
+        return _refused("RC_CHANNELS_OVERRIDE refused: channels 1 ... 4 must be 800 ... 2200 us, or 0")
+    right, back, up, clockwise = (max(-1.0, min(1.0, offset / _PULSE_RANGE_US)) for offset in offsets_us)
+    return FollowStick((-back, -right, up), -clockwise)
+
+
 def _refused(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_DENIED, text)
 
@@ -189,6 +207,11 @@ class GuidedService:
         if message.target not in (0, self._system):
             return []
         return self._handle_request(read_stick(message), now_us, decide)
+
+    def receive_channels(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """RC_CHANNELS_OVERRIDE."""
+        request = read_channels(message)
+        return [] if request is None else self._handle_request(request, now_us, decide)
 
     def _handle_request(
         self, request: SetpointRequest | Verdict, now_us: int, decide: Decide

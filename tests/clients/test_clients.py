@@ -332,20 +332,31 @@ def _ask_for_home_and_the_fence(program: Mavproxy) -> None:
         program.insist(f"fence {command}", said)
 
 
+def _ahead_m(stage: Stage) -> float:
+    """How far along the nose the load is."""
+    east, north, _ = stage.witness.load[-1][1]
+    return east * math.sin(stage.witness.yaw) + north * math.cos(stage.witness.yaw)
+
+
 def _push_forward(stage: Stage, program: Mavproxy) -> None:
     """Repeat `velocity`, as often as setpoints must come, until the load has followed along the nose."""
-
-    def ahead_m() -> float:
-        east, north, _ = stage.witness.load[-1][1]
-        return east * math.sin(stage.witness.yaw) + north * math.cos(stage.witness.yaw)
-
-    begin_m = ahead_m()
+    begin_m = _ahead_m(stage)
 
     def moved() -> bool:
         program.type("velocity 0.4 0 0")
-        return ahead_m() > begin_m + 0.4
+        return _ahead_m(stage) > begin_m + 0.4
 
     stage.wait_until(moved)
+
+
+def _pull_back(stage: Stage, program: Mavproxy) -> None:
+    """Hold the stick back with `rc`, which repeats the channels, until the load has followed; let it go."""
+    begin_m = _ahead_m(stage)
+    program.type("rc set override_hz 50")
+    program.type("rc 2 1800")
+    program.insist("mode POSHOLD", "POSHOLD>")
+    stage.wait_until(lambda: _ahead_m(stage) < begin_m - 0.4)
+    program.type("rc clear")
 
 
 def acknowledged(program: Mavproxy, command: int) -> list[int]:
@@ -423,6 +434,8 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     program.insist("mode LOITER", "LOITER>")
     program.insist("mode GUIDED", "GUIDED>")
     _push_forward(stage, program)
+    _pull_back(stage, program)
+    program.insist("mode GUIDED", "GUIDED>")
     program.type("guided 47.397745 8.545594 1.5")
     program.insist("mode RTL", "RTL>")
     program.expect(DISARMED)

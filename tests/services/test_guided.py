@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.services.guided import WARNING_INTERVAL_US, read_attitude, read_global, read_local, read_stick
+from autopilot.services.guided import (
+    WARNING_INTERVAL_US,
+    read_attitude,
+    read_channels,
+    read_global,
+    read_local,
+    read_stick,
+)
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     ChangeAltitude,
@@ -195,6 +202,33 @@ def test_the_stick():
     assert isinstance(centred, FollowStick)
     assert same(centred.velocity_share, (0.0, 0.0, 0.0))
     assert isinstance(read_stick(m.MAVLink_manual_control_message(1, 2000, 0, 500, 0, 0)), Verdict)
+
+
+def channels(roll=0, pitch=0, throttle=0, yaw=0, other=0):
+    return m.MAVLink_rc_channels_override_message(1, 1, roll, pitch, throttle, yaw, other, 0, 0, 0)
+
+
+def test_overridden_channels_are_the_same_stick():
+    flown = read_channels(channels(roll=1750, pitch=1300, throttle=1600, yaw=1450))
+    assert isinstance(flown, FollowStick)
+    assert same((*flown.velocity_share, flown.yaw_rate), (0.4, -0.5, 0.2, 0.1))
+    for centred in (0, 65535, 1500):
+        forward = read_channels(channels(roll=centred, pitch=900, throttle=centred, yaw=centred))
+        assert isinstance(forward, FollowStick)
+        assert same((*forward.velocity_share, forward.yaw_rate), (1.0, 0.0, 0.0, 0.0))
+
+
+def test_channels_that_are_given_back_ask_for_nothing(rig):
+    for other in (0, 1800):
+        rig.send(channels(other=other))
+    assert rig.asked == []
+    rig.send(channels(throttle=1500))
+    assert [type(asked) for asked in rig.asked] == [FollowStick]
+
+
+def test_a_pulse_of_no_receiver_is_refused():
+    assert isinstance(read_channels(channels(pitch=2201)), Verdict)
+    assert isinstance(read_channels(channels(pitch=100)), Verdict)
 
 
 def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):

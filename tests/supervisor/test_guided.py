@@ -165,9 +165,13 @@ def test_commands_take_over(request_: Any, phase: Phase) -> None:
 
 def test_the_stick_leads_and_is_lost() -> None:
     sky = Sky().airborne()
-    assert sky.ask(POSCTL) == Verdict(LATER, "POSCTL denied: no MANUAL_CONTROL received")
+    assert sky.ask(POSCTL) == Verdict(
+        LATER, "POSCTL denied: no stick; send MANUAL_CONTROL or RC_CHANNELS_OVERRIDE"
+    )
     poshold = SetMode(identity.POSCTL, 0, 16, "POSHOLD")
-    assert sky.ask(poshold) == Verdict(LATER, "POSHOLD denied: no MANUAL_CONTROL received")
+    assert sky.ask(poshold) == Verdict(
+        LATER, "POSHOLD denied: no stick; send MANUAL_CONTROL or RC_CHANNELS_OVERRIDE"
+    )
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 0.1)
     assert sky.ask(POSCTL).result == ACCEPTED
     assert reported_mode(sky.flight) == (identity.POSCTL, 0)

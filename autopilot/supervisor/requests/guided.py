@@ -52,7 +52,9 @@ def position_control(flight: Flight, request: SetMode, view: View, settings: Set
     """POSCTL, which is POSHOLD to ArduPilot's clients: follow the stick."""
     name = request.name or "POSCTL"
     if not flight.setpoints.manual.is_fresh(view.now_us, settings.setpoints.manual_loss_us):
-        return flight, temporarily_denied(f"{name} denied: no MANUAL_CONTROL received")
+        return flight, temporarily_denied(
+            f"{name} denied: no stick; send MANUAL_CONTROL or RC_CHANNELS_OVERRIDE"
+        )
     if flight.phase in ON_GROUND:
         return flight, temporarily_denied(f"{name} denied: take off first")
     return start_guided(flight, SetpointSource.MANUAL, name, view, settings)
