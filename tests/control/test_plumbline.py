@@ -999,6 +999,13 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     assert observed.ground_force == pytest.approx(vehicle.quad_mass * vehicle.gravity - 1.0, rel=1e-3)
     assert law.vehicle_on_ground(observed, vehicle)
     assert observed.load_ground_height == state.x_load[2]
+    # one that leans is carried by a gust
+    for lean, stands in ((math.radians(9.0), True), (math.radians(11.0), False)):
+        carried = observed
+        for _ in range(50):
+            leaning = rest._replace(R=model.rodrigues([0.0, lean, 0.0]))
+            carried = law.observe(carried, leaning, 0.0, 1.0, ZERO, constants, BEBOP_DRAG, vehicle)
+        assert law.vehicle_on_ground(carried, vehicle) == stands
     storm = law.nominal_on_ground(vehicle)._replace(ground_force=-9.0)
     blown = rest._replace(a_quad=(30.0, 0.0, 0.0))
     for _ in range(50):

@@ -443,6 +443,22 @@ def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
     assert max(jet[0][2] for _, _, jet in sky.setpoints) < 0.02 + 1.35 * SETTINGS.cable_length_m
 
 
+def test_a_gust_may_hide_the_pull_of_a_load_without_a_tracker() -> None:
+    """The pull alone shows that its cable is taut: the setpoint rises for 2 s more."""
+
+    def highest(tracked: bool) -> float:
+        sky = Sky()
+        sky.ask(Arm(True, False))
+        sky.ask(TakeoffRequest(2.0))
+        never = sky.obey
+        sky.obey = lambda: never()._replace(taut=False, load_tracked=tracked)
+        sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+        return max(jet[0][2] for _, _, jet in sky.setpoints)
+
+    rise = 2.0 * SETTINGS.motion.taut_speed_m_s
+    assert highest(tracked=False) - highest(tracked=True) == pytest.approx(rise, abs=0.01)
+
+
 def test_a_load_that_hangs_on_a_shorter_cable_than_is_believed_ends_the_climb() -> None:
     """The load swings out from under the vehicle, which would keep moving to stay above it."""
     sky = Sky()

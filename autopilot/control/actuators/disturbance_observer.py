@@ -61,6 +61,9 @@ _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _ON_GROUND_SHARE = 0.2
 _CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
+_STANDING_COSINE = (
+    0.985  # of 10 deg: a vehicle that leans more does not stand; a gust may carry it as the ground does
+)
 # s, time constant that smooths the estimator's wind on the load: the commanded direction of the cable jumps
 # with this wind, and a reading corrects it by more than the wind has changed
 _AIR_TIME = 0.15
@@ -266,7 +269,8 @@ def observe(
     residual = sub(scale(vehicle.quad_mass, specific_force), known)
     shape = constants.shape
     shape_drag = drag_force(state.v_quad, shape)
-    ground_force += constants.contact * ((0.0 if taut > 0.0 else residual[2]) - ground_force)
+    may_stand = not taut > 0.0 and state.R[2][2] > _STANDING_COSINE
+    ground_force += constants.contact * ((residual[2] if may_stand else 0.0) - ground_force)
     if taut > 0.0:
         axis = column(state.R, 2)
         tension = cable_force(residual, q, axis)

@@ -29,6 +29,7 @@ LATE_FACTOR = 2.0  # factor of the time in which the setpoint rises from the loa
 # The vehicle's setpoint rises above the cable's length by this share of it, and at least by this share of the
 # lead at which the law pulls with the load's weight: then the cable must have come taut.
 STRETCH_SHARE, LEAD_SHARE = 0.3, 1.3
+HIDDEN_S = 2.0  # where the pull decides, the setpoint rises on for this time, as gusts may hide the pull
 
 
 def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResult:
@@ -55,6 +56,8 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
             return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
         return WatchResult(_moved_over_load(flight, view, creep, at, over))
     last_height = last_setpoint_height(creep, settings) + HEIGHT_SIGMAS * view.height_std
+    if not view.load_tracked:
+        last_height += HIDDEN_S * creep.velocity[2]
     if flight.condition_since_us < 0 and at[2] > last_height:
         text = "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
