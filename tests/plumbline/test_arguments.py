@@ -66,6 +66,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sweep out": (lambda v: plumbline.sweep("hover", out=v), NO_PATH),
     "connect": (plumbline.connect, (None, 15999, "", "x", *NO_TEXT)),
     "connect timeout": (lambda v: plumbline.connect("15999", timeout_s=v), (None, 0, *NO_NUMBER)),
+    "connect sysid": (lambda v: plumbline.connect("15999", sysid=v), (0, 256, 1.5, "x")),
     "connect key": (lambda v: plumbline.connect("15999", signing_key=v), (3, "x", b"x", [1])),
     "mission name": (lambda v: Mission(v, STEPS), (None, "", " ", "x\ny", "x\n", *NO_TEXT)),
     "mission steps": (lambda v: Mission("a", v), (None, [], [3], *NO_LIST)),
