@@ -33,7 +33,7 @@ from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import warm_up
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.entry import entry_point_of
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import ZERO, Vec3, norm
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
@@ -82,7 +82,7 @@ from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import read_battery_status
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
@@ -107,6 +107,7 @@ RATE_TICKS = 1  # ticks in which the tick rate is determined
 # ticks in a row in the past or far ahead, after which the clock is assumed to have changed
 CLOCK_CHANGE_TICKS = 3
 _SIMULATOR = "simulator"  # source of a reason that prevents arming
+HOME_TOLERANCE_M = 1.0  # between the homes of simulator and autopilot: digits may have been left out
 MIN_THRUST_SHARE = 0.3  # share of the vehicle's weight: rotors commanded to less did not carry it
 
 
@@ -203,6 +204,15 @@ def _listed(numbers: Sequence[int]) -> str:
     """The first of the numbers, for a text."""
     more = " ..." if len(numbers) > MAX_LISTED_ITEMS else ""
     return ", ".join(map(str, numbers[:MAX_LISTED_ITEMS])) + more
+
+
+def home_problems(origin: Any, home: Home) -> tuple[str, ...]:
+    """Why the vehicle must not be armed, from the GPS_GLOBAL_ORIGIN of the simulator's world and our own home;
+    empty: no reason. With different homes a receiver places the vehicle where it is not."""
+    distance_m = norm(enu_from_geodetic(origin.latitude, origin.longitude, origin.altitude, home))
+    if distance_m <= HOME_TOLERANCE_M:
+        return ()
+    return (f"the home of sitl is {distance_m:.0f} m from that of autopilot: give both the same --home",)
 
 
 class Onboard:
@@ -505,6 +515,9 @@ class Onboard:
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
             self._set_arming_problems("clock", self._punctuality.arming_problems(message, self.tick))
+            return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN:
+            self._set_arming_problems("home", home_problems(message, self._options.home))
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT:
             self.endpoint.simulator_boot = message
