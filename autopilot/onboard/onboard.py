@@ -41,7 +41,14 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, PacketLoss
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
-from autopilot.onboard.snapshot import UNARMED, CoreSnapshot, MeasuredBattery, Options, SnapshotSource
+from autopilot.onboard.snapshot import (
+    UNARMED,
+    CoreSnapshot,
+    MeasuredBattery,
+    Options,
+    SnapshotSource,
+    sensor_bits,
+)
 from autopilot.onboard.tick_answer import answer_tick
 from autopilot.onboard.tick_batch import NO_TIMESYNC_REQUESTS, BatchBuilder, TickBatch, TimesyncRequests
 from autopilot.onboard.warmup import warm_up_answer, warm_up_telemetry
@@ -66,6 +73,7 @@ from autopilot.services.requests import (
     MOTION_REQUESTS,
     ChangeSigningKey,
     ChangeVehicle,
+    InjectFailure,
     Reboot,
     ResetParameters,
     SetHome,
@@ -207,8 +215,8 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def home_problems(origin: Any, home: Home) -> tuple[str, ...]:
-    """Why the vehicle must not be armed, from the GPS_GLOBAL_ORIGIN of the simulator's world and our own home;
-    empty: no reason. With different homes a receiver places the vehicle where it is not."""
+    """Why the vehicle must not be armed, from the simulator's GPS_GLOBAL_ORIGIN and our own home; empty: no
+    reason. With different homes a receiver places the vehicle where it is not."""
     distance_m = norm(enu_from_geodetic(origin.latitude, origin.longitude, origin.altitude, home))
     if distance_m <= HOME_TOLERANCE_M:
         return ()
@@ -726,6 +734,8 @@ class Onboard:
                 text = f"{request.parameter} not set while armed: disarm first"
                 return Verdict(mavlink.MAV_RESULT_DENIED, text)
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, InjectFailure):
+            return self._decide_failure(request)
         if isinstance(request, ResetParameters):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
@@ -746,6 +756,17 @@ class Onboard:
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._update_home()
         return verdict
+
+    def _decide_failure(self, failure: InjectFailure) -> Verdict:
+        """A sensor of which no reading has ever come cannot fail."""
+        snapshot = self._snapshot()
+        carried, _ = sensor_bits(snapshot.condition, snapshot.estimator, False, False, self.now_us)
+        if failure.fail and failure.sensor & ~carried:
+            return Verdict(
+                mavlink.MAV_RESULT_UNSUPPORTED,
+                "Failure: no such sensor is carried, nothing was ever received from it (sitl --sensors)",
+            )
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED)
 
     def _update_home(self) -> None:
         """Read and prepare the mission again if it returns to a home that has changed. A mission under way
