@@ -560,6 +560,12 @@ class Onboard:
 
     # ---- flight log
 
+    def set_wall_clock(self, unix_us: int) -> None:
+        """Set the time of the wall clock, for what must be in order across flights."""
+        self.endpoint.set_wall_clock(unix_us)
+        if self._log is not None:
+            self._log.set_wall_clock(unix_us)
+
     def take_log(self, min_bytes: int = 1) -> LogChunk | None:
         """The part of the flight log to be stored, if it has `min_bytes` or the log has ended."""
         self.has_log_data = False

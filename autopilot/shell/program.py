@@ -251,7 +251,7 @@ class Program:
             send(self._socket, answer)
         else:
             send(self._socket, answer)
-            self.onboard.endpoint.set_wall_clock(self._clock.unix_us())
+            self.onboard.set_wall_clock(self._clock.unix_us())
             self._send_wall_clock_heartbeat()
             self._ground.exchange(self.onboard, self._store_events, stop)
         onboard = self.onboard
