@@ -179,6 +179,7 @@ def test_a_return_over_the_fence_is_refused_at_upload_and_at_start(home: Vec3, w
         ((Takeoff(0.02), Land()), "item 0: load height 0.02 m, min 0.3 m"),
         ((Takeoff(2.0), Waypoint(1.0, 0.0, 0.29), Land()), "item 1: load height 0.29 m, min 0.3 m"),
         ((Takeoff(0.3), Waypoint(1.0, 0.0, 0.3), Land()), ""),
+        ((Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 0.2), Land()), ""),  # of the vehicle, without the load
     ],
 )
 def test_no_item_leads_lower_than_another_request_may(steps: tuple[Step, ...], problem: str) -> None:
