@@ -768,10 +768,7 @@ class Onboard:
         snapshot = self._snapshot()
         carried, _ = sensor_bits(snapshot.condition, snapshot.estimator, False, False, self.now_us)
         if failure.fail and failure.sensor & ~carried:
-            return Verdict(
-                mavlink.MAV_RESULT_UNSUPPORTED,
-                "Failure: no such sensor is carried, nothing was ever received from it (sitl --sensors)",
-            )
+            return Verdict(mavlink.MAV_RESULT_UNSUPPORTED, "Failure: no such sensor is carried")
         return Verdict(mavlink.MAV_RESULT_ACCEPTED)
 
     def _update_home(self) -> None:
