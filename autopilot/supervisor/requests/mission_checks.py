@@ -146,9 +146,11 @@ def _points_along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
 def height_problem(ahead: RemainingSteps) -> str:
     """Which item carries the load lower than any other request may; an empty string if none does."""
     for seq, entry in ahead:
-        is_carried = isinstance(entry.step, Takeoff | Waypoint) and not entry.before.released
-        if is_carried and entry.step.altitude_m < MIN_ALTITUDE_M:
-            return f"item {seq}: load height {entry.step.altitude_m:.2f} m, min {MIN_ALTITUDE_M} m"
+        step = entry.step
+        if entry.before.released or not isinstance(step, Takeoff | Waypoint):
+            continue
+        if step.altitude_m < MIN_ALTITUDE_M:
+            return f"item {seq}: load height {step.altitude_m:.2f} m, min {MIN_ALTITUDE_M} m"
     return ""
 
 
