@@ -22,6 +22,11 @@ def expected_flight_s(mission: Mission, table: ParameterTable) -> float:
     )
 
 
+def limit_text(limit_s: float) -> str:
+    """A time limit as displayed: a short one with its decimals."""
+    return f"{limit_s:.0f} s" if limit_s >= 10.0 else f"{limit_s:g} s"
+
+
 def time_limit_s(expected_s: float, limit_s: float | None = None) -> float:
     """The longest time (s) that a flight may take: `limit_s` if it is given."""
     return expected_s * TIME_FACTOR + TIME_MARGIN_S if limit_s is None else limit_s

@@ -13,6 +13,8 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+from platformdirs import user_cache_path
+
 from autopilot.own.source import file_being_loaded
 from gcs.errors import GcsError
 from missions.nearest import did_you_mean
@@ -21,8 +23,10 @@ from missions.writing import is_truth_value
 P = ParamSpec("P")
 R = TypeVar("R")
 
+INPUTS = user_cache_path("plumbline") / "inputs"  # the files of what is made in Python
 _MAX_SHOWN_CHARS = 80  # characters of a value
 _PHRASES = (  # phrases of the command line, and their equivalents in Python
+    (rf"(?<=flown by vehicle ){re.escape(str(INPUTS))}[/\\]\w+[/\\]([\w-]+)\.toml", r"\1"),
     (r"(?<=another folder) by --out\b", ""),
     (r"add --fresh to", "give fresh=True to"),
     (r"--force tries:;?", "force=True tries:"),

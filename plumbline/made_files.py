@@ -14,10 +14,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Protocol
 
-from platformdirs import user_cache_path
-
 from gcs.errors import GcsError
-from plumbline.arguments import name_or_file, shown_value
+from plumbline.arguments import INPUTS, name_or_file, shown_value
 
 
 class Savable(Protocol):
@@ -38,12 +36,11 @@ def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
             f"{argument} = {shown_value(given)}; must be a name, the path of a file, or a plumbline.{kind}"
         )
     name = getattr(given, "name", "") or argument
-    folder = user_cache_path("plumbline") / "inputs"
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+    INPUTS.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=INPUTS) as temporary:
         file = Path(temporary) / "new"
         given.save(file)
-        cached = folder / hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+        cached = INPUTS / hashlib.sha256(file.read_bytes()).hexdigest()[:16]
         cached.mkdir(exist_ok=True)
         path = cached / (re.sub(r"[^\w-]", "-", name)[:64] + ".toml")
         file.replace(path)  # atomic, even if another process does the same at this moment

@@ -25,6 +25,7 @@ from autopilot.wire.convert.battery import BatteryReading, battery_status_messag
 from autopilot.wire.convert.flight import wind_state_message
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import padded_forces, read_hil_actuator_controls
+from autopilot.wire.convert.telemetry import gps_global_origin_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.periods import next_multiple
@@ -231,7 +232,8 @@ class HilSimulator:
         """Send SIM_BOOT, the number of this run of the world, with the sensors of this tick and the next."""
         if not self._announcing_boot:
             self._announcing_boot = True
-            self._sensors = self._sensor_writer.frame(self._boot()) + self._sensors
+            frames = map(self._sensor_writer.frame, self._identity())
+            self._sensors = b"".join(frames) + self._sensors
 
     def receive(self, datagram: bytes) -> bool:
         """Take the command out of a datagram; True if the present tick is answered now.
@@ -417,7 +419,7 @@ class HilSimulator:
         messages = self.parameters.pop_messages()
         if self._announcing_boot or core.now_us % _BOOT_PERIOD_US == 0:
             self._announcing_boot = False
-            messages.append(self._boot())
+            messages += self._identity()
         if core.truth.drive.battery > 0.0 and core.now_us % _BATTERY_PERIOD_US == 0:
             messages.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # for the autopilot: how punctual the run is
@@ -475,6 +477,12 @@ class HilSimulator:
         if status_due:
             messages.append(self._status())
         return messages
+
+    def _identity(self) -> list[Any]:
+        """SIM_BOOT and, if a receiver measures positions on the earth, GPS_GLOBAL_ORIGIN."""
+        if self._profile.gnss is None:
+            return [self._boot()]
+        return [self._boot(), gps_global_origin_message(self.core.now_us, self._home)]
 
     def _boot(self) -> Any:
         """SIM_BOOT: which run of the world this is, and the state that an autopilot finds that starts now."""

@@ -24,6 +24,7 @@ from autopilot.control.drag import Drag
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.records import Cable, State, Vehicle
 from autopilot.core.estimator_slot import EstimatorSlot
+from autopilot.core.start_problem import start_problem
 from autopilot.core.tick import (
     NO_COMMAND,
     STOPPED,
@@ -223,6 +224,8 @@ class FlightCore:
             estimator, silent_s = self.estimator, summary.inertial_age
             oldest_s = self.settings.failsafe.sensor_age_limit_s
             problems = estimate_problems(estimator, oldest_s, carries_load, silent_s)
+            if summary.vehicle_problem == NO_POSE and (reason := start_problem(estimator)):
+                problems = (reason,)
             loss_text = estimate_loss(estimator, silent_s)
         slot = self._estimator_slot
         if slot is not None and not slot.fault and not slot.host.has_estimate:

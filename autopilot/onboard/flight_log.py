@@ -7,8 +7,9 @@ axes FRD, units SI, as in PX4. The log contains what the autopilot knows, not th
 
 from __future__ import annotations
 
+import re
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ TAIL_US = 1_000_000  # for which the log continues after disarming
 SLOW_PERIOD_US = 1_000_000  # between two records of the slow topics
 MAX_WAITING_BYTES = 4 * 2**20  # bytes that the shell has not taken; beyond that, records are dropped
 MAX_EARLY_TEXTS = 20  # texts sent before arming with which the log begins
+_NAME = re.compile(rf"(\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d)(?:_(\d+))?{re.escape(LOG_SUFFIX)}")
 _FLOAT32_MAX = 3.4028234663852886e38
 
 
@@ -54,6 +56,7 @@ class FlightLog:
         self._table = table
         self._release = release
         self._boot_unix_us = boot_unix_us
+        self._wall_clock_us: int | None = None
         self._writer = UlogWriter(topic for topic, _ in (*FAST, *SLOW))
         self._records = SampleRecords(self._writer, home)
         self._next_us = 0  # when there is something to do, unless one of these two changes:
@@ -76,6 +79,10 @@ class FlightLog:
     def path(self) -> Path | None:
         """The log that is being written."""
         return self._path
+
+    def set_wall_clock(self, unix_us: int) -> None:
+        """Set the time of the wall clock, by which the next log is named if the vehicle's clock differs."""
+        self._wall_clock_us = unix_us
 
     def add_text(self, now_us: int, severity: int, text: str) -> None:
         """Record a text that was sent to the operators."""
@@ -175,7 +182,8 @@ class FlightLog:
         return LogChunk(self._path, data, False)
 
     def _begin(self, now_us: int, used_names: set[str]) -> None:
-        self._path = (*LOG_FOLDER, _unused_name(self._boot_unix_us + now_us, used_names))
+        unix_us = self._boot_unix_us + now_us if self._wall_clock_us is None else self._wall_clock_us
+        self._path = (*LOG_FOLDER, _next_name(unix_us, used_names))
         self._due_us = self._slow_us = now_us
         self._disarmed_us = self._dropped_us = -1
         table = self._table
@@ -232,14 +240,12 @@ class FlightLog:
         self._waiting += len(data)
 
 
-def _unused_name(unix_us: int, used_names: set[str]) -> str:
-    """The UTC time as an unused file name."""
-    name = stem = _utc(unix_us // 1_000_000)
-    count = 0
-    while name + LOG_SUFFIX in used_names:
-        count += 1
-        name = f"{stem}_{count:03}"
-    return name + LOG_SUFFIX
+def _next_name(unix_us: int, used_names: Iterable[str]) -> str:
+    """The UTC time as a file name that is sorted behind those of all earlier logs, whatever the clock was."""
+    earlier = [match.groups(default="0") for match in map(_NAME.fullmatch, used_names) if match]
+    following = [(stem, int(count) + 1) for stem, count in earlier]
+    stem, count = max([(_utc(unix_us // 1_000_000), 0), *following])
+    return f"{stem}_{count:03}{LOG_SUFFIX}" if count else f"{stem}{LOG_SUFFIX}"
 
 
 def _utc(unix_s: int) -> str:

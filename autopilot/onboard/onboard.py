@@ -33,7 +33,7 @@ from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import warm_up
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.entry import entry_point_of
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import ZERO, Vec3, norm
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
@@ -41,7 +41,14 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, PacketLoss
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
-from autopilot.onboard.snapshot import UNARMED, CoreSnapshot, MeasuredBattery, Options, SnapshotSource
+from autopilot.onboard.snapshot import (
+    UNARMED,
+    CoreSnapshot,
+    MeasuredBattery,
+    Options,
+    SnapshotSource,
+    sensor_bits,
+)
 from autopilot.onboard.tick_answer import answer_tick
 from autopilot.onboard.tick_batch import NO_TIMESYNC_REQUESTS, BatchBuilder, TickBatch, TimesyncRequests
 from autopilot.onboard.warmup import warm_up_answer, warm_up_telemetry
@@ -66,6 +73,7 @@ from autopilot.services.requests import (
     MOTION_REQUESTS,
     ChangeSigningKey,
     ChangeVehicle,
+    InjectFailure,
     Reboot,
     ResetParameters,
     SetHome,
@@ -82,7 +90,7 @@ from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import read_battery_status
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
@@ -107,6 +115,7 @@ RATE_TICKS = 1  # ticks in which the tick rate is determined
 # ticks in a row in the past or far ahead, after which the clock is assumed to have changed
 CLOCK_CHANGE_TICKS = 3
 _SIMULATOR = "simulator"  # source of a reason that prevents arming
+HOME_TOLERANCE_M = 1.0  # between the homes of simulator and autopilot: digits may have been left out
 MIN_THRUST_SHARE = 0.3  # share of the vehicle's weight: rotors commanded to less did not carry it
 
 
@@ -203,6 +212,15 @@ def _listed(numbers: Sequence[int]) -> str:
     """The first of the numbers, for a text."""
     more = " ..." if len(numbers) > MAX_LISTED_ITEMS else ""
     return ", ".join(map(str, numbers[:MAX_LISTED_ITEMS])) + more
+
+
+def home_problems(origin: Any, home: Home) -> tuple[str, ...]:
+    """Why the vehicle must not be armed, from the simulator's GPS_GLOBAL_ORIGIN and our own home; empty: no
+    reason. With different homes a receiver places the vehicle where it is not."""
+    distance_m = norm(enu_from_geodetic(origin.latitude, origin.longitude, origin.altitude, home))
+    if distance_m <= HOME_TOLERANCE_M:
+        return ()
+    return (f"the home of sitl is {distance_m:.0f} m from that of autopilot: give both the same --home",)
 
 
 class Onboard:
@@ -506,6 +524,9 @@ class Onboard:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
             self._set_arming_problems("clock", self._punctuality.arming_problems(message, self.tick))
             return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN:
+            self._set_arming_problems("home", home_problems(message, self._options.home))
+            return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT:
             self.endpoint.simulator_boot = message
             if self._boot_id is None:
@@ -538,6 +559,12 @@ class Onboard:
             self.core.resume_flight(RestartState(thrust_n, boot.reeled, bool(boot.released)), self.now_us)
 
     # ---- flight log
+
+    def set_wall_clock(self, unix_us: int) -> None:
+        """Set the time of the wall clock, for what must be in order across flights."""
+        self.endpoint.set_wall_clock(unix_us)
+        if self._log is not None:
+            self._log.set_wall_clock(unix_us)
 
     def take_log(self, min_bytes: int = 1) -> LogChunk | None:
         """The part of the flight log to be stored, if it has `min_bytes` or the log has ended."""
@@ -713,6 +740,8 @@ class Onboard:
                 text = f"{request.parameter} not set while armed: disarm first"
                 return Verdict(mavlink.MAV_RESULT_DENIED, text)
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, InjectFailure):
+            return self._decide_failure(request)
         if isinstance(request, ResetParameters):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
@@ -733,6 +762,14 @@ class Onboard:
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._update_home()
         return verdict
+
+    def _decide_failure(self, failure: InjectFailure) -> Verdict:
+        """A sensor of which no reading has ever come cannot fail."""
+        snapshot = self._snapshot()
+        carried, _ = sensor_bits(snapshot.condition, snapshot.estimator, False, False, self.now_us)
+        if failure.fail and failure.sensor & ~carried:
+            return Verdict(mavlink.MAV_RESULT_UNSUPPORTED, "Failure: no such sensor is carried")
+        return Verdict(mavlink.MAV_RESULT_ACCEPTED)
 
     def _update_home(self) -> None:
         """Read and prepare the mission again if it returns to a home that has changed. A mission under way

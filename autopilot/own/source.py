@@ -61,7 +61,8 @@ def find_class(
         problem = (
             f"has {', '.join(one.__name__ for one in suitable)}; name one" if suitable else f"has no {role}"
         )
-        raise OwnError(f"{label}: {problem}, as {label}:{suitable[0].__name__ if suitable else 'MyLaw'}")
+        example = suitable[0].__name__ if suitable else _example_names(role)[1]
+        raise OwnError(f"{label}: {problem}, as {label}:{example}")
     found = getattr(module, name, None)
     if not isinstance(found, type):
         classes = [
@@ -70,6 +71,12 @@ def find_class(
         known = f"; there is {', '.join(classes)}" if classes else ""
         raise OwnError(f"{label}: has no class {name}{known}")
     return found
+
+
+def _example_names(role: str) -> tuple[str, str]:
+    """Names of a file and of a class in it, for messages about a kind of class."""
+    word = role.rpartition(" ")[2]
+    return f"my_{word}.py", f"My{word.capitalize()}"
 
 
 def _module_from_file(location: str) -> ModuleType:
@@ -137,7 +144,8 @@ def _class_from_entry_point(name: str, group: str, role: str, shipped: Sequence[
         file_name = f"{name}.py"
         hint = f"did you mean {file_name}? " if Path(file_name).is_file() else other_kind_hint(name, role)
         hint = hint or did_you_mean(name, (*shipped, *points))
-        raise OwnError(f"{name!r}: no {role} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
+        example = ":".join(_example_names(role))
+        raise OwnError(f"{name!r}: no {role} of that name; {hint}must be {known}a file as {example}")
     try:
         found = points[name].load()
     except BaseException as error:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
+from autopilot.services import snapshot
 from autopilot.services.identity import SUPPORTED_MODES, Flavour, Identity, Mode
 from autopilot.services.records import Announce, Decide, Output, Peer, RefusalCleared, Send, SendText, Verdict
 from autopilot.services.requests import (
@@ -455,21 +456,22 @@ def _enable_fence(call: Call, context: Context) -> Request | Verdict:
     return EnableFence(call.p[0] == 1.0)
 
 
-# bits of SIM_SENS_FAIL; gyroscope and accelerometer are one unit, motion capture is sent as visual odometry
-_SENSOR_FAILURE_BITS: dict[int | None, int] = {
-    mavlink.FAILURE_UNIT_SENSOR_GYRO: 1,
-    mavlink.FAILURE_UNIT_SENSOR_ACCEL: 1,
-    mavlink.FAILURE_UNIT_SENSOR_MAG: 64,
-    mavlink.FAILURE_UNIT_SENSOR_BARO: 32,
-    mavlink.FAILURE_UNIT_SENSOR_GPS: 16,
-    mavlink.FAILURE_UNIT_SENSOR_VIO: 2,
+# bit of SIM_SENS_FAIL, and of SYS_STATUS; gyroscope and accelerometer are one unit, motion capture is sent as
+# visual odometry
+_FAILING_SENSORS: dict[int | None, tuple[int, int]] = {
+    mavlink.FAILURE_UNIT_SENSOR_GYRO: (1, snapshot.GYRO),
+    mavlink.FAILURE_UNIT_SENSOR_ACCEL: (1, snapshot.ACCEL),
+    mavlink.FAILURE_UNIT_SENSOR_MAG: (64, snapshot.MAG),
+    mavlink.FAILURE_UNIT_SENSOR_BARO: (32, snapshot.BARO),
+    mavlink.FAILURE_UNIT_SENSOR_GPS: (16, snapshot.GPS),
+    mavlink.FAILURE_UNIT_SENSOR_VIO: (2, snapshot.TRACKER),
 }
 
 
 def _inject_failure(call: Call, context: Context) -> Request | Verdict:
     unit, kind, instance = _as_integer(call.p[0]), _as_integer(call.p[1]), _as_integer(call.p[2])
     motor = unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR
-    if not motor and unit not in _SENSOR_FAILURE_BITS:
+    if not motor and unit not in _FAILING_SENSORS:
         return Verdict(
             UNSUPPORTED,
             (
@@ -488,10 +490,10 @@ def _inject_failure(call: Call, context: Context) -> Request | Verdict:
                 f"Failure: rotor (param3) = {call.p[2]:g}; must be 1 ... {context.rotors}, or 0 for all"
             )
         every = (1 << context.rotors) - 1
-        return InjectFailure("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), fail)
+        return InjectFailure("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), 0, fail)
     if instance not in (0, 1):
         return _refused(f"Failure: instance (param3) = {call.p[2]:g}; must be 1, or 0 for all: there is one")
-    return InjectFailure("SIM_SENS_FAIL", _SENSOR_FAILURE_BITS[unit], fail)
+    return InjectFailure("SIM_SENS_FAIL", *_FAILING_SENSORS[unit], fail=fail)
 
 
 def _fixed_request(request: Request) -> Parser:

@@ -611,11 +611,14 @@ class VehicleEndpoint:
                     if save and self._parameters.table.remote_names:
                         self._consequences.append(self._parameters.simulator_values())
                     return _ACCEPTED
-                case InjectFailure(parameter, bits, fail):
-                    outcome = self._parameters.inject_failure(parameter, bits, fail)
-                    if isinstance(outcome, str):
-                        return Verdict(mavlink.MAV_RESULT_DENIED, f"Failure: {outcome}")
-                    self._consequences.append(outcome)
+                case InjectFailure(parameter, bits, _, fail):
+                    problem = self._parameters.failure_problem(parameter)
+                    if problem:
+                        return Verdict(mavlink.MAV_RESULT_DENIED, f"Failure: {problem}")
+                    verdict = decide(request)
+                    if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+                        return verdict
+                    self._consequences.append(self._parameters.inject_failure(parameter, bits, fail))
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(

@@ -33,6 +33,7 @@ ARDUPILOT_GUIDED = 4  # ArduPilot's mode for take-off, "go there" and setpoints
 # PX4's main modes and the sub-modes of AUTO
 MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED = 1, 2, 3, 4, 5, 6, 7
 AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = 2, 3, 4, 5, 6
+AUTO_FOLLOW = 8
 
 _AUTOMATIC = 4  # MAV_MODE_PROPERTY_AUTO_MODE
 
@@ -197,6 +198,7 @@ PX4 = Flavour(
         _px4(AUTO, AUTO_MISSION, "MISSION"),
         _px4(AUTO, AUTO_RTL, "RTL"),
         _px4(AUTO, AUTO_LAND, "LAND"),
+        _px4(AUTO, AUTO_FOLLOW, "FOLLOWME"),
         _px4(ACRO, 0, "ACRO"),
         _px4(OFFBOARD, 0, "OFFBOARD"),
         _px4(STABILIZED, 0, "STABILIZED"),
@@ -224,6 +226,7 @@ ARDUPILOT = Flavour(
         _ardupilot(1, "ACRO", ACRO),
         _ardupilot(2, "ALT_HOLD", ALTCTL),
         _ardupilot(16, "POSHOLD", POSCTL),
+        _ardupilot(23, "FOLLOW", AUTO, AUTO_FOLLOW),
     ),
     takeoff_above_home=True,
     capabilities=_CAPABILITIES | _ENCODE_CAST,

@@ -151,15 +151,17 @@ class ParameterService:
             text += f"; {unchangeable} are fixed while running"
         return [*outputs, SendText(mavlink.MAV_SEVERITY_NOTICE, text)]
 
-    def inject_failure(self, name: str, bits: int, fail: bool) -> SimulatorParameterRequested | str:
-        """Make the parts behind these bits of a simulator's parameter fail or work; a text if it cannot.
+    def failure_problem(self, name: str) -> str:
+        """Why this parameter of the simulator cannot make anything fail; empty if it can."""
+        if name not in self.table.remote_names:
+            return f"the simulator has told of no {name}"
+        return "the simulator is silent" if self.simulator_silent else ""
+
+    def inject_failure(self, name: str, bits: int, fail: bool) -> SimulatorParameterRequested:
+        """Make the parts behind these bits of a simulator's parameter fail or work.
 
         The value is in our table immediately, so that commands in quick succession add up.
         """
-        if name not in self.table.remote_names:
-            return f"the simulator has told of no {name}"
-        if self.simulator_silent:
-            return "the simulator is silent"
         before = int(self.table[name])
         return SimulatorParameterRequested(
             name, self.table.set(name, before | bits if fail else before & ~bits)

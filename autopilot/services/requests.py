@@ -45,10 +45,14 @@ class EnableFence:
 
 @dataclass(frozen=True, slots=True)
 class InjectFailure:
-    """Make parts of the simulated vehicle fail or work again: `bits` of the simulator's parameter."""
+    """Make parts of the simulated vehicle fail or work again: `bits` of the simulator's parameter.
+
+    `sensor` is the bit of SYS_STATUS of a sensor, 0 of rotors.
+    """
 
     parameter: str
     bits: int
+    sensor: int
     fail: bool
 
 

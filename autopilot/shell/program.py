@@ -6,7 +6,7 @@ import gc
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -251,7 +251,7 @@ class Program:
             send(self._socket, answer)
         else:
             send(self._socket, answer)
-            self.onboard.endpoint.set_wall_clock(self._clock.unix_us())
+            self.onboard.set_wall_clock(self._clock.unix_us())
             self._send_wall_clock_heartbeat()
             self._ground.exchange(self.onboard, self._store_events, stop)
         onboard = self.onboard
@@ -356,6 +356,15 @@ def _store_signing_key(store: Storage, key: bytes) -> None:
 def _address_or_none(text: str) -> Address | None:
     """PORT, HOST:PORT or `none`."""
     return None if text == "none" else address_option(text)
+
+
+def links_text(stations: Sequence[Address], programs: Sequence[Address], tcp: Address | None) -> str:
+    """Where ground stations and programs can connect, for the terminal."""
+    kinds = (("ground stations at UDP", stations), ("API clients at UDP", programs))
+    told = [f"{kind} {', '.join(map(address_text, addresses))}" for kind, addresses in kinds if addresses]
+    sends = [f"sends to {' and '.join(told)}"] if told else []
+    listens = [f"listens on TCP {address_text(tcp)}"] if tcp else []
+    return ", ".join(sends + listens) or "no link to a ground station"
 
 
 @click.command("autopilot", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -488,7 +497,8 @@ def main(
         own = OwnCode(own_law_reference(law or DEFAULT_LAW), estimator, planner)
         table = parameters_for(load_belief(vehicle), own, ignored=[name.upper() for name in ignore])
         check_names(settings, table.names)
-        store = Storage(storage or user_state_path("plumbline"))
+        folder = storage or user_state_path("plumbline")
+        store = Storage(folder)
         if not lockstep:
             worker.fork()
         store.lock()
@@ -524,9 +534,11 @@ def main(
         storage_worker = StorageWorker(threaded=not lockstep)
         ground: GroundStations | LockstepGroundStation
         if ground_lockstep:
+            stations, programs, tcp = (ground_lockstep,), (), None
             ground = LockstepGroundStation(ground_lockstep)
         else:
             ground = GroundStations(stations, programs, listen(tcp) if tcp else None, storage_worker)
+        notify(f"{links_text(stations, programs, tcp)}; storage {folder}")
         program = Program(build, mission, store, storage_worker, sim, ground, worker, notify)
         areas, unreadable = store.load_areas(origin)
         program.restore_areas(areas)

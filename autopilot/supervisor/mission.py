@@ -132,7 +132,7 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
     if isinstance(leg, SwingDamping):
         legs, here = stopping_legs(flight, view, settings)
         return _with_legs(flight, (*legs, Hold(here, SETTLE_S)), view), Report()
-    reached = (plan.sequence[number],)
+    reached = (plan.sequence[number],) if _ends_item(plan, number, after) else ()
     flight = with_current_step(flight, number + 1 if after is None else after, done=flight.mission.done)
     if next_step is None:
         event, text = Event.DONE, "Mission complete, holding"
@@ -142,6 +142,15 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
         return transition(rewound, event, view, settings), Report(((INFO, text),), reached)
     flight = with_step_heading_aims(flight, view, settings)
     return _next_step(flight, leg, next_step, view, settings), Report((), reached)
+
+
+def _ends_item(plan: MissionPlan, step: int, following: int | None) -> bool:
+    """Whether the item of a step is flown: the step that follows is of another item, or a jump leads back to
+    the first step of this one."""
+    item = plan.sequence[step]
+    if following is None or plan.sequence[following] != item:
+        return True
+    return plan.steps[following] == plan.steps[plan.sequence.index(item)]
 
 
 def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings: Settings) -> Flight:

@@ -460,6 +460,8 @@ def _advice(entry: TimelineEntry, time: float) -> str:
     step = entry.step
     if isinstance(step, AttitudeRun):
         return "lower the tilt or lengthen duration_s"
+    if isinstance(step, Takeoff | Land):
+        return "lower load_mass_kg or raise rotor_max_n, or lower MIS_ACCEL in [parameters] of the vehicle"
     if not isinstance(step, Signals):
         return "lower speed_m_s or the acceleration of transfers"
     accel = evaluate(signal_table(step.terms), time)[2]

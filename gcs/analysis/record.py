@@ -34,6 +34,8 @@ class FlightMeta:
     wall_s: float | None = None  # wall time over which the log was recorded
     command: str | None = None  # command line that repeats the flight
     version: str | None = None  # of Plumbline
+    # name and hash of the file of each custom class: law, estimator, planner
+    sources: dict[str, str] = field(default_factory=dict)
     settings: dict[str, float | str] = field(default_factory=dict)  # parameters that were changed
 
     def to_json(self) -> Record:

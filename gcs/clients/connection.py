@@ -25,6 +25,7 @@ class Connection:
         self.target: Target | None = None
         self.junk_bytes = 0
         self._link_timeout_us = link_timeout_us
+        self._system: int | None = None  # system id of the vehicle; None: not known yet
         self._writer = FrameWriter(*GROUND)
         self._next_heartbeat_us: int | None = None
         self._last_received_us: int | None = None
@@ -34,19 +35,24 @@ class Connection:
         self.signatures = Signatures(signing)
         self._sign = signing.signer(0)
 
+    def accept_only(self, system: int | None) -> None:
+        """Wait for the vehicle with this system id; None: for the first one that is heard."""
+        self._system = system
+
     def receive(self, datagram: bytes, now_us: int) -> list[Received]:
         """The vehicle's messages in `datagram`; all other contents are dropped."""
         received, junk = messages(datagram)
         self.junk_bytes += junk
         accepted = []
         for one in received:
-            if self.target is not None and one.system != self.target.system:
+            if self._system is not None and one.system != self._system:
                 continue
             if not self.signatures.accepts(one):
                 continue
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):
                 if self.target is None:
                     self.target = Target(one.system, one.component)
+                    self._system = one.system
                 if self.target == (one.system, one.component):
                     self._last_received_us = now_us
             if self.target is not None:

@@ -33,7 +33,7 @@ from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
-from gcs.expected_flight import time_limit_s
+from gcs.expected_flight import limit_text, time_limit_s
 from gcs.mission_items import in_mission_terms
 from missions.model import Mission
 
@@ -381,7 +381,8 @@ class FlightClient:
             return True
         if now_us - self._flight_start_us > self._limit_s * 1e6:
             where = f"still in phase {view.phase_name or 'unknown'}, item {self._item()}"
-            self._end(Outcome("timeout", f"not landed after {self._limit_s:.0f} s of flight: {where}"))
+            limit = limit_text(self._limit_s)
+            self._end(Outcome("timeout", f"not landed after {limit} of flight: {where}"))
             return True
         return False
 

@@ -23,6 +23,7 @@ from gcs.commands.options import (
     print_json,
     require_options,
     sensors_option,
+    sysid_option,
     time_limit_option,
     truth_option,
     vehicle_option,
@@ -101,6 +102,7 @@ _STARTED_ONLY = (
     flag_value=str(DEFAULT_PORT),
     help="Fly a vehicle that is already running, at PORT or HOST:PORT (14550 without a value).",
 )
+@sysid_option
 @truth_option
 @time_limit_option
 @click.option("--force", is_flag=True, help="Fly the mission even if it exceeds the limits of the vehicle.")
@@ -173,6 +175,8 @@ def fly_command(
 
     elif truth_at is not None:
         raise click.UsageError("--truth is that of a running simulator: add --connect", ctx)
+    elif ctx.get_parameter_source("sysid") is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--sysid is that of a running vehicle: add --connect", ctx)
 
     program = None
     if firmware is not None:

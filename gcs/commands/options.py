@@ -21,6 +21,7 @@ from missions.units import split_unit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_SYSTEM = "gcs.sysid"  # where --sysid is kept until the address is read
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
@@ -56,7 +57,8 @@ class AddressType(click.ParamType):  # type: ignore[type-arg]
             return value
         try:
             key = ctx.find_root().params.get("signing_key") if ctx else None
-            return replace(parse_address(value), signing_key=key)
+            system = ctx.meta.get(_SYSTEM) if ctx else None
+            return replace(parse_address(value), signing_key=key, system=system)
         except AddressError as error:
             self.fail(str(error), param, ctx)
 
@@ -152,8 +154,24 @@ class SettingType(click.ParamType):  # type: ignore[type-arg]
         return f"{name.strip().upper()}={number.strip()}"
 
 
+def sysid_option(function: F) -> F:
+    """--sysid of every command that communicates with one running vehicle; it becomes part of the address."""
+
+    def keep(ctx: click.Context, _: click.Parameter, system: int | None) -> None:
+        ctx.meta[_SYSTEM] = system
+
+    return click.option(
+        "--sysid",
+        type=WholeNumber(1, 255),
+        is_eager=True,  # before the address
+        expose_value=False,
+        callback=keep,
+        help="MAVLink system id of the vehicle, if several send to one port.  [default: the first one heard]",
+    )(function)
+
+
 def connect_option(function: F) -> F:
-    """--connect of every command that communicates with a running vehicle."""
+    """--connect and --sysid of every command that communicates with a running vehicle."""
     return click.option(
         "--connect",
         "address",
@@ -161,7 +179,7 @@ def connect_option(function: F) -> F:
         default=str(DEFAULT_PORT),
         show_default=True,
         help="Connection to the vehicle: PORT or HOST:PORT to listen there, udpout:HOST:PORT to send first.",
-    )(function)
+    )(sysid_option(function))
 
 
 def truth_option(function: F) -> F:

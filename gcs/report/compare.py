@@ -35,6 +35,7 @@ _CONDITIONS = (
     "vehicle",
     "seed",
 )  # keys of the record that state how it was flown
+_FILES = {f"{kind} file": kind for kind in ("law", "estimator", "planner")}  # rows: `FlightMeta.sources`
 _MACHINE_DEPENDENT = {"wall_s", "real_time_factor"}  # depend on the machine, not on the flight: no best
 STAR = "*: the best of the completed flights, and what is within 1 % of it."
 DEFAULT = "default"  # shown for an unchanged parameter whose default is not known, as with a custom law
@@ -111,6 +112,8 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
     rows: dict[str, list[str]] = {
         name: [_displayed(run.record[name]) for run in runs] for name in _CONDITIONS
     }
+    for name, kind in _FILES.items():
+        rows[name] = [_displayed(run.meta.sources.get(kind)) for run in runs]
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
     given = {name for run in runs for name in run.meta.settings}
     names = sorted(set().union(*settings), key=lambda name: (name not in given, name))
@@ -198,6 +201,8 @@ def _label_part(name: str, value: str, unchanged: bool) -> str:
     """A difference as part of a label; empty if the value is unchanged or unknown."""
     if unchanged or value == UNKNOWN:
         return ""
+    if name in _FILES:
+        return value
     if name in _CONDITIONS and name != "seed":
         return value.rsplit("/", 1)[-1]  # of a file, its name without the folder
     return f"{name} {value}" if name in ("seed", "version") else f"{name}={value}"

@@ -32,6 +32,7 @@ class Address:
     host: str
     port: int
     listen: bool = True
+    system: int | None = None  # id of the vehicle among several; None: the one that is heard first
     signing_key: bytes | None = field(default=None, repr=False)  # key with which messages are signed
 
     def __str__(self) -> str:

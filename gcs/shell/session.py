@@ -43,6 +43,7 @@ class Session:
         self._truth: TruthLink | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection(link_timeout_us)
+        self._connection.accept_only(address.system)
         if address.signing_key is not None:
             self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
         self._socket = VehicleSocket(address)
@@ -89,6 +90,12 @@ class Session:
             if signatures.problem:
                 raise NoVehicleError(
                     f"no vehicle with a valid signature on UDP {self.address}: {signatures.problem}"
+                )
+            if self.address.system is not None and self._socket.other_systems:
+                heard = ", ".join(map(str, self._socket.other_systems))
+                raise NoVehicleError(
+                    f"no vehicle with system id {self.address.system} heard on UDP {self.address} within "
+                    f"{self._find_s:g} s; heard there: {heard} (MAV_SYS_ID of the autopilot)"
                 )
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(

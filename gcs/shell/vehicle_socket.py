@@ -16,8 +16,8 @@ Sender = tuple[str, int]
 
 
 class VehicleSocket:
-    """Receives from the vehicle whose heartbeat arrives first, and from senders that are no vehicles; sends
-    to the vehicle."""
+    """Receives from the vehicle that the address names, else from the one whose heartbeat arrives first, and
+    from senders that are no vehicles; sends to the vehicle."""
 
     def __init__(self, address: Address) -> None:
         self._address = address
@@ -36,6 +36,11 @@ class VehicleSocket:
         """Whether a datagram has arrived and was not read yet."""
         return self._socket.has_datagram
 
+    @property
+    def other_systems(self) -> list[int]:
+        """System ids of the vehicles that are ignored, in order."""
+        return sorted(set(self._others.values()))
+
     def send(self, datagram: bytes) -> None:
         """Send to the vehicle; before there is one, to the last sender."""
         self._socket.send(datagram)
@@ -52,6 +57,9 @@ class VehicleSocket:
             self._report_others()
             return True
         system, autopilot = _system_ids(datagram)
+        if self._address.system is not None and autopilot not in (None, self._address.system):
+            self._others[sender] = autopilot
+            return False
         if self._vehicle is not None and now_us - self._last_received_us < REPLACEMENT_US:
             if autopilot is not None:
                 self._others[sender] = autopilot
@@ -69,14 +77,16 @@ class VehicleSocket:
 
     def _report_others(self) -> None:
         """Print once for each that it is another vehicle, now that the first one is still sending."""
+        if self._address.system is not None:  # they are ignored on purpose
+            return
         for sender, system in self._others.items():
             if sender not in self._reported:
                 self._reported.add(sender)
                 other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
                 notify(
                     f"another vehicle (system {system}) speaks on UDP {self._address} from {other} and is "
-                    f"not heard, nor does it hear what is said to {ours}; give each a port of its own: "
-                    "autopilot --gcs"
+                    f"not heard, nor does it hear what is said to {ours}; choose with --sysid, or give each "
+                    "a port of its own: autopilot --gcs"
                 )
 
     def close(self) -> None:

@@ -31,6 +31,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
+from gcs.expected_flight import limit_text
 from gcs.mission_items import in_mission_terms
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
@@ -283,8 +284,8 @@ class SweepFlight:
             self._end_landed()
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.cell.limit_us:
             where: str = flight.phase.name.lower()
-            limit_s = self.cell.limit_us * 1e-6
-            self._end("timeout", f"not landed after {limit_s:.0f} s of flight: still in phase {where}", where)
+            limit = limit_text(self.cell.limit_us * 1e-6)
+            self._end("timeout", f"not landed after {limit} of flight: still in phase {where}", where)
 
     def _end_landed(self) -> None:
         """End the flight of a vehicle that was disarmed, with outcome and reason as in `gcs fly`."""

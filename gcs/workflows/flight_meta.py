@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,16 @@ if TYPE_CHECKING:
 
 def _law_name(options: FlightOptions) -> str:
     return law_name(options.law) if options.firmware is None else options.firmware.kind
+
+
+def _sources(options: FlightOptions) -> dict[str, str]:
+    """Name and hash of the file of each custom class, by its kind: `my_law.py 1f0a3b9c`."""
+    files = {loaded.role.lower(): loaded.path for loaded in options.own.load_classes()}
+    return {
+        role: f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
+        for role, path in files.items()
+        if path is not None and path.is_file()
+    }
 
 
 def meta_of(
@@ -42,5 +53,6 @@ def meta_of(
         wall_s=wall_s,
         command=options.command_line(),
         version=version("plumbline"),
+        sources=_sources(options) if own else {},
         settings=dict(map(parse_setting, options.settings)),
     )

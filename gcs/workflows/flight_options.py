@@ -57,6 +57,7 @@ class FlightOptions:
         words = ["gcs fly", self.mission]
         if self.connect is not None:
             words += ["--connect", str(self.connect)]
+            words += ["--sysid", str(self.connect.system)] if self.connect.system is not None else []
             return " ".join([*words, "--truth", str(self.truth_at)] if self.truth_at else words)
         if self.firmware is None:
             words += ["--law", self.law, *own_part_options(self.estimator, self.planner)]

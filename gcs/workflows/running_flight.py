@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from autopilot.wire.convert.geodesy import Home
@@ -48,6 +49,7 @@ def fly_running(
             if session.unanswered_reason:  # it would not answer anything else either
                 raise NoVehicleError(f"{mission.name}: not flown: {session.unanswered_reason}")
             client = flight_client(mission, options, vehicle_home(session))
+            same_vehicle = replace(address, system=session.target.system)
             world = session.view.latest.get("SIM_BOOT")
         if truth.missing:
             notify(f"the report will not contain the simulator's truth: {truth.missing}")
@@ -56,7 +58,7 @@ def fly_running(
                 "the vehicle released its load before: it flies the mission without it, and the figures of "
                 "the load remain empty; a restart of sitl and autopilot gives the load back"
             )
-        _fly(client, mission, options, address, truth, log, stop, watch, page)
+        _fly(client, mission, options, same_vehicle, truth, log, stop, watch, page)
         return client, truth.missing
 
 
@@ -73,6 +75,7 @@ def _fly(
 ) -> None:
     if address.signing_key is not None:
         client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
+    client.connection.accept_only(address.system)
     vehicle = VehicleSocket(address)
     try:
         with FlightDisplay(mission.name, options.quiet) as display:

@@ -289,6 +289,56 @@ def test_a_sensor_that_is_lost_leads_to_a_soft_landing(sensors: str, failed: int
     assert craft.texts[-1] == "Landed, disarmed"
 
 
+@pytest.mark.parametrize(
+    ("sensors", "failed", "text"),
+    [
+        ("lab", POSE, "no vehicle pose from a tracker"),
+        ("rtk", RECEIVER, "no position from the receiver"),
+        ("rtk", MAGNETOMETER, "no reading of the magnetometer"),
+        ("rtk", INERTIAL | RECEIVER, "no reading of the inertial unit"),
+    ],
+)
+def test_a_sensor_that_never_worked_is_named_before_arming(sensors: str, failed: int, text: str) -> None:
+    craft = Craft(sensors=sensors, SIM_SENS_FAIL=failed)
+    craft.wait(3.0)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert "".join(craft.texts) == f"Arming denied: {text}"
+
+
+GYROSCOPE, MAGNETIC, PRESSURE, GNSS, VISION = (
+    mavlink.FAILURE_UNIT_SENSOR_GYRO,
+    mavlink.FAILURE_UNIT_SENSOR_MAG,
+    mavlink.FAILURE_UNIT_SENSOR_BARO,
+    mavlink.FAILURE_UNIT_SENSOR_GPS,
+    mavlink.FAILURE_UNIT_SENSOR_VIO,
+)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "carried", "missing"),
+    [
+        ("lab", (GYROSCOPE, VISION), (MAGNETIC, PRESSURE, GNSS)),
+        ("rtk", (MAGNETIC, PRESSURE, GNSS), (VISION,)),
+    ],
+)
+def test_a_sensor_that_is_not_carried_does_not_fail(
+    sensors: str, carried: tuple[int, ...], missing: tuple[int, ...]
+) -> None:
+    """The fix that is made from a tracked pose does not hide it."""
+    craft = Craft(sensors=sensors)
+    craft.wait(3.0)
+    off, ok = mavlink.FAILURE_TYPE_OFF, mavlink.FAILURE_TYPE_OK
+    for unit in missing:
+        result = craft.command(mavlink.MAV_CMD_INJECT_FAILURE, unit, off, 0)
+        assert result == mavlink.MAV_RESULT_UNSUPPORTED
+        assert "no such sensor is carried" in "".join(craft.texts)
+        assert craft.command(mavlink.MAV_CMD_INJECT_FAILURE, unit, ok, 0) == ACCEPTED
+    assert craft.onboard.parameters["SIM_SENS_FAIL"] == 0
+    for unit in carried:
+        assert craft.command(mavlink.MAV_CMD_INJECT_FAILURE, unit, off, 0) == ACCEPTED
+    assert craft.onboard.parameters["SIM_SENS_FAIL"] > 0
+
+
 def hide_load(craft: Craft, seconds: float) -> float:
     """Hide the load from its tracker; return the greatest error of its estimated position meanwhile, m."""
     set_parameter(craft, "SIM_SENS_FAIL", LOAD)

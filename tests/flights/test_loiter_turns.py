@@ -9,7 +9,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.items import WireItem, located_steps
+from autopilot.wire.items import WireItem
 from tests.doubles.craft import Craft
 from tests.doubles.sky import SETTINGS
 
@@ -23,7 +23,7 @@ def test_turns() -> None:
     )
     mission = StoredMission(items)
     assert not mission_plan(mission, Home(), SETTINGS.limits).prepared.refusal
-    craft = Craft(*(located.step for located in located_steps(items, Home())))
+    craft = Craft(*items)
     craft.begin()
     widest = 0.0
 
@@ -37,3 +37,6 @@ def test_turns() -> None:
     # measured 1.503 m and 2 mm
     assert 1.48 < widest < 1.53
     assert math.hypot(craft.truth.x_load[0], craft.truth.x_load[1]) < 0.03
+    craft.tick()
+    reached = [message.seq for message in craft.heard if message.get_type() == "MISSION_ITEM_REACHED"]
+    assert reached == [0, 1, 2], "when the turns are flown, not where they begin"

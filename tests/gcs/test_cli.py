@@ -156,6 +156,8 @@ def test_version():
         (["param", "set", "NGC_KX", "x"], "must be a finite number"),
         (["param", "get"], "NAMES"),
         (["status", "--connect", "99999"], "1 ... 65535"),
+        (["status", "--sysid", "0"], "1<=x<=255"),
+        (["fly", "hover", "--sysid", "2"], "--sysid is that of a running vehicle: add --connect"),
         (["capture", "--duration", "0"], "--duration"),
     ],
 )
@@ -365,6 +367,16 @@ def test_single_commands(live):
     assert (mode.param1, mode.param2, mode.param3) == (129.0, 4.0, 3.0)
     assert run("disarm", "--connect", port).exit_code == EXIT_DONE
     assert not vehicle.armed
+
+
+def test_a_vehicle_is_chosen_by_its_system_id(live, monkeypatch):
+    vehicle, port = live
+    assert run("arm", "--sysid", "1", "--connect", port).stdout == "arm: accepted\n"
+    monkeypatch.setattr(session_module, "FIND_S", 1.5)  # its heartbeat comes once a second
+    line = one_line(run("disarm", "--connect", port, "--sysid", "3"), EXIT_ERROR)
+    assert "no vehicle with system id 3 heard on UDP" in line
+    assert "heard there: 1" in line
+    assert vehicle.armed
 
 
 @pytest.mark.parametrize("words", [["resume"], ["mode", "auto"], ["mode", "takeoff"], ["start"]])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import click
 
 from gcs.cli import gcs
+from gcs.shell.link import parse_address
 from gcs.workflows.flight_options import FlightOptions
 
 ASKED = FlightOptions(
@@ -28,6 +29,11 @@ ASKED = FlightOptions(
 )
 
 IGNORING = replace(ASKED, ignored=("MY_GAIN", "MY_OFFSET"))
+
+
+def test_the_command_names_the_vehicle_that_was_chosen() -> None:
+    options = replace(ASKED, connect=replace(parse_address("14540"), system=2))
+    assert options.command_line() == "gcs fly hover --connect 127.0.0.1:14540 --sysid 2"
 
 
 def test_the_recorded_command_gives_the_options_back() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from gcs.expected_flight import limit_text
 from gcs.workflows.expected import duration_text, expected_s, remaining_s
 
 COSTS = [26.0, 10.0, 8.0, 3.0]
@@ -44,3 +45,8 @@ def test_a_fast_machine_is_not_promised_to_stay_fast():
 )
 def test_in_words(seconds, words):
     assert duration_text(seconds) == words
+
+
+@pytest.mark.parametrize(("seconds", "words"), [(0.1, "0.1 s"), (2.5, "2.5 s"), (119.04, "119 s")])
+def test_a_time_limit_in_words(seconds, words):
+    assert limit_text(seconds) == words

@@ -147,6 +147,29 @@ def test_a_second_flight_gets_a_name_of_its_own() -> None:
     assert log.path == ("log", "2026-01-01_00-00-00_002.ulg")
 
 
+@pytest.mark.parametrize(
+    ("wall_s", "used", "name"),
+    [
+        (0, {"2026-01-01_00-00-00.ulg"}, "2026-01-01_00-00-00_001.ulg"),
+        (
+            60,
+            {"2026-01-01_00-00-00.ulg", "2027.ulg", "2027-02-02_00-00-00_mine.ulg"},
+            "2026-01-01_00-01-00.ulg",
+        ),
+        (60, {"2026-03-04_05-06-07.ulg"}, "2026-03-04_05-06-07_001.ulg"),  # by a clock that was ahead
+        (60, {"2026-03-04_05-06-07_001.ulg"}, "2026-03-04_05-06-07_002.ulg"),  # the first one was deleted
+    ],
+)
+def test_logs_are_in_the_order_of_their_names_whatever_the_clocks(
+    wall_s: int, used: set[str], name: str
+) -> None:
+    log = make_log()
+    log.set_wall_clock(BOOT_US + wall_s * 1_000_000)
+    with pytest.raises(AssertionError):  # due immediately
+        log.step(500_000_000, True, lambda: used, no_sample)
+    assert log.path == ("log", name)
+
+
 def test_a_log_that_cannot_be_stored_is_not_begun_again_in_the_same_flight(flown: Flown) -> None:
     log, begun_us = make_log(), []
     for now_us in range(0, 20_000_000, 100_000):

@@ -24,6 +24,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, ReturnHome, Step, Takeoff, Waypoint
+from sitl.hil import HilSimulator
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
 from tests.doubles.motion import TICK_S
 
@@ -279,6 +280,31 @@ def test_arming_waits_for_the_estimate_and_says_so() -> None:
     texts = [m.text for m in messages if m.get_type() == "STATUSTEXT"]
     assert texts == ["Arming denied: no vehicle pose from a tracker"]
     assert ACCEPTED == mavlink.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("north_m", "up_m", "text"),
+    [
+        (0.9, 0.0, ""),
+        (111.0, 0.0, "the home of sitl is 111 m from that of autopilot: give both the same --home"),
+        (0.0, 300.0, "the home of sitl is 300 m from that of autopilot: give both the same --home"),
+    ],
+)
+def test_a_simulator_with_another_home_is_named_as_the_cause(north_m: float, up_m: float, text: str) -> None:
+    craft = Craft(sensors="rtk")
+    home = Home(Home().latitude_deg + north_m / 111_319.5, Home().longitude_deg, up_m)
+    craft.simulator = HilSimulator.build(sensors="rtk", home=home)
+    craft.wait(5.0)
+    result = craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    assert result == (DENIED if text else ACCEPTED)
+    assert "".join(craft.texts) == (f"Arming denied: {text}" if text else "")
+
+
+def test_a_home_without_a_receiver_may_be_another_one() -> None:
+    craft = Craft()
+    craft.simulator = HilSimulator.build(home=Home(0.0, 0.0, 0.0))
+    craft.wait(2.0)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
 
 
 def test_a_reboot_is_handed_to_the_simulator_and_both_begin_anew() -> None:

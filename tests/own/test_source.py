@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from autopilot.own.estimator import load_estimator
 from autopilot.own.law import load_law
 from autopilot.own.own_code import OwnCode, parameters_for
+from autopilot.own.planner import load_planner
 from autopilot.own.source import OwnError
 from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
@@ -132,6 +136,19 @@ def test_what_cannot_be_found_is_told(reference: str) -> None:
         written(text)
     with pytest.raises(OwnError, match=told):
         load_law(reference)
+
+
+@pytest.mark.parametrize(
+    ("load", "example"),
+    [
+        (load_planner, "mine.py: has no planner, as mine.py:MyPlanner"),
+        (load_estimator, "mine.py:MyEstimator"),
+    ],
+)
+def test_the_example_is_of_the_kind_that_is_missing(load: Callable[[str], object], example: str) -> None:
+    written("x = 1")
+    with pytest.raises(OwnError, match=f"{re.escape(example)}$"):
+        load("mine.py")
 
 
 def test_a_module_that_would_end_the_program_is_told() -> None:

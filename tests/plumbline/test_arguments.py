@@ -66,6 +66,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sweep out": (lambda v: plumbline.sweep("hover", out=v), NO_PATH),
     "connect": (plumbline.connect, (None, 15999, "", "x", *NO_TEXT)),
     "connect timeout": (lambda v: plumbline.connect("15999", timeout_s=v), (None, 0, *NO_NUMBER)),
+    "connect sysid": (lambda v: plumbline.connect("15999", sysid=v), (0, 256, 1.5, "x")),
     "connect key": (lambda v: plumbline.connect("15999", signing_key=v), (3, "x", b"x", [1])),
     "mission name": (lambda v: Mission(v, STEPS), (None, "", " ", "x\ny", "x\n", *NO_TEXT)),
     "mission steps": (lambda v: Mission("a", v), (None, [], [3], *NO_LIST)),
@@ -170,6 +171,13 @@ def test_the_error_says_what_was_found_and_what_could_be(call: Callable[[], Any]
     assert says in str(told.value)
 
 
+def test_a_vehicle_made_in_python_is_called_by_its_name() -> None:
+    """Not by the file in the cache that the programs read."""
+    vehicle = Vehicle.load("bebop").replace(name="ju", gravity_m_s2=14.0)
+    with pytest.raises(plumbline.Error, match=r"^hover cannot be flown by vehicle ju; force=True tries:"):
+        plumbline.fly("hover", vehicle=vehicle)
+
+
 def test_names_of_parameters_may_be_in_small_letters() -> None:
     """As on the command line."""
     assert setting_arguments({"sim_wind_e": 3, "MIS_SPEED": 2}) == ("SIM_WIND_E=3.0", "MIS_SPEED=2.0")
@@ -178,5 +186,6 @@ def test_names_of_parameters_may_be_in_small_letters() -> None:
 
 
 def test_a_law_that_is_an_empty_name_is_told_what_could_be() -> None:
-    with pytest.raises(plumbline.Error, match=r"no planner of that name; must be a file as my_law\.py:MyLaw"):
+    example = r"no planner of that name; must be a file as my_planner\.py:MyPlanner"
+    with pytest.raises(plumbline.Error, match=example):
         plumbline.fly("hover", planner="")

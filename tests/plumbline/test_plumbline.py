@@ -179,7 +179,10 @@ def test_a_library_that_is_missing_is_named_before_anything_is_flown(
     [
         (lambda: plumbline.sweep("hover", law="lqr"), "sweep: no argument 'law'; did you mean laws? must be"),
         (lambda: plumbline.fly("hover", setings={}), "fly: no argument 'setings'; did you mean settings?"),
-        (lambda: plumbline.connect(timeout=3.0), "did you mean timeout_s? must be one of address, timeout_s"),
+        (
+            lambda: plumbline.connect(timeout=3.0),
+            "did you mean timeout_s? must be one of address, sysid, timeout_s",
+        ),
     ],
 )
 def test_an_argument_that_there_is_not_is_told_with_the_nearest(call: Callable[[], Any], says: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -111,3 +112,36 @@ def test_a_first_key_is_taken_from_the_air_where_that_is_allowed(
     craft.send(m.MAVLink_setup_signing_message(1, 1, list(KEY), 0))
     craft.wait(0.1)
     assert told in "".join(craft.texts)
+
+
+@pytest.mark.parametrize(
+    ("links", "text"),
+    [
+        (
+            ([("127.0.0.1", 14550), ("10.0.0.2", 14550)], [("127.0.0.1", 14540)], None),
+            "sends to ground stations at UDP 127.0.0.1:14550, 10.0.0.2:14550 "
+            "and API clients at UDP 127.0.0.1:14540",
+        ),
+        (
+            ([], [("127.0.0.1", 14540)], ("127.0.0.1", 5760)),
+            "sends to API clients at UDP 127.0.0.1:14540, listens on TCP 127.0.0.1:5760",
+        ),
+        (([], [], None), "no link to a ground station"),
+    ],
+)
+def test_where_a_ground_station_meets_it_is_told(links: Any, text: str) -> None:
+    assert program.links_text(*links) == text
+
+
+def test_links_and_storage_are_told_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Ended(program.Program):
+        def report_problems(self, troubles: list[str]) -> None:
+            raise Stop
+
+    monkeypatch.setattr(program, "Program", Ended)
+    interrupt = signal.getsignal(signal.SIGINT)
+    options = ["--storage", str(tmp_path), "--ground-lockstep", str(port := free_port())]
+    result = CliRunner().invoke(program.main, options)
+    signal.signal(signal.SIGINT, interrupt)
+    told = f"autopilot: sends to ground stations at UDP 127.0.0.1:{port}; storage {tmp_path}\n"
+    assert told in result.stdout

@@ -439,6 +439,14 @@ def test_which_run_it_is_is_told_at_first_each_second_and_to_who_comes(answerer,
     assert not boots(simulator, messages)
 
 
+def test_a_world_with_a_receiver_tells_where_on_earth_it_is(messages) -> None:
+    home = Home(47.4, -8.5, 480.0)
+    for sensors, told in (("rtk", [(474_000_000, -85_000_000, 480_000)]), ("lab", [])):
+        simulator = HilSimulator.build(sensors=sensors, home=home)
+        origins = [m for m in messages(simulator.sensor_datagram()) if m.get_type() == "GPS_GLOBAL_ORIGIN"]
+        assert [(m.latitude, m.longitude, m.altitude) for m in origins] == told
+
+
 def test_who_comes_is_told_what_the_rotors_do(answerer, messages) -> None:
     simulator, pilot = HilSimulator.build(lockstep=False), answerer((1.0, 1.5, 1.0, 1.5))
 

@@ -123,6 +123,18 @@ def test_steps_that_take_no_time_do_not_stop_the_clock() -> None:
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
 
 
+def test_an_item_of_several_steps_is_reached_with_its_last_one_each_time_it_is_flown() -> None:
+    """A circle: to its centre, then the turns; and the jump behind it leads back to it."""
+    sky = Sky(
+        Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Delay(1.0), Waypoint(1.0, 0.0, 2.0), Delay(1.0), model.Land()
+    )
+    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, sequence=(0, 1, 1, 1, 1, 2)))
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached == [0, 1, 1, 2]
+
+
 def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
     sky = Sky(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0))
     sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, repeat_from=1))

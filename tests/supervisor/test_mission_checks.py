@@ -173,6 +173,24 @@ def test_a_return_over_the_fence_is_refused_at_upload_and_at_start(home: Vec3, w
         assert (verdict.result, verdict.text or None) == (DENIED if why else ACCEPTED, text)
 
 
+@pytest.mark.parametrize(
+    ("steps", "problem"),
+    [
+        ((Takeoff(0.02), Land()), "item 0: load height 0.02 m, min 0.3 m"),
+        ((Takeoff(2.0), Waypoint(1.0, 0.0, 0.29), Land()), "item 1: load height 0.29 m, min 0.3 m"),
+        ((Takeoff(0.3), Waypoint(1.0, 0.0, 0.3), Land()), ""),
+        ((Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 0.2), Land()), ""),  # of the vehicle, without the load
+    ],
+)
+def test_no_item_leads_lower_than_another_request_may(steps: tuple[Step, ...], problem: str) -> None:
+    sky = Sky(*steps)
+    text = f"Mission denied: {problem}" if problem else None
+    assert (uploaded(sky, *steps) or None) == text
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    verdict = sky.ask(StartMission(None))  # of a mission that was stored before
+    assert (verdict.result, verdict.text or None) == (DENIED if problem else ACCEPTED, text)
+
+
 def test_a_return_among_the_steps_leads_home_past_a_nearer_rally_point() -> None:
     """As in flight: only a return by mode leads to a rally point."""
     sky = fenced(*AROUND, ReturnHome())

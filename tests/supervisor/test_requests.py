@@ -50,7 +50,7 @@ REQUESTS: list[Any] = [
     R.Arm(False, False),
     R.Arm(False, True),
     R.EnableFence(False),
-    R.InjectFailure("SIM_ENGINE_FAIL", 1, True),
+    R.InjectFailure("SIM_ENGINE_FAIL", 1, 0, True),
     R.Takeoff(None),
     R.Takeoff(3.0),
     R.Takeoff(0.1),

@@ -1,4 +1,4 @@
-"""Why a mission is refused before it is flown: the fence, a released load, the winch.
+"""Why a mission is refused before it is flown: the fence, a height, a released load, the winch.
 
 Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) from the present state.
 """
@@ -43,6 +43,7 @@ def mission_problem(flight: Flight, view: View, settings: Settings) -> str:
     ahead = remaining_timeline(flight, view, settings)
     return (
         fence_exit_problem(flight, ahead, settings)
+        or height_problem(ahead)
         or missing_load_problem(ahead)
         or winch_problem(ahead, settings)
     )
@@ -51,7 +52,8 @@ def mission_problem(flight: Flight, view: View, settings: Settings) -> str:
 def upload_problem(
     flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
 ) -> str:
-    """Which item of an uploaded mission leads beyond the fence, and why; an empty string if none does.
+    """Which item of an uploaded mission leads beyond the fence or too low, and why; an empty string if none
+    does.
 
     On the ground the mission begins where the load stands; in the air it may begin anywhere.
     """
@@ -59,7 +61,7 @@ def upload_problem(
     if flight.phase in ON_GROUND:
         start = _on_ground(flight, view, settings)
     ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
-    return fence_exit_problem(flight, ahead, settings)
+    return fence_exit_problem(flight, ahead, settings) or height_problem(ahead)
 
 
 def remaining_timeline(flight: Flight, view: View, settings: Settings) -> RemainingSteps:
@@ -139,6 +141,17 @@ def _points_along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
     displacement = sub(end, begin)
     pieces = min(max(1, math.ceil(norm(displacement) / CHECK_SPACING_M)), MAX_CHECK_POINTS)
     return (axpy((k + 1) / pieces, displacement, begin) for k in range(pieces))
+
+
+def height_problem(ahead: RemainingSteps) -> str:
+    """Which item carries the load lower than any other request may; an empty string if none does."""
+    for seq, entry in ahead:
+        step = entry.step
+        if entry.before.released or not isinstance(step, Takeoff | Waypoint):
+            continue
+        if step.altitude_m < MIN_ALTITUDE_M:
+            return f"item {seq}: load height {step.altitude_m:.2f} m, min {MIN_ALTITUDE_M} m"
+    return ""
 
 
 def missing_load_problem(ahead: RemainingSteps) -> str:

@@ -71,6 +71,19 @@ def test_the_load_and_other_ground_stations_are_not_the_vehicle(world):
     assert connection.target == TARGET
 
 
+def test_the_vehicle_that_is_chosen_is_taken_and_no_other(world):
+    connection = Connection()
+    connection.accept_only(TARGET.system + 1)
+    for datagram in world.vehicle.tick(1):
+        assert connection.receive(datagram, 1) == []
+    assert connection.target is None
+    other = FrameWriter(TARGET.system + 1, 1).frame(
+        mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 0, 3)
+    )
+    assert len(connection.receive(other, 2)) == 1
+    assert connection.target == (TARGET.system + 1, 1)
+
+
 def test_heartbeat_once_a_second_from_255_190(world):
     connection = Connection()
     sent = [now for now in range(0, 5_000_000, 20_000) for _ in connection.poll(now)]

@@ -87,6 +87,20 @@ def test_what_was_not_changed_is_the_number_that_was_told_or_that_of_the_default
     assert differences([captured, changed])[0].values == ("–", "3")
 
 
+def test_own_code_of_one_name_is_told_apart_by_its_file(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+    record = {**base.record, "law": "mine"}
+    flown = [
+        replace(base, record=record, meta=replace(base.meta, sources=sources))
+        for sources in ({"law": "mine.py 1f0a3b9c"}, {"law": "mine.py 77d2e401"})
+    ]
+    assert {one.name: one.values for one in differences(flown)} == {
+        "law file": ("mine.py 1f0a3b9c", "mine.py 77d2e401")
+    }
+    assert labels(flown) == ["mine.py 1f0a3b9c", "mine.py 77d2e401"]
+    assert not differences([flown[0], flown[0]])
+
+
 def test_flights_are_called_by_what_differs(runs: list[Path]) -> None:
     base = replace(loaded(runs[0]), name="folder-1")
 

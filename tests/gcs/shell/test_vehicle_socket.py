@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -15,8 +16,10 @@ from gcs.shell.vehicle_socket import REPLACEMENT_US, VehicleSocket
 WAIT_S = 5.0
 
 
-def heartbeat(kind: int = mavlink.MAV_AUTOPILOT_PX4, of: int = mavlink.MAV_TYPE_QUADROTOR) -> bytes:
-    return FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(of, kind, 0, 0, 0, 3))
+def heartbeat(
+    kind: int = mavlink.MAV_AUTOPILOT_PX4, of: int = mavlink.MAV_TYPE_QUADROTOR, system: int = 1
+) -> bytes:
+    return FrameWriter(system, 1).frame(mavlink.MAVLink_heartbeat_message(of, kind, 0, 0, 0, 3))
 
 
 def telemetry() -> bytes:
@@ -133,3 +136,22 @@ def test_who_is_no_vehicle_is_heard_beside_it(
     ground.send(b"answer")
     wait([vehicle], WAIT_S)
     assert vehicle.drain() == [b"answer"]
+
+
+def test_the_vehicle_that_is_chosen_is_heard_and_answered_though_another_speaks_first(
+    address: Address, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ground = VehicleSocket(replace(address, system=2))
+    first, second = two
+    assert heard(ground, first, heartbeat(), telemetry()) == []
+    chosen = heartbeat(system=2)
+    assert heard(ground, second, chosen, b"more") == [chosen, b"more"]
+    clock.now_us = 2 * REPLACEMENT_US
+    assert heard(ground, first, heartbeat()) == [], "a silent vehicle is not replaced by another one"
+    assert heard(ground, second, chosen) == [chosen]
+    ground.send(b"answer")
+    wait([second], WAIT_S)
+    assert second.drain() == [b"answer"]
+    assert ground.other_systems == [1]
+    assert not capsys.readouterr().err, "the user knows of the others"
+    ground.close()
