@@ -74,9 +74,10 @@ from autopilot.services.requests import (
 from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import RestartState
+from autopilot.supervisor.requests.mission_checks import mission_begin
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, Report, fence_problem, interrupt_mission
-from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
+from autopilot.trajectory.prepare import AT_HOME, PENDING, MissionBegin, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
@@ -134,11 +135,12 @@ class PathWork(NamedTuple):
     limits: PathLimits
     home: Vec3 = ZERO  # destination of a return
     planner: OwnSetup | None = None  # custom planner
+    begin: MissionBegin = AT_HOME
 
     def run(self) -> PreparedPaths:
         """The result; takes from a millisecond to some seconds."""
         planner = plan_function_for(self.planner)
-        return prepare(self.steps, self.sequence, self.limits, self.home, planner)
+        return prepare(self.steps, self.sequence, self.limits, self.home, planner, self.begin)
 
     def failure(self, why: str) -> PreparedPaths:
         """The result if the work failed."""
@@ -732,6 +734,8 @@ class Onboard:
         verdict = self.core.handle_request(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._update_home()
+        if self.core.flight.mission.waiting and self._path_work is None:
+            self._prepare()  # again, from where it begins
         return verdict
 
     def _update_home(self) -> None:
@@ -810,8 +814,11 @@ class Onboard:
         """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
         plan, setup = self.core.flight.mission.plan, self.core.setup
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
-        home = self.core.flight.area.home
-        work = self._path_work = PathWork(plan.steps, plan.sequence, limits, home, planner)
+        flight, begin = self.core.flight, AT_HOME
+        if flight.mission.waiting:
+            begin = mission_begin(flight, self.core.view(self.now_us), self.core.settings)
+        work = PathWork(plan.steps, plan.sequence, limits, flight.area.home, planner, begin)
+        self._path_work = work
         self._set_prepared(PENDING)
         if self._options.clock_waits or not plan.steps:
             self.finish(work, work.run())

@@ -7,7 +7,7 @@ path, is flown as requested, slowed down or refused, depending on the user's set
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import cos, dist
@@ -48,6 +48,16 @@ class PathLimits(NamedTuple):
     time_optimal: bool  # paths through waypoints are as quick as the bounds allow, without the peaks
 
 
+class MissionBegin(NamedTuple):
+    """Where a mission begins: at which step, and in which state; state None: at home, on the ground."""
+
+    step: int = 0
+    state: MissionState | None = None
+
+
+AT_HOME = MissionBegin()
+
+
 @dataclass(frozen=True, slots=True)
 class PreparedPaths:
     """`paths` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
@@ -59,6 +69,7 @@ class PreparedPaths:
     pending: bool = False  # the paths are not ready yet
     # for each step: least duration of its transfer, 0 if no bound applies
     min_durations_s: tuple[float, ...] = ()
+    begin: MissionBegin = AT_HOME  # from where they are flown
 
 
 UNPREPARED = PreparedPaths()
@@ -71,15 +82,15 @@ def prepare(
     limits: PathLimits,
     home: Vec3 = ZERO,
     planner: Planner | None = None,
+    begin: MissionBegin = AT_HOME,
 ) -> PreparedPaths:
     """Prepare the steps; `sequence` has the mission item of each, by which the notes name it, and `home` is
     where a return leads. `planner` is a custom planner of paths through waypoints: it returns a path along
-    the route, or raises PlanError."""
+    the route, or raises PlanError. The steps before that of `begin` are prepared as from home."""
     paths: list[ShapedSignals | PathSegment | None] = []
     notes: list[str] = []
     refusal = ""
-    start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
-    entries = tuple(timeline(steps, start, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
+    entries = _entries(steps, limits, home, begin)
     if planner is None:
         segments = _waypoint_segments(entries, limits)
     else:
@@ -103,7 +114,27 @@ def prepare(
             notes.append(f"Item {item}: {result.problem}")
         paths.append(unshaped_signals(step) if result.problem else result.path)
     min_durations_s = tuple(min_transfer_s(entry, limits) for entry in entries) if limits.shape_paths else ()
-    return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s)
+    return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s, begin=begin)
+
+
+def _entries(
+    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+) -> tuple[TimelineEntry, ...]:
+    """The timeline of the steps, which at the step of `begin` continues from its state."""
+
+    def walk(part: Sequence[Step], state: MissionState) -> tuple[TimelineEntry, ...]:
+        return tuple(timeline(part, state, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
+
+    at_home = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
+    return walk(steps[: begin.step], at_home) + walk(steps[begin.step :], begin.state or at_home)
+
+
+def waypoint_path_starts(
+    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+) -> dict[int, Vec3]:
+    """Where each path through waypoints starts, by the index of its first step."""
+    chains = _waypoint_chains(_entries(steps, limits, home, begin), limits.speed_m_s)
+    return {first: points[0] for first, points, _ in chains if len(points) > 2}
 
 
 def min_transfer_s(entry: TimelineEntry, limits: PathLimits) -> float:
@@ -178,7 +209,7 @@ def _custom_segments(
 
 
 def _waypoint_chains(
-    entries: Sequence[TimelineEntry], speed: float
+    entries: Iterable[TimelineEntry], speed: float
 ) -> Iterator[tuple[int, list[Vec3], float]]:
     """Stretches of consecutive waypoints, all but the last without a hold: the index of the first, the points
     (the first is where the setpoint rests, which must be known), and the speed."""
@@ -191,6 +222,9 @@ def _waypoint_chains(
                 yield first, points, speed
             points = []
             continue
+        if points and points[-1] != here:  # the mission begins here
+            yield first, points, speed
+            points = []
         speed = entry.before.speed_m_s
         if points and (dist(points[-1], there) < MIN_WAYPOINT_DISTANCE_M or len(points) > MAX_POINTS):
             yield first, points, speed

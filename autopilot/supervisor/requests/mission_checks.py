@@ -22,6 +22,8 @@ from autopilot.supervisor.state import (
     is_fence_active,
     load_position_below,
 )
+from autopilot.supervisor.step_legs import NEAR_START
+from autopilot.trajectory.prepare import MissionBegin, waypoint_path_starts
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     MIN_REEL_M,
@@ -82,6 +84,36 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+
+
+def mission_begin(flight: Flight, view: View, settings: Settings) -> MissionBegin:
+    """The present step of the mission, and the state in which it begins from here."""
+    mission = flight.mission
+    ahead = remaining_timeline(flight, view, settings)
+    state = ahead[mission.step - len(mission.plan.steps)][1].before  # behind a lift that no step requests
+    speed_m_s = mission.speed_m_s if mission.step else settings.limits.speed_m_s
+    return MissionBegin(mission.step, replace(state, speed_m_s=speed_m_s))
+
+
+def is_prepared_from_here(flight: Flight, view: View, settings: Settings) -> bool:
+    """Whether the next path through waypoints was prepared from where the load is or comes to rest.
+
+    The paths behind it begin at waypoints, wherever the mission begins.
+    """
+    mission = flight.mission
+    prepared = mission.plan.prepared
+    begin = mission_begin(flight, view, settings)
+    if not prepared.paths or begin.state is None or begin.state.expected is None:
+        return True
+
+    def path_starts(begin: MissionBegin) -> dict[int, Vec3]:
+        return waypoint_path_starts(mission.plan.steps, settings.limits, flight.area.home, begin)
+
+    starts, prepared_starts = path_starts(begin), path_starts(prepared.begin)
+    step = min((step for step in starts if step >= mission.step), default=None)
+    if step is None:
+        return True
+    return step in prepared_starts and norm(sub(starts[step], prepared_starts[step])) < NEAR_START
 
 
 def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
