@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from math import cos, dist
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ from autopilot.trajectory.waypoint_path import (
     MIN_WAYPOINT_DISTANCE_M,
     PathSegment,
     plan_waypoint_path,
+    ride,
 )
 from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
 
@@ -32,6 +34,7 @@ AS_REQUESTED, SLOW_DOWN, REFUSE = 0, 1, 2
 MAX_SLOWDOWN = 4.0  # times as long as requested
 _SLOWDOWN_FACTORS = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, MAX_SLOWDOWN)
 _HALVINGS = 3
+SLOW_SHARE = 0.55  # of the time of a path: one on which a ride would take less is reported as slow
 _LENGTHENING, _LENGTHENING_TRIES = 1.05, 60  # for lengthening a transfer
 
 
@@ -58,6 +61,17 @@ class MissionBegin(NamedTuple):
 AT_HOME = MissionBegin()
 
 
+class SlowPath(NamedTuple):
+    """A path through waypoints, of steps `first` to `last`, that takes much longer than a ride along the
+    straight lines between them at the speed asked for."""
+
+    first: int
+    last: int
+    duration_s: float
+    ride_s: float
+    asked_m_s: float
+
+
 @dataclass(frozen=True, slots=True)
 class PreparedPaths:
     """`paths` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
@@ -69,6 +83,7 @@ class PreparedPaths:
     pending: bool = False  # the paths are not ready yet
     # for each step: least duration of its transfer, 0 if no bound applies
     min_durations_s: tuple[float, ...] = ()
+    slow_paths: tuple[SlowPath, ...] = ()
     begin: MissionBegin = AT_HOME  # from where they are flown
 
 
@@ -91,8 +106,10 @@ def prepare(
     notes: list[str] = []
     refusal = ""
     entries = _entries(steps, limits, home, begin)
+    slow_paths: list[SlowPath] = []
     if planner is None:
-        segments = _waypoint_segments(entries, limits)
+        segments, slow_paths = _waypoint_segments(entries, limits)
+        notes += [_slowness_note(path, sequence) for path in slow_paths]
     else:
         segments, planner_notes, refusal = _custom_segments(entries, sequence, limits, planner)
         notes += planner_notes
@@ -114,7 +131,14 @@ def prepare(
             notes.append(f"Item {item}: {result.problem}")
         paths.append(unshaped_signals(step) if result.problem else result.path)
     min_durations_s = tuple(min_transfer_s(entry, limits) for entry in entries) if limits.shape_paths else ()
-    return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s, begin=begin)
+    return PreparedPaths(
+        tuple(paths),
+        tuple(notes),
+        refusal,
+        min_durations_s=min_durations_s,
+        slow_paths=tuple(slow_paths),
+        begin=begin,
+    )
 
 
 def _entries(
@@ -158,21 +182,35 @@ def _transfer_fits(peaks: Peaks, bounds: Bounds) -> bool:
     )
 
 
-def _waypoint_segments(entries: Sequence[TimelineEntry], limits: PathLimits) -> dict[int, PathSegment]:
-    """For each step that is flown through, by its index, its segment of a path through waypoints. Paths that
-    would touch the ground are left out."""
+def _waypoint_segments(
+    entries: Sequence[TimelineEntry], limits: PathLimits
+) -> tuple[dict[int, PathSegment], list[SlowPath]]:
+    """For each step that is flown through, by its index, its segment of a path through waypoints, and the
+    slow ones of these paths. Paths that would touch the ground are left out."""
     segments: dict[int, PathSegment] = {}
+    slow_paths: list[SlowPath] = []
     for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
         path, times = plan_waypoint_path(
             points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
         )
-        table = path.table()
-        if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
+        table, jets = path.table(), path.jets()[1]
+        if float(jets[0, :, 2].min()) + points[0][2] > 0.0:
             for i in range(len(points) - 1):
                 segments[first + i] = PathSegment(table, float(times[i]), float(times[i + 1]), points[0])
-    return segments
+            length = sum(dist(a, b) for a, b in pairwise(points))
+            ride_s = ride(length, speed, limits.accel_m_s2)[2]
+            if not limits.time_optimal and ride_s < SLOW_SHARE * times[-1]:
+                slow_paths.append(SlowPath(first, first + len(points) - 2, float(times[-1]), ride_s, speed))
+    return segments, slow_paths
+
+
+def _slowness_note(path: SlowPath, sequence: Sequence[int]) -> str:
+    return (
+        f"Items {sequence[path.first]} to {sequence[path.last]} take {path.duration_s:.1f} s, not "
+        f"{path.ride_s:.1f}: too close together, or turns too sharp, for {path.asked_m_s:g} m/s"
+    )
 
 
 def _custom_segments(
