@@ -74,7 +74,7 @@ from autopilot.services.requests import (
 from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import RestartState
-from autopilot.supervisor.requests.mission_checks import mission_begin
+from autopilot.supervisor.requests.mission_checks import curve_exit_problem, mission_begin, remaining_timeline
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, Report, fence_problem, interrupt_mission
 from autopilot.trajectory.prepare import AT_HOME, PENDING, MissionBegin, PathLimits, PreparedPaths, prepare
@@ -849,6 +849,18 @@ class Onboard:
         self._set_prepared(prepared)
         if self.core.flight.mission.waiting:
             self._begin_mission()
+        elif self.tick >= 0:
+            self._warn_of_curves()
+
+    def _warn_of_curves(self) -> None:
+        """Report a curve of the mission that the fence forbids: the mission would be refused at its start."""
+        flight, settings = self.core.flight, self.core.settings
+        if flight.mission.active or not flight.mission.plan.steps:
+            return
+        ahead = remaining_timeline(flight, self.core.view(self.now_us), settings)
+        problem = curve_exit_problem(flight, ahead, settings)
+        if problem:
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, f"Mission will not start: {problem}")
 
     def _begin_mission(self) -> None:
         """Begin the mission that waited for its paths, or report why not."""

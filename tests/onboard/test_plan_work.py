@@ -184,6 +184,17 @@ def test_a_mission_that_begins_elsewhere_is_prepared_from_there() -> None:
     assert path.start == (beside.position[0], beside.position[1], 2.0)
 
 
+@pytest.mark.parametrize("outside", [True, False])
+def test_a_curve_beyond_the_fence_is_told_after_the_upload(outside: bool) -> None:
+    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=4.3 if outside else 9.0)
+    craft.wait(1.0)
+    corner = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0), Waypoint(-3.0, 3.0, 2.0))
+    upload(craft, Takeoff(2.0), *corner, Land())
+    craft.wait(0.1)
+    told = [text for text in craft.texts if text.startswith("Mission will not start: the curve to item ")]
+    assert len(told) == outside
+
+
 def test_a_mission_that_turns_out_not_to_be_flyable_is_told() -> None:
     craft = flown_to_hold()
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())

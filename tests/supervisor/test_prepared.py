@@ -13,11 +13,12 @@ from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, PathStretch, SignalRun, requested_jet
 from autopilot.services.requests import Arm, Land, Pause, Reposition, ReturnHome, StartMission
 from autopilot.services.requests import Takeoff as TakeOff
-from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.requests.mission_checks import mission_begin
+from autopilot.supervisor.mission import with_current_step, with_plan
+from autopilot.supervisor.requests.mission_checks import mission_begin, mission_problem
 from autopilot.supervisor.state import Flight, MissionPlan, Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import Disc, Fence, Polygon
 from missions import model
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
@@ -240,6 +241,30 @@ def test_a_load_that_stands_elsewhere_is_flown_through_the_waypoints_as_well() -
     start_prepared(sky)
     sky.run(lambda s: s.reached[-1:] == [1])
     assert norm(sky.setpoints[-1][2][1]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("fence", "item"),
+    [
+        (Fence((Polygon(True, ((-9.0, -9.0), (3.2, -9.0), (3.2, 9.0), (-9.0, 9.0))),)), 2),
+        (Fence((Disc(False, (1.5, 3.4), 0.2),)), 3),
+        (Fence((Disc(False, (1.5, -3.4), 0.2),)), None),
+    ],
+    ids=["out of a zone", "into a zone", "far from a zone"],
+)
+def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> None:
+    """All waypoints are within the fence, and so are the straight lines between them."""
+    sky = prepared_sky(Takeoff(2.0), *ROUND)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence))
+    verdict = sky.ask(StartMission(None))
+    if item is None:
+        assert verdict.result == ACCEPTED
+        return
+    assert verdict.result == DENIED
+    assert verdict.text.startswith(f"Mission denied: the curve to item {item} leads ")
+    # flown from rest to rest, as after a jump into the path, the lines are straight
+    at_last = with_current_step(sky.flight, 3, done=False)
+    assert mission_problem(at_last, sky.view, sky.settings) == ""
 
 
 def test_a_mission_waits_for_paths_only_once() -> None:
