@@ -131,7 +131,9 @@ def error(view: View, path: Target) -> None:
     s = view.samples
     visible = view.visible(s.time_s)
     scale, unit = length_scale(s.error_m[visible])
-    estimate_error, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
+    # a load that was released is not followed by estimator and filter
+    actual_m = np.where(s.attached[:, None], s.actual_m, np.nan)
+    estimate_error, filtered = scale * (s.estimated_m - actual_m), scale * (s.filtered_m - actual_m)
     has_filter = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
     columns = (
         ("position error", unit, scale * s.error_m),

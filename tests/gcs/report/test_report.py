@@ -20,12 +20,12 @@ from pyarrow import parquet
 from rich.console import Console
 
 from gcs.analysis.definitions import GROUPS, METRICS
-from gcs.analysis.record import FlightMeta, Record, jsonable
+from gcs.analysis.record import FlightMeta, Record, flight_record, jsonable
 from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
-from gcs.report import style
+from gcs.report import plots, style
 from gcs.report.build import ReportError, build_report, load_meta
-from gcs.report.plots import PICTURES
+from gcs.report.plots import PICTURES, View
 from gcs.report.table import record_table
 from gcs.report.track import draw_track, snapshots
 from tests.doubles import recorded_flights as flights
@@ -372,6 +372,27 @@ def test_the_track_shows_the_whole_desired_path_however_far_the_load_is_from_it(
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
     assert len(drawn) > 100
     assert (drawn >= limits[:, 0]).all() and (drawn <= limits[:, 1]).all()
+
+
+def view_of(flight, path):
+    """What the pictures of a recorded flight are drawn from."""
+    telemetry = load_telemetry(flight.write(path))
+    samples = samples_of(telemetry)
+    return View(telemetry, samples, flight_record(telemetry, META, samples), META)
+
+
+def test_the_errors_of_a_load_that_was_released_are_not_drawn(tmp_path, monkeypatch):
+    """The estimator does not follow it: the curve would hide all others."""
+    view = view_of(flights.delivery(), tmp_path / "flight.tlog")
+    drawn = {}
+    monkeypatch.setattr(
+        plots, "draw", lambda ax, t, values, **style: drawn.setdefault(style["label"], values)
+    )
+    plots.error(view, io.BytesIO())
+    lost = ~view.samples.attached[view.visible(view.samples.time_s)]
+    assert 0 < lost.sum() < len(lost)
+    assert np.isnan(drawn["estimate − true"][lost]).all()
+    assert np.isfinite(drawn["estimate − true"][~lost]).any()
 
 
 def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
