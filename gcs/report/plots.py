@@ -13,6 +13,7 @@ from gcs.analysis.definitions import METRICS
 from gcs.analysis.record import FlightMeta, Record
 from gcs.analysis.samples import CARRIED, Samples
 from gcs.analysis.tracks import Telemetry
+from gcs.report.replay import layout_of
 from gcs.report.style import (
     AXES,
     BLUE,
@@ -71,6 +72,13 @@ class View:
         carried = time_s[near & np.isin(self.samples.phase, CARRIED)]
         return float(carried[0]), float(carried[-1])
 
+    @property
+    def rotors(self) -> Floats:
+        """(n, 2) positions of the vehicle's rotors, forward and left."""
+        return np.array(
+            [(x, -y) for x, y, _ in (r["position"] for r in layout_of(self.meta.vehicle)["rotors"])]
+        )
+
     def shade(self, axes: Any, limits: tuple[float, float] | None = None) -> None:
         """Draw the phases and set the limits of the time axis, for axes above each other."""
         spans = phase_spans(self.telemetry.setpoint.time_s, self.telemetry.setpoint.phase)
@@ -85,7 +93,7 @@ class View:
 def track(view: View, path: Target) -> None:
     """Load track in three dimensions."""
     figure = new_figure(9.0, 6.4)
-    draw_track(figure, view.samples, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
+    draw_track(figure, view.samples, view.rotors, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
     figure.text(0.03, 0.945, "Load track", fontsize=12, weight="bold")
     lines = "dashed: desired · grey: cable, shadow, and the load while no position is asked for"
     if not view.samples.attached.all():
@@ -314,7 +322,7 @@ def tension(view: View, path: Target) -> None:
 def overview(view: View, path: Target) -> None:
     """Track, error and rotors in one picture, as a summary."""
     figure = new_figure(13.0, 6.2)
-    draw_track(figure, view.samples, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
+    draw_track(figure, view.samples, view.rotors, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
     s = view.samples
     above = figure.add_axes((0.605, 0.51, 0.38, 0.32))
     below = figure.add_axes((0.605, 0.095, 0.38, 0.32), sharex=above)

@@ -55,6 +55,9 @@ def built(tmp_path_factory):
     return out, record, told
 
 
+CROSS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+
+
 def strict(text):
     """JSON as the standard defines it: no NaN, no Infinity."""
 
@@ -365,13 +368,30 @@ def test_the_track_shows_the_whole_desired_path_however_far_the_load_is_from_it(
     desired_m = samples.desired_m + np.linspace(0.0, 9.0, len(samples.desired_m))[:, None]
     far = replace(samples, desired_m=desired_m)
     figure = style.new_figure(6.0, 6.0)
-    draw_track(figure, far, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    draw_track(figure, far, CROSS, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
     axes = figure.axes[0]
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     drawn = desired_m[far.in_mission]
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
     assert len(drawn) > 100
     assert (drawn >= limits[:, 0]).all() and (drawn <= limits[:, 1]).all()
+
+
+@pytest.mark.parametrize(("vehicle", "rotors"), [("bebop", 4), ("hexarotor", 6)])
+def test_the_track_shows_as_many_rotors_as_the_vehicle_has(tmp_path, vehicle, rotors):
+    view = view_of(flights.case_b(duration_s=6.0), tmp_path / "flight.tlog")
+    view = replace(view, meta=replace(META, vehicle=vehicle))
+    figure = style.new_figure(6.0, 6.0)
+    draw_track(figure, view.samples, view.rotors, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    lines = figure.axes[0].lines
+    vehicles = sum(line.get_marker() == "o" and len(line.get_data_3d()[0]) == 1 for line in lines)
+    arms = [np.array(line.get_data_3d()) for line in lines if line.get_markevery() == [1]]
+    assert vehicles > 1
+    assert len(arms) == vehicles * rotors
+    ends = np.array([arm[:, 1] - arm[:, 0] for arm in arms[:rotors]])
+    ends /= np.linalg.norm(ends, axis=1)[:, None]
+    nearest = np.sort(ends @ ends.T, axis=1)[:, -2]
+    assert nearest == pytest.approx(np.cos(2.0 * np.pi / rotors), abs=0.01)
 
 
 def view_of(flight, path):
