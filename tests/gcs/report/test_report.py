@@ -21,7 +21,7 @@ from rich.console import Console
 
 from gcs.analysis.definitions import GROUPS, METRICS
 from gcs.analysis.record import FlightMeta, Record, flight_record, jsonable
-from gcs.analysis.samples import samples_of
+from gcs.analysis.samples import PHASE_NAMES, samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import plots, style
 from gcs.report.build import ReportError, build_report, load_meta
@@ -325,6 +325,8 @@ def test_the_manual_names_every_file_key_and_column(built):
         # columns of one family are listed as load_true_*_m
         family = re.sub(r"^(.*)_(x|y|z|[1-4]|w|roll|pitch|yaw|phi|theta)(?=_|$)", r"\1_*", name)
         assert f"`{name}`" in manual or f"`{family}`" in manual, name
+    (phases,) = (line for line in manual.splitlines() if line.startswith("| `phase` |"))
+    assert set(PHASE_NAMES.values()) <= set(re.findall(r"\w+", phases))
 
 
 # --- drawing -------------------------------------------------------------------------------------
