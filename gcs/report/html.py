@@ -72,13 +72,19 @@ def _figures(record: Record, replay: Json) -> list[Json]:
     worst = replay["worst"]
     return [
         {
-            "label": label,
+            "label": label + _until(METRICS[name], record),
             "value": METRICS[name].formatted(record),
             "time": worst["time"] if worst and name == "load_error_max_m" else None,
         }
         for name, label in HEADLINE.items()
         if record[name] is not None
     ]
+
+
+def _until(metric: Metric, record: Record) -> str:
+    """For a figure over the mission window of a flight that failed: that it ends at the failure."""
+    over_mission = metric.group in ("load_error", "vehicle", "rotors") and metric.name != "slack_events"
+    return " until the failure" if over_mission and record["failure_s"] is not None else ""
 
 
 def _groups(record: Record) -> list[dict[str, Any]]:

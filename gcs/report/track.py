@@ -47,16 +47,24 @@ def snapshots(position: Floats, min_distance: float) -> list[int]:
 
 
 def draw_track(
-    figure: Any, samples: Samples, rotors: Floats, rectangle: Rectangle, bar_rectangle: Rectangle
+    figure: Any,
+    samples: Samples,
+    shown: NDArray[np.bool_],
+    rotors: Floats,
+    rectangle: Rectangle,
+    bar_rectangle: Rectangle,
 ) -> None:
-    """Desired and true path of the load, coloured by error; rectangles are shares of the figure. `rotors`
-    (n, 2) are the positions of the vehicle's rotors, forward and left; only their directions matter."""
+    """Desired and true path of the load, coloured by error; rectangles are shares of the figure.
+
+    `shown` (n,) are the samples that fill the picture. `rotors` (m, 2) are the positions of the vehicle's
+    rotors, forward and left; only their shape matters.
+    """
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     ax = figure.add_axes(rectangle, projection="3d")
     known = np.asarray((np.abs(samples.actual_m) < _FAR_M).all(axis=1))  # false for NaN
-    mission = known & samples.in_mission
+    mission = known & shown
     if not known.any():
         ax.set_axis_off()
         ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
@@ -67,9 +75,9 @@ def draw_track(
     low, high = _set_limits(ax, np.concatenate(places))
     _fill_rectangle(figure, ax, rectangle, low, high)
 
-    shown = _thin(np.flatnonzero(known))
+    whole = _thin(np.flatnonzero(known))
     # matplotlib does not cut lines in space at the box
-    whole_path = samples.actual_m[shown]
+    whole_path = samples.actual_m[whole]
     outside = np.any((whole_path < low) | (whole_path > high), axis=1, keepdims=True)
     ax.plot(*np.where(outside, np.nan, whole_path).T, color=GREY, linewidth=0.9, alpha=0.7)
     path = samples.actual_m[_thin(np.flatnonzero(mission))]

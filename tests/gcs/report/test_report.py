@@ -370,7 +370,7 @@ def test_the_track_shows_the_whole_desired_path_however_far_the_load_is_from_it(
     desired_m = samples.desired_m + np.linspace(0.0, 9.0, len(samples.desired_m))[:, None]
     far = replace(samples, desired_m=desired_m)
     figure = style.new_figure(6.0, 6.0)
-    draw_track(figure, far, CROSS, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    draw_track(figure, far, far.in_mission, CROSS, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
     axes = figure.axes[0]
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     drawn = desired_m[far.in_mission]
@@ -384,7 +384,7 @@ def test_the_track_shows_as_many_rotors_as_the_vehicle_has(tmp_path, vehicle, ro
     view = view_of(flights.case_b(duration_s=6.0), tmp_path / "flight.tlog")
     view = replace(view, meta=replace(META, vehicle=vehicle))
     figure = style.new_figure(6.0, 6.0)
-    draw_track(figure, view.samples, view.rotors, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    draw_track(figure, view.samples, view.shown, view.rotors, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
     lines = figure.axes[0].lines
     vehicles = sum(line.get_marker() == "o" and len(line.get_data_3d()[0]) == 1 for line in lines)
     arms = [np.array(line.get_data_3d()) for line in lines if line.get_markevery() == [1]]
@@ -415,6 +415,35 @@ def test_the_errors_of_a_load_that_was_released_are_not_drawn(tmp_path, monkeypa
     assert 0 < lost.sum() < len(lost)
     assert np.isnan(drawn["estimate − true"][lost]).all()
     assert np.isfinite(drawn["estimate − true"][~lost]).any()
+
+
+def test_pictures_show_a_failure_and_the_landing_after_it(tmp_path):
+    flight = flights.landing_after_a_failure(0.03)
+    view = view_of(flight, tmp_path / "flight.tlog")
+    failed_s = view.record["failure_s"]
+    assert view.window[1] == view.whole_flight[1]
+    assert view.samples.time_s[view.shown].max() > failed_s + 1.0
+    # the setpoint goes 90 mm into the ground when the load is down
+    assert np.nanmax(np.abs(view.error_m)) == pytest.approx(0.03, abs=1e-6)
+    _, axes = style.new_axes_grid(6.0, 4.0, 2)
+    view.shade(axes[:, 0])
+    assert [text.get_text() for text in axes[0, 0].texts].count("failure") == 1
+    assert all(failed_s in line.get_xdata() for ax in axes[:, 0] for line in ax.lines)
+    line = plots.summary_line(view.record)
+    assert f"load error until the failure at {failed_s:.1f} s max 0.0 mm, RMS 0.0 mm" in line
+    assert line.endswith("after it max 30.0 mm")
+    whole = view_of(flights.case_b(duration_s=6.0), tmp_path / "whole.tlog")
+    assert whole.window[1] < whole.whole_flight[1]
+    assert "failure" not in plots.summary_line(whole.record)
+
+
+def test_the_page_says_which_figures_end_at_a_failure(tmp_path):
+    tlog = flights.landing_after_a_failure(0.03).write(tmp_path / "flight.tlog")
+    build_report(tlog, tmp_path, META)
+    text = (tmp_path / "report.html").read_text()
+    for label in ("greatest load error until the failure", "greatest load error after the failure"):
+        assert label in text
+    assert "of flight until the failure" not in text
 
 
 def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
