@@ -82,9 +82,10 @@ from autopilot.services.requests import (
 from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import RestartState
+from autopilot.supervisor.requests.mission_checks import curve_exit_problem, mission_begin, remaining_timeline
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, Report, fence_problem, interrupt_mission
-from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
+from autopilot.trajectory.prepare import AT_HOME, PENDING, MissionBegin, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
@@ -143,11 +144,12 @@ class PathWork(NamedTuple):
     limits: PathLimits
     home: Vec3 = ZERO  # destination of a return
     planner: OwnSetup | None = None  # custom planner
+    begin: MissionBegin = AT_HOME
 
     def run(self) -> PreparedPaths:
         """The result; takes from a millisecond to some seconds."""
         planner = plan_function_for(self.planner)
-        return prepare(self.steps, self.sequence, self.limits, self.home, planner)
+        return prepare(self.steps, self.sequence, self.limits, self.home, planner, self.begin)
 
     def failure(self, why: str) -> PreparedPaths:
         """The result if the work failed."""
@@ -761,6 +763,8 @@ class Onboard:
         verdict = self.core.handle_request(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._update_home()
+        if self.core.flight.mission.waiting and self._path_work is None:
+            self._prepare()  # again, from where it begins
         return verdict
 
     def _decide_failure(self, failure: InjectFailure) -> Verdict:
@@ -847,8 +851,11 @@ class Onboard:
         """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
         plan, setup = self.core.flight.mission.plan, self.core.setup
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
-        home = self.core.flight.area.home
-        work = self._path_work = PathWork(plan.steps, plan.sequence, limits, home, planner)
+        flight, begin = self.core.flight, AT_HOME
+        if flight.mission.waiting:
+            begin = mission_begin(flight, self.core.view(self.now_us), self.core.settings)
+        work = PathWork(plan.steps, plan.sequence, limits, flight.area.home, planner, begin)
+        self._path_work = work
         self._set_prepared(PENDING)
         if self._options.clock_waits or not plan.steps:
             self.finish(work, work.run())
@@ -879,6 +886,18 @@ class Onboard:
         self._set_prepared(prepared)
         if self.core.flight.mission.waiting:
             self._begin_mission()
+        elif self.tick >= 0:
+            self._warn_of_curves()
+
+    def _warn_of_curves(self) -> None:
+        """Report a curve of the mission that the fence forbids: the mission would be refused at its start."""
+        flight, settings = self.core.flight, self.core.settings
+        if flight.mission.active or not flight.mission.plan.steps:
+            return
+        ahead = remaining_timeline(flight, self.core.view(self.now_us), settings)
+        problem = curve_exit_problem(flight, ahead, settings)
+        if problem:
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, f"Mission will not start: {problem}")
 
     def _begin_mission(self) -> None:
         """Begin the mission that waited for its paths, or report why not."""

@@ -12,12 +12,13 @@ and noise are not part of the check either: a mission that passes can be flown i
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, degrees, inf, nextafter, radians
 
+import numpy as np
 from numpy import linspace
 
-from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.trajectory.peaks import (
     Body,
     Extreme,
@@ -32,6 +33,7 @@ from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.shaping import ShapedSignals, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
+from autopilot.trajectory.splines import Array
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.vehicle.model import Vehicle
@@ -44,6 +46,7 @@ MIN_TENSION_SHARE = 0.3  # this and the next: the defaults of MIS_TENSION and MI
 MAX_SHAPING_M = 0.05
 MIN_HEIGHT_M = 0.3  # above home, at which a load must be carried
 _REPORT_SAMPLES = 4001
+_TOLD_BESIDE_M = 0.3  # beside the straight line between two waypoints: paths that go further say so
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
@@ -138,7 +141,8 @@ class PathReport:
 
     `distance_m` is the greatest distance between the flown and the requested path; forces are in N;
     `tilt_deg` is that of the vehicle; `speed_m_s` is the greatest speed of the load (0 in an attitude run,
-    which gives none).
+    which gives none). Of paths through waypoints, `beside_m` is the greatest distance from the straight line
+    between two of them, and `asked_m_s` the speed asked for if the path is much slower, else 0.
     """
 
     item: int
@@ -151,6 +155,8 @@ class PathReport:
     tilt_deg: float
     slowed: float = 1.0  # times as long as requested
     speed_m_s: float = 0.0
+    beside_m: float = 0.0
+    asked_m_s: float = 0.0
 
     def __str__(self) -> str:
         near = ""
@@ -160,6 +166,8 @@ class PathReport:
             near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
         if self.slowed != 1.0:
             near = f", {self.slowed:.2f} times as long as asked{near.removesuffix(' asked')}"
+        if self.beside_m > _TOLD_BESIDE_M:
+            near = f", up to {self.beside_m:.1f} m beside the straight line"
         speed = f"load to {self.speed_m_s:.2f} m/s, " if self.speed_m_s else ""
         return (
             f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; {speed}"
@@ -269,7 +277,7 @@ def paths(
         raise PlanError(prepared.refusal)
     reports = []
     for entry in _timeline(mission, limits):
-        path, distance, extremes = prepared.paths[entry.item], 0.0, None
+        path, distance, beside, extremes = prepared.paths[entry.item], 0.0, 0.0, None
         slowed = path.duration_factor if isinstance(path, ShapedSignals) else 1.0
         if entry.before.released or isinstance(entry.step, Winch | Land):
             continue
@@ -280,15 +288,26 @@ def paths(
             duration_s = float(times[-1] - times[0])
         elif isinstance(path, PathSegment):
             times = linspace(path.begin_s, path.end_s, _REPORT_SAMPLES)
-            extremes = survey_path(times, sample_path(path.table, times), 0.0, shaping.body)
+            jets = sample_path(path.table, times)
+            extremes = survey_path(times, jets, 0.0, shaping.body)
+            beside = _distance_from_line(jets[0], entry.begin, entry.end)
             duration_s = float(times[-1] - times[0])
         else:
             extremes = _survey(entry, limits, shaped)
             is_run = isinstance(entry.step, AttitudeRun)
             duration_s = entry.duration_s if is_run else _transfer_s(entry, limits, shaped)
         if extremes is not None:
-            reports.append(_path_report(entry, duration_s, distance, extremes, slowed))
+            report = _path_report(entry, duration_s, distance, extremes, slowed)
+            asked = (s.asked_m_s for s in prepared.slow_paths if s.first <= entry.item <= s.last)
+            reports.append(replace(report, beside_m=beside, asked_m_s=next(asked, 0.0)))
     return reports
+
+
+def _distance_from_line(places: Array, begin: Vec3, end: Vec3) -> float:
+    """The greatest distance (m) of places (n, 3) from the straight line between two points."""
+    line, offsets = np.subtract(end, begin), places - np.array(begin)
+    share = np.clip(offsets @ line / (line @ line), 0.0, 1.0)
+    return float(np.linalg.norm(offsets - share[:, None] * line, axis=1).max())
 
 
 def _path_report(

@@ -7,9 +7,10 @@ path, is flown as requested, slowed down or refused, depending on the user's set
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from math import cos, dist
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ from autopilot.trajectory.waypoint_path import (
     MIN_WAYPOINT_DISTANCE_M,
     PathSegment,
     plan_waypoint_path,
+    ride,
 )
 from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
 
@@ -32,6 +34,7 @@ AS_REQUESTED, SLOW_DOWN, REFUSE = 0, 1, 2
 MAX_SLOWDOWN = 4.0  # times as long as requested
 _SLOWDOWN_FACTORS = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, MAX_SLOWDOWN)
 _HALVINGS = 3
+SLOW_SHARE = 0.55  # of the time of a path: one on which a ride would take less is reported as slow
 _LENGTHENING, _LENGTHENING_TRIES = 1.05, 60  # for lengthening a transfer
 
 
@@ -48,6 +51,27 @@ class PathLimits(NamedTuple):
     time_optimal: bool  # paths through waypoints are as quick as the bounds allow, without the peaks
 
 
+class MissionBegin(NamedTuple):
+    """Where a mission begins: at which step, and in which state; state None: at home, on the ground."""
+
+    step: int = 0
+    state: MissionState | None = None
+
+
+AT_HOME = MissionBegin()
+
+
+class SlowPath(NamedTuple):
+    """A path through waypoints, of steps `first` to `last`, that takes much longer than a ride along the
+    straight lines between them at the speed asked for."""
+
+    first: int
+    last: int
+    duration_s: float
+    ride_s: float
+    asked_m_s: float
+
+
 @dataclass(frozen=True, slots=True)
 class PreparedPaths:
     """`paths` has a path for each step that needs one; `notes` say what was changed, `refusal` why it is
@@ -59,6 +83,8 @@ class PreparedPaths:
     pending: bool = False  # the paths are not ready yet
     # for each step: least duration of its transfer, 0 if no bound applies
     min_durations_s: tuple[float, ...] = ()
+    slow_paths: tuple[SlowPath, ...] = ()
+    begin: MissionBegin = AT_HOME  # from where they are flown
 
 
 UNPREPARED = PreparedPaths()
@@ -71,17 +97,19 @@ def prepare(
     limits: PathLimits,
     home: Vec3 = ZERO,
     planner: Planner | None = None,
+    begin: MissionBegin = AT_HOME,
 ) -> PreparedPaths:
     """Prepare the steps; `sequence` has the mission item of each, by which the notes name it, and `home` is
     where a return leads. `planner` is a custom planner of paths through waypoints: it returns a path along
-    the route, or raises PlanError."""
+    the route, or raises PlanError. The steps before that of `begin` are prepared as from home."""
     paths: list[ShapedSignals | PathSegment | None] = []
     notes: list[str] = []
     refusal = ""
-    start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
-    entries = tuple(timeline(steps, start, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
+    entries = _entries(steps, limits, home, begin)
+    slow_paths: list[SlowPath] = []
     if planner is None:
-        segments = _waypoint_segments(entries, limits)
+        segments, slow_paths = _waypoint_segments(entries, limits)
+        notes += [_slowness_note(path, sequence) for path in slow_paths]
     else:
         segments, planner_notes, refusal = _custom_segments(entries, sequence, limits, planner)
         notes += planner_notes
@@ -103,7 +131,34 @@ def prepare(
             notes.append(f"Item {item}: {result.problem}")
         paths.append(unshaped_signals(step) if result.problem else result.path)
     min_durations_s = tuple(min_transfer_s(entry, limits) for entry in entries) if limits.shape_paths else ()
-    return PreparedPaths(tuple(paths), tuple(notes), refusal, min_durations_s=min_durations_s)
+    return PreparedPaths(
+        tuple(paths),
+        tuple(notes),
+        refusal,
+        min_durations_s=min_durations_s,
+        slow_paths=tuple(slow_paths),
+        begin=begin,
+    )
+
+
+def _entries(
+    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+) -> tuple[TimelineEntry, ...]:
+    """The timeline of the steps, which at the step of `begin` continues from its state."""
+
+    def walk(part: Sequence[Step], state: MissionState) -> tuple[TimelineEntry, ...]:
+        return tuple(timeline(part, state, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
+
+    at_home = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
+    return walk(steps[: begin.step], at_home) + walk(steps[begin.step :], begin.state or at_home)
+
+
+def waypoint_path_starts(
+    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+) -> dict[int, Vec3]:
+    """Where each path through waypoints starts, by the index of its first step."""
+    chains = _waypoint_chains(_entries(steps, limits, home, begin), limits.speed_m_s)
+    return {first: points[0] for first, points, _ in chains if len(points) > 2}
 
 
 def min_transfer_s(entry: TimelineEntry, limits: PathLimits) -> float:
@@ -127,21 +182,35 @@ def _transfer_fits(peaks: Peaks, bounds: Bounds) -> bool:
     )
 
 
-def _waypoint_segments(entries: Sequence[TimelineEntry], limits: PathLimits) -> dict[int, PathSegment]:
-    """For each step that is flown through, by its index, its segment of a path through waypoints. Paths that
-    would touch the ground are left out."""
+def _waypoint_segments(
+    entries: Sequence[TimelineEntry], limits: PathLimits
+) -> tuple[dict[int, PathSegment], list[SlowPath]]:
+    """For each step that is flown through, by its index, its segment of a path through waypoints, and the
+    slow ones of these paths. Paths that would touch the ground are left out."""
     segments: dict[int, PathSegment] = {}
+    slow_paths: list[SlowPath] = []
     for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
         path, times = plan_waypoint_path(
             points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
         )
-        table = path.table()
-        if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
+        table, jets = path.table(), path.jets()[1]
+        if float(jets[0, :, 2].min()) + points[0][2] > 0.0:
             for i in range(len(points) - 1):
                 segments[first + i] = PathSegment(table, float(times[i]), float(times[i + 1]), points[0])
-    return segments
+            length = sum(dist(a, b) for a, b in pairwise(points))
+            ride_s = ride(length, speed, limits.accel_m_s2)[2]
+            if not limits.time_optimal and ride_s < SLOW_SHARE * times[-1]:
+                slow_paths.append(SlowPath(first, first + len(points) - 2, float(times[-1]), ride_s, speed))
+    return segments, slow_paths
+
+
+def _slowness_note(path: SlowPath, sequence: Sequence[int]) -> str:
+    return (
+        f"Items {sequence[path.first]} to {sequence[path.last]} take {path.duration_s:.1f} s, not "
+        f"{path.ride_s:.1f}: too close together, or turns too sharp, for {path.asked_m_s:g} m/s"
+    )
 
 
 def _custom_segments(
@@ -178,7 +247,7 @@ def _custom_segments(
 
 
 def _waypoint_chains(
-    entries: Sequence[TimelineEntry], speed: float
+    entries: Iterable[TimelineEntry], speed: float
 ) -> Iterator[tuple[int, list[Vec3], float]]:
     """Stretches of consecutive waypoints, all but the last without a hold: the index of the first, the points
     (the first is where the setpoint rests, which must be known), and the speed."""
@@ -191,6 +260,9 @@ def _waypoint_chains(
                 yield first, points, speed
             points = []
             continue
+        if points and points[-1] != here:  # the mission begins here
+            yield first, points, speed
+            points = []
         speed = entry.before.speed_m_s
         if points and (dist(points[-1], there) < MIN_WAYPOINT_DISTANCE_M or len(points) > MAX_POINTS):
             yield first, points, speed

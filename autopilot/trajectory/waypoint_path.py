@@ -6,8 +6,9 @@ The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint 
 
 x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
 matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
-are those of the least integral for a given total time (`optimal_time_shares`). The total follows from the
-form that was requested:
+are those of the least integral for a given total time (`optimal_time_shares`); for many waypoints those of a
+ride along the straight lines between them (`ride_time_shares`). The total follows from the form that was
+requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -20,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, dist
+from math import ceil, dist, sqrt
 
 import numpy as np
 import scipy
@@ -35,7 +36,7 @@ from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
 
 Indices = NDArray[np.int64]
 
@@ -49,10 +50,12 @@ _FINE_S = 0.01
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
 _MAX_FINE_SAMPLES = 20_000
 _TIME_SHARE_ITERATIONS = 6
-# most segments for which times are optimised; beyond it the approximate shares apply
+# most segments for which times are optimised; beyond it the shares of a ride apply
 _MAX_OPTIMISED_SEGMENTS = 8
 _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
+_RIDE_ACCEL_SHARE = 2.0 / 3.0  # of the peak acceleration, for speeding up; the rest is left for turns
+_RIDE_SAMPLES = 400  # of speeding up
 _BAND = DEGREE + 1
 
 
@@ -176,7 +179,7 @@ def approximate_time_shares(points: Array) -> Array:
 def optimal_time_shares(points: Array, total_s: float) -> Array:
     """The share of `total_s` seconds for each segment that minimises the integral."""
     begin = np.log(approximate_time_shares(points))
-    if not 1 < len(begin) <= _MAX_OPTIMISED_SEGMENTS:
+    if len(begin) == 1:
         return np.exp(begin)
 
     def shares(x: Array) -> Array:
@@ -195,6 +198,34 @@ def optimal_time_shares(points: Array, total_s: float) -> Array:
         options={"maxiter": _TIME_SHARE_ITERATIONS, "eps": 1e-3},
     )
     return shares(result.x)
+
+
+def ride(length: float, speed: float, accel: float) -> tuple[float, float, float]:
+    """A ride over `length` m: its greatest speed (m/s), in how many seconds it is reached, and the time (s)
+    of the ride."""
+    ramp_accel = _RIDE_ACCEL_SHARE * accel
+    cruise = min(speed, sqrt(length * ramp_accel / PEAK_SPEED))
+    ramp_s = PEAK_SPEED * cruise / ramp_accel
+    return cruise, ramp_s, ramp_s + length / cruise
+
+
+def ride_time_shares(points: Array, speed: float, accel: float) -> Array:
+    """The share of the total time for each segment on a ride along the straight lines between the points, at
+    up to `speed` (m/s) and `accel` (m/s^2): however close the points are, only the ends of the ride are slow.
+
+    The speed rises along the s of `autopilot.trajectory.transfer`, stays, and falls as it rose.
+    """
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    length = float(travelled[-1])
+    cruise, ramp_s, total_s = ride(length, speed, accel)
+    u = np.linspace(0.0, 1.0, _RIDE_SAMPLES + 1)
+    rise = np.array([transfer(ZERO, (1.0, 0.0, 0.0), 1.0, at)[0][0] for at in u])
+    ramp_m = (
+        cruise * ramp_s * np.concatenate([[0.0], np.cumsum(0.5 * (rise[1:] + rise[:-1]))]) / _RIDE_SAMPLES
+    )
+    times = np.concatenate([ramp_s * u, total_s - ramp_s * u[::-1]])
+    at_points = np.interp(travelled, np.concatenate([ramp_m, length - ramp_m[::-1]]), times)
+    return np.asarray(np.diff(at_points) / total_s)
 
 
 def _point_times(shares: Array, total_s: float) -> Array:
@@ -218,7 +249,10 @@ def plan_waypoint_path(
     waypoints = np.array(points)
     length = float(sum(dist(a, b) for a, b in pairwise(points)))
     total_s = transfer_duration(length, speed, accel)
-    shares = optimal_time_shares(waypoints, total_s)
+    if len(points) - 1 > _MAX_OPTIMISED_SEGMENTS:
+        shares = ride_time_shares(waypoints, speed, accel)
+    else:
+        shares = optimal_time_shares(waypoints, total_s)
 
     def evaluate(seconds: float) -> tuple[MinimumSnap, Array, float]:
         """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""

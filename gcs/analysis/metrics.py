@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, swing, tilt
+from gcs.analysis.failure import after_failure, failure_s
 from gcs.analysis.samples import (
     AIRBORNE,
     ATTITUDE_MODES,
@@ -86,6 +87,18 @@ def tracking_numbers(samples: Samples) -> Numbers:
     speed = np.linalg.norm(samples.actual_m_s[samples.carried], axis=1)
     numbers["load_speed_max_m_s"] = _statistic(speed, np.max)
     return numbers
+
+
+def failure_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
+    """When the vehicle gave up because a part of it failed, and the load position error from then on."""
+    failed_s = failure_s(telemetry, samples)
+    if failed_s is None:
+        return {"failure_s": None, "failure_error_max_m": None}
+    after = after_failure(samples, failed_s) & samples.attached
+    return {
+        "failure_s": failed_s,
+        "failure_error_max_m": _statistic(np.linalg.norm(samples.error_m[after], axis=1), np.max),
+    }
 
 
 def step_window(samples: Samples) -> NDArray[np.bool_]:
@@ -277,6 +290,8 @@ def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
     lost = not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any())
     if lost or (phase == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
         return "diverged"
+    if failure_s(telemetry, samples) is not None and _disarmed(telemetry):
+        return "interrupted"
     if np.isin(phase, CARRIED).any() and _disarmed(telemetry):
         return "completed"
     return "incomplete"

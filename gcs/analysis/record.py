@@ -63,6 +63,7 @@ def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | Non
         "outcome": meta.outcome or metrics.outcome_of(telemetry, samples),
         **metrics.time_numbers(telemetry, meta.wall_s),
         **metrics.tracking_numbers(samples),
+        **metrics.failure_numbers(telemetry, samples),
         **metrics.step_numbers(samples),
         **metrics.cascade_numbers(telemetry),
         **metrics.cable_numbers(telemetry, samples),

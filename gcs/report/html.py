@@ -25,7 +25,6 @@ SCRIPTS = (
     "plots.js",
     "replay.js",
 )
-_ERRORS = ("load_error_max_m", "load_error_rms_m")
 STYLES = (*PLOT_STYLES, "page.css", "charts.css", "transport.css", "stage.css")
 
 
@@ -73,13 +72,21 @@ def _figures(record: Record, replay: Json) -> list[Json]:
     worst = replay["worst"]
     return [
         {
-            "label": f"{label} until the loss" if is_lost(record) and name in _ERRORS else label,
+            "label": label + _until(METRICS[name], record),
             "value": METRICS[name].formatted(record),
             "time": worst["time"] if worst and name == "load_error_max_m" else None,
         }
         for name, label in HEADLINE.items()
         if record[name] is not None
     ]
+
+
+def _until(metric: Metric, record: Record) -> str:
+    """For a figure over the mission window of a flight that failed or was lost: where it ends."""
+    over_mission = metric.group in ("load_error", "vehicle", "rotors") and metric.name != "slack_events"
+    if over_mission and record["failure_s"] is not None:
+        return " until the failure"
+    return " until the loss" if over_mission and is_lost(record) else ""
 
 
 def _groups(record: Record) -> list[dict[str, Any]]:

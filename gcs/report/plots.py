@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.definitions import METRICS
+from gcs.analysis.failure import after_failure
 from gcs.analysis.record import FlightMeta, Record
 from gcs.analysis.samples import CARRIED, Samples
 from gcs.analysis.tracks import Telemetry
+from gcs.report.replay import layout_of
 from gcs.report.style import (
     AXES,
     BLUE,
@@ -25,6 +28,7 @@ from gcs.report.style import (
     RED,
     Target,
     draw,
+    draw_failure,
     draw_legend,
     draw_phase_bands,
     flagged_spans,
@@ -60,7 +64,8 @@ class View:
 
     @property
     def window(self) -> tuple[float, float]:
-        """The time axis around the mission window; the whole flight if it has none."""
+        """The time axis around the mission window, and after a failure to the end; the whole flight if it has
+        no mission window."""
         inside = self.samples.time_s[self.samples.in_mission]
         if len(inside) < 2:
             return self.whole_flight
@@ -69,12 +74,39 @@ class View:
         time_s = self.samples.time_s
         near = (time_s >= inside[0] - margin) & (time_s <= inside[-1] + margin)
         carried = time_s[near & np.isin(self.samples.phase, CARRIED)]
-        return float(carried[0]), float(carried[-1])
+        failed = self.record["failure_s"] is not None
+        return float(carried[0]), self.whole_flight[1] if failed else float(carried[-1])
+
+    @property
+    def shown(self) -> NDArray[np.bool_]:
+        """(n,) the mission window, and after a failure the flight until the load is set down."""
+        failed_s = self.record["failure_s"]
+        if failed_s is None:
+            return self.samples.in_mission
+        return self.samples.in_mission | after_failure(self.samples, failed_s)
+
+    @property
+    def error_m(self) -> Floats:
+        """(n, 3) true minus requested load position; NaN once the load was set down after a failure."""
+        failed_s = self.record["failure_s"]
+        if failed_s is None:
+            return self.samples.error_m
+        known = self.shown | (self.samples.time_s < failed_s)
+        return np.where(known[:, None], self.samples.error_m, np.nan)
+
+    @property
+    def rotors(self) -> Floats:
+        """(n, 2) positions of the vehicle's rotors, forward and left."""
+        return np.array(
+            [(x, -y) for x, y, _ in (r["position"] for r in layout_of(self.meta.vehicle)["rotors"])]
+        )
 
     def shade(self, axes: Any, limits: tuple[float, float] | None = None) -> None:
-        """Draw the phases and set the limits of the time axis, for axes above each other."""
+        """Draw the phases and a failure, and set the limits of the time axis, for axes above each other."""
         spans = phase_spans(self.telemetry.setpoint.time_s, self.telemetry.setpoint.phase)
         draw_phase_bands(list(axes), spans, limits or self.window)
+        if self.record["failure_s"] is not None:
+            draw_failure(list(axes), self.record["failure_s"])
 
     def visible(self, time_s: Floats) -> slice:
         """The samples inside the window, so that axes scale to what is visible."""
@@ -85,7 +117,9 @@ class View:
 def track(view: View, path: Target) -> None:
     """Load track in three dimensions."""
     figure = new_figure(9.0, 6.4)
-    draw_track(figure, view.samples, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
+    draw_track(
+        figure, view.samples, view.shown, view.rotors, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5)
+    )
     figure.text(0.03, 0.945, "Load track", fontsize=12, weight="bold")
     lines = "dashed: desired · grey: cable, shadow, and the load while no position is asked for"
     if not view.samples.attached.all():
@@ -130,11 +164,13 @@ def error(view: View, path: Target) -> None:
     figure, axes = new_axes_grid(11.0, 6.2, 3, 2)
     s = view.samples
     visible = view.visible(s.time_s)
-    scale, unit = length_scale(s.error_m[visible])
-    estimate_error, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
+    scale, unit = length_scale(view.error_m[visible])
+    # a load that was released is not followed by estimator and filter
+    actual_m = np.where(s.attached[:, None], s.actual_m, np.nan)
+    estimate_error, filtered = scale * (s.estimated_m - actual_m), scale * (s.filtered_m - actual_m)
     has_filter = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
     columns = (
-        ("position error", unit, scale * s.error_m),
+        ("position error", unit, scale * view.error_m),
         ("velocity error", f"{unit}/s", scale * s.error_m_s),
     )
     for column, (what, shown_unit, values) in enumerate(columns):
@@ -312,14 +348,17 @@ def tension(view: View, path: Target) -> None:
 def overview(view: View, path: Target) -> None:
     """Track, error and rotors in one picture, as a summary."""
     figure = new_figure(13.0, 6.2)
-    draw_track(figure, view.samples, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
+    draw_track(
+        figure, view.samples, view.shown, view.rotors, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5)
+    )
     s = view.samples
     above = figure.add_axes((0.605, 0.51, 0.38, 0.32))
     below = figure.add_axes((0.605, 0.095, 0.38, 0.32), sharex=above)
     visible = view.visible(s.time_s)
-    scale, unit = length_scale(s.error_m[visible])
+    error_m = view.error_m[visible]
+    scale, unit = length_scale(error_m)
     for i, colour in enumerate((RED, BLUE, GREEN)):
-        draw(above, s.time_s[visible], scale * s.error_m[visible, i], color=colour, label=AXES[i][0])
+        draw(above, s.time_s[visible], scale * error_m[:, i], color=colour, label=AXES[i][0])
     above.set_title("Load position error")
     above.set_ylabel(f"true − desired ({unit})")
     above.tick_params(labelbottom=False)
@@ -359,10 +398,17 @@ def summary_line(record: Record) -> str:
     parts += [
         f"{name} {record[name]}" for name in ("law", "vehicle", "sensors", "seed") if record[name] is not None
     ]
-    worst, rms = (METRICS[name].formatted(record) for name in ("load_error_max_m", "load_error_rms_m"))
+    worst, rms, failure, after = (
+        METRICS[name].formatted(record)
+        for name in ("load_error_max_m", "load_error_rms_m", "failure_s", "failure_error_max_m")
+    )
+    failed = record["failure_s"] is not None
     if record["load_error_max_m"] is not None:
-        parts.append(f"load error max {worst}, RMS {rms}")
-    if record["saturated_fraction"] is not None:
+        until = f" until the failure at {failure}" if failed else ""
+        parts.append(f"load error{until} max {worst}, RMS {rms}")
+    if record["failure_error_max_m"] is not None:
+        parts.append(f"after it max {after}")
+    if record["saturated_fraction"] is not None and not failed:
         parts.append(f"rotors saturated {100.0 * record['saturated_fraction']:.1f} %")
     return "  ·  ".join(parts)
 

@@ -177,7 +177,7 @@ def _columns(
         *_xyz("vehicle", samples.vehicle_m, _POSITION_M),
         *_xyz("asked", samples.requested_m, _POSITION_M),
         *_xyz("flown_for", samples.desired_m, _POSITION_M),
-        *_xyz("believed", samples.estimated_m, _POSITION_M),
+        *_xyz("believed", np.where(samples.attached[:, None], samples.estimated_m, np.nan), _POSITION_M),
         *_xyz("velocity", samples.actual_m_s, _SPEED_M_S),
         *_xyz("asked_velocity", samples.requested_m_s, _SPEED_M_S),
         *_components("quat", "wxyz", quat_enu_flu_from_ned_frd(samples.quat_wxyz), _UNIT),  # its own inverse

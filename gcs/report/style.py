@@ -208,6 +208,27 @@ def draw_phase_bands(
             )
 
 
+def draw_failure(axes: list[Any], time_s: float) -> None:
+    """Mark the time of a failure in all axes; the first name it, below the names of the phases."""
+    for ax in axes:
+        ax.axvline(time_s, color=RED, linewidth=1.2, zorder=4)
+    begin, end = axes[0].get_xlim()
+    side = 1 if time_s < 0.5 * (begin + end) else -1  # of the line, on which there is room
+    axes[0].annotate(
+        "failure",
+        (time_s, 0.9),
+        xycoords=axes[0].get_xaxis_transform(),
+        xytext=(4 * side, 0),
+        textcoords="offset points",
+        ha="left" if side > 0 else "right",
+        va="top",
+        fontsize=8,
+        color=RED,
+        zorder=5,
+        annotation_clip=True,
+    )
+
+
 def flagged_spans(time_s: Floats, flags: NDArray[np.bool_], min_width_s: float) -> list[tuple[float, float]]:
     """(begin, width) of each stretch of set flags, at least `min_width_s` wide so that one is visible."""
     if not flags.any():

@@ -46,14 +46,25 @@ def snapshots(position: Floats, min_distance: float) -> list[int]:
     return chosen
 
 
-def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangle: Rectangle) -> None:
-    """Desired and true path of the load, coloured by error; rectangles are shares of the figure."""
+def draw_track(
+    figure: Any,
+    samples: Samples,
+    shown: NDArray[np.bool_],
+    rotors: Floats,
+    rectangle: Rectangle,
+    bar_rectangle: Rectangle,
+) -> None:
+    """Desired and true path of the load, coloured by error; rectangles are shares of the figure.
+
+    `shown` (n,) are the samples that fill the picture. `rotors` (m, 2) are the positions of the vehicle's
+    rotors, forward and left; only their shape matters.
+    """
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     ax = figure.add_axes(rectangle, projection="3d")
     known = np.asarray((np.abs(samples.actual_m) < _FAR_M).all(axis=1))  # false for NaN
-    mission = known & samples.in_mission
+    mission = known & shown
     if not known.any():
         ax.set_axis_off()
         ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
@@ -64,9 +75,9 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
     low, high = _set_limits(ax, np.concatenate(places))
     _fill_rectangle(figure, ax, rectangle, low, high)
 
-    shown = _thin(np.flatnonzero(known))
+    whole = _thin(np.flatnonzero(known))
     # matplotlib does not cut lines in space at the box
-    whole_path = samples.actual_m[shown]
+    whole_path = samples.actual_m[whole]
     outside = np.any((whole_path < low) | (whole_path > high), axis=1, keepdims=True)
     ax.plot(*np.where(outside, np.nan, whole_path).T, color=GREY, linewidth=0.9, alpha=0.7)
     path = samples.actual_m[_thin(np.flatnonzero(mission))]
@@ -95,7 +106,7 @@ def draw_track(figure: Any, samples: Samples, rectangle: Rectangle, bar_rectangl
         bar.set_label(f"load position error ({unit})", fontsize=9)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=8, length=0)
-    _draw_vehicles(ax, samples, np.flatnonzero(central), low, high)
+    _draw_vehicles(ax, samples, rotors, np.flatnonzero(central), low, high)
     # the box is turned: its corners may be outside the rectangle of the axes, at which Matplotlib would cut
     for artist in (*ax.lines, *ax.collections):
         artist.set_clip_on(False)
@@ -164,7 +175,9 @@ def _fill_rectangle(figure: Any, ax: Any, rectangle: Rectangle, low: Floats, hig
     ax.set_position((rectangle[0] + x, rectangle[1] + y, rectangle[2], rectangle[3]))
 
 
-def _draw_vehicles(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
+def _draw_vehicles(
+    ax: Any, samples: Samples, rotors: Floats, mission: Indices, low: Floats, high: Floats
+) -> None:
     """Draw vehicle, cable and load at some instants; after a release, the vehicle and its path."""
     box = _box(high - low)
     stretch = (high - low) / box
@@ -182,14 +195,15 @@ def _draw_vehicles(ax: Any, samples: Samples, mission: Indices, low: Floats, hig
     )
     # arms keep their shape in the picture if the axes are not to scale
     reach = _ARM * float(box.max()) * stretch
+    arms = rotors / np.linalg.norm(rotors, axis=1).max()
     forward, left = body_axes(samples.quat_wxyz[chosen])
     for index, *axes in zip(chosen, forward, left, strict=True):
         vehicle = samples.vehicle_m[index]
         if not np.isfinite(axes).all():
             continue
-        for axis in axes:
-            ends = np.stack((vehicle - reach * axis, vehicle + reach * axis))
-            ax.plot(*ends.T, color=INK, linewidth=1.8, marker="o", markersize=2.8, zorder=6)
+        for arm in arms @ np.array(axes):
+            ends = np.stack((vehicle, vehicle + reach * arm))
+            ax.plot(*ends.T, color=INK, linewidth=1.8, marker="o", markevery=[1], markersize=2.8, zorder=6)
 
 
 def _box(size: Floats) -> Floats:

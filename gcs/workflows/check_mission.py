@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -22,7 +23,7 @@ from gcs.workflows.before_flight import unused_planner_text
 from gcs.workflows.flyable_marks import mark_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import AttitudeRun, Mission, Release, Signals, Winch
+from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
 # one: slower rotors, a sagging battery and a cable off the centre take a part of it, wind another.
@@ -72,9 +73,30 @@ def path_reports(
     """How the vehicle flies the mission, with paths `shaped` by the autopilot or as requested; a `planner`
     makes those through waypoints. GcsError says what is wrong with a planned path."""
     try:
-        return paths(mission, load_limits(vehicle), planner, shaped)
+        return paths(_as_sent(mission), load_limits(vehicle), planner, shaped)
     except PlanError as error:
         raise GcsError(f"{mission.name}: {error}") from None
+
+
+def _as_sent(mission: Mission) -> Mission:
+    """The mission with its waypoints on the grid on which mission items carry them: how fast waypoints that
+    are close together can be flown depends on it."""
+    sent = decode_items(items_of(mission, Home()), Home())
+    steps = (
+        there if isinstance(here, Waypoint) else here for here, there in zip(mission.steps, sent, strict=True)
+    )
+    return replace(mission, steps=tuple(steps))
+
+
+def slowness_notes(reports: Sequence[PathReport]) -> Iterator[str]:
+    """A line about each path through waypoints that does not come near the speed asked for."""
+    for asked_m_s, group in groupby(reports, lambda report: report.asked_m_s):
+        items = [report.item for report in group]
+        if asked_m_s:
+            yield (
+                f"note: items[{items[0]}] to items[{items[-1]}]: too close together, or turns too sharp, for "
+                f"{asked_m_s:g} m/s; leave out waypoints, or fly signals (docs/missions.md)"
+            )
 
 
 def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
@@ -179,7 +201,11 @@ def check_mission(
     mission = load(name_or_path)
     found = [*violations(mission, vehicle, not as_asked), *winch_violations(mission, vehicle)]
     reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
-    warnings = (*margin_warnings(reports, vehicle), *timeout_warnings(mission, reports, vehicle))
+    warnings = (
+        *slowness_notes(reports),
+        *margin_warnings(reports, vehicle),
+        *timeout_warnings(mission, reports, vehicle),
+    )
     if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
         warnings += (
             "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "

@@ -339,6 +339,20 @@ def delivery() -> Flight:
     return made
 
 
+def landing_after_a_failure(error_m: float, still_s: float = 4.0) -> Flight:
+    """A rotor is lost in mid-mission, `still_s` after its beginning: the load is lowered at once, sags by
+    `error_m` on the way, and lies there while its setpoint goes on into the ground."""
+    made = flight(still_s, still)
+    failed = int(np.flatnonzero(made.mission)[-1]) + 1
+    made.phase[failed:][made.phase[failed:] != mavlink.PLUMBLINE_PHASE_DISARMED] = (
+        mavlink.PLUMBLINE_PHASE_LOWER
+    )
+    made.actual[failed + 20 : failed + 30, 2] -= error_m
+    made.desired[np.flatnonzero(made.phase == mavlink.PLUMBLINE_PHASE_LOWER)[-20:], 2] -= 0.09
+    made.texts.append((float(made.time_s[failed]), 3, "Failsafe: rotor 3 lost, landing"))
+    return made
+
+
 def _fly_it(made: Flight, rng: np.random.Generator) -> None:
     """Cable, attitude, tension and rotor forces from the acceleration of the path, by differences."""
     n = len(made.time_s)

@@ -25,6 +25,7 @@ from gcs.workflows.check_mission import (
     margin_warnings,
     notes_after_release,
     path_reports,
+    slowness_notes,
     timeout_warnings,
     winch_notes,
     winch_violations,
@@ -96,6 +97,29 @@ def test_how_fast_the_load_becomes_is_told() -> None:
     assert path.speed_m_s == pytest.approx(PEAK_SPEED * 1.0 / path.duration_s, rel=1e-9)
     assert path.speed_m_s < 2.0
     assert f"; load to {path.speed_m_s:.2f} m/s, rotors" in str(path)
+
+
+def test_waypoints_that_are_too_close_for_their_speed_are_told() -> None:
+    """On the grid of mission items a diagonal row is crooked; the file itself is straight."""
+    row = [Waypoint(0.048 * i, 0.036 * i, 2.0) for i in range(1, 31)]
+    close = Mission("close", "", "", (), (Takeoff(2.0), Speed(1.0), *row, Land()))
+    reports = path_reports(close, "bebop")
+    (note,) = slowness_notes(reports)
+    assert note.startswith("note: items[2] to items[31]: too close together, or turns too sharp, for 1 m/s")
+    assert {report.asked_m_s for report in reports[1:]} == {1.0}
+    assert max(report.speed_m_s for report in reports[1:]) < 0.5
+    wide = Mission("wide", "", "", (), (Takeoff(2.0), Speed(1.0), row[-1], Waypoint(5.0, 0.0, 2.0), Land()))
+    assert list(slowness_notes(path_reports(wide, "bebop"))) == []
+
+
+def test_a_path_that_leaves_the_lines_between_its_waypoints_tells_how_far() -> None:
+    corner = (Takeoff(2.0), Waypoint(4.0, 0.0, 2.0), Waypoint(4.0, 4.0, 2.0), Land())
+    up, *beside = path_reports(Mission("corner", "", "", (), corner), "bebop")
+    assert up.beside_m == 0.0
+    assert all(0.3 < report.beside_m < 2.0 for report in beside)
+    assert f" s, up to {beside[0].beside_m:.1f} m beside the straight line; load to " in str(beside[0])
+    single = Mission("single", "", "", (), (Takeoff(2.0), corner[1], Land()))
+    assert "beside" not in str(path_reports(single, "bebop")[-1])
 
 
 def test_attitude_runs_tell_of_no_speed() -> None:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from autopilot.guidance.legs import Hold
+from autopilot.onboard.onboard import PathWork
 from autopilot.services import identity
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING, PreparedPaths
@@ -14,7 +18,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Status, Target
-from missions.model import Delay, Land, Signals, Takeoff, Term
+from missions.model import Delay, Land, Signals, Takeoff, Term, Waypoint
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
 PLUMBLINE = 2.0  # CTL_LAW
@@ -24,7 +28,7 @@ PX4_MISSION, PX4_RTL, PX4_LAND = (
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 
 
-def upload(craft: Craft, *steps: Takeoff | Delay | Signals | Land) -> None:
+def upload(craft: Craft, *steps: Takeoff | Delay | Signals | Waypoint | Land) -> None:
     """Upload a mission, item by item as a ground station does."""
     operation = MissionUpload(Target(1, 1), encode_steps(steps, Home()))
     heard = len(craft.heard)
@@ -154,6 +158,41 @@ def test_a_vehicle_that_nothing_is_asked_of_is_disarmed(refused: bool) -> None:
         assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED), 11.0)
     assert "Disarmed: no command received" in craft.texts
+
+
+def test_a_mission_that_begins_elsewhere_is_prepared_from_there() -> None:
+    """The paths of an upload begin at home; the start waits for those from where the load hangs."""
+    craft = flown_to_hold()
+    upload(craft, Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0), Land())
+    first = craft.onboard.work
+    assert first is not None
+    craft.onboard.finish(first, first.run())
+    here = craft.onboard.core.flight.legs[0].jet(0.0)[0]
+    flight = craft.flight
+    beside = Hold((here[0] + 1.0, here[1], here[2]))
+    craft.onboard.core.replace_flight(replace(flight, legs=(beside,)))
+    assert craft.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+    assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.HOLD, True)
+    work = craft.onboard.work
+    assert isinstance(work, PathWork)
+    assert work.begin.state is not None
+    assert work.begin.state.expected == beside.position
+    craft.onboard.finish(work, work.run())
+    assert craft.flight.mission.active
+    path = craft.flight.mission.plan.prepared.paths[1]
+    assert isinstance(path, PathSegment)
+    assert path.start == (beside.position[0], beside.position[1], 2.0)
+
+
+@pytest.mark.parametrize("outside", [True, False])
+def test_a_curve_beyond_the_fence_is_told_after_the_upload(outside: bool) -> None:
+    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=4.3 if outside else 9.0)
+    craft.wait(1.0)
+    corner = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0), Waypoint(-3.0, 3.0, 2.0))
+    upload(craft, Takeoff(2.0), *corner, Land())
+    craft.wait(0.1)
+    told = [text for text in craft.texts if text.startswith("Mission will not start: the curve to item ")]
+    assert len(told) == outside
 
 
 def test_a_mission_that_turns_out_not_to_be_flyable_is_told() -> None:

@@ -11,12 +11,14 @@ import pytest
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, PathStretch, SignalRun, requested_jet
-from autopilot.services.requests import Arm, Land, Pause, ReturnHome, StartMission
+from autopilot.services.requests import Arm, Land, Pause, Reposition, ReturnHome, StartMission
 from autopilot.services.requests import Takeoff as TakeOff
-from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.mission import with_current_step, with_plan
+from autopilot.supervisor.requests.mission_checks import mission_begin, mission_problem
 from autopilot.supervisor.state import Flight, MissionPlan, Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import Disc, Fence, Polygon
 from missions import model
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
@@ -47,6 +49,17 @@ def started(*steps: Step, limits: object = LIMITS) -> Sky:
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     return sky
+
+
+def start_prepared(sky: Sky) -> None:
+    """Start the mission with paths from where it begins now, which it waits for."""
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    if sky.flight.mission.waiting:
+        plan, begin = sky.flight.mission.plan, mission_begin(sky.flight, sky.view, SETTINGS)
+        found = prepare(plan.steps, plan.sequence, LIMITS, begin=begin)
+        sky.flight = prepared(sky.flight, replace(plan, prepared=found))
+        assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert not sky.flight.mission.waiting
 
 
 def worst_jump(sky: Sky, order: int) -> float:
@@ -143,7 +156,9 @@ def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     assert isinstance(sky.flight.legs[0], PathStretch)
     assert sky.ask(Pause()).result == ACCEPTED
     sky.wait(4.0)
-    assert sky.ask(StartMission(None)).result == ACCEPTED
+    start_prepared(sky)
+    sky.run(lambda s: s.reached[-1] == 2)
+    assert norm(sky.setpoints[-1][2][1]) > 0.5, "flown through"
     sky.run(lambda s: s.flight.phase == Phase.LOWER)
     assert sky.reached == [0, 1, 2, 3]
     assert worst_jump(sky, 0) < TRAPEZOID_M
@@ -192,9 +207,74 @@ def test_a_start_before_the_paths_are_there_holds_in_the_air() -> None:
     sky.wait(5.0)
     assert sky.flight.phase == Phase.HOLD
     sky.flight = prepared(sky.flight, plan)
-    assert sky.ask(StartMission(None)).result == ACCEPTED
+    start_prepared(sky)
     sky.run(lambda s: s.flight.phase == Phase.LOWER)
     assert sky.reached[-1] == 3
+
+
+@pytest.mark.parametrize("takeoff", [(), (Takeoff(2.0),)], ids=["waypoints alone", "with a take-off"])
+def test_a_mission_that_begins_elsewhere_in_the_air_is_flown_through_as_well(
+    takeoff: tuple[Step, ...],
+) -> None:
+    """The paths were prepared from home, so a start elsewhere waits until they are prepared from there."""
+    sky = prepared_sky(*takeoff, *ROUND).airborne()
+    assert sky.ask(Reposition(-2.0, 1.0, 2.0, None)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.HOLD and norm(s.view.v_load) == 0.0 and s.view.x_load[0] < -1.9)
+    start_prepared(sky)
+    passed: list[float] = []
+    while sky.flight.mission.active:
+        known = len(sky.reached)
+        sky.tick()
+        if len(sky.reached) > known:
+            passed.append(norm(sky.setpoints[-1][2][1]))
+    assert min(passed[len(takeoff) : -1]) > 0.5
+    assert len(passed) == len(takeoff) + 3
+    assert worst_jump(sky, 0) < TRAPEZOID_M
+
+
+def test_a_load_that_stands_elsewhere_is_flown_through_the_waypoints_as_well() -> None:
+    sky = prepared_sky(Takeoff(2.0), *ROUND)
+    sky.view = sky.view._replace(x_load=(2.0, -1.0, 0.02), x_quad=(2.1, -1.0, 0.06))
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.ARMED, True)
+    start_prepared(sky)
+    sky.run(lambda s: s.reached[-1:] == [1])
+    assert norm(sky.setpoints[-1][2][1]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("fence", "item"),
+    [
+        (Fence((Polygon(True, ((-9.0, -9.0), (3.2, -9.0), (3.2, 9.0), (-9.0, 9.0))),)), 2),
+        (Fence((Disc(False, (1.5, 3.4), 0.2),)), 3),
+        (Fence((Disc(False, (1.5, -3.4), 0.2),)), None),
+    ],
+    ids=["out of a zone", "into a zone", "far from a zone"],
+)
+def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> None:
+    """All waypoints are within the fence, and so are the straight lines between them."""
+    sky = prepared_sky(Takeoff(2.0), *ROUND)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence))
+    verdict = sky.ask(StartMission(None))
+    if item is None:
+        assert verdict.result == ACCEPTED
+        return
+    assert verdict.result == DENIED
+    assert verdict.text.startswith(f"Mission denied: the curve to item {item} leads ")
+    # flown from rest to rest, as after a jump into the path, the lines are straight
+    at_last = with_current_step(sky.flight, 3, done=False)
+    assert mission_problem(at_last, sky.view, sky.settings) == ""
+
+
+def test_a_mission_waits_for_paths_only_once() -> None:
+    """A path that would touch the ground is not flown, wherever it begins."""
+    low = (Waypoint(3.0, 0.0, 0.02), Waypoint(6.0, 0.0, 0.02), Waypoint(9.0, 0.0, 2.0))
+    sky = prepared_sky(Takeoff(2.0), *low).airborne()
+    assert sky.ask(Reposition(-2.0, 1.0, 2.0, None)).result == ACCEPTED
+    sky.wait(20.0)
+    start_prepared(sky)
+    assert sky.flight.mission.plan.prepared.paths == (None,) * 4
 
 
 @pytest.mark.parametrize("wish", [Pause(), Land(), ReturnHome(), TakeOff(None)], ids=type)

@@ -23,6 +23,7 @@ from autopilot.trajectory.waypoint_path import (
     PathSegment,
     evaluate_path,
     plan_waypoint_path,
+    ride_time_shares,
     sample_path,
 )
 from missions.model import Land, Speed, Step, Takeoff, Waypoint
@@ -132,6 +133,38 @@ def test_time_optimal_is_quicker_and_at_a_bound() -> None:
 
 def replace_rotor(high: float) -> Bounds:
     return BOUNDS._replace(rotor_high=high)
+
+
+def test_points_sampled_from_a_curve_are_flown_at_the_speed_asked_for() -> None:
+    """However close they are: only the ends of the path are slow."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 41)
+    circle = [(2.0 * float(np.sin(a)), 2.0 - 2.0 * float(np.cos(a)), 2.0) for a in angles]
+    path, times = plan_waypoint_path(circle, 1.0, 1.5, BODY, BOUNDS, False)
+    middle = sample_path(path.table(), np.linspace(times[8], times[-9], 400))
+    assert np.linalg.norm(middle[1], axis=1).min() > 0.95
+
+
+def test_a_ride_takes_the_time_of_the_lines_between_its_ends() -> None:
+    points = np.column_stack([np.arange(0.0, 10.01, 0.1), np.zeros(101), np.full(101, 2.0)])
+    shares = ride_time_shares(points, 1.0, 1.5)
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares == pytest.approx(shares[::-1])
+    assert shares[40:60] == pytest.approx(np.full(20, shares[50]), rel=1e-3)
+    assert shares[0] > 5.0 * shares[50]
+
+
+@pytest.mark.parametrize("spacing_m", [0.06, 0.5])
+def test_a_path_that_does_not_come_near_its_speed_is_told(spacing_m: float) -> None:
+    """Mission items carry places on a grid of 11 mm, so that a row of close waypoints is crooked."""
+    steps: list[Step] = [Takeoff(2.0), Speed(1.0)]
+    steps += [Waypoint(spacing_m * i, 0.011 * (i % 2), 2.0) for i in range(1, 31)]
+    found = prepare(steps, range(len(steps)), LIMITS)
+    assert bool(found.notes) == bool(found.slow_paths) == (spacing_m < 0.1)
+    if found.notes:
+        assert found.notes[0].startswith("Items 2 to 31 take ")
+        assert found.notes[0].endswith(": too close together, or turns too sharp, for 1 m/s")
+        assert (found.slow_paths[0].first, found.slow_paths[0].last) == (2, 31)
+    assert not prepare(steps, range(len(steps)), LIMITS._replace(time_optimal=True)).notes
 
 
 def test_drag_binds_at_speed() -> None:

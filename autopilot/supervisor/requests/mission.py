@@ -9,7 +9,12 @@ from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import start_step, step_event, with_current_step
-from autopilot.supervisor.requests.mission_checks import lift_altitude_m, mission_problem, upload_problem
+from autopilot.supervisor.requests.mission_checks import (
+    is_prepared_from_here,
+    lift_altitude_m,
+    mission_problem,
+    upload_problem,
+)
 from autopilot.supervisor.requests.takeoff import start_takeoff
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
@@ -34,7 +39,8 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     plan = flight.mission.plan
     if not plan.steps:
         return flight, denied("Mission denied: there is none")
-    problem = mission_problem(flight, view, settings) or plan.prepared.refusal
+    prepared = not plan.prepared.pending and is_prepared_from_here(flight, view, settings)
+    problem = mission_problem(flight, view, settings) or (plan.prepared.refusal if prepared else "")
     if problem:
         return flight, denied(f"Mission denied: {problem}")
     if flight.phase == Phase.DISARMED:
@@ -42,7 +48,7 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     event = Event.LAND if isinstance(plan.steps[flight.mission.step], model.Land) else Event.MISSION
     if flight.phase != Phase.ARMED and (flight.phase, event) not in TRANSITIONS:
         return flight, wrong_phase(flight, "Mission")
-    if plan.prepared.pending:
+    if not prepared:
         return _hold_until_prepared(flight, view, settings), _ACCEPTED_PENDING
     flight = replace(
         flight,

@@ -22,6 +22,8 @@ from autopilot.supervisor.state import (
     is_fence_active,
     load_position_below,
 )
+from autopilot.supervisor.step_legs import NEAR_START
+from autopilot.trajectory.prepare import MissionBegin, waypoint_path_starts
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     MIN_REEL_M,
@@ -30,10 +32,12 @@ from autopilot.trajectory.timeline import (
     cable_length_problem,
     timeline,
 )
+from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
-# spacing of the places at which a straight line is checked, and their greatest number
+# spacing of the places at which a line is checked, and their greatest number
 CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
+MIN_CURVE_POINTS = 16  # between two waypoints, however close
 
 RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
 
@@ -43,6 +47,7 @@ def mission_problem(flight: Flight, view: View, settings: Settings) -> str:
     ahead = remaining_timeline(flight, view, settings)
     return (
         fence_exit_problem(flight, ahead, settings)
+        or curve_exit_problem(flight, ahead, settings)
         or height_problem(ahead)
         or missing_load_problem(ahead)
         or winch_problem(ahead, settings)
@@ -86,6 +91,36 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
+def mission_begin(flight: Flight, view: View, settings: Settings) -> MissionBegin:
+    """The present step of the mission, and the state in which it begins from here."""
+    mission = flight.mission
+    ahead = remaining_timeline(flight, view, settings)
+    state = ahead[mission.step - len(mission.plan.steps)][1].before  # behind a lift that no step requests
+    speed_m_s = mission.speed_m_s if mission.step else settings.limits.speed_m_s
+    return MissionBegin(mission.step, replace(state, speed_m_s=speed_m_s))
+
+
+def is_prepared_from_here(flight: Flight, view: View, settings: Settings) -> bool:
+    """Whether the next path through waypoints was prepared from where the load is or comes to rest.
+
+    The paths behind it begin at waypoints, wherever the mission begins.
+    """
+    mission = flight.mission
+    prepared = mission.plan.prepared
+    begin = mission_begin(flight, view, settings)
+    if not prepared.paths or begin.state is None or begin.state.expected is None:
+        return True
+
+    def path_starts(begin: MissionBegin) -> dict[int, Vec3]:
+        return waypoint_path_starts(mission.plan.steps, settings.limits, flight.area.home, begin)
+
+    starts, prepared_starts = path_starts(begin), path_starts(prepared.begin)
+    step = min((step for step in starts if step >= mission.step), default=None)
+    if step is None:
+        return True
+    return step in prepared_starts and norm(sub(starts[step], prepared_starts[step])) < NEAR_START
+
+
 def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
     """Height to which a mission that begins on the ground lifts the load, whatever its first step is."""
     first = next((step for step in plan.steps if isinstance(step, Takeoff)), None)
@@ -107,7 +142,7 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
     """Which item leads beyond the fence, and why; an empty string if none does.
 
     This checks the straight ways to take-off height, to waypoints and home, and the places at which signals
-    and the winch leave the load; signals and curves between waypoints are watched in flight.
+    and the winch leave the load; signals are watched in flight, and for curves there is `curve_exit_problem`.
     """
     if not is_fence_active(flight, settings):
         return ""
@@ -119,21 +154,53 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
 
 
 def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
-    begin, end, cable = entry.before.expected, entry.after.expected, entry.after.cable_m
+    begin, end = entry.before.expected, entry.after.expected
     if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | Signals | Winch):
         return ""
-    if cable is not None:
-        settings = replace(settings, cable_length_m=cable)
-
-    def violation(place: Vec3) -> str:
-        load = load_position_below(place, settings) if entry.after.released else place
-        return fence_violation(flight.area.fence, load, settings)
-
     straight = not isinstance(entry.step, Signals | Winch)
     # a way that begins beyond the fence leads back: only its end counts
-    if begin is None or not straight or violation(begin):
-        return violation(end)
-    return next(filter(None, map(violation, _points_along(begin, end))), "")
+    if begin is None or not straight or _first_violation(flight, entry, (begin,), settings):
+        return _first_violation(flight, entry, (end,), settings)
+    return _first_violation(flight, entry, _points_along(begin, end), settings)
+
+
+def _first_violation(flight: Flight, entry: TimelineEntry, places: Iterable[Vec3], settings: Settings) -> str:
+    """Why load or vehicle may not be at one of the places to which a step leads; an empty string if they may
+    be at all of them."""
+    cable = entry.after.cable_m
+    if cable is not None:
+        settings = replace(settings, cable_length_m=cable)
+    loads = (load_position_below(place, settings) if entry.after.released else place for place in places)
+    return next(filter(None, (fence_violation(flight.area.fence, load, settings) for load in loads)), "")
+
+
+def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
+    """Which item is reached on a curve through waypoints that leads beyond the fence, and why; an empty
+    string if none is, or if the curves are not prepared yet."""
+    if not is_fence_active(flight, settings):
+        return ""
+    mission = flight.mission
+    paths = mission.plan.prepared.paths[mission.step :]
+    table = None  # of the path that is flown
+    for path, (seq, entry) in zip(paths, ahead[len(ahead) - len(paths) :], strict=True):
+        if not isinstance(path, PathSegment):
+            continue
+        if path.begin_s == 0.0 and norm(sub(entry.begin, path.start)) < NEAR_START:
+            table = path.table
+        if path.table is table:
+            places = _points_on_curve(path, entry)
+            reason = _first_violation(flight, entry, places, settings)
+            if reason and not _first_violation(flight, entry, (entry.begin,), settings):
+                return f"the curve to item {seq} leads {reason}"
+    return ""
+
+
+def _points_on_curve(path: PathSegment, entry: TimelineEntry) -> Iterable[Vec3]:
+    """Places on a segment of a path through waypoints, at most about CHECK_SPACING_M apart."""
+    straight_m = norm(sub(entry.end, entry.begin))
+    pieces = min(MIN_CURVE_POINTS + math.ceil(2.0 * straight_m / CHECK_SPACING_M), MAX_CHECK_POINTS)
+    step_s = (path.end_s - path.begin_s) / pieces
+    return (evaluate_path(path.table, path.begin_s + k * step_s)[0] for k in range(1, pieces + 1))
 
 
 def _points_along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:

@@ -330,6 +330,27 @@ def test_the_heartbeat_tells_of_the_landing_before_the_phase():
     assert found == ["incomplete", "completed"]
 
 
+def test_the_figures_of_a_failure():
+    """The setpoint of a load that is set down goes on into the ground: that is no error."""
+    flight = flights.landing_after_a_failure(0.03)
+    found = record(flight)
+    assert found["failure_s"] == pytest.approx(flight.texts[-1][0], abs=0.02)
+    assert found["load_error_max_m"] == pytest.approx(0.0, abs=1e-6)
+    assert found["failure_error_max_m"] == pytest.approx(0.03, abs=1e-6)
+    assert found["outcome"] == "interrupted"
+
+
+@pytest.mark.parametrize("change", ["no text", "before the mission ends"])
+def test_what_is_no_failure(change):
+    flight = flights.landing_after_a_failure(0.03)
+    time_s, severity, text = flight.texts.pop()
+    if change == "before the mission ends":
+        flight.texts.append((time_s - 2.0, severity, text))
+    found = record(flight)
+    assert (found["failure_s"], found["failure_error_max_m"]) == (None, None)
+    assert found["outcome"] == "completed"
+
+
 @pytest.mark.parametrize(
     ("phases", "error_m", "outcome"),
     [

@@ -98,6 +98,8 @@ def test_the_load_is_off_the_cable_from_the_moment_it_is_let_go() -> None:
     assert numbers["swing_max_deg"] == pytest.approx(0.0, abs=1e-3)
     assert numbers["tension_min_n"] == pytest.approx(flights.LOAD_KG * flights.GRAVITY)
     assert numbers["matched_fraction"] == 1.0
+    believed = unpacked(replay_of(telemetry, samples_of(telemetry), FlightMeta())["samples"])["believed_z"]
+    np.testing.assert_array_equal(np.isnan(believed), ~on)
 
 
 def test_a_slack_cable_is_a_cable() -> None:

@@ -20,12 +20,12 @@ from pyarrow import parquet
 from rich.console import Console
 
 from gcs.analysis.definitions import GROUPS, METRICS
-from gcs.analysis.record import FlightMeta, Record, jsonable
-from gcs.analysis.samples import samples_of
+from gcs.analysis.record import FlightMeta, Record, flight_record, jsonable
+from gcs.analysis.samples import PHASE_NAMES, samples_of
 from gcs.analysis.telemetry import load_telemetry
-from gcs.report import style
+from gcs.report import plots, style
 from gcs.report.build import ReportError, build_report, load_meta
-from gcs.report.plots import PICTURES
+from gcs.report.plots import PICTURES, View
 from gcs.report.table import record_table
 from gcs.report.track import draw_track, snapshots
 from tests.doubles import recorded_flights as flights
@@ -53,6 +53,9 @@ def built(tmp_path_factory):
     tlog = flights.case_b(duration_s=12.0).write(out / "flight.tlog")
     record = build_report(tlog, out, META, lambda *step: told.append(step), all_pictures=True)
     return out, record, told
+
+
+CROSS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
 
 
 def strict(text):
@@ -338,6 +341,8 @@ def test_the_manual_names_every_file_key_and_column(built):
         # columns of one family are listed as load_true_*_m
         family = re.sub(r"^(.*)_(x|y|z|[1-4]|w|roll|pitch|yaw|phi|theta)(?=_|$)", r"\1_*", name)
         assert f"`{name}`" in manual or f"`{family}`" in manual, name
+    (phases,) = (line for line in manual.splitlines() if line.startswith("| `phase` |"))
+    assert set(PHASE_NAMES.values()) <= set(re.findall(r"\w+", phases))
 
 
 # --- drawing -------------------------------------------------------------------------------------
@@ -381,13 +386,80 @@ def test_the_track_shows_the_whole_desired_path_however_far_the_load_is_from_it(
     desired_m = samples.desired_m + np.linspace(0.0, 9.0, len(samples.desired_m))[:, None]
     far = replace(samples, desired_m=desired_m)
     figure = style.new_figure(6.0, 6.0)
-    draw_track(figure, far, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    draw_track(figure, far, far.in_mission, CROSS, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
     axes = figure.axes[0]
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     drawn = desired_m[far.in_mission]
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
     assert len(drawn) > 100
     assert (drawn >= limits[:, 0]).all() and (drawn <= limits[:, 1]).all()
+
+
+@pytest.mark.parametrize(("vehicle", "rotors"), [("bebop", 4), ("hexarotor", 6)])
+def test_the_track_shows_as_many_rotors_as_the_vehicle_has(tmp_path, vehicle, rotors):
+    view = view_of(flights.case_b(duration_s=6.0), tmp_path / "flight.tlog")
+    view = replace(view, meta=replace(META, vehicle=vehicle))
+    figure = style.new_figure(6.0, 6.0)
+    draw_track(figure, view.samples, view.shown, view.rotors, (0.0, 0.0, 0.9, 0.9), (0.92, 0.2, 0.02, 0.5))
+    lines = figure.axes[0].lines
+    vehicles = sum(line.get_marker() == "o" and len(line.get_data_3d()[0]) == 1 for line in lines)
+    arms = [np.array(line.get_data_3d()) for line in lines if line.get_markevery() == [1]]
+    assert vehicles > 1
+    assert len(arms) == vehicles * rotors
+    ends = np.array([arm[:, 1] - arm[:, 0] for arm in arms[:rotors]])
+    ends /= np.linalg.norm(ends, axis=1)[:, None]
+    nearest = np.sort(ends @ ends.T, axis=1)[:, -2]
+    assert nearest == pytest.approx(np.cos(2.0 * np.pi / rotors), abs=0.01)
+
+
+def view_of(flight, path):
+    """What the pictures of a recorded flight are drawn from."""
+    telemetry = load_telemetry(flight.write(path))
+    samples = samples_of(telemetry)
+    return View(telemetry, samples, flight_record(telemetry, META, samples), META)
+
+
+def test_the_errors_of_a_load_that_was_released_are_not_drawn(tmp_path, monkeypatch):
+    """The estimator does not follow it: the curve would hide all others."""
+    view = view_of(flights.delivery(), tmp_path / "flight.tlog")
+    drawn = {}
+    monkeypatch.setattr(
+        plots, "draw", lambda ax, t, values, **style: drawn.setdefault(style["label"], values)
+    )
+    plots.error(view, io.BytesIO())
+    lost = ~view.samples.attached[view.visible(view.samples.time_s)]
+    assert 0 < lost.sum() < len(lost)
+    assert np.isnan(drawn["estimate − true"][lost]).all()
+    assert np.isfinite(drawn["estimate − true"][~lost]).any()
+
+
+def test_pictures_show_a_failure_and_the_landing_after_it(tmp_path):
+    flight = flights.landing_after_a_failure(0.03)
+    view = view_of(flight, tmp_path / "flight.tlog")
+    failed_s = view.record["failure_s"]
+    assert view.window[1] == view.whole_flight[1]
+    assert view.samples.time_s[view.shown].max() > failed_s + 1.0
+    # the setpoint goes 90 mm into the ground when the load is down
+    assert np.nanmax(np.abs(view.error_m)) == pytest.approx(0.03, abs=1e-6)
+    _, axes = style.new_axes_grid(6.0, 4.0, 2)
+    view.shade(axes[:, 0])
+    assert [text.get_text() for text in axes[0, 0].texts].count("failure") == 1
+    assert all(failed_s in line.get_xdata() for ax in axes[:, 0] for line in ax.lines)
+    line = plots.summary_line(view.record)
+    assert f"load error until the failure at {failed_s:.1f} s max 0.0 mm, RMS 0.0 mm" in line
+    assert line.endswith("after it max 30.0 mm")
+    whole = view_of(flights.case_b(duration_s=6.0), tmp_path / "whole.tlog")
+    assert whole.window[1] < whole.whole_flight[1]
+    assert "failure" not in plots.summary_line(whole.record)
+
+
+def test_the_page_says_which_figures_end_at_a_failure(tmp_path):
+    tlog = flights.landing_after_a_failure(0.03).write(tmp_path / "flight.tlog")
+    build_report(tlog, tmp_path, META)
+    text = (tmp_path / "report.html").read_text()
+    for label in ("greatest load error until the failure", "greatest load error after the failure"):
+        assert label in text
+    assert "of flight until the failure" not in text
 
 
 def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
