@@ -268,8 +268,8 @@ def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> 
 
 
 def test_a_mission_waits_for_paths_only_once() -> None:
-    """A path that would touch the ground is not flown, wherever it begins."""
-    low = (Waypoint(3.0, 0.0, 0.02), Waypoint(6.0, 0.0, 0.02), Waypoint(9.0, 0.0, 2.0))
+    """A curve that would touch the ground between its waypoints is not flown, wherever it begins."""
+    low = (Waypoint(3.0, 0.0, 0.3), Waypoint(9.0, 0.0, 0.3), Waypoint(9.5, 0.0, 9.0))
     sky = prepared_sky(Takeoff(2.0), *low).airborne()
     assert sky.ask(Reposition(-2.0, 1.0, 2.0, None)).result == ACCEPTED
     sky.wait(20.0)
