@@ -225,8 +225,6 @@ def test_a_vehicle_that_cannot_hover_is_not_advised_to_fly_slower() -> None:
     assert "speed_m_s" not in found.text
 
 
-@pytest.mark.parametrize("shaped", [True, False])
-@pytest.mark.parametrize("distance_m", [1e-3, 0.02, 0.06, 0.1])
 def test_a_vehicle_that_can_hardly_lift_its_load_is_not_advised_to_change_what_a_takeoff_has_not() -> None:
     limits = replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update={"gravity_m_s2": 14.0}))
     found = check(Mission("up", "Up", "", (), (Takeoff(2.0), Delay(1.0), Land())), limits)
@@ -237,6 +235,8 @@ def test_a_vehicle_that_can_hardly_lift_its_load_is_not_advised_to_change_what_a
         )
 
 
+@pytest.mark.parametrize("shaped", [True, False])
+@pytest.mark.parametrize("distance_m", [1e-3, 0.02, 0.06, 0.1])
 def test_a_short_move_takes_the_time_of_every_move_and_passes(distance_m: float, shaped: bool) -> None:
     short = mission(Waypoint(distance_m, 0.0, 2.0, 1.0), ReturnHome())
     assert [str(violation) for violation in check(short, LIMITS, shaped)] == []
