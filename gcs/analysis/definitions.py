@@ -112,6 +112,11 @@ GROUPS: tuple[tuple[Group, tuple[Metric, ...]], ...] = tuple(
 HEADLINE: dict[str, str] = _FILE.headline  # key: label at the top of the report
 
 
+def covers_mission(metric: Metric) -> bool:
+    """Whether the metric is one over the mission window, which a loss or a failure ends."""
+    return bool(_FILE.groups[metric.group].window_if_lost)
+
+
 def known_groups(record: Mapping[str, Any]) -> list[tuple[Group, list[Metric]]]:
     """The groups that a report shows, each with its known metrics. A group in which nothing happened (for
     example if no gust blew) is left out."""

@@ -6,7 +6,7 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from gcs.analysis.definitions import HEADLINE, METRICS, Metric, is_lost, known_groups
+from gcs.analysis.definitions import HEADLINE, METRICS, Metric, covers_mission, is_lost, known_groups
 from gcs.analysis.record import FlightMeta, Record
 from gcs.report.plots import PICTURES, headline
 from gcs.report.replay import Json
@@ -83,7 +83,7 @@ def _figures(record: Record, replay: Json) -> list[Json]:
 
 def _until(metric: Metric, record: Record) -> str:
     """For a figure over the mission window of a flight that failed or was lost: where it ends."""
-    over_mission = metric.group in ("load_error", "vehicle", "rotors") and metric.name != "slack_events"
+    over_mission = covers_mission(metric) and metric.name != "slack_events"
     if over_mission and record["failure_s"] is not None:
         return " until the failure"
     return " until the loss" if over_mission and is_lost(record) else ""

@@ -524,11 +524,11 @@ def the_state_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle: Veh
             agree(found.omega_body, np.array(true.omega_body), 2e-3)
 
 
-def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """In steady flight, under wind and drag, with thrust and lean in balance, no moment is commanded.
-
-    The demand of the integral is bounded.
-    """
+def leaning_against_wind(
+    law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
+) -> tuple[State, Vec3, float]:
+    """The state of steady flight in which thrust and lean balance a push and the drag; this push, and the
+    thrust, N."""
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     push, v = np.array([0.4, -0.3, 0.0]), np.array([1.0, 2.0, 0.0])
     F = np.array([0.0, 0.0, weight]) - push - np.array(law.drag_force(model.vec(v), BEBOP_DRAG))
@@ -536,14 +536,21 @@ def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle
     b1 = model.unit(np.array(EAST) - b3[0] * b3)
     R = np.column_stack([b1, np.cross(b3, b1), b3])
     state = level_state(model)._replace(R=model.mat(R), v_load=model.vec(v), v_quad=model.vec(v))
-    reference = Reference((ZERO, model.vec(v), ZERO, ZERO, ZERO, ZERO, ZERO), EAST)
-    f = float(np.linalg.norm(F))
+    return state, model.vec(push), float(np.linalg.norm(F))
+
+
+def wind_is_leaned_against(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """In steady flight, under wind and drag, with thrust and lean in balance, no moment is commanded.
+
+    The demand of the integral is bounded.
+    """
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    state, push, f = leaning_against_wind(law, model, vehicle)
+    reference = Reference((ZERO, state.v_load, ZERO, ZERO, ZERO, ZERO, ZERO), EAST)
 
     def said(integral: Array) -> Any:
         memory = law.start()._replace(integral=model.vec(integral))
-        return law.load_position(
-            memory, state, reference, f, ZERO, GAINS, BEBOP_DRAG, model.vec(push), TICK, vehicle
-        )
+        return law.load_position(memory, state, reference, f, ZERO, GAINS, BEBOP_DRAG, push, TICK, vehicle)
 
     memory, command = said(np.zeros(3))
     assert command.thrust == pytest.approx(f, abs=ROUNDING)
@@ -698,12 +705,7 @@ def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicl
 def wind_does_not_turn_the_direction(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """While thrust and lean balance wind and drag, the cable of a load in steady flight hangs still."""
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
-    push, v = np.array([0.4, -0.3, 0.0]), np.array([1.0, 2.0, 0.0])
-    F = np.array([0.0, 0.0, weight]) - push - np.array(law.drag_force(model.vec(v), BEBOP_DRAG))
-    b3 = model.unit(F)
-    b1 = model.unit(np.array(EAST) - b3[0] * b3)
-    R = np.column_stack([b1, np.cross(b3, b1), b3])
-    state = level_state(model)._replace(R=model.mat(R), v_load=model.vec(v), v_quad=model.vec(v))
+    state, push, f = leaning_against_wind(law, model, vehicle)
     memory, command = law.load_attitude(
         law.start(),
         state,
@@ -711,11 +713,11 @@ def wind_does_not_turn_the_direction(law: SimpleNamespace, model: SimpleNamespac
         ZERO,
         EAST,
         weight,
-        float(np.linalg.norm(F)),
+        f,
         ZERO,
         GAINS,
         BEBOP_DRAG,
-        model.vec(push),
+        push,
         vehicle,
     )
     agree(command.e_Omega, np.zeros(3), 1e-7)

@@ -61,9 +61,8 @@ _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _ON_GROUND_SHARE = 0.2
 _CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
-_STANDING_COSINE = (
-    0.985  # of 10 deg: a vehicle that leans more does not stand; a gust may carry it as the ground does
-)
+# cosine of 10 deg: a vehicle that leans more does not stand; a gust may carry it as the ground does
+_STANDING_COSINE = 0.985
 # s, time constant that smooths the estimator's wind on the load: the commanded direction of the cable jumps
 # with this wind, and a reading corrects it by more than the wind has changed
 _AIR_TIME = 0.15
