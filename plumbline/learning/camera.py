@@ -6,7 +6,7 @@ desired position of the load, and moves away if the load is far from that.
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin
+from math import ceil, cos, hypot, log10, radians, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +16,10 @@ from sitl.world import Floats
 
 _AZIMUTH, _ELEVATION = radians(-65.0), radians(32.0)  # of the camera, seen from the scene
 _SIDE = 0.9  # the shorter side of the picture, in a plane at distance 1
-_USED = 0.84  # share of the shorter side that the scene fills
+_USED = 0.86  # share of the shorter side that the scene fills
 _GROUND_M = 3.0  # height of the load up to which the ground below it is in the picture
 _NEAR_M = 0.6  # error of the load up to which the camera only follows the desired position
+_FINE_M = 10.0  # height of the camera up to which the grid on the ground has lines every metre
 _NEAREST_M = 0.1  # distance from the camera below which nothing is drawn
 
 _OUTWARD = np.array(  # from the scene to the camera
@@ -43,6 +44,16 @@ class Camera(NamedTuple):
         seen = (points - self.eye) @ _AXES.T
         depth = np.where(seen[..., 2] > _NEAREST_M, seen[..., 2], np.nan)
         return np.asarray(self.middle + self.focal * seen[..., :2] / depth[..., None])
+
+    @property
+    def grid_m(self) -> float:
+        """Distance of the lines of a grid on the ground that is neither too fine nor too coarse: 1 m, or 10 m
+        and so on from high up."""
+        return float(10.0 ** max(0, ceil(log10(self.eye[2] / _FINE_M))))
+
+    def ground(self) -> Floats:
+        """The point (3,) on the ground in the direction in which it looks."""
+        return self.eye - self.eye[2] / _OUTWARD[2] * _OUTWARD
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point (3,)."""

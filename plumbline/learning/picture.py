@@ -1,4 +1,4 @@
-"""Draws the picture of an environment: vehicle, cable and load above the ground, and the load's desired position.
+"""Draws a scene: vehicle, cable and load above the ground, and the desired position of the load.
 
 Matplotlib draws it. Its artists are made once, and moved for each picture. Colours are those of the light
 theme of the replay (gcs/web/scene_theme.js).
@@ -18,12 +18,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
-from numpy.typing import NDArray
 
 from plumbline.learning.camera import Camera, camera_at
 from plumbline.learning.scene import (
     CIRCLE,
     GAP,
+    Frame,
     Scene,
     VehicleShape,
     cable_shape,
@@ -32,8 +32,6 @@ from plumbline.learning.scene import (
     vehicle_shape,
 )
 from sitl.world import Floats
-
-Frame = NDArray[np.uint8]  # (height, width, 3)
 
 LOAD_COLOUR = "#d99a00"
 _BACKGROUND, _GRID, _LABEL, _SHADOW = "#f4f6f8", "#c3cdd6", "#22303d", "#2c3a48"
@@ -46,7 +44,7 @@ _MARGIN = 12.0  # of the texts
 _LOAD_RADIUS = 5.0  # least radius of the load as drawn
 _SHADOW_RADII = 2.5  # radius of the shadow of the load, in radii of the load
 _DESIRED_M = 0.12  # radius of the ring around the desired position
-_GRID_M, _GRID_LINES = 1.0, 12  # distance of the lines of the grid, and how many are drawn on each side
+_GRID_LINES = 14  # of the grid, on each side of its middle
 _FADING = (0.2, 0.4, 0.6, 0.8, 1.0)  # opacities of the grid, from far to near
 _FULL = 0.75  # share of its maximum force from which a rotor changes its colour
 
@@ -63,7 +61,7 @@ class Painter:
         dpi = 72.0 * self._unit  # so that a point is a unit
         width, height = ((pixels + 0.01) / dpi for pixels in size)  # above, as it is rounded down
         self._figure = Figure(figsize=(width, height), dpi=dpi, facecolor=_BACKGROUND)
-        self._canvas = FigureCanvasAgg(self._figure)
+        self._canvas: Any = FigureCanvasAgg(self._figure)
         self._grid = [self._line(_ON_GROUND, _GRID, alpha=alpha) for alpha in _FADING]
         self._shadows = self._polygons(_ON_GROUND, facecolors=_SHADOW, alpha=0.16, linewidths=0.0)
         self._path = self._line(_ON_GROUND, _GRID, linewidth=1.6)
@@ -78,11 +76,13 @@ class Painter:
         self._load = self._circle(_LOAD_ORDER, facecolor=LOAD_COLOUR, edgecolor=_LABEL, linewidth=1.0)
         self._gleam = self._circle(_LOAD_ORDER, facecolor="white", edgecolor="none", alpha=0.5)
         self._arms = self._line(_VEHICLE_IN_FRONT, _ARM, linewidth=2.6)
-        self._hull = self._add(_VEHICLE_IN_FRONT, Polygon(CIRCLE[:, :2], facecolor=_HULL, transform=_STILL))
+        self._hull = self._add(
+            _VEHICLE_IN_FRONT, Polygon(CIRCLE[:, :2], facecolor=_HULL, edgecolor="none", transform=_STILL)
+        )
         self._nose = self._line(_VEHICLE_IN_FRONT, _NOSE, linewidth=2.6)
         self._rotors = self._polygons(_VEHICLE_IN_FRONT, linewidths=1.2)
         self._numbers = self._text(_MARGIN * self._unit, _LABEL)
-        self._slack = self._text(size[0] - _MARGIN * self._unit, _SLACK, ha="right", weight="bold", text="slack")
+        self._slack = self._text(size[0] - _MARGIN * self._unit, _SLACK, text="slack", ha="right")
 
     def draw(self, scene: Scene) -> Frame:
         """(height, width, 3) the picture of a scene."""
@@ -114,7 +114,7 @@ class Painter:
 
     def _draw_desired(self, scene: Scene, camera: Camera) -> None:
         desired, load = np.array(scene.desired), np.array(scene.plant.x_load)
-        heights = np.arange(1.0, load[2])[:, None]
+        heights = np.arange(camera.grid_m, load[2], camera.grid_m)[:, None]
         for line, points in (
             (self._path, scene.path),
             (self._ahead, scene.ahead),
@@ -178,27 +178,30 @@ class Painter:
         return self._add(order, Circle((0.0, 0.0), 1.0, transform=_STILL, **style))
 
     def _text(self, x: float, colour: str, text: str = "", **style: Any) -> Any:
-        y = self._size[1] - _MARGIN * self._unit
-        artist = Text(x, y, text, color=colour, va="top", fontfamily="DejaVu Sans", fontsize=12, **style)
+        style = {"va": "top", "family": "DejaVu Sans", "fontsize": 12, "parse_math": False, **style}
+        artist = Text(x, self._size[1] - _MARGIN * self._unit, text, color=colour, usetex=False, **style)
         artist.set(transform=_STILL, visible=min(self._size) >= _MIN_TEXT_PIXELS)
         return self._add(_TEXT_ORDER, artist)
 
 
 def _grid(camera: Camera) -> list[Floats]:
     """For each opacity, points (n, 2) of the lines on the ground that have it."""
-    x, y = camera.centre[:2]
-    along = np.arange(-_GRID_LINES, _GRID_LINES + 1) * _GRID_M
-    east, north = (_GRID_M * np.round(at / _GRID_M) + along for at in (x, y))
-    corners = np.stack((*np.meshgrid(east, north, indexing="ij"), np.zeros((along.size, along.size))), axis=-1)
+    spacing, middle = camera.grid_m, camera.ground()[:2]
+    nearest = np.round(middle / spacing)
+    steps = np.arange(-_GRID_LINES, _GRID_LINES + 1)
+    corners = np.zeros((len(steps), len(steps), 3))
+    corners[..., 0] = spacing * (nearest[0] + steps)[:, None]
+    corners[..., 1] = spacing * (nearest[1] + steps)
+    gaps = np.full((len(steps) - 1, len(steps), 1, 3), np.nan)
     pieces = np.concatenate(
         [
-            np.stack((corners[:-1], corners[1:]), axis=2).reshape(-1, 2, 3),
-            np.stack((corners[:, :-1], corners[:, 1:]), axis=2).reshape(-1, 2, 3),
+            np.concatenate((np.stack((lines[:-1], lines[1:]), axis=2), gaps), axis=2).reshape(-1, 3, 3)
+            for lines in (corners, corners.swapaxes(0, 1))
         ]
     )
-    away = np.linalg.norm(pieces.mean(axis=1)[:, :2] - (x, y), axis=1) / (_GRID_LINES * _GRID_M)
-    steps = np.ceil((1.0 - away) * len(_FADING)).astype(int) - 1
+    away = np.linalg.norm(0.5 * (pieces[:, 0, :2] + pieces[:, 1, :2]) - middle, axis=1)
+    fading = np.floor((1.0 - away / (_GRID_LINES * spacing)) * len(_FADING))
     seen = camera.pixels(pieces)
-    inside = ((seen.max(axis=1) > 0.0) & (seen.min(axis=1) < camera.size)).all(axis=1)
-    ends = np.concatenate((seen, np.full((len(seen), 1, 2), np.nan)), axis=1)  # with a gap after each piece
-    return [ends[inside & (steps == step)].reshape(-1, 2) for step in range(len(_FADING))]
+    first, last = seen[:, 0], seen[:, 1]
+    inside = ((np.maximum(first, last) > 0.0) & (np.minimum(first, last) < camera.size)).all(axis=1)
+    return [seen[inside & (fading == step)].reshape(-1, 2) for step in range(len(_FADING))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import rotation_from_quat
@@ -13,6 +14,8 @@ from gcs.errors import GcsError
 from plumbline.learning.batch import Episodes
 from sitl.plant.records import PlantState, Truth
 from sitl.world import Floats
+
+Frame = NDArray[np.uint8]  # (height, width, 3), a picture of a scene
 
 _AHEAD_S, _AHEAD_POINTS = 3.0, 30  # of the path that is drawn ahead of the desired position
 _PATH_POINTS = 400  # of the whole path
@@ -72,8 +75,9 @@ def scene_of(episodes: Episodes, i: int) -> Scene:
 
 
 def _thinned(points: Floats, count: int) -> Floats:
-    """At most about `count` of the points, with the first and the last one."""
-    return points[np.unique(np.linspace(0, len(points) - 1, min(len(points), count)).astype(int))]
+    """At most `count` of the points (n, 3), with the first and the last one."""
+    chosen = np.linspace(0, len(points) - 1, min(len(points), count)).round().astype(np.intp)
+    return np.asarray(points[chosen])
 
 
 def vehicle_shape(scene: Scene) -> VehicleShape:
