@@ -36,7 +36,7 @@ from sitl.world import Floats
 LOAD_COLOUR = "#d99a00"
 _BACKGROUND, _GRID, _LABEL, _SHADOW = "#f4f6f8", "#c3cdd6", "#22303d", "#2c3a48"
 _HULL, _ARM, _NOSE, _ROTOR, _ROTOR_FULL = "#2c3a48", "#516273", "#d9541e", "#3a7ab5", "#d9541e"
-_CABLE, _SLACK, _DESIRED = "#22303d", "#b86e00", "#1464b4"
+_CABLE, _SLACK, _DESIRED, _PATH = "#22303d", "#b86e00", "#1464b4", "#7b8b9a"
 
 _UNIT_PIXELS = 480  # shorter side of the picture for which widths of lines and sizes of letters are given
 _MIN_TEXT_PIXELS = 200  # shorter side below which letters would be illegible
@@ -64,7 +64,7 @@ class Painter:
         self._canvas: Any = FigureCanvasAgg(self._figure)
         self._grid = [self._line(_ON_GROUND, _GRID, alpha=alpha) for alpha in _FADING]
         self._shadows = self._polygons(_ON_GROUND, facecolors=_SHADOW, alpha=0.16, linewidths=0.0)
-        self._path = self._line(_ON_GROUND, _GRID, linewidth=1.6)
+        self._path = self._line(_ON_GROUND, _PATH, linewidth=1.6, alpha=0.6)
         dashes = {"linestyle": (0, (2, 3)), "alpha": 0.5}
         self._desired_drop = self._line(_ON_GROUND, _DESIRED, **dashes)
         self._load_drop = self._line(_ON_GROUND, _SHADOW, **dashes)
@@ -157,7 +157,7 @@ class Painter:
     def _write(self, scene: Scene) -> None:
         load = np.array(scene.plant.x_load)
         error = np.linalg.norm(load - scene.desired)
-        lines = (f"{scene.time_s:.2f} s", f"error {error:.2f} m", f"height {load[2]:.2f} m")
+        lines = (f"{scene.time_s:.2f} s", f"error {error:.3f} m", f"height {load[2]:.2f} m")
         self._numbers.set_text("\n".join(lines))
         self._slack.set_visible(scene.plant.taut == 0.0 and min(self._size) >= _MIN_TEXT_PIXELS)
 
