@@ -53,7 +53,7 @@ class Camera(NamedTuple):
 
     def ground(self) -> Floats:
         """The point (3,) on the ground in the direction in which it looks."""
-        return self.eye - self.eye[2] / _OUTWARD[2] * _OUTWARD
+        return np.asarray(self.eye - self.eye[2] / _OUTWARD[2] * _OUTWARD)
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point (3,)."""

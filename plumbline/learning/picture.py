@@ -1,7 +1,6 @@
 """Draws a scene: vehicle, cable and load above the ground, and the desired position of the load.
 
-Matplotlib draws it. Its artists are made once, and moved for each picture. Colours are those of the light
-theme of the replay (gcs/web/scene_theme.js).
+Matplotlib draws it. Its artists are made once, and moved for each picture.
 """
 
 from __future__ import annotations
@@ -33,10 +32,21 @@ from plumbline.learning.scene import (
 )
 from sitl.world import Floats
 
-LOAD_COLOUR = "#d99a00"
-_BACKGROUND, _GRID, _LABEL, _SHADOW = "#f4f6f8", "#c3cdd6", "#22303d", "#2c3a48"
-_HULL, _ARM, _NOSE, _ROTOR, _ROTOR_FULL = "#2c3a48", "#516273", "#d9541e", "#3a7ab5", "#d9541e"
-_CABLE, _SLACK, _DESIRED, _PATH = "#22303d", "#b86e00", "#1464b4", "#7b8b9a"
+COLOURS = {  # as in the light theme of the replay, gcs/web/scene_theme.js
+    "background": "#f4f6f8",
+    "gridMajor": "#c3cdd6",
+    "shadow": "#2c3a48",
+    "asked": "#7b8b9a",  # the whole path
+    "hull": "#2c3a48",
+    "nose": "#d9541e",
+    "arm": "#516273",
+    "rotor": "#3a7ab5",
+    "rotorFull": "#d9541e",
+    "cable": "#22303d",
+    "slack": "#b86e00",
+    "load": "#d99a00",
+}
+_DESIRED, _TEXT = "#1464b4", "#22303d"
 
 _UNIT_PIXELS = 480  # shorter side of the picture for which widths of lines and sizes of letters are given
 _MIN_TEXT_PIXELS = 200  # shorter side below which letters would be illegible
@@ -60,29 +70,30 @@ class Painter:
         self._size, self._unit = size, min(size) / _UNIT_PIXELS
         dpi = 72.0 * self._unit  # so that a point is a unit
         width, height = ((pixels + 0.01) / dpi for pixels in size)  # above, as it is rounded down
-        self._figure = Figure(figsize=(width, height), dpi=dpi, facecolor=_BACKGROUND)
+        self._figure = Figure(figsize=(width, height), dpi=dpi, facecolor=COLOURS["background"])
         self._canvas: Any = FigureCanvasAgg(self._figure)
-        self._grid = [self._line(_ON_GROUND, _GRID, alpha=alpha) for alpha in _FADING]
-        self._shadows = self._polygons(_ON_GROUND, facecolors=_SHADOW, alpha=0.16, linewidths=0.0)
-        self._path = self._line(_ON_GROUND, _PATH, linewidth=1.6, alpha=0.6)
+        self._grid = [self._line(_ON_GROUND, COLOURS["gridMajor"], alpha=alpha) for alpha in _FADING]
+        self._shadows = self._polygons(_ON_GROUND, facecolors=COLOURS["shadow"], alpha=0.16, linewidths=0.0)
+        self._path = self._line(_ON_GROUND, COLOURS["asked"], linewidth=1.6, alpha=0.6)
         dashes = {"linestyle": (0, (2, 3)), "alpha": 0.5}
         self._desired_drop = self._line(_ON_GROUND, _DESIRED, **dashes)
-        self._load_drop = self._line(_ON_GROUND, _SHADOW, **dashes)
-        self._metres = self._line(_ON_GROUND, _SHADOW, linestyle="none", marker="o", markersize=3.5)
+        self._load_drop = self._line(_ON_GROUND, COLOURS["shadow"], **dashes)
+        self._metres = self._line(_ON_GROUND, COLOURS["shadow"], linestyle="none", marker="o", markersize=3.5)
         self._ahead = self._line(_ON_GROUND, _DESIRED, linewidth=2.0, alpha=0.6)
         self._desired = self._line(_ON_GROUND, _DESIRED, linewidth=1.5)
         self._error = self._line(_ON_GROUND, _DESIRED, alpha=0.6)
-        self._cable = self._line(_CABLE_ORDER, _CABLE, linewidth=1.6)
-        self._load = self._circle(_LOAD_ORDER, facecolor=LOAD_COLOUR, edgecolor=_LABEL, linewidth=1.0)
+        self._cable = self._line(_CABLE_ORDER, COLOURS["cable"], linewidth=1.6)
+        self._load = self._circle(_LOAD_ORDER, facecolor=COLOURS["load"], edgecolor=_TEXT, linewidth=1.0)
         self._gleam = self._circle(_LOAD_ORDER, facecolor="white", edgecolor="none", alpha=0.5)
-        self._arms = self._line(_VEHICLE_IN_FRONT, _ARM, linewidth=2.6)
+        self._arms = self._line(_VEHICLE_IN_FRONT, COLOURS["arm"], linewidth=2.6)
         self._hull = self._add(
-            _VEHICLE_IN_FRONT, Polygon(CIRCLE[:, :2], facecolor=_HULL, edgecolor="none", transform=_STILL)
+            _VEHICLE_IN_FRONT,
+            Polygon(CIRCLE[:, :2], facecolor=COLOURS["hull"], edgecolor="none", transform=_STILL),
         )
-        self._nose = self._line(_VEHICLE_IN_FRONT, _NOSE, linewidth=2.6)
+        self._nose = self._line(_VEHICLE_IN_FRONT, COLOURS["nose"], linewidth=2.6)
         self._rotors = self._polygons(_VEHICLE_IN_FRONT, linewidths=1.2)
-        self._numbers = self._text(_MARGIN * self._unit, _LABEL)
-        self._slack = self._text(size[0] - _MARGIN * self._unit, _SLACK, text="slack", ha="right")
+        self._numbers = self._text(_MARGIN * self._unit, _TEXT)
+        self._slack = self._text(size[0] - _MARGIN * self._unit, COLOURS["slack"], text="slack", ha="right")
 
     def draw(self, scene: Scene) -> Frame:
         """(height, width, 3) the picture of a scene."""
@@ -136,7 +147,7 @@ class Painter:
         self._rotors.set_verts(camera.pixels(shape.rims))
         share = np.clip(scene.shares, 0.0, 1.0)[:, None]
         warm = np.clip((share - _FULL) / (1.0 - _FULL), 0.0, 1.0)
-        colours = (1.0 - warm) * to_rgb(_ROTOR) + warm * to_rgb(_ROTOR_FULL)
+        colours = (1.0 - warm) * to_rgb(COLOURS["rotor"]) + warm * to_rgb(COLOURS["rotorFull"])
         self._rotors.set_facecolor(np.concatenate((colours, 0.15 + 0.45 * share), axis=1))
         self._rotors.set_edgecolor(colours)
         # the rotor plane separates it from what is on the other side
@@ -148,7 +159,7 @@ class Painter:
     def _draw_load(self, scene: Scene, camera: Camera) -> None:
         load = np.array(scene.plant.x_load)
         self._cable.set_data(*camera.pixels(cable_shape(scene)).T)
-        self._cable.set_color(_CABLE if scene.plant.taut != 0.0 else _SLACK)
+        self._cable.set_color(COLOURS["cable"] if scene.plant.taut != 0.0 else COLOURS["slack"])
         centre = camera.pixels(load)
         radius = max(scene.truth.load_radius * camera.scale(load), _LOAD_RADIUS * self._unit)
         self._load.set(center=centre, radius=radius)

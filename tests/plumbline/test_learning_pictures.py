@@ -21,9 +21,9 @@ from gymnasium.wrappers import RecordVideo
 from matplotlib.colors import to_rgb
 
 import plumbline.learning
-from plumbline.learning import HOVER, LOAD_TRACKING, picture
+from plumbline.learning import HOVER, LOAD_TRACKING
 from plumbline.learning.camera import camera_at
-from plumbline.learning.picture import LOAD_COLOUR, Painter
+from plumbline.learning.picture import COLOURS, Painter
 from plumbline.learning.scene import Scene, cable_shape, scene_of, vehicle_shape
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -206,7 +206,7 @@ def test_the_load_is_drawn_where_it_is(scene: Scene) -> None:
     for displacement in ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, -0.7, 0.4), (-2.5, 1.0, -0.5)):
         here = moved(scene, *displacement)
         right, up = painter.camera(here).pixels(np.array(here.plant.x_load))
-        rows, columns = np.nonzero(is_colour(painter.draw(here), LOAD_COLOUR))
+        rows, columns = np.nonzero(is_colour(painter.draw(here), COLOURS["load"]))
         assert len(rows) > 20
         assert np.hypot(columns + 0.5 - right, SIZE[1] - rows - 0.5 - up).max() < 8.0
         assert (columns.mean(), SIZE[1] - rows.mean()) == pytest.approx((right, up), abs=2.0)
@@ -262,14 +262,12 @@ def test_a_slack_cable_bends_and_is_told(scene: Scene) -> None:
         assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(length, rel=0.15)
     painter = Painter(SIZE)
     corner = (slice(0, 40), slice(400, 480))
-    assert is_colour(painter.draw(slack)[corner], picture._SLACK).any()
-    assert not is_colour(painter.draw(scene)[corner], picture._SLACK).any()
+    assert is_colour(painter.draw(slack)[corner], COLOURS["slack"]).any()
+    assert not is_colour(painter.draw(scene)[corner], COLOURS["slack"]).any()
 
 
 def test_colours_are_those_of_the_replay() -> None:
     text = (ROOT / "gcs" / "web" / "scene_theme.js").read_text(encoding="utf-8")
     light = text[text.index("light: {") :]
     theme = dict(re.findall(r"(\w+): 0x([0-9a-f]{6})", light))
-    names = {"LOAD_COLOUR": "load", "_CABLE": "cable", "_SLACK": "slack", "_ROTOR": "rotor", "_HULL": "hull"}
-    for name, in_theme in names.items():
-        assert getattr(picture, name) == f"#{theme[in_theme]}"
+    assert {name: f"#{theme[name]}" for name in COLOURS} == COLOURS
