@@ -1,9 +1,10 @@
 """The pictures of README and docs, from flights through real processes: `make pictures`.
 
-    python benchmarks/pictures.py [flight] [report] [live] [--images docs/images]
+    python benchmarks/pictures.py [flight] [report] [live] [learning] [--images docs/images]
 
 `flight.webp` is a replay of Case C in a gust, frame by frame; `report.png` is the page that `make fly` makes;
 `live.png` is the live page in the middle of a mission. Headless Chromium draws them without a graphics card.
+`learning.png` is what an environment draws.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 from live_page import IN_MISSION, WAIT_S, flight
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from plumbline.learning import LOAD_TRACKING
+from plumbline.learning.baseline import LawPolicy
 from tests.doubles.browser import Browser, chromium, missing
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
@@ -30,6 +34,7 @@ SIZE = (720, 420)  # of the animated picture, pixels
 BEGIN_S, END_S = 28.5, 44.5  # of the flight; the gust is in it
 PERIOD_S = 3.0  # of the swing that Case C requests
 FRAMES_PER_S, PACE = 12.0, 2.0  # of the picture; seconds of the flight per second of the picture
+STEPS = 775  # of the environment: it is then in the middle of a swing
 LAST_S = 1.5  # how long the last frame stays before the picture repeats
 QUALITY = 70
 
@@ -128,7 +133,22 @@ def live(browser: Browser, folder: Path, path: Path) -> None:
         browser.screenshot(path)
 
 
-PICTURES = {"flight": ("flight.webp", animated), "report": ("report.png", report), "live": ("live.png", live)}
+def learning(_browser: Browser, _folder: Path, path: Path) -> None:
+    """An environment in which a law follows the path of Case C."""
+    env = gymnasium.make(LOAD_TRACKING, mission="case-c", render_mode="rgb_array")
+    law = LawPolicy(env)
+    observation, _ = env.reset(seed=1)
+    for _ in range(STEPS):
+        observation, *_ = env.step(law.predict(observation)[0])
+    Image.fromarray(env.render()).save(path, optimize=True)
+
+
+PICTURES = {
+    "flight": ("flight.webp", animated),
+    "report": ("report.png", report),
+    "live": ("live.png", live),
+    "learning": ("learning.png", learning),
+}
 
 
 def main() -> None:

@@ -45,8 +45,9 @@ from plumbline.learning.records import (
 )
 from plumbline.learning.scenario import Draw, Scenario
 from plumbline.learning.step import LAW_EVERY, jet_at, step_or_start, true_state
-from sitl.plant.records import PlantState
-from sitl.world import Floats, World
+from sitl.plant.records import PlantState, Truth
+from sitl.plant.rotors import FORCE
+from sitl.world import Floats, World, WorldModel
 
 Numbers = NDArray[np.int64]
 _MIN_TICKS_PER_THREAD = 2000  # ticks per thread from which on another thread is worthwhile
@@ -285,12 +286,29 @@ class Episodes:
             return unpack(EstimateSummary, self._batch.estimators.summary[i], 0).state
         return true_state(self.plant(i))
 
+    def truth(self, i: int) -> Truth:
+        """The true vehicle of an episode."""
+        return unpack(WorldModel, self._batch.model[i], 0).truth
+
+    def rotor_forces(self, i: int) -> Floats:
+        """(MAX_ROTORS,) N: present force of each rotor."""
+        forces: Floats = self._batch.rotors[i, FORCE].copy()
+        return forces
+
     def is_at_start(self, i: int) -> bool:
         """Whether an episode has not been stepped yet."""
         return unpack(Episode, self._batch.episode[i], 0).tick == 0
 
+    def elapsed_s(self, i: int) -> float:
+        """Time since the beginning of an episode."""
+        return unpack(Episode, self._batch.episode[i], 0).tick * self.scenario.tick_us * 1e-6
+
+    def row(self, i: int) -> int:
+        """The present row of the reference; beyond its end, the last one holds."""
+        episode = unpack(Episode, self._batch.episode[i], 0)
+        return episode.first_row + episode.tick
+
     def jet(self, i: int, ahead_s: float = 0.0) -> Jet:
         """Desired position of the load, with six derivatives, `ahead_s` seconds from now."""
-        episode = unpack(Episode, self._batch.episode[i], 0)
         later = round(ahead_s * 1e6 / self.scenario.tick_us)
-        return jet_at(self.scenario.reference, episode.first_row + episode.tick + later)
+        return jet_at(self.scenario.reference, self.row(i) + later)

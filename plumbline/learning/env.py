@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plumbline.learning.batch import Episodes
-from plumbline.learning.options import options_of
+from plumbline.learning.options import EnvOptions, options_of
 from plumbline.learning.ready import compile_step
+from plumbline.learning.rendering import Renderer, checked_render_mode, render_metadata
 from plumbline.learning.scenario import Scenario
+from plumbline.learning.scene import Frame
 from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
 
@@ -25,13 +27,15 @@ class LoadEnv(gymnasium.Env[Array, Array]):
     described in docs/learning.md.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = render_metadata(EnvOptions.rate_hz)  # of each environment: with its own rate
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode)
         self.scenario = Scenario(options_of(options))
+        self.metadata = render_metadata(self.scenario.options.rate_hz)
         compile_step(self.scenario)
         self.episodes = Episodes(self.scenario, 1, threads=1)
+        self._renderer = Renderer(self.episodes, render_mode)
         self.action_space = action_space(self.scenario)
         self.observation_space = observation_space(self.scenario)
         self._shape = (self.scenario.task.observation_model.actions,)
@@ -50,6 +54,11 @@ class LoadEnv(gymnasium.Env[Array, Array]):
         end = int(self.episodes.ends[0])
         reward = float(self.episodes.rewards[0])
         return self.episodes.observations[0].copy(), reward, end == CRASHED, end == ENDED, {}
+
+    def render(self) -> Frame | None:
+        """(height, width, 3) a picture of the present state, which it leaves unchanged."""
+        frames = self._renderer.frames()
+        return None if frames is None else frames[0]
 
     def close(self) -> None:
         """Release what the environment holds."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +28,7 @@ from plumbline.vehicles import Vehicle
 
 OBSERVATIONS = ("truth", "estimate")
 STARTS = ("begin", "random")
+_PIXELS = (32, 4096)  # least and greatest side of a picture
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class EnvOptions:
     max_accel_m_s2: tuple[float, float, float] = (4.0, 4.0, 4.0)
     mission: str | Path | Mission | None = None  # None: hover at a fixed position
     start: str = "begin"
+    render_size: tuple[int, int] = (480, 480)
 
     @cached_property
     def vehicle_file(self) -> str:
@@ -78,6 +80,7 @@ class EnvOptions:
             raise GcsError(f"start_m = {self.start_m!r}; must be at least 0 and below reach_m")
         for name in ("max_rate_rad_s", "max_accel_m_s2"):
             _three_positive(name, getattr(self, name))
+        _width_and_height("render_size", self.render_size)
         setting_arguments(self.settings)
         for name, weight in parameter_mapping("reward", self.reward, "{'crash': -10}").items():
             if name not in Reward._fields:
@@ -111,6 +114,13 @@ def _three_positive(name: str, values: Any) -> None:
     found = numbers(name, values)
     if len(found) != 3 or min(found) <= 0.0:
         raise GcsError(f"{name} = {shown_value(values)}; must be three numbers above 0")
+
+
+def _width_and_height(name: str, values: Any) -> None:
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != 2:
+        raise GcsError(f"{name} = {shown_value(values)}; must be (width, height) in pixels")
+    for value in values:
+        whole_number(name, value, *_PIXELS)
 
 
 def _is_range(limits: Any) -> bool:

@@ -26,9 +26,9 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc]
         if not isinstance(inner, LoadVectorEnv) or inner.autoreset_mode != AutoresetMode.SAME_STEP:
             raise GcsError("envs: must be those of gymnasium.make_vec with autoreset_mode='SameStep'")
         self.envs = inner
-        self.render_mode = None
         self._actions: Any = None
         super().__init__(inner.num_envs, inner.single_observation_space, inner.single_action_space)
+        self.metadata["render_fps"] = inner.metadata["render_fps"]  # for videos
 
     def reset(self) -> Any:
         """The first observations."""
@@ -49,6 +49,10 @@ class SB3VecEnv(VecEnv):  # type: ignore[misc]
             episode_infos[i]["terminal_observation"] = infos["final_obs"][i]
             episode_infos[i]["TimeLimit.truncated"] = bool(ended[i] and not crashed[i])
         return observations, rewards.astype(np.float32), done, episode_infos
+
+    def get_images(self) -> Sequence[Any]:
+        """A picture of each environment; Stable-Baselines3 joins them in one, for `render` and for videos."""
+        return self.envs.render() or [None] * self.num_envs
 
     def close(self) -> None:
         """End the threads."""

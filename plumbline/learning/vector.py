@@ -16,7 +16,9 @@ from plumbline.arguments import whole_number
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
 from plumbline.learning.ready import compile_step
+from plumbline.learning.rendering import Renderer, checked_render_mode, render_metadata
 from plumbline.learning.scenario import Scenario
+from plumbline.learning.scene import Frame
 from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
 
@@ -47,12 +49,14 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
         if threads is not None:
             threads = whole_number("threads", threads, 1)
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.scenario = Scenario(options_of(options))
+        rate_hz = self.scenario.options.rate_hz
+        self.metadata = {**render_metadata(rate_hz), "autoreset_mode": self.autoreset_mode}
         compile_step(self.scenario)
         self.episodes = Episodes(self.scenario, num_envs, threads)
+        self._renderer = Renderer(self.episodes, render_mode)
         self.single_action_space = action_space(self.scenario)
         self.single_observation_space = observation_space(self.scenario)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -110,6 +114,11 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
                 infos = self._add_info(infos, final, i)
             self._start(over)
         return episodes.observations.copy(), rewards, crashed, ended, infos
+
+    def render(self) -> tuple[Frame, ...] | None:
+        """A picture (height, width, 3) of the present state of each environment, which it leaves
+        unchanged."""
+        return self._renderer.frames()
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
