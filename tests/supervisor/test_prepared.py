@@ -11,7 +11,7 @@ import pytest
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, PathStretch, SignalRun, requested_jet
-from autopilot.services.requests import Arm, Land, Pause, Reposition, ReturnHome, StartMission
+from autopilot.services.requests import Arm, Land, Pause, Reposition, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeOff
 from autopilot.supervisor.mission import with_current_step, with_plan
 from autopilot.supervisor.requests.mission_checks import mission_begin, mission_problem
@@ -229,6 +229,23 @@ def test_a_mission_that_begins_elsewhere_in_the_air_is_flown_through_as_well(
             passed.append(norm(sky.setpoints[-1][2][1]))
     assert min(passed[len(takeoff) : -1]) > 0.5
     assert len(passed) == len(takeoff) + 3
+    assert worst_jump(sky, 0) < TRAPEZOID_M
+
+
+def test_a_jump_in_flight_is_flown_through_the_remaining_waypoints_as_well() -> None:
+    """It waits until their path is prepared from where the load comes to rest; the last one needs no path."""
+    sky = started(Takeoff(2.0), *ROUND, model.Land())
+    sky.run(lambda s: s.flight.mission.step == 3)
+    verdict = sky.ask(SetCurrent(1))
+    assert (verdict.result, verdict.text) == (ACCEPTED, "Mission item 1 begins when its paths are prepared")
+    assert (sky.flight.phase, sky.flight.mission.waiting, sky.flight.mission.step) == (Phase.HOLD, True, 1)
+    start_prepared(sky)
+    sky.reached.clear()
+    sky.run(lambda s: s.reached == [1])
+    assert norm(sky.setpoints[-1][2][1]) > 0.5
+    assert sky.ask(SetCurrent(3)).result == ACCEPTED
+    assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.MISSION, False)
+    sky.run(lambda s: s.flight.phase == Phase.LOWER)
     assert worst_jump(sky, 0) < TRAPEZOID_M
 
 

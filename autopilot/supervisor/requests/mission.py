@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from autopilot.services.records import Verdict
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import transition
@@ -31,7 +32,10 @@ from autopilot.supervisor.table import TRANSITIONS
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
-_ACCEPTED_PENDING = ACCEPTED._replace(text="Mission begins when its paths are prepared")
+
+def _accepted_pending(what: str) -> Verdict:
+    """What holds, or stands armed, until its paths are prepared."""
+    return ACCEPTED._replace(text=f"{what} begins when its paths are prepared")
 
 
 def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Decision:
@@ -49,7 +53,7 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     if flight.phase != Phase.ARMED and (flight.phase, event) not in TRANSITIONS:
         return flight, wrong_phase(flight, "Mission")
     if not prepared:
-        return _hold_until_prepared(flight, view, settings), _ACCEPTED_PENDING
+        return _hold_until_prepared(flight, view, settings), _accepted_pending("Mission")
     flight = replace(
         flight,
         mission=replace(flight.mission, active=True, done=False, waiting=False),
@@ -96,22 +100,25 @@ def continue_mission(flight: Flight, request: Any, view: View, settings: Setting
 
 
 def set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
-    """Make another item the present one; while the mission is flown, fly there immediately."""
-    plan = flight.mission.plan
+    """Make another item the present one; while the mission is flown, fly there immediately, or as soon as the
+    path from there is prepared."""
+    plan, item = flight.mission.plan, f"Mission item {request.seq}"
     if not plan.item_count:
-        return flight, denied(f"Mission item {request.seq} denied: no mission is stored")
+        return flight, denied(f"{item} denied: no mission is stored")
     if not 0 <= request.seq < plan.item_count:
-        return flight, denied(f"Mission item {request.seq} denied: the last is {plan.item_count - 1}")
+        return flight, denied(f"{item} denied: the last is {plan.item_count - 1}")
     step = next((i for i, seq in enumerate(plan.sequence) if seq >= request.seq), None)
     if step is None:
-        return flight, denied(f"Mission item {request.seq} denied: nothing is flown from there")
+        return flight, denied(f"{item} denied: nothing is flown from there")
     at_item = with_current_step(flight, step, done=False)
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
-        return flight, wrong_phase(flight, f"Mission item {request.seq}")
+        return flight, wrong_phase(flight, item)
     if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
         problem = mission_problem(at_item, view, settings)
         if problem:
-            return flight, denied(f"Mission item {request.seq} denied: {problem}")
+            return flight, denied(f"{item} denied: {problem}")
+        if not is_prepared_from_here(at_item, view, settings):
+            return _hold_until_prepared(at_item, view, settings), _accepted_pending(item)
         at_item = with_step_heading_aims(at_item, view, settings)
         return start_step(at_item, step_event(at_item), view, settings), ACCEPTED
     return at_item, ACCEPTED
