@@ -1,4 +1,4 @@
-"""Missions for the commands: loaded, and checked against the vehicle that is to fly them."""
+"""`gcs check`: a mission against the vehicle that is to fly it, without this vehicle."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import shlex
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
 
-from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, check, paths
+from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
 from autopilot.trajectory.transfer import transfer_duration
@@ -15,14 +17,16 @@ from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import WireItem, decode_items
+from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
-from gcs.mission_items import items_of
+from gcs.formats.missions import check_plan, is_foreign, planned_home, read_foreign
+from gcs.mission_items import in_mission_terms, items_of
 from gcs.workflows.before_flight import unused_planner_text
-from gcs.workflows.flyable_marks import mark_flyable
+from gcs.workflows.flyable import mission_of, violations
 from gcs.workflows.mission_file import load
+from gcs.workflows.refusals import Answer, ItemLists, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
@@ -32,19 +36,6 @@ from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Win
 # of 1 m/s (docs/realism.md).
 MIN_CONTROL_SHARE = 0.25
 MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
-
-
-def violations(mission: Mission, vehicle: str, limits: VehicleLimits, shaped: bool = True) -> list[Violation]:
-    """What the vehicle with these limits cannot fly of the mission, with paths `shaped` by the autopilot or
-    as requested.
-
-    InputError if no vehicle would accept its items.
-    """
-    items_of(mission, Home())
-    found = check(mission, limits, shaped)
-    if not found:
-        mark_flyable(mission, vehicle, shaped)
-    return found
 
 
 def winch_violations(mission: Mission, table: AutopilotParameters) -> Iterator[Violation]:
@@ -175,43 +166,85 @@ def notes_after_release(mission: Mission) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What `gcs check` found: what the vehicle cannot fly, or else how it flies each path, with warnings."""
+    """What `gcs check` found: what the vehicle cannot fly, or what it would refuse, in its words, or else how
+    it flies each path, with warnings."""
 
     mission: str
     vehicle: str
     violations: tuple[Violation, ...]
     paths: tuple[PathReport, ...]
     warnings: tuple[str, ...] = ()
+    refusals: tuple[str, ...] = ()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why the mission cannot be flown; empty if it can."""
+        return (*map(str, self.violations), *self.refusals)
 
     def lines(self) -> tuple[str, ...]:
         """The result as text."""
-        if self.violations:
-            return tuple(map(str, self.violations))
+        if self.problems:
+            return self.problems
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
+
+
+class _ReadFile(NamedTuple):
+    """A mission as it is read from a file, and the items to be sent; parts of the file for which there are
+    none, and notes about others."""
+
+    mission: Mission
+    lists: ItemLists
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def _read_foreign(path: Path) -> _ReadFile:
+    """The content of a file of another ground station; FormatError says what is wrong with it."""
+    plan = read_foreign(path)
+    home = planned_home(plan)
+    items, left_out, kept = check_plan(plan, home)
+    place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
+    return _ReadFile(
+        mission_of(path.name, items, home),
+        ItemLists(items, home, plan.fence or (), plan.rally or ()),
+        tuple(left_out) if items else (*left_out, "nothing that can be flown"),
+        (f"note: flown with home at {place}", *(f"note: {line}" for line in kept)),
+    )
 
 
 def check_mission(
     name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None
 ) -> CheckResult:
-    """Check a mission against a vehicle; `as_asked`: without shaping.
+    """Check a mission by name or path, or the file of another ground station, against a vehicle; `as_asked`:
+    without shaping.
 
     GcsError if a custom `planner` fails to plan it.
     """
-    mission = load(name_or_path)
-    limits = load_limits(vehicle)
+    path, limits = Path(name_or_path), load_limits(vehicle)
+    if foreign := is_foreign(path):
+        mission, lists, left_out, notes = _read_foreign(path)
+        if left_out:
+            return CheckResult(mission.name, vehicle, (), (), notes, left_out)
+    else:
+        mission, notes = load(name_or_path), ()
+        lists = ItemLists(items_of(mission, Home()))
     table = autopilot_parameters(limits.vehicle)
     found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
     reports = [] if found else path_reports(mission, limits, planner, not as_asked)
+    answer = Answer() if found else ask_supervisor(lists, table, not as_asked, planner)
     warnings = (
+        *notes,
+        *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
         *margin_warnings(reports, vehicle, limits.vehicle),
-        *timeout_warnings(mission, reports, table),
     )
-    if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
-        warnings += (
-            "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
-            f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
-        )
+    if not foreign:  # which `gcs fly` does not fly
+        warnings += tuple(timeout_warnings(mission, reports, table))
+        if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
+            warnings += (
+                "note: how near a law without preview keeps to this, and whether its own errors lose the "
+                f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
+            )
     warnings += (
         *winch_notes(mission, table),
         *notes_after_release(mission),
@@ -219,27 +252,7 @@ def check_mission(
     )
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
-    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings)
-
-
-def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
-    """The mission; GcsError unless the vehicle can fly it, which is not checked with `force`."""
-    mission = load(name_or_path)
-    if force:
-        return mission
-    require_flyable(mission, vehicle)
-    return mission
-
-
-def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
-    """GcsError unless the vehicle can fly the mission of these items."""
-    steps = decode_items(items, home)
-    require_flyable(Mission(name, name, "", (), steps), vehicle, True)
-
-
-def require_flyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
-    """GcsError unless the vehicle can fly the mission."""
-    found = violations(mission, vehicle, load_limits(vehicle), shaped)
-    if found:
-        summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
-        raise GcsError(*([f"{summary} {found[0]}"] if len(found) == 1 else [summary, *map(str, found)]))
+    refusals = answer.refusals
+    if not foreign:  # whose items are numbered as they are sent
+        refusals = tuple(in_mission_terms(text, mission) for text in refusals)
+    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, refusals)

@@ -73,13 +73,13 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
 
 
-def test_a_plan_of_another_ground_station_is_told_where_it_is_checked(tmp_path: Path) -> None:
+def test_a_plan_of_another_ground_station_is_told_how_it_is_flown(tmp_path: Path) -> None:
     plan = tmp_path / "a.plan"
     plan.write_text("{}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"a file of another ground station; gcs upload .* checks it"):
-        check_mission(str(plan), "bebop", as_asked=False)
+    with pytest.raises(InputError, match=r"a file of another ground station; gcs check .* and gcs upload"):
+        load(str(plan))
     with pytest.raises(InputError, match=r"unknown mission|No such file|no such file"):
-        check_mission(str(tmp_path / "b.plan"), "bebop", as_asked=False)
+        load(str(tmp_path / "b.plan"))
 
 
 def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:

@@ -326,7 +326,7 @@ def test_check_says_that_it_can_be_flown():
     assert all(
         0.9 < path["tension_low_n"] < 1.0 and 3.0 < path["duration_s"] < 10.0 for path in told.pop("paths")
     )
-    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": []}
+    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": [], "refusals": []}
 
 
 def test_check_tells_how_signals_will_be_flown():

@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import pytest
 
-from gcs.workflows.check_mission import violations
+from gcs.workflows.flyable import violations
 from gcs.workflows.flyable_marks import is_known_flyable
 from gcs.workflows.vehicle_limits import load_limits
 from missions.fileformat import load_mission

@@ -18,6 +18,7 @@ from autopilot.supervisor.state import (
     Flight,
     MissionPlan,
     View,
+    fence_problem,
     fence_violation,
     is_fence_active,
     load_position_below,
@@ -33,11 +34,13 @@ from autopilot.trajectory.timeline import (
     timeline,
 )
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
+from autopilot.wire.statustext import listed
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
 # spacing of the places at which a line is checked, and their greatest number
 CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
 MIN_CURVE_POINTS = 16  # between two waypoints, however close
+MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence
 
 RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
 
@@ -151,6 +154,13 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
         if reason:
             return f"item {seq} leads {reason}"
     return ""
+
+
+def forbidden_rally_text(flight: Flight, settings: Settings) -> str:
+    """A warning that names the rally points that the fence forbids; empty if there are none."""
+    places = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
+    outside = [number for number, place in places if fence_problem(flight, place, settings)]
+    return f"Rally points outside the fence: {listed(outside)}; no return leads there" if outside else ""
 
 
 def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
