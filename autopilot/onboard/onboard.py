@@ -847,7 +847,8 @@ class Onboard:
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
         flight, begin = self.core.flight, AT_HOME
         if flight.mission.waiting:
-            begin = mission_begin(flight, self.core.view(self.now_us), self.core.settings)
+            ahead = remaining_timeline(flight, self.core.view(self.now_us), self.core.settings)
+            begin = mission_begin(flight, ahead, self.core.settings)
         work = PathWork(plan.steps, plan.sequence, limits, flight.area.home, planner, begin)
         self._path_work = work
         self._set_prepared(PENDING)
