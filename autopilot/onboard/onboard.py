@@ -6,7 +6,7 @@ wait until the shell hands them over between two ticks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -82,9 +82,14 @@ from autopilot.services.requests import (
 from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import RestartState
-from autopilot.supervisor.requests.mission_checks import curve_exit_problem, mission_begin, remaining_timeline
+from autopilot.supervisor.requests.mission_checks import (
+    curve_exit_problem,
+    forbidden_rally_text,
+    mission_begin,
+    remaining_timeline,
+)
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import MissionPlan, Phase, Report, fence_problem, interrupt_mission
+from autopilot.supervisor.state import MissionPlan, Phase, Report, interrupt_mission
 from autopilot.trajectory.prepare import AT_HOME, PENDING, MissionBegin, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
@@ -97,7 +102,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
-from autopilot.wire.statustext import TextReader
+from autopilot.wire.statustext import TextReader, listed
 from missions.model import Land, ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
@@ -108,8 +113,6 @@ _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
-MAX_LISTED_ITEMS = 8  # items in one text
-MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence when either is uploaded
 MAX_LEAP_US = 5_000_000  # a single tick that lies farther ahead is rejected
 MIN_GAP_US = 500_000  # time without a tick after which a vehicle in the air has long been out of control
 RATE_TICKS = 1  # ticks in which the tick rate is determined
@@ -208,12 +211,6 @@ def mission_plan(
     repeat_from = endless_jump_target(mission.items, steps)
     aims = tuple(s.heading_commands for s in steps)
     return MissionPlan(flown, sequence, len(mission.items), prepared, aims, repeat_from)
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    """The first of the numbers, for a text."""
-    more = " ..." if len(numbers) > MAX_LISTED_ITEMS else ""
-    return ", ".join(map(str, numbers[:MAX_LISTED_ITEMS])) + more
 
 
 def home_problems(origin: Any, home: Home) -> tuple[str, ...]:
@@ -804,11 +801,8 @@ class Onboard:
 
     def _warn_of_rally(self) -> None:
         """Report rally points that the fence forbids; they may have been uploaded before it."""
-        flight, settings = self.core.flight, self.core.settings
-        listed = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
-        outside = [i for i, place in listed if fence_problem(flight, place, settings)]
-        if outside:
-            text = f"Rally points outside the fence: {_listed(outside)}; no return leads there"
+        text = forbidden_rally_text(self.core.flight, self.core.settings)
+        if text:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def set_storage_losses(self, lost: tuple[str, ...]) -> None:
@@ -839,7 +833,7 @@ class Onboard:
         self._prepare()
         unflown = unflown_items(mission.items)
         if unflown:
-            text = f"Mission items kept, not flown: {_listed(unflown)}"
+            text = f"Mission items kept, not flown: {listed(unflown)}"
             self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
         early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
         landing = next((item for step, item in early if isinstance(step, Land)), None)
@@ -853,7 +847,8 @@ class Onboard:
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
         flight, begin = self.core.flight, AT_HOME
         if flight.mission.waiting:
-            begin = mission_begin(flight, self.core.view(self.now_us), self.core.settings)
+            ahead = remaining_timeline(flight, self.core.view(self.now_us), self.core.settings)
+            begin = mission_begin(flight, ahead, self.core.settings)
         work = PathWork(plan.steps, plan.sequence, limits, flight.area.home, planner, begin)
         self._path_work = work
         self._set_prepared(PENDING)

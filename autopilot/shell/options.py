@@ -12,16 +12,17 @@ import socket
 import struct
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TextIO, cast
+from typing import Any, TextIO, TypeVar, cast
 
 import click
 
 from autopilot.wire.convert.geodesy import Home, home_from_text
 
 Address = tuple[str, int]
+F = TypeVar("F", bound=Callable[..., Any])
 
 MAX_DATAGRAM_BYTES = 65535
 MAX_SEED = 2**63 - 1
@@ -306,6 +307,21 @@ def setting_option(text: str) -> tuple[str, float]:
         return name.strip().upper(), float(value)
     except ValueError:
         raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+
+
+def ignore_option(function: F) -> F:
+    """--ignore of every command that starts an autopilot."""
+
+    def in_capitals(_: click.Context, __: click.Parameter, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(name.strip().upper() for name in names)
+
+    return click.option(
+        "--ignore",
+        metavar="NAME",
+        multiple=True,
+        callback=in_capitals,
+        help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
+    )(function)
 
 
 def unknown_setting(name: str, names: Iterable[str]) -> str:

@@ -47,6 +47,7 @@ from autopilot.shell.options import (
     address_option,
     address_text,
     home_option,
+    ignore_option,
     os_error_text,
     print_errors,
     reduce_latency,
@@ -438,12 +439,7 @@ def links_text(stations: Sequence[Address], programs: Sequence[Address], tcp: Ad
     multiple=True,
     help="Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.",
 )
-@click.option(
-    "--ignore",
-    metavar="NAME",
-    multiple=True,
-    help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
-)
+@ignore_option
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
@@ -495,7 +491,7 @@ def main(
     worker = BackgroundWorker()
     try:
         own = OwnCode(own_law_reference(law or DEFAULT_LAW), estimator, planner)
-        table = parameters_for(load_belief(vehicle), own, ignored=[name.upper() for name in ignore])
+        table = parameters_for(load_belief(vehicle), own, ignored=ignore)
         check_names(settings, table.names)
         folder = storage or user_state_path("plumbline")
         store = Storage(folder)

@@ -7,8 +7,8 @@ path, is flown as requested, slowed down or refused, depending on the user's set
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from math import cos, dist
@@ -84,7 +84,8 @@ class PreparedPaths:
     # for each step: least duration of its transfer, 0 if no bound applies
     min_durations_s: tuple[float, ...] = ()
     slow_paths: tuple[SlowPath, ...] = ()
-    begin: MissionBegin = AT_HOME  # from where they are flown
+    # where each path through waypoints starts, by the index of its first step
+    path_starts: Mapping[int, Vec3] = field(default_factory=dict)
 
 
 UNPREPARED = PreparedPaths()
@@ -137,7 +138,7 @@ def prepare(
         refusal,
         min_durations_s=min_durations_s,
         slow_paths=tuple(slow_paths),
-        begin=begin,
+        path_starts=_path_starts(entries, limits),
     )
 
 
@@ -157,7 +158,11 @@ def waypoint_path_starts(
     steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
 ) -> dict[int, Vec3]:
     """Where each path through waypoints starts, by the index of its first step."""
-    chains = _waypoint_chains(_entries(steps, limits, home, begin), limits.speed_m_s)
+    return _path_starts(_entries(steps, limits, home, begin), limits)
+
+
+def _path_starts(entries: Iterable[TimelineEntry], limits: PathLimits) -> dict[int, Vec3]:
+    chains = _waypoint_chains(entries, limits.speed_m_s)
     return {first: points[0] for first, points, _ in chains if len(points) > 2}
 
 

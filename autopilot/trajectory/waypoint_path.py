@@ -25,6 +25,7 @@ from math import ceil, dist, sqrt
 
 import numpy as np
 import scipy
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -36,7 +37,7 @@ from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
-from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, transfer_duration
 
 Indices = NDArray[np.int64]
 
@@ -56,6 +57,9 @@ _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
 _RIDE_ACCEL_SHARE = 2.0 / 3.0  # of the peak acceleration, for speeding up; the rest is left for turns
 _RIDE_SAMPLES = 400  # of speeding up
+# way while speeding up, as a share of cruise speed times the time of speeding up: the integral of the s of
+# `autopilot.trajectory.transfer`, whose slope is 12012 u^6 (1 - u)^6
+_RAMP = (12012.0 * Polynomial([0.0, 1.0]) ** 6 * Polynomial([1.0, -1.0]) ** 6).integ(2)
 _BAND = DEGREE + 1
 
 
@@ -219,10 +223,7 @@ def ride_time_shares(points: Array, speed: float, accel: float) -> Array:
     length = float(travelled[-1])
     cruise, ramp_s, total_s = ride(length, speed, accel)
     u = np.linspace(0.0, 1.0, _RIDE_SAMPLES + 1)
-    rise = np.array([transfer(ZERO, (1.0, 0.0, 0.0), 1.0, at)[0][0] for at in u])
-    ramp_m = (
-        cruise * ramp_s * np.concatenate([[0.0], np.cumsum(0.5 * (rise[1:] + rise[:-1]))]) / _RIDE_SAMPLES
-    )
+    ramp_m = cruise * ramp_s * _RAMP(u)
     times = np.concatenate([ramp_s * u, total_s - ramp_s * u[::-1]])
     at_points = np.interp(travelled, np.concatenate([ramp_m, length - ramp_m[::-1]]), times)
     return np.asarray(np.diff(at_points) / total_s)

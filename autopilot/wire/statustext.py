@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
@@ -10,6 +11,13 @@ GAP = "..."  # in place of chunks that were lost
 CHUNK = 50  # STATUSTEXT.text
 _LAST_ID = 0xFFFF
 _MAX_CHUNKS = 256  # STATUSTEXT.chunk_seq is a byte
+_MAX_LISTED = 8  # numbers in one text
+
+
+def listed(numbers: Sequence[int]) -> str:
+    """The first of the numbers, for a text."""
+    more = " ..." if len(numbers) > _MAX_LISTED else ""
+    return ", ".join(map(str, numbers[:_MAX_LISTED])) + more
 
 
 class TextWriter:

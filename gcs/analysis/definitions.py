@@ -63,16 +63,20 @@ def is_lost(record: Mapping[str, Any]) -> bool:
 
 
 class Group(_StrictModel):
-    """Figures that are shown together. `window` is the part of the flight that they cover, `window_if_lost`
-    that of a flight that was lost, if it is another; `note` is for the documentation."""
+    """Figures that are shown together. `window` is the part of the flight that they cover, `window_if_failed`
+    and `window_if_lost` that of a flight that failed or was lost, if it is another; `note` is for the
+    documentation."""
 
     title: str
     window: str = ""
+    window_if_failed: str = ""
     window_if_lost: str = ""
     note: str = ""
 
     def window_of(self, record: Mapping[str, Any]) -> str:
         """The part of this flight that the figures cover."""
+        if record.get("failure_s") is not None:
+            return self.window_if_failed or self.window
         return (self.window_if_lost if is_lost(record) else "") or self.window
 
 

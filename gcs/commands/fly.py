@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from autopilot.shell.options import MAX_SEED, MAX_SPEED, WholeNumber
+from autopilot.shell.options import MAX_SEED, MAX_SPEED, WholeNumber, ignore_option
 from gcs.commands.options import (
     OUTPUT_FOLDER,
     AddressType,
@@ -83,13 +83,7 @@ _STARTED_ONLY = (
     multiple=True,
     help="Set a parameter of the simulator (SIM_*) or of the autopilot; repeatable.",
 )
-@click.option(
-    "--ignore",
-    metavar="NAME",
-    multiple=True,
-    callback=lambda ctx, param, names: tuple(name.strip().upper() for name in names),
-    help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
-)
+@ignore_option
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,

@@ -61,9 +61,11 @@ def check_command(
 ) -> int:
     """Check whether a vehicle can fly a mission.
 
-    MISSION is a shipped name or the path of a mission file. Every limit that it breaks is printed, with the
-    time and the excess; the exit code is 1 if there is any. Otherwise the duration of each path, its distance
-    from the requested path, and its peaks of rotor force, tension and tilt are printed. With --as-asked the
+    MISSION is a shipped name, the path of a mission file, or a .plan or .waypoints file of another ground
+    station. Every limit that it breaks is printed, with the time and the excess, or else what the vehicle
+    would refuse, such as a path that leaves the fence of a .plan; the exit code is then 1. Otherwise the
+    duration of each path, its distance from the requested path, and its peaks of rotor force, tension and
+    tilt are printed. With --as-asked the
     paths are judged as the laws thesis and lqr fly them, without shaping; how closely such a law follows them
     is not judged. With --planner the paths through waypoints are those of your own planner, whose errors are
     printed.
@@ -90,4 +92,4 @@ def check_command(
         print_json(asdict(found))
     else:
         click.echo("\n".join(found.lines()))
-    return EXIT_ERROR if found.violations else EXIT_DONE
+    return EXIT_ERROR if found.problems else EXIT_DONE

@@ -154,8 +154,9 @@ class SettingType(click.ParamType):  # type: ignore[type-arg]
         return f"{name.strip().upper()}={number.strip()}"
 
 
-def sysid_option(function: F) -> F:
-    """--sysid of every command that communicates with one running vehicle; it becomes part of the address."""
+def sysid_option(function: F, otherwise: str = "the first one heard") -> F:
+    """--sysid of every command that communicates with running vehicles, `otherwise` with which ones; it
+    becomes part of the address."""
 
     def keep(ctx: click.Context, _: click.Parameter, system: int | None) -> None:
         ctx.meta[_SYSTEM] = system
@@ -166,7 +167,7 @@ def sysid_option(function: F) -> F:
         is_eager=True,  # before the address
         expose_value=False,
         callback=keep,
-        help="MAVLink system id of the vehicle, if several send to one port.  [default: the first one heard]",
+        help=f"MAVLink system id of the vehicle, if several send to one port.  [default: {otherwise}]",
     )(function)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import click
 
-from gcs.commands.options import AddressType, page_options, truth_option
+from gcs.commands.options import AddressType, page_options, sysid_option, truth_option
 from gcs.shell.link import API_PORT, SITL_TRUTH, Address
 
 
@@ -18,6 +20,7 @@ from gcs.shell.link import API_PORT, SITL_TRUTH, Address
     help="Connection to vehicles, as in the other commands; repeatable.  "
     f"[default: {API_PORT}, which leaves 14550 to other ground stations]",
 )
+@partial(sysid_option, otherwise="all that are heard")
 @page_options
 @click.option("--no-open", is_flag=True, help="Do not open the page in a browser.")
 @click.option(
@@ -44,7 +47,7 @@ def view_command(
 
     \b
     gcs view
-    gcs view --connect 14550
+    gcs view --connect 14550 --sysid 2
     gcs view --connect udpout:127.0.0.1:14555 --port 8095
     """
     from gcs.workflows.view import ViewOptions, serve_feed, view

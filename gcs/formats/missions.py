@@ -78,6 +78,14 @@ def write_foreign(
         raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
 
 
+def planned_home(plan: Plan) -> Home:
+    """The home for which a file is planned: the one it names, or else where the vehicle is by default."""
+    row = _home_row(plan)
+    if plan.home is not None or row is None:
+        return plan.home or Home()
+    return Home(row.x * 1e-7, row.y * 1e-7, row.z)
+
+
 def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     """The parts of a plan that the vehicle would accept, and those that it would not execute.
 
@@ -119,16 +127,22 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
 
 
 def _begins_with_other_home(plan: Plan, home: Home) -> bool:
-    """Whether the list begins with a home item, as Mission Planner writes it, that is not the vehicle's."""
+    """Whether the list begins with a home item that is not the vehicle's."""
+    row = _home_row(plan)
+    return row is not None and _is_not_home(row, home)
+
+
+def _home_row(plan: Plan) -> WireItem | None:
+    """The home item with which the list begins, as Mission Planner writes it; None if it does not."""
     if len(plan.items) < 2:
-        return False
+        return None
     (first, _), (second, _) = plan.items[:2]
-    return (
+    is_home_row = (
         first.command == mavlink.MAV_CMD_NAV_WAYPOINT
         and first.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
         and second.command == mavlink.MAV_CMD_NAV_TAKEOFF
-        and _is_not_home(first, home)
     )
+    return first if is_home_row else None
 
 
 def _is_not_home(item: WireItem, home: Home) -> bool:

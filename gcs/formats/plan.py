@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, home_from_text
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.formats.items import FileItem, FormatError, item_of, params_of
@@ -25,13 +25,14 @@ _RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 class Plan(NamedTuple):
     """The content of a file; `not_converted` has a line for each part for which there are no mission items.
 
-    Fence and rally points are None if the file does not mention them.
+    Fence, rally points and the planned home are None if the file does not mention them.
     """
 
     items: list[FileItem]
     not_converted: list[str]
     fence: tuple[WireItem, ...] | None = None
     rally: tuple[WireItem, ...] | None = None
+    home: Home | None = None
 
 
 def read_plan(text: str) -> Plan:
@@ -55,7 +56,7 @@ def read_plan(text: str) -> Plan:
             items.append(_simple(entry, where))
         else:
             raise FormatError(f"{where}.type: {entry['type']!r}; must be SimpleItem or ComplexItem")
-    return Plan(items, not_converted, _fence(document), _rally(document))
+    return Plan(items, not_converted, _fence(document), _rally(document), _planned_home(mission))
 
 
 def write_plan(
@@ -122,6 +123,25 @@ def _complex(entry: dict[str, Any], where: str, not_converted: list[str]) -> Ite
         if not isinstance(inner, dict):
             raise FormatError(f"{place}: must be an object")
         yield _simple(inner, place)
+
+
+def _planned_home(mission: dict[str, Any]) -> Home | None:
+    """The place from which QGroundControl plans the mission; None if it is not known there."""
+    where = "mission.plannedHomePosition"
+    place = mission.get("plannedHomePosition")
+    if place is None:
+        return None
+    if not isinstance(place, list) or len(place) != 3:
+        raise FormatError(f"{where}: must be a list of 3 numbers")
+    latitude, longitude, altitude = (_number(one, where) for one in place)
+    if math.isnan(latitude) or math.isnan(longitude):
+        return None
+    if math.isnan(altitude):  # the height of the ground is not known
+        altitude = 0.0
+    try:
+        return home_from_text(f"{latitude!r},{longitude!r},{altitude!r}")
+    except ValueError as error:
+        raise FormatError(f"{where}: {error}") from None
 
 
 def _fence(record: dict[str, Any]) -> tuple[WireItem, ...] | None:

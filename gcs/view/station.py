@@ -64,9 +64,11 @@ class _Task:
 
 
 class Station:
-    """All vehicles from which something was received."""
+    """All vehicles from which something was received, or the one with the id `system`."""
 
-    def __init__(self, active: bool = True, signing: Signing | None = None) -> None:
+    def __init__(
+        self, active: bool = True, signing: Signing | None = None, system: int | None = None
+    ) -> None:
         self.vehicles: dict[int, WatchedVehicle] = {}
         self.known_parameters: dict[str, float] = {}  # of vehicles that a passive station does not ask
         self.known_waypoints: list[list[float]] = []
@@ -74,6 +76,7 @@ class Station:
         self._new_samples: dict[str, list[list[Any]]] = {}  # samples that were not sent to pages yet
         self._active = active
         self._signing = signing
+        self._system = system
         self._tasks: dict[int, deque[_Task]] = {}
         self._news: list[dict[str, Any]] = []
         self._texts: deque[dict[str, Any]] = deque(maxlen=_TEXTS)
@@ -85,7 +88,9 @@ class Station:
     def receive(self, datagram: bytes, now_us: int) -> list[int]:
         """Process a datagram of a vehicle; return the system ids of the vehicles that sent messages in it."""
         for one in messages(datagram)[0]:
-            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles:
+            is_shown = self._system is None or one.system == self._system
+            is_new = one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles
+            if is_shown and is_new:
                 self._add_vehicle(one, datagram, now_us)
         senders: list[int] = []
         for system, vehicle in self.vehicles.items():

@@ -58,7 +58,7 @@ def check_mission(mission: Mission, options: FlightOptions) -> None:
         return
     shaped = options.law == "plumbline"
     if not is_known_flyable(mission, options.vehicle, shaped):
-        from gcs.workflows.check_mission import require_flyable
+        from gcs.workflows.flyable import require_flyable
 
         with notify_if_slow(CHECKING_TEXT, options.quiet):
             require_flyable(mission, options.vehicle, shaped)

@@ -1,27 +1,32 @@
-"""Missions for the commands: loaded, and checked against the vehicle that is to fly them."""
+"""`gcs check`: a mission against the vehicle that is to fly it, without this vehicle."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
 
-from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
+from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
 from autopilot.trajectory.transfer import transfer_duration
-from autopilot.vehicle.file import belief_of, load_belief
+from autopilot.vehicle.file import belief_of
+from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import WireItem, decode_items
+from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
-from gcs.mission_items import items_of
+from gcs.formats.missions import check_plan, is_foreign, planned_home, read_foreign
+from gcs.mission_items import in_mission_terms, items_of
 from gcs.workflows.before_flight import unused_planner_text
-from gcs.workflows.flyable_marks import mark_flyable
+from gcs.workflows.flyable import mission_of, violations
 from gcs.workflows.mission_file import load
+from gcs.workflows.refusals import Answer, ItemLists, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
@@ -33,22 +38,9 @@ MIN_CONTROL_SHARE = 0.25
 MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
-def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
-    """What the vehicle cannot fly of the mission, with paths `shaped` by the autopilot or as requested.
-
-    InputError if no vehicle would accept its items.
-    """
-    items_of(mission, Home())
-    found = check(mission, load_limits(vehicle), shaped)
-    if not found:
-        mark_flyable(mission, vehicle, shaped)
-    return found
-
-
-def winch_violations(mission: Mission, vehicle: str) -> Iterator[Violation]:
+def winch_violations(mission: Mission, table: AutopilotParameters) -> Iterator[Violation]:
     """Winch items that request a cable length beyond the default limits of the vehicle's winch; the vehicle
     would refuse the mission at its start."""
-    table = autopilot_parameters(load_belief(vehicle))
     min_m, max_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
     for entry, _, length_m in _winch_items(mission, table):
         problem = cable_length_problem(length_m, min_m, max_m)
@@ -68,12 +60,12 @@ def _winch_items(
 
 
 def path_reports(
-    mission: Mission, vehicle: str, planner: Planner | None = None, shaped: bool = True
+    mission: Mission, limits: VehicleLimits, planner: Planner | None = None, shaped: bool = True
 ) -> list[PathReport]:
-    """How the vehicle flies the mission, with paths `shaped` by the autopilot or as requested; a `planner`
-    makes those through waypoints. GcsError says what is wrong with a planned path."""
+    """How a vehicle with these limits flies the mission, with paths `shaped` by the autopilot or as
+    requested; a `planner` makes those through waypoints. GcsError says what is wrong with a planned path."""
     try:
-        return paths(_as_sent(mission), load_limits(vehicle), planner, shaped)
+        return paths(_as_sent(mission), limits, planner, shaped)
     except PlanError as error:
         raise GcsError(f"{mission.name}: {error}") from None
 
@@ -99,12 +91,12 @@ def slowness_notes(reports: Sequence[PathReport]) -> Iterator[str]:
             )
 
 
-def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
-    """A line for each path that leaves little for control, if the true vehicle is not the assumed one."""
+def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle) -> Iterator[str]:
+    """A line for each path that leaves little for control, if the true vehicle is not the assumed one,
+    `belief`."""
     believed = belief_of(vehicle)
     if believed == vehicle:
         return
-    belief = load_belief(vehicle)
     rotor_range = belief.rotor_max_n - belief.rotor_min_n
     for report in reports:
         margin = min(report.rotor_low_n - belief.rotor_min_n, belief.rotor_max_n - report.rotor_high_n)
@@ -117,9 +109,10 @@ def margin_warnings(reports: Sequence[PathReport], vehicle: str) -> Iterator[str
             )
 
 
-def timeout_warnings(mission: Mission, reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
+def timeout_warnings(
+    mission: Mission, reports: Sequence[PathReport], table: AutopilotParameters
+) -> Iterator[str]:
     """A line if the paths take so much longer than the mission asks for that `gcs fly` would give up."""
-    table = autopilot_parameters(load_belief(vehicle))
     expected_s = expected_flight_s(mission, table)
     limit_s = time_limit_s(expected_s)
     moves_s = {entry.item: _move_s(entry) for entry in timeline(mission.steps, _start(table))}
@@ -140,10 +133,8 @@ def _start(table: AutopilotParameters) -> MissionState:
     return MissionState(cable_m=table["VEH_CABLE_LEN"], speed_m_s=table["MIS_SPEED"])
 
 
-def parameter_notes(vehicle: str) -> Iterator[str]:
+def parameter_notes(belief: Vehicle, known: Collection[str]) -> Iterator[str]:
     """A line about each parameter with which the vehicle is delivered and that only custom code may have."""
-    belief = load_belief(vehicle)
-    known = autopilot_parameters(belief).names
     for name in belief.parameters:
         if name not in known:
             yield (
@@ -152,9 +143,8 @@ def parameter_notes(vehicle: str) -> Iterator[str]:
             )
 
 
-def winch_notes(mission: Mission, vehicle: str) -> Iterator[str]:
+def winch_notes(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
     """A line about each winch item while the load is carried, which path reports do not include."""
-    table = autopilot_parameters(load_belief(vehicle))
     for entry, step, length_m in _winch_items(mission, table):
         if not entry.before.released:
             speed_m_s = step.speed_m_s or table["WNC_SPEED"]
@@ -176,65 +166,93 @@ def notes_after_release(mission: Mission) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What `gcs check` found: what the vehicle cannot fly, or else how it flies each path, with warnings."""
+    """What `gcs check` found: what the vehicle cannot fly, or what it would refuse, in its words, or else how
+    it flies each path, with warnings."""
 
     mission: str
     vehicle: str
     violations: tuple[Violation, ...]
     paths: tuple[PathReport, ...]
     warnings: tuple[str, ...] = ()
+    refusals: tuple[str, ...] = ()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why the mission cannot be flown; empty if it can."""
+        return (*map(str, self.violations), *self.refusals)
 
     def lines(self) -> tuple[str, ...]:
         """The result as text."""
-        if self.violations:
-            return tuple(map(str, self.violations))
+        if self.problems:
+            return self.problems
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
+
+
+class _ReadFile(NamedTuple):
+    """A mission as it is read from a file, and the items to be sent; parts of the file for which there are
+    none, and notes about others."""
+
+    mission: Mission
+    lists: ItemLists
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def _read_foreign(path: Path) -> _ReadFile:
+    """The content of a file of another ground station; FormatError says what is wrong with it."""
+    plan = read_foreign(path)
+    home = planned_home(plan)
+    items, left_out, kept = check_plan(plan, home)
+    place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
+    return _ReadFile(
+        mission_of(path.name, items, home),
+        ItemLists(items, home, plan.fence or (), plan.rally or ()),
+        tuple(left_out) if items else (*left_out, "nothing that can be flown"),
+        (f"note: flown with home at {place}", *(f"note: {line}" for line in kept)),
+    )
 
 
 def check_mission(
     name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None
 ) -> CheckResult:
-    """Check a mission against a vehicle; `as_asked`: without shaping.
+    """Check a mission by name or path, or the file of another ground station, against a vehicle; `as_asked`:
+    without shaping.
 
     GcsError if a custom `planner` fails to plan it.
     """
-    mission = load(name_or_path)
-    found = [*violations(mission, vehicle, not as_asked), *winch_violations(mission, vehicle)]
-    reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
+    path, limits = Path(name_or_path), load_limits(vehicle)
+    if foreign := is_foreign(path):
+        mission, lists, left_out, notes = _read_foreign(path)
+        if left_out:
+            return CheckResult(mission.name, vehicle, (), (), notes, left_out)
+    else:
+        mission, notes = load(name_or_path), ()
+        lists = ItemLists(items_of(mission, Home()))
+    table = autopilot_parameters(limits.vehicle)
+    found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
+    reports = [] if found else path_reports(mission, limits, planner, not as_asked)
+    answer = Answer() if found else ask_supervisor(lists, table, not as_asked, planner)
     warnings = (
+        *notes,
+        *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
-        *margin_warnings(reports, vehicle),
-        *timeout_warnings(mission, reports, vehicle),
+        *margin_warnings(reports, vehicle, limits.vehicle),
     )
-    if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
-        warnings += (
-            "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
-            f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
-        )
-    warnings += (*winch_notes(mission, vehicle), *notes_after_release(mission), *parameter_notes(vehicle))
+    if not foreign:  # which `gcs fly` does not fly
+        warnings += tuple(timeout_warnings(mission, reports, table))
+        if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
+            warnings += (
+                "note: how near a law without preview keeps to this, and whether its own errors lose the "
+                f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
+            )
+    warnings += (
+        *winch_notes(mission, table),
+        *notes_after_release(mission),
+        *parameter_notes(limits.vehicle, table.names),
+    )
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
-    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings)
-
-
-def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
-    """The mission; GcsError unless the vehicle can fly it, which is not checked with `force`."""
-    mission = load(name_or_path)
-    if force:
-        return mission
-    require_flyable(mission, vehicle)
-    return mission
-
-
-def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
-    """GcsError unless the vehicle can fly the mission of these items."""
-    steps = decode_items(items, home)
-    require_flyable(Mission(name, name, "", (), steps), vehicle, True)
-
-
-def require_flyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
-    """GcsError unless the vehicle can fly the mission."""
-    found = violations(mission, vehicle, shaped)
-    if found:
-        summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
-        raise GcsError(*([f"{summary} {found[0]}"] if len(found) == 1 else [summary, *map(str, found)]))
+    refusals = answer.refusals
+    if not foreign:  # whose items are numbered as they are sent
+        refusals = tuple(in_mission_terms(text, mission) for text in refusals)
+    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, refusals)

@@ -14,7 +14,7 @@ from autopilot.vehicle.shipped import VEHICLES
 from missions.model import Mission
 from missions.toml_files import FileError
 
-_CHECK = ROOT / "gcs" / "workflows" / "check_mission.py"  # imports all code that determines the result
+_CHECK = ROOT / "gcs" / "workflows" / "flyable.py"  # imports all code that determines the result
 
 
 def is_known_flyable(mission: Mission, vehicle: str, shaped: bool) -> bool:

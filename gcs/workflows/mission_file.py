@@ -17,8 +17,8 @@ def load(name_or_path: str) -> Mission:
         path = Path(name_or_path)
         if path.is_file() and _is_of_others(path):
             raise InputError(
-                f"{path}: a file of another ground station; gcs upload {path} checks it, and brings it to a "
-                "running vehicle (docs/tools.md)"
+                f"{path}: a file of another ground station; gcs check {path} checks it, and "
+                f"gcs upload {path} brings it to a running vehicle (docs/tools.md)"
             ) from None
         raise input_error(error) from None
 

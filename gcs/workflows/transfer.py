@@ -16,7 +16,7 @@ from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.before_flight import CHECKING_TEXT
-from gcs.workflows.check_mission import check_items, load_checked
+from gcs.workflows.flyable import check_items, load_checked
 from gcs.workflows.running_flight import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION

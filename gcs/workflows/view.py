@@ -151,8 +151,8 @@ def view(options: ViewOptions) -> None:
     """Serve the page until Ctrl-C."""
     key = next((address.signing_key for address in options.connect if address.signing_key), None)
     signing = None if key is None else Signing(key, timestamp_of(unix_us()))
+    station = Station(signing=signing, system=options.connect[0].system)
     links = UdpLinks(options.connect, options.truth)
-    station = Station(signing=signing)
     try:
         asyncio.run(_serve(station, links, options, _Session(), Site(_texts()), None))
     finally:

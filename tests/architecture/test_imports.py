@@ -140,6 +140,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.vehicles",
     ),
     "gcs.workflows.own_planner": (*GCS, "gcs", "autopilot.own", "autopilot.shell.watched_calls"),
+    "gcs.workflows.refusals": (*GCS, "gcs", "autopilot.services.requests", "autopilot.supervisor"),
     "gcs.workflows.in_process_flight": (*GCS, "gcs", "autopilot.shell.watched_calls"),
     "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),

@@ -35,11 +35,13 @@ from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
+HEAVY, BEBOP_LIMITS = load_belief("heavy-real"), load_limits("bebop")
+BEBOP = autopilot_parameters(BEBOP_LIMITS.vehicle)
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # for `heavy`, rotors of 12 N each
 
 
 def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warned_of() -> None:
-    (warning,) = margin_warnings([CASE_C], "heavy-real")
+    (warning,) = margin_warnings([CASE_C], "heavy-real", HEAVY)
     assert warning.startswith("warning: items[2] (signals): 16 % of the rotors' range is left for control")
     assert "heavy-real differs from what the autopilot assumes (heavy)" in warning
     assert "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1" in warning
@@ -51,11 +53,11 @@ def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warne
 )
 def test_either_limit_counts(low_n: float, high_n: float, warned_of: bool) -> None:
     path = PathReport(2, "signals", 50.5, 0.0, low_n, high_n, 3.9, 20.0)
-    assert bool(list(margin_warnings([path], "heavy-real"))) == warned_of
+    assert bool(list(margin_warnings([path], "heavy-real", HEAVY))) == warned_of
 
 
 def test_nothing_is_feared_of_a_vehicle_that_is_as_it_is_believed() -> None:
-    assert list(margin_warnings([CASE_C], "heavy")) == []
+    assert list(margin_warnings([CASE_C], "heavy", HEAVY)) == []
 
 
 @pytest.mark.parametrize(("by_m", "cable_m", "limit_m"), [(-5.0, -4.3, 0.3), (2.31, 3.01, 3.0)])
@@ -63,21 +65,21 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     by_m: float, cable_m: float, limit_m: float
 ) -> None:
     mission = Mission("deep", "Deep", "", (), (Takeoff(5.0), Winch(0.2), Winch(-0.2), Winch(by_m), Land()))
-    (found,) = winch_violations(mission, "bebop")
+    (found,) = winch_violations(mission, BEBOP)
     assert (found.item, found.quantity, found.limit) == (3, "cable length", limit_m)
     assert found.value == pytest.approx(cable_m)
     within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 < limit
-    assert list(winch_violations(within, "bebop")) == []
+    assert list(winch_violations(within, BEBOP)) == []
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
 
 
-def test_a_plan_of_another_ground_station_is_told_where_it_is_checked(tmp_path: Path) -> None:
+def test_a_plan_of_another_ground_station_is_told_how_it_is_flown(tmp_path: Path) -> None:
     plan = tmp_path / "a.plan"
     plan.write_text("{}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"a file of another ground station; gcs upload .* checks it"):
-        check_mission(str(plan), "bebop", as_asked=False)
+    with pytest.raises(InputError, match=r"a file of another ground station; gcs check .* and gcs upload"):
+        load(str(plan))
     with pytest.raises(InputError, match=r"unknown mission|No such file|no such file"):
-        check_mission(str(tmp_path / "b.plan"), "bebop", as_asked=False)
+        load(str(tmp_path / "b.plan"))
 
 
 def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:
@@ -103,23 +105,23 @@ def test_waypoints_that_are_too_close_for_their_speed_are_told() -> None:
     """On the grid of mission items a diagonal row is crooked; the file itself is straight."""
     row = [Waypoint(0.048 * i, 0.036 * i, 2.0) for i in range(1, 31)]
     close = Mission("close", "", "", (), (Takeoff(2.0), Speed(1.0), *row, Land()))
-    reports = path_reports(close, "bebop")
+    reports = path_reports(close, BEBOP_LIMITS)
     (note,) = slowness_notes(reports)
     assert note.startswith("note: items[2] to items[31]: too close together, or turns too sharp, for 1 m/s")
     assert {report.asked_m_s for report in reports[1:]} == {1.0}
     assert max(report.speed_m_s for report in reports[1:]) < 0.5
     wide = Mission("wide", "", "", (), (Takeoff(2.0), Speed(1.0), row[-1], Waypoint(5.0, 0.0, 2.0), Land()))
-    assert list(slowness_notes(path_reports(wide, "bebop"))) == []
+    assert list(slowness_notes(path_reports(wide, BEBOP_LIMITS))) == []
 
 
 def test_a_path_that_leaves_the_lines_between_its_waypoints_tells_how_far() -> None:
     corner = (Takeoff(2.0), Waypoint(4.0, 0.0, 2.0), Waypoint(4.0, 4.0, 2.0), Land())
-    up, *beside = path_reports(Mission("corner", "", "", (), corner), "bebop")
+    up, *beside = path_reports(Mission("corner", "", "", (), corner), BEBOP_LIMITS)
     assert up.beside_m == 0.0
     assert all(0.3 < report.beside_m < 2.0 for report in beside)
     assert f" s, up to {beside[0].beside_m:.1f} m beside the straight line; load to " in str(beside[0])
     single = Mission("single", "", "", (), (Takeoff(2.0), corner[1], Land()))
-    assert "beside" not in str(path_reports(single, "bebop")[-1])
+    assert "beside" not in str(path_reports(single, BEBOP_LIMITS)[-1])
 
 
 def test_attitude_runs_tell_of_no_speed() -> None:
@@ -139,7 +141,7 @@ def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:
 
 def test_a_cable_that_is_reeled_is_told_with_its_duration() -> None:
     steps = (Takeoff(5.0), Winch(0.6), Winch(-0.6, 0.1), Release(), Winch(0.1), Land())
-    longer, shorter = winch_notes(Mission("m", "M", "", (), steps), "bebop")
+    longer, shorter = winch_notes(Mission("m", "M", "", (), steps), BEBOP)
     assert longer == (
         "note: items[1] (winch): 5.9 s, to a cable of 1.30 m; the vehicle stays in place, no path to report"
     )
@@ -222,4 +224,4 @@ def test_paths_that_outlast_the_time_limit_of_a_flight_are_told_with_what_to_add
         "warning: along these paths the flight takes about 931 s, and gcs fly gives up "
     )
     assert warning.endswith("add --timeout 1456")
-    assert not list(timeout_warnings(load("square"), path_reports(load("square"), "bebop"), "bebop"))
+    assert not list(timeout_warnings(load("square"), path_reports(load("square"), BEBOP_LIMITS), BEBOP))

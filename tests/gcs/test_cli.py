@@ -24,12 +24,13 @@ from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE, GcsError
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows import readiness as readiness_module
 from gcs.workflows import status as status_module
+from gcs.workflows import view as view_module
 from missions.model import Land, Signals, Sine, Takeoff, Term
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -326,7 +327,7 @@ def test_check_says_that_it_can_be_flown():
     assert all(
         0.9 < path["tension_low_n"] < 1.0 and 3.0 < path["duration_s"] < 10.0 for path in told.pop("paths")
     )
-    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": []}
+    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": [], "refusals": []}
 
 
 def test_check_tells_how_signals_will_be_flown():
@@ -386,6 +387,16 @@ def test_what_begins_when_the_vehicle_is_armed_says_so(live, words):
     assert result.stdout.endswith("accepted; it begins when the vehicle is armed: gcs arm\n"), result.output
     assert run("arm", "--connect", port).exit_code == EXIT_DONE
     assert run(*words, "--connect", port).stdout.endswith(": accepted\n")
+
+
+@pytest.mark.parametrize(("words", "system"), [([], None), (["--sysid", "2"], 2)])
+def test_the_page_shows_all_vehicles_or_the_chosen_one(monkeypatch, words, system):
+    def station(**options):
+        raise GcsError(f"a station for {options['system']}")
+
+    monkeypatch.setattr(view_module, "Station", station)
+    told = one_line(run("view", "--connect", str(free_port()), "--no-open", *words), EXIT_ERROR)
+    assert told == f"gcs: a station for {system}"
 
 
 def test_a_vehicle_without_a_mission_has_no_items(live):

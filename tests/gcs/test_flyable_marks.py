@@ -7,8 +7,9 @@ from importlib.resources import files
 
 import pytest
 
-from gcs.workflows.check_mission import violations
+from gcs.workflows.flyable import violations
 from gcs.workflows.flyable_marks import is_known_flyable
+from gcs.workflows.vehicle_limits import load_limits
 from missions.fileformat import load_mission
 from missions.model import Waypoint
 
@@ -24,7 +25,7 @@ def nothing_known(tmp_path, monkeypatch):
 def test_what_was_found_flyable_is_known_with_its_vehicle_and_its_shaping():
     hover = load_mission("hover")
     assert not is_known_flyable(hover, "bebop", True)
-    assert violations(hover, "bebop", True) == []
+    assert violations(hover, "bebop", load_limits("bebop")) == []
     assert is_known_flyable(hover, "bebop", True)
     assert is_known_flyable(replace(hover, title="another"), "bebop", True)
     assert not is_known_flyable(hover, "bebop", False)
@@ -36,7 +37,7 @@ def test_what_was_found_flyable_is_known_with_its_vehicle_and_its_shaping():
 def test_a_vehicle_file_is_known_by_what_stands_in_it(tmp_path):
     hover, path = load_mission("hover"), tmp_path / "mine.toml"
     path.write_text(BEBOP, encoding="utf-8")
-    assert violations(hover, str(path), True) == []
+    assert violations(hover, str(path), load_limits(str(path))) == []
     assert is_known_flyable(hover, str(path), True)
     path.write_text(BEBOP.replace("load_mass_kg = 0.1", "load_mass_kg = 0.2"), encoding="utf-8")
     assert not is_known_flyable(hover, str(path), True)
@@ -47,5 +48,5 @@ def test_a_vehicle_file_is_known_by_what_stands_in_it(tmp_path):
 def test_what_cannot_be_flown_is_never_known():
     hover = load_mission("hover")
     too_low = replace(hover, steps=(hover.steps[0], Waypoint(1.0, 0.0, 0.05), hover.steps[-1]))
-    assert violations(too_low, "bebop", True)
+    assert violations(too_low, "bebop", load_limits("bebop"))
     assert not is_known_flyable(too_low, "bebop", True)

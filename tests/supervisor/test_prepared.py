@@ -14,7 +14,7 @@ from autopilot.guidance.legs import Hold, PathStretch, SignalRun, requested_jet
 from autopilot.services.requests import Arm, Land, Pause, Reposition, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeOff
 from autopilot.supervisor.mission import with_current_step, with_plan
-from autopilot.supervisor.requests.mission_checks import mission_begin, mission_problem
+from autopilot.supervisor.requests.mission_checks import mission_begin, mission_problem, remaining_timeline
 from autopilot.supervisor.state import Flight, MissionPlan, Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
@@ -55,7 +55,8 @@ def start_prepared(sky: Sky) -> None:
     """Start the mission with paths from where it begins now, which it waits for."""
     assert sky.ask(StartMission(None)).result == ACCEPTED
     if sky.flight.mission.waiting:
-        plan, begin = sky.flight.mission.plan, mission_begin(sky.flight, sky.view, SETTINGS)
+        ahead = remaining_timeline(sky.flight, sky.view, SETTINGS)
+        plan, begin = sky.flight.mission.plan, mission_begin(sky.flight, ahead, SETTINGS)
         found = prepare(plan.steps, plan.sequence, LIMITS, begin=begin)
         sky.flight = prepared(sky.flight, replace(plan, prepared=found))
         assert sky.ask(StartMission(None)).result == ACCEPTED
@@ -281,7 +282,8 @@ def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> 
     assert verdict.text.startswith(f"Mission denied: the curve to item {item} leads ")
     # flown from rest to rest, as after a jump into the path, the lines are straight
     at_last = with_current_step(sky.flight, 3, done=False)
-    assert mission_problem(at_last, sky.view, sky.settings) == ""
+    ahead = remaining_timeline(at_last, sky.view, sky.settings)
+    assert mission_problem(at_last, ahead, sky.settings) == ""
 
 
 def test_a_mission_waits_for_paths_only_once() -> None:

@@ -14,6 +14,7 @@ from autopilot.supervisor.requests.mission_checks import (
     is_prepared_from_here,
     lift_altitude_m,
     mission_problem,
+    remaining_timeline,
     upload_problem,
 )
 from autopilot.supervisor.requests.takeoff import start_takeoff
@@ -43,8 +44,9 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     plan = flight.mission.plan
     if not plan.steps:
         return flight, denied("Mission denied: there is none")
-    prepared = not plan.prepared.pending and is_prepared_from_here(flight, view, settings)
-    problem = mission_problem(flight, view, settings) or (plan.prepared.refusal if prepared else "")
+    ahead = remaining_timeline(flight, view, settings)
+    prepared = not plan.prepared.pending and is_prepared_from_here(flight, ahead, settings)
+    problem = mission_problem(flight, ahead, settings) or (plan.prepared.refusal if prepared else "")
     if problem:
         return flight, denied(f"Mission denied: {problem}")
     if flight.phase == Phase.DISARMED:
@@ -114,7 +116,7 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, item)
     if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
-        problem = mission_problem(at_item, view, settings)
+        problem = mission_problem(at_item, remaining_timeline(at_item, view, settings), settings)
         if problem:
             return flight, denied(f"{item} denied: {problem}")
         if not is_prepared_from_here(at_item, view, settings):

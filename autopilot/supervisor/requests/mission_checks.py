@@ -18,6 +18,7 @@ from autopilot.supervisor.state import (
     Flight,
     MissionPlan,
     View,
+    fence_problem,
     fence_violation,
     is_fence_active,
     load_position_below,
@@ -33,18 +34,19 @@ from autopilot.trajectory.timeline import (
     timeline,
 )
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
+from autopilot.wire.statustext import listed
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
 # spacing of the places at which a line is checked, and their greatest number
 CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
 MIN_CURVE_POINTS = 16  # between two waypoints, however close
+MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence
 
 RemainingSteps = list[tuple[int, TimelineEntry]]  # each with its mission item
 
 
-def mission_problem(flight: Flight, view: View, settings: Settings) -> str:
+def mission_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which remaining item must not be flown from here, and why; an empty string if there is none."""
-    ahead = remaining_timeline(flight, view, settings)
     return (
         fence_exit_problem(flight, ahead, settings)
         or curve_exit_problem(flight, ahead, settings)
@@ -91,34 +93,30 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
-def mission_begin(flight: Flight, view: View, settings: Settings) -> MissionBegin:
+def mission_begin(flight: Flight, ahead: RemainingSteps, settings: Settings) -> MissionBegin:
     """The present step of the mission, and the state in which it begins from here."""
     mission = flight.mission
-    ahead = remaining_timeline(flight, view, settings)
     state = ahead[mission.step - len(mission.plan.steps)][1].before  # behind a lift that no step requests
     speed_m_s = mission.speed_m_s if mission.step else settings.limits.speed_m_s
     return MissionBegin(mission.step, replace(state, speed_m_s=speed_m_s))
 
 
-def is_prepared_from_here(flight: Flight, view: View, settings: Settings) -> bool:
+def is_prepared_from_here(flight: Flight, ahead: RemainingSteps, settings: Settings) -> bool:
     """Whether the next path through waypoints was prepared from where the load is or comes to rest.
 
     The paths behind it begin at waypoints, wherever the mission begins.
     """
     mission = flight.mission
     prepared = mission.plan.prepared
-    begin = mission_begin(flight, view, settings)
+    begin = mission_begin(flight, ahead, settings)
     if not prepared.paths or begin.state is None or begin.state.expected is None:
         return True
-
-    def path_starts(begin: MissionBegin) -> dict[int, Vec3]:
-        return waypoint_path_starts(mission.plan.steps, settings.limits, flight.area.home, begin)
-
-    starts, prepared_starts = path_starts(begin), path_starts(prepared.begin)
+    starts = waypoint_path_starts(mission.plan.steps, settings.limits, flight.area.home, begin)
     step = min((step for step in starts if step >= mission.step), default=None)
     if step is None:
         return True
-    return step in prepared_starts and norm(sub(starts[step], prepared_starts[step])) < NEAR_START
+    prepared_start = prepared.path_starts.get(step)
+    return prepared_start is not None and norm(sub(starts[step], prepared_start)) < NEAR_START
 
 
 def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
@@ -151,6 +149,13 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
         if reason:
             return f"item {seq} leads {reason}"
     return ""
+
+
+def forbidden_rally_text(flight: Flight, settings: Settings) -> str:
+    """A warning that names the rally points that the fence forbids; empty if there are none."""
+    places = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
+    outside = [number for number, place in places if fence_problem(flight, place, settings)]
+    return f"Rally points outside the fence: {listed(outside)}; no return leads there" if outside else ""
 
 
 def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:

@@ -19,7 +19,7 @@ from autopilot.wire.items import WireItem, encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
 from gcs.formats.items import NO_COORDINATE, FormatError
-from gcs.formats.missions import check_plan, read_foreign, write_foreign
+from gcs.formats.missions import check_plan, planned_home, read_foreign, write_foreign
 from gcs.formats.params import parameter_lines, qgc_parameters
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import read_waypoints, write_waypoints
@@ -65,6 +65,10 @@ def plan_text(*items: Any, **more: Any) -> str:
             **more,
         }
     )
+
+
+def plan_at(home: object) -> str:
+    return json.dumps({"fileType": "Plan", "mission": {"items": [], "plannedHomePosition": home}})
 
 
 TAKEOFF = simple(22, params=[0, 0, 0, None, 47.397742, 8.545594, 2])
@@ -115,6 +119,19 @@ def test_fence_and_rally_points_become_items_and_come_back() -> None:
     assert back["rallyPoints"] == RALLY
     bare = json.dumps({"fileType": "Plan", "mission": {"items": []}})
     assert (read_plan(bare).fence, read_plan(bare).rally) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("place", "home"),
+    [
+        ([47.5, 8.5, 488.0], Home(47.5, 8.5, 488.0)),
+        ([47.5, 8.5, None], Home(47.5, 8.5, 0.0)),
+        ([None, None, None], Home()),
+        (None, Home()),
+    ],
+)
+def test_a_plan_is_judged_at_its_planned_home(place: list[float | None] | None, home: Home) -> None:
+    assert planned_home(read_plan(plan_at(place))) == home
 
 
 def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
@@ -239,6 +256,7 @@ def test_a_home_row_of_another_place_is_not_flown() -> None:
     assert len(at_home.items) == 2
     for current in (0, 1):
         elsewhere = check_plan(rows(47.39, current), HOME)
+        assert planned_home(rows(47.39, current)) == Home(47.39, 8.545594, 0.0)
         assert len(elsewhere.left_out) == 1
         assert "home row" in elsewhere.left_out[0]
         assert [item.command for item in elsewhere.items] == [22]
@@ -261,6 +279,10 @@ BAD_PLANS = [
     (plan_text(simple(16, -1)), "frame -1"),
     (plan_text(simple(16) | {"command": "x"}), "mission.items[0].command"),
     (plan_text(survey(3)), "Items[0]: must be an object"),
+    (plan_at(3), "mission.plannedHomePosition: must be a list of 3"),
+    (plan_at([47.0, 8.5]), "mission.plannedHomePosition: must be a list of 3"),
+    (plan_at([470.0, 8.5, 0]), "mission.plannedHomePosition: home '470.0,8.5,0.0': latitude 470; must be"),
+    (plan_at([47.0, "x", 0]), "mission.plannedHomePosition: 'x'; must be a number or null"),
     (plan_text(geoFence=3), "geoFence: must be an object"),
     (plan_text(geoFence={"circles": 3}), "geoFence.circles: must be a list"),
     (plan_text(geoFence={"polygons": [3]}), "geoFence.polygons[0]: must be an object"),

@@ -211,6 +211,13 @@ def test_figures_of_a_lost_flight_say_that_they_end_with_the_loss(built, tmp_pat
     assert lost["load_error_max_m"] == record["load_error_max_m"]
 
 
+@pytest.mark.parametrize("outcome", ["landed", "lost"])
+def test_figures_of_a_flight_that_failed_say_that_they_end_with_the_failure(built, outcome):
+    table = printed({**built[1], "outcome": outcome, "failure_s": 12.0, "failure_error_max_m": 0.4})
+    for group in ("Load position error", "Vehicle and cable", "Rotors"):
+        assert re.search(rf"{group} .*\n *until the failure", table)
+
+
 def test_groups_in_which_nothing_happened_are_left_out(page, built):
     for text in (" ".join(page.text), printed(built[1])):
         for group, metrics in GROUPS:

@@ -75,6 +75,19 @@ def test_a_vehicle_that_is_met_is_asked_for_fast_telemetry_and_for_the_parameter
     assert told["parameters"] == {slider.name: slider.default or 0.0 for slider in SLIDERS}
 
 
+@pytest.mark.parametrize(("system", "shown"), [(None, [1, 2]), (2, [2]), (3, [])])
+def test_of_several_vehicles_all_are_shown_or_the_one_that_is_chosen(
+    system: int | None, shown: list[int]
+) -> None:
+    station = Station(system=system)
+    heartbeat = mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 29, 0, 3, 3
+    )
+    heard = [station.receive(FrameWriter(one, 1).frame(heartbeat), 1000) for one in (1, 2)]
+    assert list(station.vehicles) == shown
+    assert [one for found in heard for one in found] == shown
+
+
 def test_one_that_only_looks_on_says_no_word_until_a_person_asks(world: Any) -> None:
     watched = Watched(world, active=False)
     watched.run(5.0)
