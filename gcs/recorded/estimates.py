@@ -116,7 +116,8 @@ def predictions(
 
 def _ends(rows: FilterRows, begin: np.intp, horizons_s: tuple[float, ...]) -> NDArray[np.intp]:
     """The rows that lie `horizons_s` after row `begin`."""
-    return np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+    ends: NDArray[np.intp] = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+    return ends
 
 
 def swings(
