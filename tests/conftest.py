@@ -44,11 +44,19 @@ def shaped_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Headless Chromium; `open` a page in it."""
+def started_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Headless Chromium, started once for all tests."""
     from tests.doubles import browser as browsers
 
     if browsers.missing():
         pytest.skip(browsers.missing())
     with browsers.chromium(tmp_path_factory.mktemp("chromium")) as opened:
         yield opened
+
+
+@pytest.fixture
+def browser(started_browser: Browser) -> Iterator[Browser]:
+    """Headless Chromium; `open` a page in it. It is left when the test ends: without a graphics card a scene
+    that nobody looks at any more takes a tenth of a core from all tests that follow."""
+    yield started_browser
+    started_browser.leave()

@@ -172,9 +172,12 @@ def source_digest(kind: type) -> str:
 
 
 def _loaded_files_beside(path: Path) -> set[Path]:
+    folder, depth = path.parent.parts, len(path.parent.parts)
     places = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
     files = {Path(location) for location in places if isinstance(location, str) and location.endswith(".py")}
-    return {path, *(file for file in files if file.is_file() and file.is_relative_to(path.parent))}
+    # of some thousand modules few lie here: only these are looked up on the disk
+    beside = (file for file in files if file.parts[:depth] == folder and file.anchor == path.anchor)
+    return {path, *(file for file in beside if file.is_file())}
 
 
 def error_text(error: BaseException, path: Path | None, entry: str = "") -> str:

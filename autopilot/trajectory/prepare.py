@@ -20,6 +20,7 @@ from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import PlanError, Planner, Route, bound_violation, path_segments
 from autopilot.trajectory.route import slower as slowed_path
 from autopilot.trajectory.shaping import ShapedSignals, shape, unshaped_signals
+from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import (
     MAX_POINTS,
@@ -197,18 +198,30 @@ def _waypoint_segments(
     for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
-        path, times = plan_waypoint_path(
-            points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
-        )
-        table, jets = path.table(), path.jets()[1]
-        if float(jets[0, :, 2].min()) + points[0][2] > 0.0:
+        table, times, lowest_m = _planned_path(tuple(points), speed, limits)
+        if lowest_m + points[0][2] > 0.0:
             for i in range(len(points) - 1):
-                segments[first + i] = PathSegment(table, float(times[i]), float(times[i + 1]), points[0])
+                segments[first + i] = PathSegment(table, times[i], times[i + 1], points[0])
             length = sum(dist(a, b) for a, b in pairwise(points))
             ride_s = ride(length, speed, limits.accel_m_s2)[2]
             if not limits.time_optimal and ride_s < SLOW_SHARE * times[-1]:
-                slow_paths.append(SlowPath(first, first + len(points) - 2, float(times[-1]), ride_s, speed))
+                slow_paths.append(SlowPath(first, first + len(points) - 2, times[-1], ride_s, speed))
     return segments, slow_paths
+
+
+@lru_cache(maxsize=16)
+def _planned_path(
+    points: tuple[Vec3, ...], speed: float, limits: PathLimits
+) -> tuple[PieceTable, tuple[float, ...], float]:
+    """The path through the points as a table, the times at them, and its lowest place relative to the first.
+
+    Cached, as `shaped_path`: planning takes a tenth of a second, and one process flies the same path often,
+    in a sweep or after a restart.
+    """
+    path, times = plan_waypoint_path(
+        points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
+    )
+    return path.table(), tuple(times.tolist()), float(path.jets()[1][0, :, 2].min())
 
 
 def _slowness_note(path: SlowPath, sequence: Sequence[int]) -> str:

@@ -27,6 +27,7 @@ from autopilot.trajectory.signals import Jet
 Array = NDArray[np.float64]
 
 DEGREE = 9
+_BAND = DEGREE + 1
 ORDERS = 7  # position and six derivatives are matched at the ends
 
 PieceTable = Array
@@ -47,26 +48,33 @@ class Basis:
         self.spacing = (end - begin) / intervals
         inner = np.arange(intervals + 1, dtype=np.float64)
         knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
-        self._splines = scipy.interpolate.BSpline(knots, np.eye(self.count), DEGREE)
+        # of ten B-splines in a row, which are all that are not zero in an interval, no two have one column
+        columns = np.arange(self.count)[:, None] % _BAND == np.arange(_BAND)
+        self._splines = scipy.interpolate.BSpline(knots, columns.astype(np.float64), DEGREE)
+
+    def _band(self, u: Array, first: NDArray[np.int64], order: int) -> Array:
+        """(n, 10): a derivative by u of the B-splines `first` ... `first` + 9."""
+        columns = (first[:, None] + np.arange(_BAND)) % _BAND
+        return np.take_along_axis(self._splines(u, nu=order), columns, axis=1)
 
     def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
         """(orders, n, 10): derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
         times; (n,): the index of the first of these."""
         u = (times - self.breaks[0]) / self.spacing
         first = np.clip(u.astype(np.int64), 0, self.intervals - 1)
-        columns = first[:, None] + np.arange(DEGREE + 1)
-        values = np.empty((orders, times.size, DEGREE + 1))
+        values = np.empty((orders, times.size, _BAND))
         for order in range(orders):
-            all_values = self._splines(u, nu=order) / self.spacing**order
-            values[order] = np.take_along_axis(all_values, columns, axis=1)
+            values[order] = self._band(u, first, order) / self.spacing**order
         return values, first
 
     def end_coefficients(self, before: Array, after: Array) -> Array:
         """(count, 3) coefficients: those that follow from the jets (7, 3) at the two ends; the others 0."""
         coefficients = np.zeros((self.count, 3))
-        for at, jet, part in ((0.0, before, slice(0, ORDERS)), (1.0, after, slice(-ORDERS, None))):
-            u = np.array([at * self.intervals])
-            rows = np.vstack([self._splines(u, nu=n)[0] for n in range(ORDERS)])[:, part]
+        last = self.intervals - 1
+        ends = (0.0, 0, before, slice(0, ORDERS)), (last + 1.0, last, after, slice(-ORDERS, None))
+        for at, first, jet, part in ends:
+            u, interval = np.array([at]), np.array([first])
+            rows = np.vstack([self._band(u, interval, n) for n in range(ORDERS)])[:, part]
             scaled = jet * self.spacing ** np.arange(ORDERS)[:, None]
             coefficients[part] = np.linalg.solve(rows, scaled)
         return coefficients

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil, dist, sqrt
 
@@ -103,6 +104,38 @@ def sample_path(table: PieceTable, times: Array) -> Array:
     return out
 
 
+class _Grid:
+    """The spline of a path of `total_s` seconds in `intervals` parts, and the integral as a quadratic form of
+    its coefficients, whatever points the path passes."""
+
+    def __init__(self, total_s: float, intervals: int) -> None:
+        self.basis = basis = Basis(0.0, total_s, intervals)
+        times = np.linspace(0.0, total_s, _SAMPLES * intervals + 1)
+        values, first = basis.band(times, 7)
+        self.spacing = spacing = float(times[1])
+        four, six = (self.matrix(values[order], first) for order in (4, 6))
+        self.snap, self.turn = four, six
+        self.hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
+        free = slice(basis.free.start, basis.free.stop)
+        hessian = self.hessian[free, free]
+        # the scale keeps the two kinds of rows comparable in size for pivoting
+        self.scale = float(np.median(hessian.diagonal()))
+        self.scaled_hessian = hessian / self.scale
+
+    def matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
+        """(n, count) matrix of one derivative at n times by the coefficients of one axis."""
+        n = len(values)
+        columns = first[:, None] + np.arange(_BAND)
+        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+        return sparse.csr_matrix(
+            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
+        )
+
+
+# the times at the points are searched with the same total: nearly all paths that are compared have one grid
+_grid = lru_cache(maxsize=4)(_Grid)
+
+
 class MinimumSnap:
     """The smoothest path from rest at the first point, past others at their times, to rest at the last."""
 
@@ -110,51 +143,32 @@ class MinimumSnap:
         segments = np.diff(times)
         count = ceil(_PER_SEGMENT * times[-1] / segments.min())
         # `_PER_SEGMENT` intervals to the shortest segment, but within the limits on their number
-        intervals = int(np.clip(count, 2 * ORDERS, _MAX_INTERVALS))
-        self.basis = basis = Basis(0.0, float(times[-1]), intervals)
+        grid = _grid(float(times[-1]), int(np.clip(count, 2 * ORDERS, _MAX_INTERVALS)))
+        self.basis = basis = grid.basis
         self.origin: Array = points[0]
         ends = np.zeros((2, ORDERS, 3))
         ends[1, 0] = points[-1] - self.origin
-        self.coefficients: Array = basis.end_coefficients(ends[0], ends[1])
-        self._times = np.linspace(0.0, times[-1], _SAMPLES * intervals + 1)
-        self.values, self.first = basis.band(self._times, 7)
-        spacing = float(self._times[1])
-        four, six = (self._matrix(self.values[order], self.first) for order in (4, 6))
-        hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
-        inner = times[1:-1]
-        passing = self._matrix(*self._at(inner))
-        free, fixed = slice(basis.free.start, basis.free.stop), self.coefficients
-        H, A = hessian[free, free], passing[:, free]
-        n = H.shape[0]
-        # the scale keeps the two kinds of rows comparable in size for pivoting
-        scale = float(np.median(H.diagonal()))
-        system = sparse.bmat([[H / scale, A.T], [A, None]], format="csc")
+        fixed = basis.end_coefficients(ends[0], ends[1])
+        values, first = basis.band(times[1:-1], 1)
+        passing = grid.matrix(values[0], first)
+        free = slice(basis.free.start, basis.free.stop)
+        A = passing[:, free]
+        n = A.shape[1]
+        system = sparse.bmat([[grid.scaled_hessian, A.T], [A, None]], format="csc")
         right_side = np.vstack(
             [
-                -(hessian @ fixed)[free] / scale,
+                -(grid.hessian @ fixed)[free] / grid.scale,
                 (points[1:-1] - self.origin) - passing @ fixed,
             ]
         )
-        self.coefficients = fixed.copy()
+        self.coefficients: Array = fixed.copy()
         factor = splu(system)
         solved = factor.solve(right_side)
         # one step of refinement with the residual: the least integral is small compared with its terms
         solved += factor.solve(right_side - system @ solved)
         self.coefficients[free] = solved[:n]
-        snap, turn = four @ self.coefficients, six @ self.coefficients
-        self.cost = spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
-
-    def _at(self, times: Array) -> tuple[Array, Indices]:
-        values, first = self.basis.band(times, 1)
-        return values[0], first
-
-    def _matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
-        n = len(values)
-        columns = first[:, None] + np.arange(_BAND)
-        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
-        return sparse.csr_matrix(
-            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
-        )
+        snap, turn = grid.snap @ self.coefficients, grid.turn @ self.coefficients
+        self.cost = grid.spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
 
     def jets(self) -> tuple[Array, Array]:
         """Times (n,) and jets (7, n, 3) along the path, relative to its first point."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcs.recorded.load_filter import SIZE, WORK, predict_ahead, run_filter
+from gcs.recorded.load_filter import SIZE, WORK, predict_ahead, run_filter, swing_ahead
 from gcs.recorded.load_model import LoadModel
 from gcs.recorded.motion import Motion, drive_rows, measurement_rows, slow_rows
 from gcs.recorded.smoothing import Floats
@@ -88,24 +88,21 @@ def predictions(
     estimates: Estimates,
     starts: NDArray[np.intp],
     horizons_s: tuple[float, ...],
-    *,
-    tilt: bool,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Prediction]:
-    """Predictions from rows `starts` on, by the vehicle's motion alone; stops where the rows end. `progress`
-    receives the number of predictions that are done, and of all."""
+    """Predictions from rows `starts` on, by the vehicle's motion and attitude; stops where the rows end.
+    `progress` receives the number of predictions that are done, and of all."""
     windows = []
     work = np.zeros((WORK + SIZE, SIZE))
     for done, begin in enumerate(starts):
         progress(done, len(starts))
-        ends = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+        ends = _ends(rows, begin, horizons_s)
         if ends[-1] >= len(rows.time_s):
             break
         found = np.zeros((len(ends), 5))
         predict_ahead(
             *rows,
             model,
-            tilt,
             int(begin),
             ends.astype(np.float64),
             estimates.states,
@@ -115,6 +112,36 @@ def predictions(
         )
         windows.append(Prediction(int(begin), ends, found[:, :2], found[:, 2:]))
     return windows
+
+
+def _ends(rows: FilterRows, begin: np.intp, horizons_s: tuple[float, ...]) -> NDArray[np.intp]:
+    """The rows that lie `horizons_s` after row `begin`."""
+    ends: NDArray[np.intp] = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+    return ends
+
+
+def swings(
+    rows: FilterRows,
+    model: LoadModel,
+    estimates: Estimates,
+    starts: NDArray[np.intp],
+    horizons_s: tuple[float, ...],
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Predictions by the vehicle's motion alone, as many of those from rows `starts` on as end within the
+    rows: where they begin (k,), where they end (k, horizons), cable directions there (k, horizons, 2)."""
+    windows = []
+    for begin in starts:
+        ends = _ends(rows, begin, horizons_s)
+        if ends[-1] >= len(rows.time_s):
+            break
+        directions = np.zeros((len(ends), 2))
+        swing_ahead(
+            *(rows.time_s, rows.drive, model, int(begin)),
+            *(ends.astype(np.float64), estimates.states, directions),
+        )
+        windows.append((ends, directions))
+    end_rows = np.array([ends for ends, _ in windows], dtype=np.intp)
+    return starts[: len(windows)], end_rows, np.array([directions for _, directions in windows])
 
 
 def load_position(motion: Motion, model: LoadModel, row: NDArray[np.intp], direction: Floats) -> Floats:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 from scipy.special import stdtrit
 
-from gcs.recorded.estimates import filter_rows, filtered_estimates, load_position, predictions
+from gcs.recorded.estimates import filter_rows, filtered_estimates, load_position, swings
 from gcs.recorded.load_model import LoadModel
 from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion, distances
 from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
@@ -261,15 +261,11 @@ def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
     estimates = filtered_estimates(rows, model, load=True, tilt=False)
     interval = max(1, round(_PREDICTION_INTERVAL_S / float(np.median(np.diff(rows.time_s)))))
     starts = np.arange(SETTLED_ROWS, len(rows.time_s), interval)
-    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=False)
-    end_rows = np.array([one.ends for one in windows], dtype=np.intp)
-    direction = np.array([one.direction for one in windows])
+    begins, ends, directions = swings(rows, model, estimates, starts, HORIZONS_S)
     errors = [
-        load_position(motion, model, end_rows[:, i], direction[:, i]) - motion.load[end_rows[:, i]]
-        for i in range(2)
+        load_position(motion, model, ends[:, i], directions[:, i]) - motion.load[ends[:, i]] for i in range(2)
     ]
-    start_s = motion.time_s[[one.begin for one in windows]]
-    return np.nan_to_num(np.stack(errors, axis=1)), start_s
+    return np.nan_to_num(np.stack(errors, axis=1)), motion.time_s[begins]
 
 
 def _weights(errors: Floats) -> Floats:

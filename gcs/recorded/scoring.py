@@ -57,7 +57,7 @@ def score_ahead(
     step_s = float(np.median(np.diff(rows.time_s)))
     interval = max(ROWS_BETWEEN_PREDICTIONS, round(INTERVAL_S / step_s))
     starts = np.arange(SETTLED_ROWS, len(rows.time_s), interval)
-    windows = predictions(rows, model, estimates, starts, HORIZONS_S, tilt=True, progress=progress)
+    windows = predictions(rows, model, estimates, starts, HORIZONS_S, progress)
     breaks = np.cumsum(motion.times.broken)
     windows = [one for one in windows if breaks[one.begin] == breaks[one.ends[-1]]]
     scores = []

@@ -17,6 +17,7 @@ from scipy.linalg import expm
 from autopilot.control.records import Reference, Vehicle
 from tests.control.closeness import EXACT, close
 from tests.control.mixer_proofs import MIXER_PROOFS
+from tests.control.model import cross
 
 # each with its reason
 DIFFERENCE = (
@@ -51,7 +52,7 @@ def attitude_error_obeys_3_22(laws: SimpleNamespace, model: SimpleNamespace, veh
         result = laws.attitude_moment(
             model.mat(R), model.vec(W), command, model.vec(k_R), model.vec(k_Omega), eps, vehicle.inertia
         )
-        W_dot = (np.array(result.moment) - np.cross(W, J * W)) / J
+        W_dot = (np.array(result.moment) - cross(W, J * W)) / J
 
         def e_Omega(t: float, R=R, R_c=R_c, W=W, W_c=W_c, W_dot=W_dot, W_c_dot=W_c_dot) -> np.ndarray:
             Rt = R @ model.rodrigues(t * W + t * t / 2 * W_dot)
@@ -83,7 +84,7 @@ def commanded_frame_is_differentiated(
             b3 = model.unit(c3[0] + t * c3[1] + t * t / 2 * c3[2])
             b1 = c1[0] + t * c1[1] + t * t / 2 * c1[2]
             b1 = model.unit(b1 - (b1 @ b3) * b3)
-            return np.column_stack([b1, np.cross(b3, b1), b3])
+            return np.column_stack([b1, cross(b3, b1), b3])
 
         def omega(t: float, frame=frame) -> np.ndarray:
             S = frame(t).T @ (frame(t + STEP) - frame(t - STEP)) / (2 * STEP)
@@ -146,7 +147,7 @@ def filters_feed_rates_but_not_the_attitude(
         e_R = skew(R_c.T @ R)
         W_c, W_c_dot = R.T @ R_c @ skew(R_c.T @ x2), R.T @ R_c @ skew(R_c.T @ x3)
         e_Omega = W - W_c
-        moment = -0.9 * e_R - 0.1 * e_Omega + np.cross(W, J * W) - J * (np.cross(W, W_c) - W_c_dot)
+        moment = -0.9 * e_R - 0.1 * e_Omega + cross(W, J * W) - J * (cross(W, W_c) - W_c_dot)
         close(command.R_c, R_c, EXACT)
         close(command.e_R, e_R, EXACT)
         close(command.e_Omega, e_Omega, FILTERED)
@@ -219,11 +220,11 @@ def cable_error_obeys_3_33(laws: SimpleNamespace, model: SimpleNamespace, vehicl
     m_Q, L = vehicle.quad_mass, vehicle.cable_length
     for rng in motions(5):
         q, q_c = model.unit(rng.normal(size=3)), model.unit(rng.normal(size=3))
-        q_dot = np.cross(rng.normal(size=3), q)
+        q_dot = cross(rng.normal(size=3), q)
         w_c, w_c_dot = rng.normal(size=(2, 3))
         w_c, w_c_dot = w_c - (w_c @ q_c) * q_c, w_c_dot - (w_c_dot @ q_c) * q_c
-        q_c_dot = np.cross(w_c, q_c)
-        q_c_ddot = np.cross(w_c_dot, q_c) + np.cross(w_c, q_c_dot)
+        q_c_dot = cross(w_c, q_c)
+        q_c_ddot = cross(w_c_dot, q_c) + cross(w_c, q_c_dot)
         k_q, k_omega, pull = 3.9, 2.0, 4.9
         F_n = laws.normal_force_held(model.vec(q), model.vec(q_c), pull)
         close(F_n, -pull * (q @ q_c) * q, EXACT)
@@ -239,14 +240,14 @@ def cable_error_obeys_3_33(laws: SimpleNamespace, model: SimpleNamespace, vehicl
         )
         F = np.array(result.F)
         close(F @ q, -pull * (q @ q_c), EXACT)
-        q_ddot = np.cross(q, np.cross(q, F)) / (m_Q * L) - (q_dot @ q_dot) * q
+        q_ddot = cross(q, cross(q, F)) / (m_Q * L) - (q_dot @ q_dot) * q
 
         def e_q_dot(
             t: float, q=q, q_dot=q_dot, q_ddot=q_ddot, q_c=q_c, q_c_dot=q_c_dot, q_c_ddot=q_c_ddot
         ) -> np.ndarray:
             qt, qt_dot = q + t * q_dot + t * t / 2 * q_ddot, q_dot + t * q_ddot
             ct, ct_dot = q_c + t * q_c_dot + t * t / 2 * q_c_ddot, q_c_dot + t * q_c_ddot
-            return qt_dot - np.cross(np.cross(ct, ct_dot), qt)
+            return qt_dot - cross(cross(ct, ct_dot), qt)
 
         across = np.eye(3) - np.outer(q, q)
         rate = across @ (e_q_dot(STEP) - e_q_dot(-STEP)) / (2 * STEP)
@@ -263,8 +264,8 @@ def load_error_obeys_3_41(laws: SimpleNamespace, model: SimpleNamespace, vehicle
     m, m_Q, L = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass, vehicle.cable_length
     for rng in motions(6):
         q = model.unit(rng.normal(size=3) * 0.4 - E3)
-        w = np.cross(q, rng.normal(size=3))
-        q_dot = np.cross(w, q)
+        w = cross(q, rng.normal(size=3))
+        q_dot = cross(w, q)
         k_x, k_v = rng.uniform(2, 6, 3), rng.uniform(1, 3, 3)
         x_d, v_d, a_d, e_v = rng.normal(size=(4, 3))
         A = -5.0 * q  # A must be along the cable, so solve the law for the e_x that gives it
@@ -280,7 +281,7 @@ def load_error_obeys_3_41(laws: SimpleNamespace, model: SimpleNamespace, vehicle
         close(result.e_v, e_v, EXACT)
         close(laws.computed_direction(result.A), q, EXACT)
         F_n = np.array(laws.normal_force_tracking(model.vec(q), result.A))
-        R = np.column_stack([E1, np.cross(model.unit(F_n), E1), model.unit(F_n)])
+        R = np.column_stack([E1, cross(model.unit(F_n), E1), model.unit(F_n)])
         f = laws.thrust_along(model.vec(F_n), model.mat(R))
         y = model.pack(x_d + e_x, v_d + e_v, q, w, R, np.zeros(3))
         a = model.rates(y, f, np.zeros(3), vehicle)[3:6]

@@ -12,6 +12,7 @@ from autopilot.control import load_attitude, quad_attitude, quad_position
 from autopilot.control import thesis_cascade as thesis
 from autopilot.control.records import Command, Reference, Vehicle
 from autopilot.trajectory.flatness import flat_outputs
+from tests.control.model import cross
 
 ZERO = (0.0, 0.0, 0.0)
 HEADING = (1.0, 0.0, 0.0)
@@ -40,7 +41,7 @@ def settle_attitude(model: SimpleNamespace, R: np.ndarray, R_c: np.ndarray, vehi
             model.mat(R), model.vec(W), command, gains.k_R, gains.k_Omega, gains.epsilon, vehicle.inertia
         )
         psi.append(result.psi_R)
-        W = W + h * (np.array(result.moment) - np.cross(W, J * W)) / J
+        W = W + h * (np.array(result.moment) - cross(W, J * W)) / J
         R = R @ model.rodrigues(h * W)
     return psi
 
@@ -65,7 +66,7 @@ def test_cable_converges_from_almost_everywhere(model: SimpleNamespace, bebop: V
     rng = np.random.default_rng(7)
     for angle in (0.1, 1.0, 2.0, 3.0, 3.13):
         q_c = model.unit(rng.normal(size=3))
-        q = model.rodrigues(angle * model.unit(np.cross(q_c, rng.normal(size=3)))) @ q_c
+        q = model.rodrigues(angle * model.unit(cross(q_c, rng.normal(size=3)))) @ q_c
         w = np.zeros(3)
         command = load_attitude.DirectionCommand(model.vec(q_c), ZERO, ZERO)
         psi = []
@@ -73,7 +74,7 @@ def test_cable_converges_from_almost_everywhere(model: SimpleNamespace, bebop: V
             F_n = load_attitude.normal_force_held(model.vec(q), model.vec(q_c), 4.9)
             result = load_attitude.load_attitude_force(
                 model.vec(q),
-                model.vec(np.cross(w, q)),
+                model.vec(cross(w, q)),
                 command,
                 F_n,
                 gains.k_q,
@@ -82,7 +83,7 @@ def test_cable_converges_from_almost_everywhere(model: SimpleNamespace, bebop: V
                 bebop.cable_length,
             )
             psi.append(result.psi_q)
-            w = w - h * np.cross(q, np.array(result.F)) / m_Q_L
+            w = w - h * cross(q, np.array(result.F)) / m_Q_L
             q = model.rodrigues(h * w) @ q
         assert psi[-1] < ALIGNED
         assert max(psi) <= psi[0] * (1.0 + 1e-9)
@@ -131,7 +132,7 @@ def fly(
 def swinging(model: SimpleNamespace) -> np.ndarray:
     q = model.unit([0.2, -0.1, -1.0])
     R = model.rodrigues([0.2, 0.3, 0.5])
-    return model.pack((0.3, -0.2, 1.4), (0.1, 0.2, 0.0), q, np.cross(q, (0.3, 0.1, 0.0)), R, (0.2, -0.1, 0.3))
+    return model.pack((0.3, -0.2, 1.4), (0.1, 0.2, 0.0), q, cross(q, (0.3, 0.1, 0.0)), R, (0.2, -0.1, 0.3))
 
 
 def test_load_position_settles_without_error(model: SimpleNamespace, bebop: Vehicle) -> None:

@@ -50,6 +50,7 @@ from sitl.plant.by_value import advance, initial_state
 from sitl.plant.records import PlantState, Truth
 from sitl.vehicles.truth import load_truth
 from tests.control.flips import surviving
+from tests.control.model import cross
 from tests.control.plain_laws import plain_laws, sources
 from tests.doubles.mixing import mix
 
@@ -141,7 +142,7 @@ def random_path(
     f, f_rate = 5.0 + rng.normal(), 8.0 * rng.normal()
     M = 0.01 * rng.normal(size=3)
     q = model.unit(0.5 * rng.normal(size=3) - [0.0, 0.0, 1.0])
-    w = np.cross(q, 1.5 * rng.normal(size=3))
+    w = cross(q, 1.5 * rng.normal(size=3))
     R = model.rodrigues(0.4 * rng.normal(size=3))
     y0 = model.pack(rng.normal(size=3), rng.normal(size=3), q, w, R, rng.normal(size=3))
 
@@ -416,7 +417,7 @@ def it_comes_back(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
     still has to release: measured 11 mm."""
     dt = 0.008
     q = model.unit([0.03, -0.02, -1.0])
-    y = model.pack((0.15, -0.1, 0.05), ZERO, q, np.cross(q, (0.1, 0.1, 0.0)), np.eye(3), ZERO)
+    y = model.pack((0.15, -0.1, 0.05), ZERO, q, cross(q, (0.1, 0.1, 0.0)), np.eye(3), ZERO)
     memory, thrust, moment = law.start(), 4.905, ZERO
     reference = Reference((ZERO,) * 7, EAST)
     for _ in range(600):
@@ -534,7 +535,7 @@ def leaning_against_wind(
     F = np.array([0.0, 0.0, weight]) - push - np.array(law.drag_force(model.vec(v), BEBOP_DRAG))
     b3 = model.unit(F)
     b1 = model.unit(np.array(EAST) - b3[0] * b3)
-    R = np.column_stack([b1, np.cross(b3, b1), b3])
+    R = np.column_stack([b1, cross(b3, b1), b3])
     state = level_state(model)._replace(R=model.mat(R), v_load=model.vec(v), v_quad=model.vec(v))
     return state, model.vec(push), float(np.linalg.norm(F))
 
@@ -576,7 +577,7 @@ def commands_are_differentiated(
     state, memory, found = said[0]
     F_dot = (F[-2] - 8 * F[-1] + 8 * F[1] - F[2]) / (12 * h)
     b3 = np.array(state.R)[:, 2]
-    b3_dot = np.array(state.R) @ np.cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
+    b3_dot = np.array(state.R) @ cross(np.array(state.omega_body), [0.0, 0.0, 1.0])
     assert memory.thrust_rate == pytest.approx(F_dot @ b3 + F[0] @ b3_dot, abs=ALONG)
     R_dot = (R_c[-2] - 8 * R_c[-1] + 8 * R_c[1] - R_c[2]) / (12 * h)
     R_ddot = (-R_c[-2] + 16 * R_c[-1] - 30 * R_c[0] + 16 * R_c[1] - R_c[2]) / (12 * h * h)
@@ -599,7 +600,7 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
     # the last case swings and turns so much that Omega' matters
     for size, turning in ((1.0, 1.0), (1.0, 1.0), (6.0, 20.0)):
         q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
-        w = np.cross(q, 0.05 * size * rng.normal(size=3))
+        w = cross(q, 0.05 * size * rng.normal(size=3))
         R = model.rodrigues(0.03 * size * rng.normal(size=3))
         y0 = model.pack(
             0.02 * rng.normal(size=3), 0.1 * rng.normal(size=3), q, w, R, 0.3 * size * rng.normal(size=3)
@@ -655,7 +656,7 @@ def directions_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehicl
     rate, pull = 10.0, 5.3
     for size in (1.0, 3.0):
         q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
-        w = np.cross(q, 0.05 * size * rng.normal(size=3))
+        w = cross(q, 0.05 * size * rng.normal(size=3))
         R = model.rodrigues(0.03 * size * rng.normal(size=3))
         y0 = model.pack(rng.normal(size=3), rng.normal(size=3), q, w, R, 0.3 * size * rng.normal(size=3))
         M = 0.002 * rng.normal(size=3)
@@ -769,7 +770,7 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
             belief = law.advance(belief, float(u[0]), model.vec(u[1:]), constants)
             rows.append(u)
         q = model.unit(0.4 * rng.normal(size=3) - [0.0, 0.0, 1.0])
-        w = np.cross(q, rng.normal(size=3))
+        w = cross(q, rng.normal(size=3))
         R = model.rodrigues(0.3 * rng.normal(size=3))
         y = model.pack(rng.normal(size=3), rng.normal(size=3), q, w, R, rng.normal(size=3))
         state = model.state_of(y, vehicle)
@@ -787,8 +788,8 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
             y = model.rk4(y, float(half[0]), half[1:], vehicle, h)
             a = half[0] * free[:, 2] / vehicle.quad_mass - np.array([0.0, 0.0, vehicle.gravity])
             x, v = x + h * v + 0.5 * h * h * a, v + h * a
-            middle = spin + 0.5 * h * (half[1:] - np.cross(spin, J * spin)) / J
-            spin = spin + h * (half[1:] - np.cross(middle, J * middle)) / J
+            middle = spin + 0.5 * h * (half[1:] - cross(spin, J * spin)) / J
+            spin = spin + h * (half[1:] - cross(middle, J * middle)) / J
             free = free @ model.rodrigues(h * middle)
             r = u + math.exp(-h / lag) * (r - u)
         true = model.state_of(y, vehicle)
@@ -933,7 +934,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
             state = model.state_of(pose, vehicle)
             observed = law.observe(observed, state, 1.0, lift, model.vec(M), constants, BEBOP_DRAG, vehicle)
             M = J * (0.2 * rng.normal(size=3) - 5.0 * (omega - [0.5, 2.0, -1.5]))
-            omega = omega + TICK * (M + beside + tilt * swept - np.cross(omega, J * omega)) / J
+            omega = omega + TICK * (M + beside + tilt * swept - cross(omega, J * omega)) / J
         return observed, state, swept, beside + tilt * swept
 
     observed, state, _, torque = learned(lambda k: [1.5 * math.sin(0.02 * k), math.cos(0.03 * k), 0.3])
@@ -973,7 +974,7 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     wind = np.array([0.1, -0.2, 0.05])
     for _ in range(600):
         q = model.unit([0.3 * rng.normal(), 0.3 * rng.normal(), -1.0])
-        w = np.cross(q, rng.normal(size=3))
+        w = cross(q, rng.normal(size=3))
         R, f = model.rodrigues(0.2 * rng.normal(size=3)), 5.0 + 0.5 * rng.normal()
         state = model.state_of(model.pack(ZERO, rng.normal(size=3), q, w, R, ZERO), vehicle)
         axis = np.array(R)[:, 2]

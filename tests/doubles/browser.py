@@ -50,7 +50,7 @@ class Browser:
 
     def open(self, url: str, width: int = 1280, height: int = 800, theme: str = "dark") -> None:
         """Load the page into a window of that size, for a reader who prefers that theme."""
-        self.driver.get("about:blank")
+        self.leave()
         self.listen()
         self.requests.clear()
         self.errors.clear()
@@ -59,6 +59,10 @@ class Browser:
         self.driver.get(url)
         # `get` may return while the page is still loading
         self.wait("document.readyState === 'complete' && document.URL !== 'about:blank'")
+
+    def leave(self) -> None:
+        """Leave the page, so that nothing is drawn."""
+        self.driver.get("about:blank")
 
     def resize(self, width: int, height: int) -> None:
         """Set the size of the page in CSS pixels."""

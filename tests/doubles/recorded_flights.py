@@ -58,6 +58,13 @@ PHASES = (  # name, duration in s; that of MISSION is inserted
     (mavlink.PLUMBLINE_PHASE_DISARMED, 0.2),
 )
 BEFORE_S = sum(duration for _, duration in PHASES[:4])
+_TYPES = {
+    kind: getattr(mavlink, f"MAVLink_{kind}_message")
+    for kind in (
+        *("hil_state_quaternion", "load_state", "rotor_state", "sim_status", "load_setpoint"),
+        *("cascade_errors", "attitude_quaternion", "heartbeat", "mission_current", "statustext"),
+    )
+}
 
 
 def _ned(v: np.ndarray) -> np.ndarray:
@@ -107,100 +114,64 @@ class Flight:
         for t, speed, impulse in self.snaps:
             message = mavlink.MAVLink_cable_snap_message(round(t * 1e6), speed, impulse)
             yield BOOT_US + round(t * 1e6), truth.frame(message)
-        half = np.sqrt(0.5)
-        for i, t in enumerate(self.time_s):
+        half = float(np.sqrt(0.5))
+        # numbers of Python, of whole columns at once: a row of an array takes longer than its frame
+        quats = self.quat.tolist()
+        actual, actual_v, estimated, q_cable, desired, desired_v, desired_a, errors = (
+            _ned(column).tolist()
+            for column in (
+                *(self.actual, self.actual_v, self.estimated, self.q_cable),
+                *(self.desired, self.desired_v, self.desired_a, self.actual - self.desired),
+            )
+        )
+        distances, tensions, slack_events = self.distance.tolist(), self.tension.tolist(), self.slack_events
+        forces, commands, thrusts = (
+            self.force.tolist(),
+            self.command.tolist(),
+            self.command.sum(axis=1).tolist(),
+        )
+        psi_r, psi_q = self.psi_r.tolist(), self.psi_q.tolist()
+        nil = [0.0] * 3
+        for i, t in enumerate(self.time_s.tolist()):
             us = round(t * 1e6)
-            unix_us = BOOT_US + us
-            w, x, y, z = self.quat[i]
+            w, x, y, z = quats[i]
             quat = (half * (w + z), half * (x + y), half * (x - y), half * (w - z))
+            frames: list[bytes] = []
 
-            def say(writer: FrameWriter, kind: str, *values, i=i, unix_us=unix_us):
-                if self.drop(i, kind):
-                    return
-                message = getattr(mavlink, f"MAVLink_{kind}_message")(*values)
-                yield unix_us, writer.frame(message)
+            def say(writer: FrameWriter, kind: str, *values, i=i, frames=frames):
+                if not self.drop(i, kind):
+                    frames.append(writer.frame(_TYPES[kind](*values)))
 
-            def load_state(position, source, i=i, us=us):
-                return (
-                    us,
-                    *_ned(position[i]),
-                    *_ned(self.actual_v[i]),
-                    *_ned(self.q_cable[i]),
-                    0.0,
-                    0.0,
-                    0.0,
-                    self.distance[i],
-                    self.tension[i],
-                    int(self.slack_events[i]),
-                    int(self.taut[i]),
-                    source,
-                )
-
-            yield from say(
-                truth, "hil_state_quaternion", us, quat, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0
-            )
-            yield from say(truth, "load_state", *load_state(self.actual, 0))
-            yield from say(truth, "rotor_state", us, self.force[i], 0.0, ROTOR_MAX_N, 0, 0)
+            pull = distances[i], tensions[i], int(slack_events[i]), int(self.taut[i])
+            motion = (*actual_v[i], *q_cable[i], 0.0, 0.0, 0.0, *pull)
+            mode = int(self.control_mode[i])
+            say(truth, "hil_state_quaternion", us, quat, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+            say(truth, "load_state", us, *actual[i], *motion, 0)
+            say(truth, "rotor_state", us, forces[i], 0.0, ROTOR_MAX_N, 0, 0)
             if i % 25 == 0:
-                yield from say(truth, "sim_status", us, 0.0, 0.0, 0, 0, 0, 0, 0, 0)
-            yield from say(dialect, "load_state", *load_state(self.estimated, 2))
-            yield from say(
-                dialect,
-                "load_setpoint",
-                us,
-                *_ned(self.desired[i]),
-                *_ned(self.desired_v[i]),
-                *_ned(self.desired_a[i]),
-                0.0,
-                0.0,
-                1.0,
-                0.0,
-                float("nan"),
-                2,
-                int(self.phase[i]),
-                int(self.control_mode[i]),
-            )
-            error = list(_ned(self.actual[i] - self.desired[i]))
-            nil = [0.0] * 3
-            yield from say(
-                dialect,
-                "cascade_errors",
-                us,
-                error,
-                nil,
-                nil,
-                nil,
-                nil,
-                nil,
-                self.psi_r[i],
-                self.psi_q[i],
-                float(self.command[i].sum()),
-                nil,
-                int(self.control_mode[i]),
-            )
-            yield from say(
-                dialect,
-                "rotor_state",
-                us,
-                list(self.command[i]),
-                0.0,
-                ROTOR_MAX_N,
-                int(self.saturated[i]),
-                2,
-            )
+                say(truth, "sim_status", us, 0.0, 0.0, 0, 0, 0, 0, 0, 0)
+            say(dialect, "load_state", us, *estimated[i], *motion, 2)
+            place = (*desired[i], *desired_v[i], *desired_a[i])
+            rest = (0.0, 0.0, 1.0, 0.0, float("nan"), 2, int(self.phase[i]), mode)
+            say(dialect, "load_setpoint", us, *place, *rest)
+            outer = (errors[i], nil, nil, nil, nil, nil)
+            say(dialect, "cascade_errors", us, *outer, psi_r[i], psi_q[i], thrusts[i], nil, mode)
+            say(dialect, "rotor_state", us, commands[i], 0.0, ROTOR_MAX_N, int(self.saturated[i]), 2)
             if i % 5 == 0:
-                yield from say(common, "attitude_quaternion", us // 1000, *quat, 0.0, 0.0, 0.0)
+                say(common, "attitude_quaternion", us // 1000, *quat, 0.0, 0.0, 0.0)
             if i % 125 == 0:
-                yield from say(common, "heartbeat", 2, 12, 128, 0, 4, 3)
-                yield from say(ground, "heartbeat", 6, 8, 0, 0, 4, 3)
-                yield from say(load, "attitude_quaternion", us // 1000, 1.0, 0.0, 0.0, 0.0, 9.0, 9.0, 9.0)
-                yield from say(common, "mission_current", 2)
+                say(common, "heartbeat", 2, 12, 128, 0, 4, 3)
+                say(ground, "heartbeat", 6, 8, 0, 0, 4, 3)
+                say(load, "attitude_quaternion", us // 1000, 1.0, 0.0, 0.0, 0.0, 9.0, 9.0, 9.0)
+                say(common, "mission_current", 2)
             while texts and texts[0][0] <= t:
                 _, severity, text = texts.pop(0)
                 data = text.encode()
                 for seq, first in enumerate(range(0, len(data), 50)):
                     chunk_id = len(texts) + 1 if len(data) > 50 else 0
-                    yield from say(common, "statustext", severity, data[first : first + 50], chunk_id, seq)
+                    say(common, "statustext", severity, data[first : first + 50], chunk_id, seq)
+            for frame in frames:
+                yield BOOT_US + us, frame
 
     def tlog(self) -> bytes:
         return b"".join(struct.pack(">Q", us) + frame for us, frame in self.records())
