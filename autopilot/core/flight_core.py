@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -70,6 +71,7 @@ from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
 
 SETPOINTS_PER_CALL = 250  # setpoints computed in one call, a second of them: this must not delay a tick
 SETPOINTS_LOCKSTEP = 4000  # where the clock waits, as in lockstep and in a sweep
+SETPOINTS_ENDLESS = 1000  # of a leg without an end, of which most end soon: at a touch, at a pull
 SETPOINTS_BRAKING = 50  # of a stop, which takes 20 us each: a commanded stop must not delay a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
@@ -119,7 +121,7 @@ class FlightCore:
         self.flight = Flight()
         self.settings = setup.settings  # with the present cable
         self._setpoints_per_call = setpoints_per_call
-        self._lost_rotors = 0  # rotors that are known to be lost: bits
+        self.lost_rotors = 0  # rotors that are known to be lost: bits
         self._cable_m: float | None = None  # length for which `settings` were made
         self._dirty = True  # the flight has changed since `rows.winch` was written
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
@@ -144,7 +146,7 @@ class FlightCore:
             targets=_NO_ROWS,
             references=_NO_ROWS,
             rotors=new_rotors(),
-            table=with_lag_columns(mixer_table(setup.layout), setup.layout, setup.actuation),
+            table=self._table(),
         )
 
         self.law_rows = self._rows_of_law(setup)
@@ -329,18 +331,15 @@ class FlightCore:
     def _use_rotors(self) -> None:
         """Use the mixer's table for the rotors that are not lost, if these can fly the vehicle."""
         lost = self.flight.rotors_lost
-        if lost != self._lost_rotors:
-            self._lost_rotors = lost
+        if lost != self.lost_rotors:
+            self.lost_rotors = lost
             self.rows = self.rows._replace(table=self._table())
             pack(self._constants(), self.rows.constants, 0)
 
     def _table(self) -> Array:
         """The mixer's table, for the remaining rotors if these can fly the vehicle, otherwise for all."""
-        can_fly = self.setup.settings.rotors.can_fly_without(self._lost_rotors)
-        layout = self.setup.layout
-        return with_lag_columns(
-            mixer_table(layout, self._lost_rotors if can_fly else 0), layout, self.setup.actuation
-        )
+        can_fly = self.setup.settings.rotors.can_fly_without(self.lost_rotors)
+        return _table_of(self.setup.layout, self.lost_rotors if can_fly else 0, self.setup.actuation)
 
     def _constants(self) -> CoreConstants:
         setup, rotors = self.setup, self.setup.settings.rotors
@@ -356,8 +355,8 @@ class FlightCore:
             setup.settings.failsafe.sensor_age_limit_s,
             setup.rotor_watch,
             setup.factor_share,
-            rotors.can_fly_without(self._lost_rotors)
-            and not rotors.can_hold_heading_without(self._lost_rotors),
+            rotors.can_fly_without(self.lost_rotors)
+            and not rotors.can_hold_heading_without(self.lost_rotors),
             *(self._estimator_slot.link if self._estimator_slot is not None else (0, 0)),
         )
 
@@ -404,7 +403,11 @@ class FlightCore:
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
         else:
             legs = (*flight.legs, *flight.following)
-            max_ticks = SETPOINTS_BRAKING if isinstance(leg, Brake | PathStop) else self._setpoints_per_call
+            max_ticks = self._setpoints_per_call
+            if isinstance(leg, Brake | PathStop):
+                max_ticks = SETPOINTS_BRAKING
+            elif leg.duration_s == inf:
+                max_ticks = min(max_ticks, SETPOINTS_ENDLESS)
             ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
@@ -512,6 +515,12 @@ class FlightCore:
         self.law_rows = rows
         self._update_cable_length()
         self.interrupt()
+
+
+@lru_cache(maxsize=8)
+def _table_of(layout: Layout, lost: int, actuation: ActuationConstants) -> Array:
+    """The table of a mixer for these rotors without those in `lost`. It is not written to: cores share it."""
+    return with_lag_columns(mixer_table(layout, lost), layout, actuation)
 
 
 def with_cable_now(flight: Flight, now_us: int) -> Flight:

@@ -19,12 +19,11 @@ from autopilot.core.tick import placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import field_offset, packed, unpack
-from autopilot.guidance.jet_table import COLUMNS, jets
+from autopilot.guidance.jet_table import COLUMNS, flies_requested_path, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.quiescence import Stretch
 from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.state import IN_AIR, Phase
 from autopilot.wire.dialect import plumbline as mavlink
@@ -230,12 +229,13 @@ class SweepFlight:
         self.requested_path = _NO_ROWS
         if flight.phase != Phase.MISSION or not flight.legs or flight.legs[0].control_mode != LOAD_POSITION:
             return
-        leg = flight.legs[0]
-        stretch = unpack(Stretch, self.core.rows.stretch, 0)
-        leg_elapsed_us = now_us - flight.leg_start_us
-        ticks = np.arange(len(self.core.rows.targets))
-        times = np.asarray((leg_elapsed_us + stretch.period_us * ticks) * 1e-6, np.float64)
-        self.requested_path = jets(leg, times, requested=True)
+        leg, planned = flight.legs[0], self.core.planned
+        assert planned is not None, "positions of the load are planned"
+        self.requested_path = (
+            self.core.rows.targets
+            if flies_requested_path(leg)
+            else jets(leg, planned.times_s, requested=True)
+        )
 
     # ---- what the ground station does
 
