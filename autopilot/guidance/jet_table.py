@@ -9,7 +9,17 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance.legs import Creep, Hold, Leg, PathStretch, SignalRun, Transfer, requested_jet
+from autopilot.guidance.legs import (
+    Creep,
+    Hold,
+    Leg,
+    PathStretch,
+    Reel,
+    SignalRun,
+    Transfer,
+    requested_jet,
+)
+from autopilot.trajectory.reeling import reel
 from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
@@ -54,6 +64,12 @@ def _runs(
 
 
 @kernel
+def _reels(times: Floats, begin: Vec3, speed: float, ramp_s: float, cruise_s: float, out: Floats) -> None:
+    for k in range(times.shape[0]):
+        _put(out[k], reel(begin, speed, ramp_s, cruise_s, times[k]))
+
+
+@kernel
 def _passes(
     times: Floats, table: PieceTable, begin_s: float, offset: Vec3, fade_s: float, out: Floats
 ) -> None:
@@ -79,6 +95,8 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
     elif type(leg) is PathStretch:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
+    elif type(leg) is Reel:
+        _reels(times_s, leg.begin, leg.speed, leg.ramp_s, leg.cruise_s, found)
     elif type(leg) is Hold:
         found[:, :3] = leg.position
     elif type(leg) is Creep:

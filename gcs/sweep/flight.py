@@ -167,7 +167,7 @@ class SweepFlight:
         self, started: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int
     ) -> bool:
         fly, code = self._entry()
-        arguments = (started, decided, gripper_open, reel_rate, stop_tick, self.chain)
+        arguments = (started, decided, gripper_open, reel_rate, self.core.reeling, stop_tick, self.chain)
         return fly(code, self.world, self.core.rows, self.core.law, *self._flight_rows, *arguments)
 
     @property
@@ -179,7 +179,7 @@ class SweepFlight:
         if cable_type not in _ENTRIES:
             world, core, law = self.world, self.core.rows, placeholder_law(self.core.law_rows)
             code = Code(code_of_world(world, self.chain), code_of_autopilot(core, law))
-            arguments = (False, False, False, 0.0, 0, self.chain)
+            arguments = (False, False, False, 0.0, self.core.reeling, 0, self.chain)
             _ENTRIES[cable_type] = (
                 entry_point_of(fly_stretch, code, world, core, law, *self._flight_rows, *arguments),
                 code,
@@ -223,6 +223,8 @@ class SweepFlight:
 
     def _decide(self, now_us: int) -> None:
         """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
+        if self.core.is_reeling:
+            self.core.move_cable(now_us)
         phase = self.core.flight.phase
         self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
