@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -24,6 +25,15 @@ from autopilot.control.drag import Drag
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.records import Cable, State, Vehicle
 from autopilot.core.estimator_slot import EstimatorSlot
+from autopilot.core.reeling import (
+    ACCEL,
+    GROWTH,
+    LENGTH,
+    NOT_REELING,
+    RATE,
+    TAUT_LENGTH,
+    reeling_table,
+)
 from autopilot.core.start_problem import start_problem
 from autopilot.core.tick import (
     NO_COMMAND,
@@ -52,7 +62,7 @@ from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
 from autopilot.geometry.packed import field_offset, pack, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, jets_ahead
-from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, winch_hold_height
+from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, Reel, winch_hold_height
 from autopilot.own.estimator import load_estimator
 from autopilot.own.host import Host
 from autopilot.own.law import load_law
@@ -70,6 +80,7 @@ from autopilot.vehicle.rotors import mixer_table, thrust_and_moment_per_force
 
 SETPOINTS_PER_CALL = 250  # setpoints computed in one call, a second of them: this must not delay a tick
 SETPOINTS_LOCKSTEP = 4000  # where the clock waits, as in lockstep and in a sweep
+SETPOINTS_ENDLESS = 1000  # of a leg without an end, of which most end soon: at a touch, at a pull
 SETPOINTS_BRAKING = 50  # of a stop, which takes 20 us each: a commanded stop must not delay a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
@@ -119,7 +130,7 @@ class FlightCore:
         self.flight = Flight()
         self.settings = setup.settings  # with the present cable
         self._setpoints_per_call = setpoints_per_call
-        self._lost_rotors = 0  # rotors that are known to be lost: bits
+        self.lost_rotors = 0  # rotors that are known to be lost: bits
         self._cable_m: float | None = None  # length for which `settings` were made
         self._dirty = True  # the flight has changed since `rows.winch` was written
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
@@ -128,6 +139,7 @@ class FlightCore:
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
         self._law: Any = None  # `law`, once it was needed
         self.planned: PlannedSetpoints | None = None  # what `rows.targets` are the setpoints of
+        self.reeling: Array = NOT_REELING  # the winch at the ticks of the stretch, if its leg reels
         control = ControlMemory(
             NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal_on_ground(setup.vehicle), UNCONTROLLED, 0, False
         )
@@ -144,7 +156,7 @@ class FlightCore:
             targets=_NO_ROWS,
             references=_NO_ROWS,
             rotors=new_rotors(),
-            table=with_lag_columns(mixer_table(setup.layout), setup.layout, setup.actuation),
+            table=self._table(),
         )
 
         self.law_rows = self._rows_of_law(setup)
@@ -329,18 +341,15 @@ class FlightCore:
     def _use_rotors(self) -> None:
         """Use the mixer's table for the rotors that are not lost, if these can fly the vehicle."""
         lost = self.flight.rotors_lost
-        if lost != self._lost_rotors:
-            self._lost_rotors = lost
+        if lost != self.lost_rotors:
+            self.lost_rotors = lost
             self.rows = self.rows._replace(table=self._table())
             pack(self._constants(), self.rows.constants, 0)
 
     def _table(self) -> Array:
         """The mixer's table, for the remaining rotors if these can fly the vehicle, otherwise for all."""
-        can_fly = self.setup.settings.rotors.can_fly_without(self._lost_rotors)
-        layout = self.setup.layout
-        return with_lag_columns(
-            mixer_table(layout, self._lost_rotors if can_fly else 0), layout, self.setup.actuation
-        )
+        can_fly = self.setup.settings.rotors.can_fly_without(self.lost_rotors)
+        return _table_of(self.setup.layout, self.lost_rotors if can_fly else 0, self.setup.actuation)
 
     def _constants(self) -> CoreConstants:
         setup, rotors = self.setup, self.setup.settings.rotors
@@ -356,8 +365,8 @@ class FlightCore:
             setup.settings.failsafe.sensor_age_limit_s,
             setup.rotor_watch,
             setup.factor_share,
-            rotors.can_fly_without(self._lost_rotors)
-            and not rotors.can_hold_heading_without(self._lost_rotors),
+            rotors.can_fly_without(self.lost_rotors)
+            and not rotors.can_hold_heading_without(self.lost_rotors),
             *(self._estimator_slot.link if self._estimator_slot is not None else (0, 0)),
         )
 
@@ -366,16 +375,42 @@ class FlightCore:
         flight = self.flight
         if not (self._dirty or self.is_reeling):
             return
-        before_m = flight.cable.length_m
-        flight = self.flight = with_cable_now(flight, now_us)
-        winch = flight.cable
+        row = self._reeling_row(now_us)
+        if row is None:
+            before_m = flight.cable.length_m
+            flight = with_cable_now(flight, now_us)
+            winch = flight.cable
+            length_change = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
+        else:
+            winch = replace(
+                flight.cable,
+                length_m=row[LENGTH],
+                reel_rate=row[RATE],
+                reel_accel=row[ACCEL],
+                taut_length_m=row[TAUT_LENGTH],
+            )
+            flight, length_change = replace(flight, cable=winch), row[GROWTH]
+            self.rows.stretch[_STRETCH_TAUT_LENGTH] = row[TAUT_LENGTH]
+        self.flight = flight
         length = self.setup.vehicle.cable_length if winch.length_m is None else winch.length_m
-        length_change = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
         cable = Cable(length, winch.reel_rate, winch.reel_accel)
         pack(Winch(cable, length_change, winch.released), self.rows.winch, 0)
         # the growth is passed on once
         self._dirty = length_change != 0.0
         self._update_cable_length()
+
+    def _reeling_row(self, now_us: int) -> list[float] | None:
+        """The winch at this tick in `reeling`, as laid out for the leg that is flown; None: there is none."""
+        planned, flight = self.planned, self.flight
+        if planned is None or not len(self.reeling):
+            return None
+        if flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
+            return None
+        at, off = divmod(now_us - planned.first_us, planned.period_us)
+        row: list[float] | None = (
+            self.reeling[at].tolist() if off == 0 and 1 <= at < len(self.reeling) else None
+        )
+        return row
 
     def _update_cable_length(self) -> None:
         if self.flight.cable.length_m == self._cable_m:
@@ -391,7 +426,7 @@ class FlightCore:
         """Compute the stretch that begins with this tick, and its setpoints."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
-        self.planned = None
+        self.planned, self.reeling = None, NOT_REELING
         if stretch.mode == UNCONTROLLED:
             pack(stretch, self.rows.stretch, 0)
             return
@@ -404,13 +439,21 @@ class FlightCore:
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
         else:
             legs = (*flight.legs, *flight.following)
-            max_ticks = SETPOINTS_BRAKING if isinstance(leg, Brake | PathStop) else self._setpoints_per_call
+            max_ticks = self._setpoints_per_call
+            if isinstance(leg, Brake | PathStop):
+                max_ticks = SETPOINTS_BRAKING
+            elif leg.duration_s == inf:
+                max_ticks = min(max_ticks, SETPOINTS_ENDLESS)
             ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
             targets = references = jets_ahead(legs, times)
             if preview_s != 0.0:
                 references = jets_ahead(legs, times + preview_s)
+            if type(leg) is Reel:
+                # to the tick at which the supervisor decides next
+                until = np.asarray((since_us + stretch.period_us * np.arange(ticks + 1)) * 1e-6, np.float64)
+                self.reeling = reeling_table(leg, until, flight.cable, stretch.period_us * 1e-6)
             # the remaining setpoints are those of legs that follow
             leg_rows = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
             self.planned = PlannedSetpoints(
@@ -514,6 +557,12 @@ class FlightCore:
         self.interrupt()
 
 
+@lru_cache(maxsize=8)
+def _table_of(layout: Layout, lost: int, actuation: ActuationConstants) -> Array:
+    """The table of a mixer for these rotors without those in `lost`. It is not written to: cores share it."""
+    return with_lag_columns(mixer_table(layout, lost), layout, actuation)
+
+
 def with_cable_now(flight: Flight, now_us: int) -> Flight:
     """The flight with its cable as reeled at this instant: L, L' and L'' of the leg that reels."""
     top = winch_hold_height(flight.legs[0]) if flight.legs else None
@@ -541,6 +590,7 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
     return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
 
 
+_STRETCH_TAUT_LENGTH = field_offset(Stretch, "taut_length")
 _LOAD_AGE = field_offset(EstimatorState, "load") + field_offset(LoadEstimate, "age_s")
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 # before the first reading

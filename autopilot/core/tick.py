@@ -92,6 +92,8 @@ STOPPED = MixerResult(0, 0.0, ZERO)
 # the force that has long been commanded, reduced by SPEED_TOLERANCE of its greatest force
 LOST_SHARE, SPEED_TOLERANCE, LOST_COUNT = 0.3, 0.03, 3
 
+_control_addresses: dict[type, int] = {}  # of `control_tick`, by the type of the law's rows
+
 # results of a tick
 ESTIMATED, FLOWN, TO_DECIDE = 0, 1, 2
 
@@ -455,8 +457,10 @@ def compiled_law(rows: CoreRows, law_rows: Any) -> Any:
     nothing is compiled, the rows themselves."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
-    control = kernel_address_of(control_tick, rows, law_rows, 0)
-    return CompiledLaw(law_rows.constants, law_rows.memory, control)
+    law = type(law_rows)
+    if law not in _control_addresses:
+        _control_addresses[law] = kernel_address_of(control_tick, rows, law_rows, 0)
+    return CompiledLaw(law_rows.constants, law_rows.memory, _control_addresses[law])
 
 
 def placeholder_law(law_rows: Any) -> Any:

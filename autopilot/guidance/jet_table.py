@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance.legs import Creep, Hold, Leg, PathStretch, SignalRun, Transfer, requested_jet
-from autopilot.trajectory.shaping import ShapedSignals, evaluate_requested, evaluate_shaped
+from autopilot.guidance.legs import (
+    Creep,
+    Hold,
+    Leg,
+    PathStretch,
+    Reel,
+    SignalRun,
+    Transfer,
+    requested_jet,
+)
+from autopilot.trajectory.reeling import reel
+from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.transfer import transfer
@@ -20,8 +28,6 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
-_CACHE_SIZE = 3  # evaluated signals to keep
-_MIN_CACHED_TIMES = 500  # of signals that are kept: those of a sweep
 
 
 @kernel
@@ -44,6 +50,7 @@ def _runs(
     pieces: PieceTable,
     duration: float,
     lead: float,
+    anchor: Vec3,
     requested: bool,
     out: Floats,
 ) -> None:
@@ -52,32 +59,14 @@ def _runs(
             _put(out[k], evaluate_requested(table, duration, times[k] - lead))
         else:
             _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
+        for j in range(3):
+            out[k, j] = anchor[j] + out[k, j]
 
 
-class _Evaluated(NamedTuple):
-    """Signals of a path at some times, relative to their own origin."""
-
-    path: ShapedSignals
-    times_s: Floats
-    requested: bool
-    found: Floats
-
-
-_evaluated: deque[_Evaluated] = deque(maxlen=_CACHE_SIZE)  # the last ones
-
-
-def _signals(path: ShapedSignals, times_s: Floats, requested: bool) -> Floats:
-    """(n, 21) the signals of a path at n times. A sweep needs the flown and the requested ones: where both
-    are the same, they are evaluated once."""
-    requested = requested or not len(path.pieces)
-    for one in _evaluated:
-        if one.path is path and one.requested == requested and np.array_equal(one.times_s, times_s):
-            return one.found
-    found = np.zeros((len(times_s), COLUMNS))
-    _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, requested, found)
-    if len(times_s) >= _MIN_CACHED_TIMES:
-        _evaluated.append(_Evaluated(path, times_s.copy(), requested, found))
-    return found
+@kernel
+def _reels(times: Floats, begin: Vec3, speed: float, ramp_s: float, cruise_s: float, out: Floats) -> None:
+    for k in range(times.shape[0]):
+        _put(out[k], reel(begin, speed, ramp_s, cruise_s, times[k]))
 
 
 @kernel
@@ -96,16 +85,18 @@ def _passes(
 def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
     """(n, 21) `leg.jet` (or `requested_jet`) at each of the n times (s into the leg), in machine code for the
     kinds of legs that last long."""
+    found = np.zeros((len(times_s), COLUMNS))
     # by the exact type: a leg of a subclass may mean something else
     if type(leg) is SignalRun:
-        found = _signals(leg.path, times_s, requested).copy()
-        found[:, :3] += leg.anchor
-        return found
-    found = np.zeros((len(times_s), COLUMNS))
-    if type(leg) is Transfer:
+        path = leg.path
+        as_requested = requested or flies_requested_path(leg)
+        _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, leg.anchor, as_requested, found)
+    elif type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
     elif type(leg) is PathStretch:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
+    elif type(leg) is Reel:
+        _reels(times_s, leg.begin, leg.speed, leg.ramp_s, leg.cruise_s, found)
     elif type(leg) is Hold:
         found[:, :3] = leg.position
     elif type(leg) is Creep:
@@ -116,6 +107,12 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
         for k, t in enumerate(times_s.tolist()):
             found[k] = np.ravel(requested_jet(leg, t) if requested else leg.jet(t))
     return found
+
+
+def flies_requested_path(leg: Leg) -> bool:
+    """Whether the setpoints of a leg are those of the path that was requested: of all legs except signals
+    that were shaped."""
+    return not isinstance(leg, SignalRun) or len(leg.path.pieces) == 0
 
 
 def jets_ahead(legs: Sequence[Leg], times_s: Floats) -> Floats:

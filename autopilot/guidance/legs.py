@@ -6,14 +6,15 @@ A leg is data. The supervisor strings legs together; the flight core gets its se
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import comb, inf, sqrt
+from math import inf, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
+from autopilot.trajectory.reeling import reel
 from autopilot.trajectory.shaping import ShapedSignals
 from autopilot.trajectory.swing import swing_direction
-from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, transfer, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -26,9 +27,6 @@ CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
 DAMPING_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
 MIN_RAMP_S = 0.3  # in which the winch comes to its rate
 MAX_LEAN_SINE = 0.7  # sine of the greatest lean of the cable that is requested of a swinging load
-
-# Taylor coefficients of transfer's s(u): of u^7 ... u^13
-_STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
 
 
 def _rest(position: Vec3) -> Jet:
@@ -89,7 +87,7 @@ class Brake:
     def _position(self, u: float) -> Vec3:
         """x at t = u duration: x' integrated term by term."""
         along, bent = u, 0.5 * u * u
-        for power, c in _STEP:
+        for power, c in STEP_TERMS:
             along -= c * u ** (power + 1) / (power + 1)
             bent -= c * u ** (power + 2) / (power + 2)
         T = self.duration_s
@@ -139,7 +137,7 @@ class PathStop:
         """sigma: 1 - s integrated term by term."""
         u = t / self.stop_s
         gone = u
-        for power, c in _STEP:
+        for power, c in STEP_TERMS:
             gone -= c * u ** (power + 1) / (power + 1)
         return self.begin_s + gone * self.stop_s
 
@@ -251,29 +249,9 @@ class Reel:
         x = self.begin
         return (x[0], x[1], x[2] - self.speed * (self.ramp_s + self.cruise_s))
 
-    def _ramp(self, t: float) -> tuple[float, ...]:
-        """Growth of the cable in `t` seconds of the first ramp, for a rate of 1, and its six derivatives."""
-        u = t / self.ramp_s
-        grown = sum(c * u ** (power + 1) / (power + 1) for power, c in _STEP)
-        return (self.ramp_s * grown, *(w[0] for w in transfer(ZERO, (1.0, 0.0, 0.0), self.ramp_s, t)[:6]))
-
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
-        left = self.duration_s - t
-        if left <= 0.0:
-            return _rest(self.end)
-        whole = self.ramp_s + self.cruise_s
-        if t <= self.ramp_s:
-            w = self._ramp(max(t, 0.0))
-        elif left >= self.ramp_s:
-            w = (t - 0.5 * self.ramp_s, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        else:
-            back = self._ramp(left)
-            w = (whole - back[0], *((-1.0) ** (n + 1) * back[n] for n in range(1, 7)))
-        x, down = self.begin, -self.speed
-        later = [(0.0, 0.0, down * w[n]) for n in range(1, 7)]
-        at = (x[0], x[1], x[2] + down * w[0])
-        return (at, later[0], later[1], later[2], later[3], later[4], later[5])
+        return reel(self.begin, self.speed, self.ramp_s, self.cruise_s, t)
 
 
 @dataclass(frozen=True, slots=True)

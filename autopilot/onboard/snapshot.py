@@ -36,8 +36,8 @@ from autopilot.estimation.records import (
 from autopilot.geometry.entry import entry_point_of, kernel_address_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
-from autopilot.guidance.jet_table import jets
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg, SignalRun
+from autopilot.guidance.jet_table import flies_requested_path, jets
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg
 from autopilot.onboard.instant_row import NO_LEG, put_instant
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode
 from autopilot.services import identity, snapshot
@@ -375,7 +375,7 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
         leg = flight.legs[0]
         mode, start_us = int(leg.control_mode), flight.leg_start_us
         duration_s = leg.duration_s if leg.duration_s < inf else nan
-        if isinstance(leg, SignalRun) and setpoints is not None and setpoints.legs is flight.legs:
+        if not flies_requested_path(leg) and setpoints is not None and setpoints.legs is flight.legs:
             # while a winch reels, the flight record is replaced at each tick
             unchanged = (
                 before is not None and before.setpoints is setpoints and before.flight.legs is flight.legs
@@ -404,7 +404,7 @@ def _setpoint(leg: Leg, elapsed_s: float) -> tuple[Array, Array]:
     """The setpoint of a leg for this instant, and the requested path, if they are not laid out in tables."""
     times_s = np.array([elapsed_s])
     targets = jets(leg, times_s)
-    return targets, jets(leg, times_s, requested=True) if isinstance(leg, SignalRun) else targets
+    return targets, targets if flies_requested_path(leg) else jets(leg, times_s, requested=True)
 
 
 class CoreSnapshot(Snapshot):

@@ -3,8 +3,8 @@
 After each decision `next_stretch` determines what is flown from here, until when no time limit expires, and
 what must stay true meanwhile. `may_need_decision` checks at each tick, in machine code, whether it still is.
 If so, `advance` would change nothing. `may_need_decision` may call for a decision needlessly, but never
-misses one. What a stretch cannot judge (setpoints, which come at any time, fences, winches, loads that are
-being caught) is decided at every tick.
+misses one. What a stretch cannot judge (setpoints, which come at any time, fences, a winch that is being
+stopped, loads that are being caught) is decided at every tick.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from autopilot.guidance.legs import (
     Creep,
     Leg,
     LevelHold,
+    PathStop,
     Swing,
     SwingDamping,
     winch_hold_height,
@@ -75,7 +76,7 @@ class Stretch(NamedTuple):
     )
     error_limit: float  # m: of the tracked position; infinite where none is tracked
     load_suspended: bool  # the load should hang on the cable
-    taut_length: float  # m, from load to vehicle
+    taut_length: float  # m, from load to vehicle; while a winch reels, that of the present tick
     load_weight: float  # N
     load_required: bool  # the load must be known for the flight to continue
     released: bool
@@ -176,7 +177,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or isinstance(leg, CatchLoad)
         or flight.cable.slack_since_us >= 0
         or flight.phase == Phase.GUIDED
-        or winch_hold_height(leg) is not None
+        or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)
         or not flight.heading.is_settled
         or (has_fence and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
     )

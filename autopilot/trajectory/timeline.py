@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import dist, pi, sqrt
 
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
@@ -27,6 +28,7 @@ from missions.model import (
     Speed,
     Step,
     Takeoff,
+    Term,
     Waypoint,
     Winch,
 )
@@ -179,7 +181,7 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
             above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
             return replace(before, expected=above, unknown_after="a release", released=True)
         case Signals(duration_s=duration, terms=terms):
-            x, v, *_ = evaluate(signal_table(terms), duration)
+            x, v = _signals_end(terms, duration)
             moving = dot(v, v) > AT_REST_M2_S2
             unknown_after = "signals that end in motion" if moving else before.unknown_after
             return replace(
@@ -190,6 +192,14 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
         case Delay():
             return before
     raise AssertionError(step)
+
+
+@lru_cache(maxsize=64)
+def _signals_end(terms: tuple[Term, ...], duration_s: float) -> tuple[Vec3, Vec3]:
+    """Displacement and velocity at the end of signals. Each start of a mission needs those of all its
+    signals several times."""
+    x, v, *_ = evaluate(signal_table(terms), duration_s)
+    return x, v
 
 
 def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:

@@ -16,6 +16,8 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
 from autopilot.trajectory.signals import Jet
 
+# Taylor coefficients of s(u): (power, coefficient) of u^7 ... u^13
+STEP_TERMS = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
 PEAK_SPEED = 3003.0 / 1024.0
 PEAK_ACCELERATION = 72072.0 * (5.0 / 22.0) ** 5 / sqrt(11.0)
 

@@ -19,12 +19,11 @@ from autopilot.core.tick import placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import field_offset, packed, unpack
-from autopilot.guidance.jet_table import COLUMNS, jets
+from autopilot.guidance.jet_table import COLUMNS, flies_requested_path, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.quiescence import Stretch
 from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.state import IN_AIR, Phase
 from autopilot.wire.dialect import plumbline as mavlink
@@ -168,7 +167,7 @@ class SweepFlight:
         self, started: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int
     ) -> bool:
         fly, code = self._entry()
-        arguments = (started, decided, gripper_open, reel_rate, stop_tick, self.chain)
+        arguments = (started, decided, gripper_open, reel_rate, self.core.reeling, stop_tick, self.chain)
         return fly(code, self.world, self.core.rows, self.core.law, *self._flight_rows, *arguments)
 
     @property
@@ -180,7 +179,7 @@ class SweepFlight:
         if cable_type not in _ENTRIES:
             world, core, law = self.world, self.core.rows, placeholder_law(self.core.law_rows)
             code = Code(code_of_world(world, self.chain), code_of_autopilot(core, law))
-            arguments = (False, False, False, 0.0, 0, self.chain)
+            arguments = (False, False, False, 0.0, self.core.reeling, 0, self.chain)
             _ENTRIES[cable_type] = (
                 entry_point_of(fly_stretch, code, world, core, law, *self._flight_rows, *arguments),
                 code,
@@ -224,18 +223,21 @@ class SweepFlight:
 
     def _decide(self, now_us: int) -> None:
         """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
+        if self.core.is_reeling:
+            self.core.move_cable(now_us)
         phase = self.core.flight.phase
         self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
         self.requested_path = _NO_ROWS
         if flight.phase != Phase.MISSION or not flight.legs or flight.legs[0].control_mode != LOAD_POSITION:
             return
-        leg = flight.legs[0]
-        stretch = unpack(Stretch, self.core.rows.stretch, 0)
-        leg_elapsed_us = now_us - flight.leg_start_us
-        ticks = np.arange(len(self.core.rows.targets))
-        times = np.asarray((leg_elapsed_us + stretch.period_us * ticks) * 1e-6, np.float64)
-        self.requested_path = jets(leg, times, requested=True)
+        leg, planned = flight.legs[0], self.core.planned
+        assert planned is not None, "positions of the load are planned"
+        self.requested_path = (
+            self.core.rows.targets
+            if flies_requested_path(leg)
+            else jets(leg, planned.times_s, requested=True)
+        )
 
     # ---- what the ground station does
 

@@ -1,9 +1,10 @@
 """Up to eight flights of one cell of a sweep, flown at once while they take the same branches.
 
-A block of ticks is flown in lanes (`gcs.sweep.lane_kernel`). A flight that takes another branch than the
-others, or for which the supervisor must decide, is flown alone for some ticks, while the others continue.
-Ticks of a block that are not valid for a flight are flown again from its own memory, which is still as it was
-when the block began. Every flight is therefore the same to the bit as if it were flown alone.
+A block of ticks is flown in lanes (`gcs.sweep.lane_kernel`). Where a flight takes another branch than the
+others, or where the supervisor must decide for one, all of them are flown alone for a few ticks: they stay at
+the same tick, and a few ticks alone cost less than a short block. Ticks of a block that are not valid for a
+flight are flown again from its own memory, which is still as it was when the block began. Every flight is
+therefore the same to the bit as if it were flown alone.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Callable, Sequence
 from autopilot.core.tick import Winch
 from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.packed import unpack
+from autopilot.supervisor.quiescence import NO_WATCH
 from gcs.sweep.flight import SweepFlight
 from gcs.sweep.lane_kernel import fly_lanes
 from gcs.sweep.lane_memory import LaneMemory
@@ -20,8 +22,14 @@ from sitl.world import JITTER, LOSS, OUTAGE_CHANCE, WorldModel
 
 MIN_FLIGHTS = 3  # least number of flights for which lanes are faster
 _MAX_BLOCK, _MIN_BLOCK = 2000, 8  # ticks of a block
-_DECISION_TICKS = 16  # ticks that a flight is flown alone when the supervisor must decide for it
-_MIN_ALONE, _MAX_ALONE = 4, 128  # ticks that a flight is flown alone after another branch: more each time
+# the same while the supervisor waits for a pull or a touch: it comes at another tick in each flight, and a
+# block that fails there is flown again
+_MAX_WATCHED_BLOCK = 128
+# ticks at a time that flights are flown alone which are behind, differ from the others in more than their
+# course, or for which the supervisor decides at every tick
+_ALONE_TICKS = 16
+# ticks that flights are flown alone after they took different branches: more if they do so again soon
+_MIN_ALONE, _MAX_ALONE = 8, 32
 
 _ENTRIES: dict[type, Callable[..., tuple[int, int]]] = {}  # machine code, by the type of the law's rows
 
@@ -42,7 +50,7 @@ class LaneGroup:
         self._flights = flights
         self._memory = LaneMemory(flights)
         self._block = _MIN_BLOCK
-        self._alone = [_MIN_ALONE] * len(flights)
+        self._alone = _MIN_ALONE
         self.lane_ticks = 0  # ticks that were flown in lanes, of all flights
 
     def compile(self) -> None:
@@ -52,8 +60,7 @@ class LaneGroup:
     def run(self) -> None:
         """Fly all flights to their ends."""
         flying = list(range(len(self._flights)))
-        for i in flying:
-            self._fly_alone(i, 1)
+        self._fly_alone(flying, 1)
         while len(flying) >= MIN_FLIGHTS:
             self._advance(flying)
             flying = [i for i in flying if not self._flights[i].result.outcome]
@@ -71,31 +78,31 @@ class LaneGroup:
         max_ticks = min(others) - tick if others else _MAX_BLOCK
         group = self._largest_group(behind)
         if len(group) < MIN_FLIGHTS or max_ticks < _MIN_BLOCK:
-            for i in behind:
-                self._fly_alone(i, tick + min(max_ticks, _DECISION_TICKS))
+            self._fly_alone(behind, tick + min(max_ticks, _ALONE_TICKS))
             return
-        for i in set(behind) - set(group):
-            self._fly_alone(i, tick + self._next_alone_ticks(i))
+        self._fly_alone([i for i in behind if i not in group], tick + _ALONE_TICKS)
         ahead = {i: self._ticks_to_decision(i) for i in group}
-        soon = [i for i in group if ahead[i] < _MIN_BLOCK]
-        if len(group) - len(soon) < MIN_FLIGHTS:
-            last = max(ahead[i] for i in soon) + 1
-            for i in group:
-                self._fly_alone(i, tick + min(last, max_ticks))
-        elif soon:
-            for i in soon:
-                self._fly_alone(i, tick + _DECISION_TICKS)
-        else:
-            self._fly_block(group, min(max_ticks, self._block, *ahead.values()))
+        soon = [ticks for ticks in ahead.values() if ticks < _MIN_BLOCK]
+        if soon:
+            self._fly_alone(group, tick + min(max(soon) + 1, max_ticks))
+            return
+        max_block = min(self._block, *(self._max_block(i) for i in group))
+        self._fly_block(group, min(max_ticks, max_block, *ahead.values()))
+
+    def _max_block(self, i: int) -> int:
+        return _MAX_BLOCK if self._memory.watch(i) == NO_WATCH else _MAX_WATCHED_BLOCK
 
     def _largest_group(self, members: Sequence[int]) -> list[int]:
         """The greatest number of these flights that can be flown together."""
         flights = self._flights
+        now_us = flights[members[0]].now_us
         groups: dict[object, list[int]] = {}
         for i in members:
             core = flights[i].core
-            if not core.is_reeling:  # otherwise the growth of the cable would be passed on twice
-                core.move_cable(flights[i].now_us + flights[i].tick_us)
+            decides_at_every_tick = self._memory.stop_us(i) <= now_us
+            # while it reels, the growth of the cable would be passed on twice
+            if not decides_at_every_tick and not core.is_reeling:
+                core.move_cable(now_us + flights[i].tick_us)
                 groups.setdefault(self._memory.grouping_key(i), []).append(i)
         largest = max(groups.values(), key=len, default=[])
         if not largest:
@@ -119,8 +126,7 @@ class LaneGroup:
         agreed_ticks, diverged_bits = self._fly_lanes(members, ticks)
         if not memory.ring_suffices():
             # the estimator was reset or needs a longer memory: the lanes do not hold all of the ring for it
-            for i in members:
-                self._fly_alone(i, tick + min(agreed_ticks + 1, ticks))
+            self._fly_alone(members, tick + min(agreed_ticks + 1, ticks))
             return
         diverged = [i for lane, i in enumerate(members) if diverged_bits >> lane & 1]
         agreeing = [i for i in members if i not in diverged]
@@ -131,13 +137,12 @@ class LaneGroup:
             if agreed_ticks > 0 and len(diverged) >= MIN_FLIGHTS:
                 self._fly_lanes(diverged, agreed_ticks)
                 self._copy_back(diverged, agreed_ticks)
-            for i in diverged:
-                self._fly_alone(i, tick + agreed_ticks + (self._next_alone_ticks(i) if agreeing else 1))
+            self._fly_alone(members, tick + agreed_ticks + (self._alone if agreeing else 1))
+            self._alone = min(2 * self._alone, _MAX_ALONE)
             self._block = max(self._block // 2, _MIN_BLOCK)
         else:
+            self._alone = _MIN_ALONE
             self._block = min(2 * self._block, _MAX_BLOCK)
-            for i in members:
-                self._alone[i] = _MIN_ALONE
 
     def _fly_lanes(self, members: Sequence[int], ticks: int) -> tuple[int, int]:
         """Take the members into lanes and call `fly_lanes`, with its result."""
@@ -166,13 +171,7 @@ class LaneGroup:
 
     # ---- alone
 
-    def _next_alone_ticks(self, i: int) -> int:
-        """The number of ticks to fly a flight alone after it took another branch: more each time."""
-        ticks = self._alone[i]
-        self._alone[i] = min(2 * ticks, _MAX_ALONE)
-        return ticks
-
-    def _fly_alone(self, i: int, last_tick: int) -> None:
-        flight = self._flights[i]
-        while not flight.result.outcome and flight.tick < last_tick:
-            flight.advance(last_tick)
+    def _fly_alone(self, members: Sequence[int], last_tick: int) -> None:
+        for flight in (self._flights[i] for i in members):
+            while not flight.result.outcome and flight.tick < last_tick:
+                flight.advance(last_tick)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
+from autopilot.core.reeling import commanded_rate_at, move_winch
 from autopilot.core.tick import (
     FLOWN,
     TO_DECIDE,
@@ -29,7 +30,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.supervisor.quiescence import Stretch
-from gcs.sweep.wire import Wire, deliver_readings, put_forces
+from gcs.sweep.wire import Wire, deliver_readings, put_forces, rounded_reel_rate
 from sitl.plant.chain.records import ChainRows
 from sitl.plant.rotors import FORCE, REQUESTED
 from sitl.world import Floats, World, WorldModel, WorldRows, world_tick
@@ -179,6 +180,7 @@ def fly_stretch(
     decided: bool,
     gripper_open: bool,
     reel_rate: float,
+    reeling: Floats,
     stop_tick: int,
     chain: ChainRows | None,
 ) -> bool:
@@ -187,14 +189,21 @@ def fly_stretch(
     `started`: the present tick has been flown; `decided`: except for the law's part, which had to wait for
     the supervisor's decision. `requested_path` (ticks, 21) is the load's requested path, from the first tick
     of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the true state,
-    up to its length. `chain` is the memory of a cable of links, None for other cables.
+    up to its length. `reeling` is the winch at the ticks of the core's stretch, as of
+    `autopilot.core.reeling`; without rows its rate is to be `reel_rate` (m/s). `chain` is the memory of a
+    cable of links, None for other cables.
     """
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us
     while True:
         if started and not decided:
             put_forces(core.rotors, core.table, world)
+            if reeling.shape[0] > 0:
+                before_us = unpack(World, world.world, 0).now_us
+                reel_rate = rounded_reel_rate(commanded_rate_at(core, reeling, before_us))
             call_world_tick(code, world, gripper_open, reel_rate, chain)
+            if reeling.shape[0] > 0:
+                move_winch(core, reeling, unpack(World, world.world, 0).now_us)
         started = True
         now = unpack(World, world.world, 0)
         _trace(trace, now, world.rotors, world.rotor_table.shape[0])

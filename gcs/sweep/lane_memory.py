@@ -36,7 +36,7 @@ _SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
 # compete for few places of the processor's cache
 _COLUMNS = PADDED_SIZE + 8
 _MEMORY, _HEAD, _RESETS = (field_offset(EstimatorState, name) for name in ("memory_s", "head", "resets"))
-_STOP_US, _MODE = field_offset(Stretch, "stop_us"), field_offset(Stretch, "mode")
+_STOP_US, _MODE, _WATCH = (field_offset(Stretch, name) for name in ("stop_us", "mode", "watch"))
 _CONTROL_MODE = field_offset(ControlMemory, "control_mode")
 
 
@@ -165,13 +165,16 @@ class LaneMemory:
             len(flight.requested_path) > 0,
             self._blocks[member, self._shared].tobytes(),
             flight.core.rows.winch.tobytes(),
-            flight.core.rows.constants.tobytes(),
-            flight.core.rows.table.tobytes(),
+            flight.core.lost_rotors,  # by these alone differ the constants and the mixer's tables of a cell
         )
 
     def stop_us(self, member: int) -> int:
         """The time at which the supervisor must decide for a flight, at the latest."""
         return int(self._block_stretch[member, _STOP_US])
+
+    def watch(self, member: int) -> int:
+        """What the supervisor watches for in a flight."""
+        return int(self._block_stretch[member, _WATCH])
 
     def _recent_rows(self, ticks: int = 0) -> Indices:
         """Rows of the ring that may be needed, and those of the last ticks."""

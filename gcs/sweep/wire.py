@@ -71,9 +71,10 @@ def put_forces(rotors: Array, table: Array, world: WorldRows) -> None:
         rotors_of_world[REQUESTED, i] = to_single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
 
 
+@kernel
 def rounded_reel_rate(rate: float) -> float:
     """The winch's rate (m/s), rounded as in HIL_ACTUATOR_CONTROLS."""
-    return float(to_single(rate / REEL_MAX) * REEL_MAX)
+    return to_single(rate / REEL_MAX) * REEL_MAX
 
 
 @kernel

@@ -16,6 +16,7 @@ from autopilot.guidance.legs import (
     Leg,
     PathStop,
     PathStretch,
+    Reel,
     SignalRun,
     Transfer,
     requested_jet,
@@ -38,6 +39,8 @@ LEGS = (
     Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
+    Reel((0.1, 0.2, 1.3), 2.0, 0.3, 0.7, 2.1),
+    Reel((0.1, 0.2, 1.3), 2.0, -0.3, 0.5, 0.0),
     PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
 )
 

@@ -162,6 +162,8 @@ class Watched(Sky):
     def _reel(self) -> None:
         """Set the cable to the length that the winch gives it at the next tick."""
         self.flight = with_cable_now(self.flight, self.now_us + STEP_US)
+        if self.stretch is not None:
+            self.stretch = self.stretch._replace(taut_length=self.flight.cable.taut_length_m)
         length = self.flight.cable.length_m
         if length is not None and length != self.settings.cable_length_m:
             least_s = min_move_duration(length, self.settings.gravity_m_s2)

@@ -10,7 +10,9 @@ from itertools import count
 import pytest
 from numba.core import config
 
+from autopilot.core.flight_core import FlightCore
 from autopilot.shell.compiling import Part
+from autopilot.supervisor.state import Report
 from gcs.closed_loop import Conditions
 from gcs.sweep import work
 from gcs.sweep.cell import cell_of
@@ -125,6 +127,23 @@ def test_while_the_winch_works_each_flies_alone(winched: str) -> None:
     flown, share = both_ways(winched, {"CTL_LAW": PLUMBLINE}, range(1, 4))
     assert {one.outcome for one in flown} == {"completed"}
     assert 0.0 < share < 0.9
+
+
+def test_while_the_winch_works_the_supervisor_rests(winched: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mission, conditions = load_mission(winched), Conditions(settings={"CTL_LAW": PLUMBLINE})
+    decisions: list[str] = []
+    decide = FlightCore.decide
+
+    def counted(core: FlightCore, now_us: int, period_us: int) -> Report:
+        decisions.append(type(core.flight.legs[0]).__name__ if core.flight.legs else "")
+        return decide(core, now_us, period_us)
+
+    start = start_times(mission, conditions)
+    monkeypatch.setattr(FlightCore, "decide", counted)
+    one = fly(mission, conditions, start)
+    assert one.outcome == "completed"
+    assert "Reel" in decisions
+    assert len(decisions) < 100
 
 
 def test_readings_that_get_lost_do_not_suit(short: str) -> None:
