@@ -116,10 +116,11 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, item)
     if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
-        problem = mission_problem(at_item, remaining_timeline(at_item, view, settings), settings)
+        ahead = remaining_timeline(at_item, view, settings)
+        problem = mission_problem(at_item, ahead, settings)
         if problem:
             return flight, denied(f"{item} denied: {problem}")
-        if not is_prepared_from_here(at_item, view, settings):
+        if not is_prepared_from_here(at_item, ahead, settings):
             return _hold_until_prepared(at_item, view, settings), _accepted_pending(item)
         at_item = with_step_heading_aims(at_item, view, settings)
         return start_step(at_item, step_event(at_item), view, settings), ACCEPTED
