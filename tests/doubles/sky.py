@@ -101,9 +101,10 @@ class Sky:
             risen = vars(_risen(self.steps, self.settings))
             vars(self).update({k: list(v) if isinstance(v, list) else v for k, v in risen.items()})
             return self
-        return self._rise()
+        return self.take_off()
 
-    def _rise(self) -> Sky:
+    def take_off(self) -> Sky:
+        """The same from any state."""
         assert self.ask(Arm(True, False)).result == ACCEPTED
         assert self.ask(Takeoff(2.0)).result == ACCEPTED
         self.run(lambda sky: sky.flight.phase == Phase.HOLD)
@@ -147,4 +148,4 @@ class Sky:
 @cache
 def _risen(steps: tuple[Step, ...], settings: Settings) -> Sky:
     """A sky in which the load was lifted by command; it must not be changed."""
-    return Sky(*steps, settings=settings)._rise()
+    return Sky(*steps, settings=settings).take_off()
