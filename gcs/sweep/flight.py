@@ -159,9 +159,10 @@ class SweepFlight:
 
     def account_lane_ticks(self, ticks: int, slack_before: int) -> None:
         """Account for ticks that were flown in lanes: times and slack events, the ground station, the end."""
+        now_us = self.now_us
         self._account(self.core.flight.phase, ticks * self.tick_us, self.slack_events - slack_before)
-        self._ground_turn(self.now_us)
-        self._check_end(self.now_us)
+        self._ground_turn(now_us)
+        self._check_end(now_us)
 
     def _fly(
         self, started: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int
@@ -207,10 +208,13 @@ class SweepFlight:
 
     def stop_tick(self, now_us: int) -> int:
         """The tick after which the ground station has something to do, or the time limit has passed."""
-        due = [time for time in (self.arm_us, self.start_us) if time > now_us]
+        until_us = now_us + self.cell.limit_us
         if self.airborne_us >= 0:
-            due.append(self.airborne_us + self.cell.limit_us + self.tick_us)
-        return -(-min(due, default=now_us + self.cell.limit_us) // self.tick_us)
+            until_us = self.airborne_us + self.cell.limit_us + self.tick_us
+        for time_us in (self.arm_us, self.start_us):
+            if now_us < time_us < until_us:
+                until_us = time_us
+        return -(-until_us // self.tick_us)
 
     def _account(self, phase: Phase, elapsed_us: int, slack_events: int) -> None:
         """Add time and slack events of a stretch that was flown in this phase."""
@@ -223,7 +227,7 @@ class SweepFlight:
 
     def _decide(self, now_us: int) -> None:
         """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
-        if self.core.is_reeling:
+        if self.core.is_reeling:  # the loop has moved the cable since the last decision
             self.core.move_cable(now_us)
         phase = self.core.flight.phase
         self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
@@ -243,6 +247,8 @@ class SweepFlight:
 
     def _ground_turn(self, now_us: int) -> None:
         """Arm and start at their instants; as long as the vehicle is not ready to be armed, postpone both."""
+        if now_us not in (self.arm_us, self.start_us):
+            return
         phase = self.core.flight.phase
         if now_us == self.arm_us and phase == Phase.DISARMED:
             problems = arming_problems(self.core.flight, self.core.view(now_us), self.core.settings)

@@ -114,8 +114,9 @@ class LaneGroup:
     def _ticks_to_decision(self, i: int) -> int:
         """Ticks that a flight can fly before the supervisor must decide, or the ground station has a turn."""
         flight = self._flights[i]
-        to_decide = -(-(self._memory.stop_us(i) - flight.now_us) // flight.tick_us) - 1
-        return max(min(to_decide, flight.stop_tick(flight.now_us) - flight.tick), 0)
+        now_us = flight.now_us
+        to_decide = -(-(self._memory.stop_us(i) - now_us) // flight.tick_us) - 1
+        return max(min(to_decide, flight.stop_tick(now_us) - flight.tick), 0)
 
     # ---- in lanes
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from autopilot.guidance.jet_table import jets, jets_ahead
+from autopilot.guidance.jet_table import flies_requested_path, jets, jets_ahead
 from autopilot.guidance.legs import (
     LOAD_POSITION,
     Brake,
@@ -51,6 +49,7 @@ def test_a_leg_laid_out_is_the_leg(leg: Leg, asked: bool) -> None:
     times = np.arange(-3, 1500) * 0.004
     expected = [np.ravel(requested_jet(leg, t) if asked else leg.jet(t)) for t in times.tolist()]
     assert np.array_equal(jets(leg, times, asked), np.array(expected))
+    assert flies_requested_path(leg)
 
 
 def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
@@ -69,19 +68,8 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
     for leg in (PathStretch(passage, (0.1, -0.2, 0.05), 1.5), SignalRun((0.1, 0.2, 0.3), shaped)):
         expected = [np.ravel(leg.jet(t)) for t in times.tolist()]
         assert np.array_equal(jets(leg, times), np.array(expected))
-
-
-def test_signals_are_those_of_the_path_and_the_times_whatever_was_laid_out_before() -> None:
-    paths = [
-        unshaped_signals(SIGNALS),
-        unshaped_signals(replace(SIGNALS, duration_s=SIGNALS.duration_s + 1.0)),
-    ]
-    times = np.arange(600) * 0.004
-    for anchor in ((0.0, 0.0, 1.0), (1.0, 2.0, 3.0)):
-        for path in paths:
-            for at in (times, times + 0.5):
-                expected = [np.ravel(SignalRun(anchor, path).jet(t)) for t in at.tolist()]
-                assert np.array_equal(jets(SignalRun(anchor, path), at), np.array(expected))
+        as_requested = np.array_equal(jets(leg, times, requested=True), np.array(expected))
+        assert flies_requested_path(leg) == as_requested == isinstance(leg, PathStretch)
 
 
 def test_the_path_ahead_goes_on_into_what_follows() -> None:
