@@ -40,6 +40,7 @@ _WIDENING_TRIES = 3  # ... up to this number of tries, ...
 _LONG_WINDOW_S = 4.0
 _COARSE_S = 0.01
 _FINE_S = 0.002
+_EXCESS_S = 0.001  # between samples of its excess: a path may begin with a peak of a millisecond
 _TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
 _SAMPLE_MARGIN_N = 0.03  # by which its samples must stay inside them
 # in the cost, this distance counts as much as a sixth derivative that takes a quarter of a rotor's range: the
@@ -347,7 +348,7 @@ def _path_constraints(
 
 
 def _fine_excess(pieces: PieceTable, begin: float, end: float, body: Body, bounds: Bounds) -> float:
-    times = _sample_times(begin, nextafter(end, -inf), _FINE_S)
+    times = _sample_times(begin, nextafter(end, -inf), _EXCESS_S)
     jets = np.empty((7, times.size, 3))
     _fill(np.zeros((0, 7)), pieces, 0.0, times, jets)
     return float(excess(demand(jets, body), float(times[1] - times[0]), bounds).max())
