@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Any
 
 import click
@@ -84,6 +85,8 @@ class Gcs(click.Group):
             from autopilot.shell.options import open_closed_streams
 
             open_closed_streams()
+        if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+            sys.stdout.reconfigure(errors="replace")  # a terminal in Latin-1 has no Greek letters
         if sys.stdout.isatty() or sys.stderr.isatty():
             from autopilot.shell.options import tolerate_closed_terminal
 

@@ -845,15 +845,19 @@ class Onboard:
         """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
         plan, setup = self.core.flight.mission.plan, self.core.setup
         self._prepared_for = limits, planner = setup.settings.limits, setup.planner
-        flight, begin = self.core.flight, AT_HOME
-        if flight.mission.waiting:
-            ahead = remaining_timeline(flight, self.core.view(self.now_us), self.core.settings)
-            begin = mission_begin(flight, ahead, self.core.settings)
-        work = PathWork(plan.steps, plan.sequence, limits, flight.area.home, planner, begin)
+        begin = self._mission_begin() if self.core.flight.mission.waiting else AT_HOME
+        work = PathWork(plan.steps, plan.sequence, limits, self.core.flight.area.home, planner, begin)
         self._path_work = work
         self._set_prepared(PENDING)
         if self._options.clock_waits or not plan.steps:
             self.finish(work, work.run())
+
+    def _mission_begin(self) -> MissionBegin:
+        """Where the mission would begin now."""
+        flight, settings = self.core.flight, self.core.settings
+        return mission_begin(
+            flight, remaining_timeline(flight, self.core.view(self.now_us), settings), settings
+        )
 
     @property
     def work(self) -> PathWork | SetupWork | None:
@@ -872,15 +876,16 @@ class Onboard:
                 self._apply_setup(result)
         elif work is self._path_work:
             self._path_work = None
-            self._set_paths(result)
+            self._set_paths(result, work.begin)
 
-    def _set_paths(self, prepared: PreparedPaths) -> None:
-        """Take over the paths of the plan, and begin the mission if it waited for them."""
+    def _set_paths(self, prepared: PreparedPaths, begin: MissionBegin) -> None:
+        """Take over the paths of the plan, which were prepared for this begin, and begin the mission if it
+        waited for them."""
         for note in prepared.notes:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, note)
         self._set_prepared(prepared)
         if self.core.flight.mission.waiting:
-            self._begin_mission()
+            self._begin_mission(begin)
         elif self.tick >= 0:
             self._warn_of_curves()
 
@@ -894,14 +899,17 @@ class Onboard:
         if problem:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, f"Mission will not start: {problem}")
 
-    def _begin_mission(self) -> None:
-        """Begin the mission that waited for its paths, or report why not."""
+    def _begin_mission(self, prepared_for: MissionBegin) -> None:
+        """Begin the mission that waited for its paths, or report why not. If it begins elsewhere by now, it
+        waits for other paths."""
         verdict = self.core.handle_request(StartMission(None), self.now_us)
         self.endpoint.state_changed()
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             self.core.replace_flight(interrupt_mission(self.core.flight))
             text, subject = verdict.text or "Mission denied", mavlink.MAV_CMD_MISSION_START
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text, subject)
+        elif self.core.flight.mission.waiting and self._mission_begin() != prepared_for:
+            self._prepare()
 
     def _set_prepared(self, prepared: PreparedPaths) -> None:
         flight = self.core.flight

@@ -48,8 +48,9 @@ RELEASED_TEXT = "Load released"
 
 
 def with_plan(flight: Flight, plan: MissionPlan) -> Flight:
-    """The flight with another mission, rewound."""
-    flight = replace(flight, mission=replace(flight.mission, plan=plan))
+    """The flight with another mission, rewound; without steps there is nothing to wait for."""
+    waiting = flight.mission.waiting and bool(plan.steps)
+    flight = replace(flight, mission=replace(flight.mission, plan=plan, waiting=waiting))
     return with_current_step(flight, 0, done=False)
 
 

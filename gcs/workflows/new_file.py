@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.machinery import PathFinder
 from importlib.resources import files
@@ -74,6 +75,8 @@ def new_file(kind: str, name: str) -> NewFile:
     except FileExistsError:
         raise InputError(f"{path} exists already and is left as it is; choose another name") from None
     except OSError as error:
+        with suppress(OSError):
+            path.unlink()  # of a full disk: else it would be in the way when there is space again
         raise write_error(error, path, "file", option="") from None
     return NewFile(path, _command(text, kind))
 

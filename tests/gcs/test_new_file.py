@@ -6,6 +6,7 @@ import re
 import shlex
 import tomllib
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -13,7 +14,7 @@ from click.testing import CliRunner, Result
 import plumbline
 from autopilot.vehicle.model import Vehicle
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
 from gcs.workflows.new_file import kinds
 from missions.model import Land, Mission, Takeoff, Waypoint
 from sitl.sensors.profile import Profile
@@ -111,6 +112,22 @@ def test_what_cannot_be_is_one_line(words: tuple[str, ...], code: int, part: str
     result = run("new", *words)
     assert (result.exit_code, result.stdout) == (code, "")
     assert part in result.stderr and result.stderr.count("\n") == 1
+    assert list(Path().iterdir()) == []
+
+
+def test_a_full_disk_leaves_no_file_in_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    open_file = Path.open
+
+    def full(path: Path, mode: str = "r", **options: Any) -> IO[str]:
+        if mode == "x":
+            path.touch()
+            path, mode = Path("/dev/full"), "w"
+        return open_file(path, mode, **options)
+
+    monkeypatch.setattr(Path, "open", full)
+    result = run("new", "mission", "mine")
+    assert result.exit_code == EXIT_ERROR
+    assert "No space left on device" in result.stderr
     assert list(Path().iterdir()) == []
 
 

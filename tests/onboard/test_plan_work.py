@@ -160,18 +160,22 @@ def test_a_vehicle_that_nothing_is_asked_of_is_disarmed(refused: bool) -> None:
     assert "Disarmed: no command received" in craft.texts
 
 
-def test_a_mission_that_begins_elsewhere_is_prepared_from_there() -> None:
-    """The paths of an upload begin at home; the start waits for those from where the load hangs."""
+@pytest.mark.parametrize("early", [False, True], ids=["after", "during"])
+def test_a_mission_that_begins_elsewhere_is_prepared_from_there(early: bool) -> None:
+    """The paths of an upload begin at home; the start waits for those from where the load hangs, whether it
+    comes after the paths of the upload or while these are being prepared."""
     craft = flown_to_hold()
+    here = craft.onboard.core.flight.legs[0].jet(0.0)[0]
+    beside = Hold((here[0] + 1.0, here[1], here[2]))
+    craft.onboard.core.replace_flight(replace(craft.flight, legs=(beside,)))
     upload(craft, Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0), Land())
     first = craft.onboard.work
     assert first is not None
-    craft.onboard.finish(first, first.run())
-    here = craft.onboard.core.flight.legs[0].jet(0.0)[0]
-    flight = craft.flight
-    beside = Hold((here[0] + 1.0, here[1], here[2]))
-    craft.onboard.core.replace_flight(replace(flight, legs=(beside,)))
+    if not early:
+        craft.onboard.finish(first, first.run())
     assert craft.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+    if early:
+        craft.onboard.finish(first, first.run())
     assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.HOLD, True)
     work = craft.onboard.work
     assert isinstance(work, PathWork)
@@ -182,6 +186,26 @@ def test_a_mission_that_begins_elsewhere_is_prepared_from_there() -> None:
     path = craft.flight.mission.plan.prepared.paths[1]
     assert isinstance(path, PathSegment)
     assert path.start == (beside.position[0], beside.position[1], 2.0)
+
+
+@pytest.mark.parametrize("in_air", [False, True], ids=["on the ground", "in the air"])
+def test_a_mission_that_is_deleted_while_it_waits_no_longer_does(in_air: bool) -> None:
+    craft = flown_to_hold() if in_air else Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    late = craft.onboard.work
+    assert late is not None
+    if not in_air:
+        assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+    assert craft.flight.mission.waiting
+    craft.send(mavlink.MAVLink_mission_clear_all_message(1, 1, mavlink.MAV_MISSION_TYPE_ALL))
+    craft.wait(0.1)
+    assert not craft.flight.mission.waiting
+    assert not craft.flight.mission.plan.steps
+    craft.onboard.finish(late, late.run())
+    craft.wait(1.0)
+    assert craft.flight.phase == (Phase.HOLD if in_air else Phase.ARMED)
 
 
 @pytest.mark.parametrize("outside", [True, False])

@@ -71,6 +71,12 @@ def test_what_differed_is_told_and_nothing_else(runs: list[Path]) -> None:
     assert found == {"law": ("plumbline", "thesis"), "seed": ("1", "2"), "SIM_WIND_E": ("0", "2")}
 
 
+def test_a_character_that_the_output_cannot_have_is_replaced(runs: list[Path]) -> None:
+    result = CliRunner(charset="latin-1").invoke(gcs, ["compare", *map(str, runs[:2])])
+    assert result.exit_code == 0, result.exception
+    assert "?" in result.stdout
+
+
 def test_what_was_not_changed_is_the_number_that_was_told_or_that_of_the_default(runs: list[Path]) -> None:
     base = loaded(runs[0])
     settings = {"SIM_WIND_E": 2.0, "SIM_LOAD_MASS": 0.25, "OWN_GAIN": 3.0}
