@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
+from gcs.errors import GcsError
 from plumbline.laws import Asked, Now, wrench
 from plumbline.learning.policy import PolicyPilot, load_policy
 
@@ -23,6 +24,8 @@ class PolicyLaw:
     file: ClassVar[str | Path]
 
     def __init__(self, parameters: Mapping[str, float]) -> None:
+        if not hasattr(self, "file"):
+            raise GcsError(f"{type(self).__name__}: file, the path of the policy (.npz), is not set")
         self._pilot = PolicyPilot(load_policy(self.file))
 
     def start(self, now: Now) -> None:

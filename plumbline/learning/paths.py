@@ -14,7 +14,7 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, MissionPlan
 from autopilot.supervisor.step_legs import destination, step_legs
 from gcs.errors import GcsError
-from missions.model import AttitudeRun, Land, Release, Speed, Takeoff, Winch
+from missions.model import KINDS, AttitudeRun, Land, Release, Speed, Takeoff, Winch
 from sitl.world import Floats
 
 _ENDING_STEPS = (Land, Release, AttitudeRun, Winch)  # the first of these steps ends the path of the load
@@ -27,6 +27,7 @@ def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: flo
     flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
     position: Vec3 = ZERO
     tables: list[Floats] = []
+    end = ""
     for number, step in enumerate(plan.steps):
         flight = replace(flight, mission=replace(flight.mission, step=number))
         if isinstance(step, Takeoff):
@@ -34,6 +35,7 @@ def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: flo
         elif isinstance(step, Speed):
             flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
         elif isinstance(step, _ENDING_STEPS):
+            end = f"; items[{number}] ({KINDS[type(step)]}) ends it"
             break
         else:
             for leg in step_legs(step, position, flight, settings):
@@ -45,5 +47,5 @@ def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: flo
                 position = leg.jet(leg.duration_s)[0]
     table = np.concatenate(tables) if tables else np.zeros((0, COLUMNS))
     if not len(table):
-        raise GcsError(f"mission {name}: there is no path of the load to follow")
+        raise GcsError(f"mission {name}: there is no path of the load to follow{end}")
     return np.ascontiguousarray(table)

@@ -48,13 +48,14 @@ _AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 
 class Policy:
     """A network with tanh between its layers. Of the `options` of its environment, those in `KEPT_OPTIONS`
-    are kept."""
+    are kept; `Error` (plumbline.Error) if there is no such option."""
 
     def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
         self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+        checked = options_of(options)
         self.options = {name: options[name] for name in KEPT_OPTIONS if name in options}
         if "vehicle" in self.options:
-            self.options["vehicle"] = options_of(self.options).vehicle_file
+            self.options["vehicle"] = checked.vehicle_file
 
     def __call__(self, observation: Floats) -> Floats:
         """Actions for one observation, or for many (n, size)."""

@@ -159,8 +159,21 @@ def test_a_trained_policy_flies_a_mission_as_a_law() -> None:
     assert 0.002 < flight.summary["load_error_max_m"] < 0.05  # more than shipped laws leave, but bounded
 
 
-def test_a_law_without_its_policy_is_told(tmp_path: Path) -> None:
-    text = 'from plumbline.learning.law import PolicyLaw\n\n\nclass Lost(PolicyLaw):\n    file = "lost.npz"\n'
+def test_a_policy_has_the_options_of_environments_only() -> None:
+    with pytest.raises(plumbline.Error, match="preveiw: there is no such option; did you mean preview"):
+        Policy([(np.zeros((4, 3)), np.zeros(4))], {"preveiw": 1})
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ('file = "lost.npz"', "lost.npz: No such file"),
+        ("pass", "Lost: file, the path of the policy .*, is not set"),
+    ],
+    ids=["lost", "not set"],
+)
+def test_a_law_without_its_policy_is_told(tmp_path: Path, line: str, told: str) -> None:
+    text = f"from plumbline.learning.law import PolicyLaw\n\n\nclass Lost(PolicyLaw):\n    {line}\n"
     (tmp_path / "lost.py").write_text(text, encoding="utf-8")
-    with pytest.raises(plumbline.Error, match=r"lost.npz: No such file"):
+    with pytest.raises(plumbline.Error, match=told):
         plumbline.fly("hover", law=f"{tmp_path / 'lost.py'}:Lost", quiet=True)
