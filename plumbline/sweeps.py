@@ -70,8 +70,9 @@ def sweep(
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
     the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
-    which an interrupted sweep continues; by default nothing is kept. `fresh=True` discards flights that are
-    there already, also those of another sweep. `quiet=False` shows progress on stderr.
+    which an interrupted sweep continues, or one with more seeds or values; by default nothing is kept.
+    `fresh=True` discards flights that are there already, also those of another sweep. `quiet=False` shows
+    progress on stderr.
 
     Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
     polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script

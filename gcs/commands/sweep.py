@@ -122,7 +122,7 @@ def sweep_command(
     The flights are those of gcs fly --lockstep without the UDP link, ten to twenty per second on each core.
     Every parameter of the simulator and of the autopilot can be varied. Afterwards, the folder contains
     flights.parquet (a row for each flight), report.html with plots, and plan.json. The same command continues
-    a sweep that was stopped.
+    a sweep that was stopped, and extends it if it has more seeds or values.
 
     The mission is not checked beforehand; gcs check MISSION shows whether the vehicle can fly it. A path that
     the autopilot refuses is flown as requested with --set MIS_INFEASIBLE=0, and slower with 1.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import Any, TypeVar
@@ -100,6 +100,19 @@ class SweepPlan:
     def flights(self) -> int:
         """The number of flights."""
         return len(self.laws) * self.points * len(self.seeds)
+
+    def contains(self, other: SweepPlan) -> bool:
+        """Whether every flight of the other plan is one of this plan, which has only more seeds, or more
+        values in its grid."""
+        if replace(self, seeds=other.seeds, varied=other.varied) != other:
+            return False
+        if not set(other.seeds) <= set(self.seeds):
+            return False
+        if self.sample:  # what is drawn depends on all values
+            return self.varied == other.varied
+        return [v.name for v in self.varied] == [v.name for v in other.varied] and all(
+            set(old.values) <= set(new.values) for old, new in zip(other.varied, self.varied, strict=True)
+        )
 
     def cases(self) -> Iterator[Case]:
         """Every flight, in the order of its number: law by law, setting by setting, seed by seed."""

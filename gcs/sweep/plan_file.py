@@ -30,14 +30,16 @@ def sweep_origin(plan: SweepPlan) -> Origin:
 
 
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:
-    """Write plan.json; PlanError if the directory contains flights of another origin, GcsError if it cannot
-    be written."""
+    """Write plan.json, also in place of that of a sweep which this one extends; PlanError if the directory
+    contains flights of another origin, GcsError if it cannot be written."""
     make_folder(directory)
     path = directory / PLAN_FILE
     if path.exists():
         found = _read(directory)
         differing = origin.differences(found.get("origin"))
-        if differing:
+        if not differing:
+            return
+        if not _extends(plan, origin, found):
             content = "this sweep as flown by another version or other code of Plumbline"
             if "settings" in differing:
                 content = f"another sweep, with other {', '.join(_differing_options(origin, found))}"
@@ -45,9 +47,23 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
                 f"{directory}: holds {content}; name another folder by --out, or add --fresh to discard its "
                 "flights"
             )
-        return
     fields = {"command": command, "flights": plan.flights, "origin": origin.to_json()}
-    path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
+    unfinished = path.with_suffix(".unfinished")
+    unfinished.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
+    unfinished.replace(path)
+
+
+def _extends(plan: SweepPlan, origin: Origin, found: Mapping[str, Any]) -> bool:
+    """Whether all flights of the plan of a stored plan.json are flights of this plan, flown as now."""
+    if origin.differences(found.get("origin")) != ("settings",):
+        return False
+    try:
+        stored = found["origin"]["settings"]
+        return bool(stored["files"] == origin.to_json()["settings"]["files"]) and plan.contains(
+            from_json(stored["plan"])
+        )
+    except (KeyError, TypeError):
+        return False
 
 
 def default_folder(plan: SweepPlan) -> Path:
@@ -56,8 +72,8 @@ def default_folder(plan: SweepPlan) -> Path:
 
 
 def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
-    """The first of sweeps/MISSION, sweeps/MISSION-2, -3 ... that contains this sweep, or nothing, or does not
-    exist.
+    """The first of sweeps/MISSION, sweeps/MISSION-2, -3 ... that contains this sweep, or one that it extends,
+    or nothing, or does not exist.
 
     `fresh`: also one with flights by other code, which are discarded.
     """
@@ -65,7 +81,7 @@ def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
     ordinal = 1
     while True:
         directory = first if ordinal == 1 else first.with_name(f"{first.name}-{ordinal}")
-        if _is_free(directory) or _is_of_origin(directory, origin, fresh):
+        if _is_free(directory) or _can_continue(directory, plan, origin, fresh):
             return directory
         ordinal += 1
 
@@ -79,12 +95,13 @@ def _is_free(directory: Path) -> bool:
         return False
 
 
-def _is_of_origin(directory: Path, origin: Origin, fresh: bool) -> bool:
+def _can_continue(directory: Path, plan: SweepPlan, origin: Origin, fresh: bool) -> bool:
     try:
-        differing = origin.differences(_read(directory).get("origin"))
+        found = _read(directory)
     except PlanError:
         return False
-    return "settings" not in differing if fresh else not differing
+    differing = origin.differences(found.get("origin"))
+    return "settings" not in differing if fresh else not differing or _extends(plan, origin, found)
 
 
 def _differing_options(origin: Origin, found: Mapping[str, Any]) -> list[str]:

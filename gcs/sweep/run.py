@@ -63,6 +63,8 @@ def sweep(
             store.clear()
             (directory / PLAN_FILE).unlink(missing_ok=True)
         store_plan(directory, plan, command, sweep_origin(plan))
+        if store.parts():
+            store.merge()  # parts of a sweep that was killed; their names are those of its plan
         return _fly_missing(plan, store, workers, stopped, quiet, warm)
 
 

@@ -1,7 +1,8 @@
 """flights.parquet: a row for each flight of a sweep, written in parts so that no flight is lost.
 
 A part is either complete or absent: it is written under another name and renamed. When the sweep ends, the
-parts are merged into one table in the order of the flights.
+parts are merged into one table in the order of the flights. Each file has the plan by which its flights are
+numbered: in a sweep that was extended, they have other numbers than in the file.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from autopilot.own.law import law_name
 from gcs.formats.arrow import array_of, text_array
 from gcs.sweep.flight import FlightResult
-from gcs.sweep.plan import Case, SweepPlan
+from gcs.sweep.plan import Case, SweepPlan, from_json
 
 if TYPE_CHECKING:
     import pyarrow
@@ -103,7 +104,9 @@ class Store:
 
         found: set[int] = set()
         for path in self._files():
-            found.update(pq.ParquetFile(path).read(columns=["index"]).column("index").to_pylist())
+            found.update(
+                self._numbered(pq.ParquetFile(path).read(columns=["index"])).column("index").to_pylist()
+            )
         return found
 
     def add(self, rows: Sequence[Row]) -> None:
@@ -133,12 +136,23 @@ class Store:
         import pyarrow.parquet as pq
 
         # `read_table` and `to_numpy` would import pandas too
-        tables = [pq.ParquetFile(path).read().cast(self._schema) for path in self._files()]
+        tables = [self._numbered(pq.ParquetFile(path).read()).cast(self._schema) for path in self._files()]
         if not tables:
             return self._schema.empty_table()
         table = pa.concat_tables(tables)
         _, first = np.unique(table.column("index").to_pylist(), return_index=True)
         return table.take(array_of(first)).replace_schema_metadata(self._schema.metadata)
+
+    def _numbered(self, table: pyarrow.Table) -> pyarrow.Table:
+        """The table of a file with its flights numbered by the present plan, which has all of them."""
+        stored = table.schema.metadata[METADATA_KEY]
+        if stored == self._schema.metadata[METADATA_KEY]:
+            return table
+        number = {(case.law, case.varied, case.seed): case.index for case in self._plan.cases()}
+        cases = list(from_json(json.loads(stored)).cases())
+        flown = [cases[index] for index in table.column("index").to_pylist()]
+        numbers = np.array([number[case.law, case.varied, case.seed] for case in flown], np.int64)
+        return table.set_column(table.schema.get_field_index("index"), "index", array_of(numbers))
 
     def clear(self) -> None:
         """Delete all flights."""

@@ -215,6 +215,27 @@ def test_of_a_parameter_that_takes_whole_numbers_only_such_are_drawn(short: str)
         planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.5, 4.0), True)], {}, sample=20)
 
 
+def test_a_plan_contains_those_with_fewer_seeds_and_values(plan: SweepPlan) -> None:
+    delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 12.0, 24.0), True)
+    wind = VariedParameter("SIM_WIND_E", (0.0, 2.0), True)
+    grid = replace(plan, seeds=(1, 2, 3), varied=(delays, wind), sample=0)
+    assert grid.contains(grid)
+    assert grid.contains(replace(grid, seeds=(3, 1), varied=(replace(delays, values=(24.0, 0.0)), wind)))
+    for other in (
+        replace(grid, seeds=(1, 4)),
+        replace(grid, varied=(replace(delays, values=(6.0,)), wind)),
+        replace(grid, varied=(delays,)),
+        replace(grid, varied=(wind, delays)),
+        replace(grid, sensors="ideal"),
+        replace(grid, settings=(("SIM_GUST_E", 1.0),)),
+    ):
+        assert not grid.contains(other)
+    drawn = replace(grid, sample=8)
+    assert drawn.contains(replace(drawn, seeds=(2,)))
+    assert not drawn.contains(replace(drawn, varied=(replace(delays, values=(0.0, 24.0)), wind)))
+    assert not drawn.contains(replace(drawn, sample=4))
+
+
 def origin(plan: SweepPlan, version: str = "1", code: str = "code") -> Origin:
     return Origin({"plan": plan.to_json(), "files": {}}, version, code)
 

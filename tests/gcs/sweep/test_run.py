@@ -7,6 +7,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,29 @@ def test_a_sweep_that_was_killed_goes_on(
     done = swept(plan, tmp_path)
     assert (done.flights, done.flown) == (6, 3)
     assert without_clock(tmp_path) == without_clock(complete)
+
+
+@pytest.mark.parametrize("stopped", [False, True], ids=["after its end", "after a stop"])
+def test_a_sweep_is_extended_by_seeds_and_values(
+    whole: tuple[SweepPlan, Path, run.SweepResult],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    stopped: bool,
+) -> None:
+    plan, complete, _ = whole
+    monkeypatch.setattr(work, "batch_size", lambda flights, workers: 1)
+    less = replace(plan, seeds=(2,), varied=(replace(plan.varied[0], values=(60.0, 0.0)),))
+    first = swept(less, tmp_path, AfterOne() if stopped else False)
+    if stopped:  # killed before its parts were merged
+        rows = pq.read_table(tmp_path / "flights.parquet").to_pylist()
+        (tmp_path / "flights.parquet").unlink()
+        Store(tmp_path, less).add(rows)
+    rest = swept(plan, tmp_path)
+    assert (rest.flights, rest.flown) == (6, 6 - first.flights)
+    assert without_clock(tmp_path) == without_clock(complete)
+    assert load_plan(tmp_path) == plan
+    with pytest.raises(PlanError, match="another sweep, with other --seeds, --vary"):
+        swept(less, tmp_path)
 
 
 def test_flights_are_stored_without_what_imports_pandas(
