@@ -13,6 +13,7 @@ from autopilot.shell.compiling import Part
 from gcs.batch.pool import PoolBackend
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
+from gcs.errors import GcsError, disk_problem, reason
 from gcs.folders import PAGE_FILE, PLAN_FILE, check_no_other_results, make_folder, reserved
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_origin
@@ -53,7 +54,7 @@ def sweep(
     """Fly the flights of the plan that are missing, and store them.
 
     `stopped` returns whether a stop was requested; `warm` compiles parts of the flight software beforehand,
-    which are otherwise compiled when they are first needed.
+    which are otherwise compiled when they are first needed. GcsError if a flight cannot be stored.
     """
     store = Store(directory, plan)
     check_no_other_results(directory, PLAN_FILE, (PAGE_FILE,))
@@ -65,7 +66,15 @@ def sweep(
         store_plan(directory, plan, command, sweep_origin(plan))
         if store.parts():
             store.merge()  # parts of a sweep that was killed; their names are those of its plan
-        return _fly_missing(plan, store, workers, stopped, quiet, warm)
+        try:
+            return _fly_missing(plan, store, workers, stopped, quiet, warm)
+        except OSError as error:
+            if not disk_problem(error):
+                raise
+            text = (
+                f"{directory}: {reason(error).lower()}; its flights are kept, and the same command continues"
+            )
+            raise GcsError(text) from None
 
 
 def _fly_missing(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, completion_range, flights_by_law
 from gcs.sweep.standouts import repeat_command, stored_standouts
-from gcs.sweep.store import Store, columns
+from gcs.sweep.store import Row, Store, columns
 from tests.doubles.browser import Browser
 from tests.gcs.sweep.conftest import AtOnce
 
@@ -105,6 +106,30 @@ def test_a_sweep_that_was_killed_goes_on(
     assert store.stored_indices() == {0, 1, 2}
     done = swept(plan, tmp_path)
     assert (done.flights, done.flown) == (6, 3)
+    assert without_clock(tmp_path) == without_clock(complete)
+
+
+def test_a_full_disk_is_told_with_the_folder_and_loses_no_flight(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, complete, _ = whole
+    monkeypatch.setattr(work, "batch_size", lambda flights, workers: 1)
+    add = Store.add
+
+    def add_until_full(store: Store, rows: Sequence[Row]) -> None:
+        if store.stored_indices():
+            raise OSError(errno.ENOSPC, "wrapped by a library")
+        add(store, rows)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run, "_STORE_INTERVAL_S", 0.0)
+        patch.setattr(Store, "add", add_until_full)
+        with pytest.raises(GcsError) as error:
+            swept(plan, tmp_path)
+    told = "no space left on device; its flights are kept, and the same command continues"
+    assert str(error.value) == f"{tmp_path}: {told}"
+    stored = len(Store(tmp_path, plan).stored_indices())
+    assert 0 < stored < 6 and swept(plan, tmp_path).flown == 6 - stored
     assert without_clock(tmp_path) == without_clock(complete)
 
 
