@@ -21,7 +21,7 @@ from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
 
-_STORE_INTERVAL_S = 5.0  # longest time between the end of a flight and its storage on disk
+STORE_INTERVAL_S = 5.0  # longest time between the end of a flight and its storage on disk
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _fly_missing(
 
             backend = PoolBackend(executor, count, partial(fly_cases, work))
             is_complete = fly_all(
-                batches(plan, missing, count), backend, store.add, report, stopped, _STORE_INTERVAL_S
+                batches(plan, missing, count), backend, store.add, report, stopped, STORE_INTERVAL_S
             )
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()

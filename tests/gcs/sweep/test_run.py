@@ -122,7 +122,7 @@ def test_a_full_disk_is_told_with_the_folder_and_loses_no_flight(
         add(store, rows)
 
     with monkeypatch.context() as patch:
-        patch.setattr(run, "_STORE_INTERVAL_S", 0.0)
+        patch.setattr(run, "STORE_INTERVAL_S", 0.0)
         patch.setattr(Store, "add", add_until_full)
         with pytest.raises(GcsError) as error:
             swept(plan, tmp_path)
