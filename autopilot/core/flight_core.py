@@ -121,6 +121,11 @@ class PlannedSetpoints(NamedTuple):
     period_us: int
     times_s: NDArray[np.float64]  # into the leg, of each row
 
+    def row_at(self, now_us: int) -> int:
+        """The row of this instant, which may lie behind the last one; -1 before the first and between two."""
+        at, off = divmod(now_us - self.first_us, self.period_us)
+        return max(at, -1) if off == 0 else -1
+
 
 class FlightCore:
     """One vehicle's flight software. `flight` is the supervisor's record; all else lies in `rows`."""
@@ -401,15 +406,9 @@ class FlightCore:
 
     def _reeling_row(self, now_us: int) -> list[float] | None:
         """The winch at this tick in `reeling`, as laid out for the leg that is flown; None: there is none."""
-        planned, flight = self.planned, self.flight
-        if planned is None or not len(self.reeling):
-            return None
-        if flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
-            return None
-        at, off = divmod(now_us - planned.first_us, planned.period_us)
-        row: list[float] | None = (
-            self.reeling[at].tolist() if off == 0 and 1 <= at < len(self.reeling) else None
-        )
+        planned = self._planned_for_leg()
+        at = -1 if planned is None else planned.row_at(now_us)
+        row: list[float] | None = self.reeling[at].tolist() if 1 <= at < len(self.reeling) else None
         return row
 
     def _update_cable_length(self) -> None:
@@ -463,21 +462,28 @@ class FlightCore:
         pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
         self.rows = self.rows._replace(targets=targets, references=references)
 
-    def setpoints_until_us(self, period_us: int) -> int:
-        """The time from which `setpoint_row` has no row for ticks of this period; 0: it has none now."""
+    def _planned_for_leg(self) -> PlannedSetpoints | None:
+        """The setpoints in `rows.targets`, if they are those of the leg that is flown."""
         planned, flight = self.planned, self.flight
         if planned is None or flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
+            return None
+        return planned
+
+    def setpoints_until_us(self, period_us: int) -> int:
+        """The time from which `setpoint_row` has no row for ticks of this period; 0: it has none now."""
+        planned = self._planned_for_leg()
+        if planned is None or planned.period_us != period_us:
             return 0
-        return planned.first_us + period_us * len(planned.times_s) if planned.period_us == period_us else 0
+        return planned.first_us + period_us * len(planned.times_s)
 
     def setpoint_row(self, now_us: int) -> int:
         """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: there is
         none."""
-        planned, flight = self.planned, self.flight
-        if planned is None or flight.legs is not planned.legs or flight.leg_start_us != planned.leg_start_us:
+        planned = self._planned_for_leg()
+        if planned is None:
             return -1
-        at, off = divmod(now_us - planned.first_us, planned.period_us)
-        return at if off == 0 and 0 <= at < len(planned.times_s) else -1
+        at = planned.row_at(now_us)
+        return at if at < len(planned.times_s) else -1
 
     # ---- between two ticks
 
