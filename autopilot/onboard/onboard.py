@@ -876,16 +876,17 @@ class Onboard:
                 self._apply_setup(result)
         elif work is self._path_work:
             self._path_work = None
-            self._set_paths(result, work.begin)
+            self._set_paths(result)
+            if self.core.flight.mission.waiting and self._mission_begin() != work.begin:
+                self._prepare()  # it begins elsewhere by now, and waits for other paths
 
-    def _set_paths(self, prepared: PreparedPaths, begin: MissionBegin) -> None:
-        """Take over the paths of the plan, which were prepared for this begin, and begin the mission if it
-        waited for them."""
+    def _set_paths(self, prepared: PreparedPaths) -> None:
+        """Take over the paths of the plan, and begin the mission if it waited for them."""
         for note in prepared.notes:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, note)
         self._set_prepared(prepared)
         if self.core.flight.mission.waiting:
-            self._begin_mission(begin)
+            self._begin_mission()
         elif self.tick >= 0:
             self._warn_of_curves()
 
@@ -899,17 +900,14 @@ class Onboard:
         if problem:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, f"Mission will not start: {problem}")
 
-    def _begin_mission(self, prepared_for: MissionBegin) -> None:
-        """Begin the mission that waited for its paths, or report why not. If it begins elsewhere by now, it
-        waits for other paths."""
+    def _begin_mission(self) -> None:
+        """Begin the mission that waited for its paths, or report why not."""
         verdict = self.core.handle_request(StartMission(None), self.now_us)
         self.endpoint.state_changed()
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             self.core.replace_flight(interrupt_mission(self.core.flight))
             text, subject = verdict.text or "Mission denied", mavlink.MAV_CMD_MISSION_START
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text, subject)
-        elif self.core.flight.mission.waiting and self._mission_begin() != prepared_for:
-            self._prepare()
 
     def _set_prepared(self, prepared: PreparedPaths) -> None:
         flight = self.core.flight

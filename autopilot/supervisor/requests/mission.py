@@ -35,7 +35,7 @@ from missions import model
 
 
 def _accepted_pending(what: str) -> Verdict:
-    """What holds, or stands armed, until its paths are prepared."""
+    """The verdict on a request for which the vehicle holds, or stands armed, until paths are prepared."""
     return ACCEPTED._replace(text=f"{what} begins when its paths are prepared")
 
 
