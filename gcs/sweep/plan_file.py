@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from autopilot.shell.atomic_file import write_atomically
 from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
@@ -48,9 +49,7 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
                 "flights"
             )
     fields = {"command": command, "flights": plan.flights, "origin": origin.to_json()}
-    unfinished = path.with_suffix(".unfinished")
-    unfinished.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
-    unfinished.replace(path)
+    write_atomically(path, (json.dumps(fields, indent=2) + "\n").encode())
 
 
 def _extends(plan: SweepPlan, origin: Origin, found: Mapping[str, Any]) -> bool:

@@ -64,8 +64,6 @@ def sweep(
             store.clear()
             (directory / PLAN_FILE).unlink(missing_ok=True)
         store_plan(directory, plan, command, sweep_origin(plan))
-        if store.parts():
-            store.merge()  # parts of a sweep that was killed; their names are those of its plan
         try:
             return _fly_missing(plan, store, workers, stopped, quiet, warm)
         except OSError as error:
@@ -85,6 +83,8 @@ def _fly_missing(
     quiet: bool,
     warm: Callable[[Iterable[Part]], None],
 ) -> SweepResult:
+    if store.parts():
+        store.merge()  # parts of a sweep that was killed; their names are those of its plan
     stored = store.stored_indices()
     missing = [case for case in plan.cases() if case.index not in stored]
     is_complete, flown, wall_s = True, 0, 0.0

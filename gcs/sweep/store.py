@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,13 +100,9 @@ class Store:
 
     def stored_indices(self) -> set[int]:
         """Numbers of the flights that are stored."""
-        import pyarrow.parquet as pq
-
         found: set[int] = set()
-        for path in self._files():
-            found.update(
-                self._numbered(pq.ParquetFile(path).read(columns=["index"])).column("index").to_pylist()
-            )
+        for table in self._tables(["index"]):
+            found.update(table.column("index").to_pylist())
         return found
 
     def add(self, rows: Sequence[Row]) -> None:
@@ -133,15 +129,21 @@ class Store:
     def read(self) -> pyarrow.Table:
         """All that is stored; a flight that was stored twice (by a merge that was killed) counts once."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        # `read_table` and `to_numpy` would import pandas too
-        tables = [self._numbered(pq.ParquetFile(path).read()).cast(self._schema) for path in self._files()]
+        tables = [table.cast(self._schema) for table in self._tables()]
         if not tables:
             return self._schema.empty_table()
         table = pa.concat_tables(tables)
+        # `to_numpy` would import pandas too
         _, first = np.unique(table.column("index").to_pylist(), return_index=True)
         return table.take(array_of(first)).replace_schema_metadata(self._schema.metadata)
+
+    def _tables(self, names: list[str] | None = None) -> Iterator[pyarrow.Table]:
+        """What each file holds, all columns or those of these names, numbered by the present plan."""
+        import pyarrow.parquet as pq
+
+        for path in self._files():
+            yield self._numbered(pq.ParquetFile(path).read(columns=names))  # `read_table` would import pandas
 
     def _numbered(self, table: pyarrow.Table) -> pyarrow.Table:
         """The table of a file with its flights numbered by the present plan, which has all of them."""
