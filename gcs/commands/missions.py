@@ -65,10 +65,9 @@ def check_command(
     station. Every limit that it breaks is printed, with the time and the excess, or else what the vehicle
     would refuse, such as a path that leaves the fence of a .plan; the exit code is then 1. Otherwise the
     duration of each path, its distance from the requested path, and its peaks of rotor force, tension and
-    tilt are printed. With --as-asked the
-    paths are judged as the laws thesis and lqr fly them, without shaping; how closely such a law follows them
-    is not judged. With --planner the paths through waypoints are those of your own planner, whose errors are
-    printed.
+    tilt are printed. With --as-asked the paths are judged as the laws thesis and lqr fly them, without
+    shaping; how closely such a law follows them is not judged. With --planner the paths through waypoints are
+    those of your own planner, whose errors are printed.
     """
     if law is not None:
         raise click.UsageError(

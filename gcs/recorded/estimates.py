@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -94,30 +94,32 @@ def predictions(
     `progress` receives the number of predictions that are done, and of all."""
     windows = []
     work = np.zeros((WORK + SIZE, SIZE))
-    for done, begin in enumerate(starts):
+    for done, (begin, ends) in enumerate(_windows(rows, starts, horizons_s)):
         progress(done, len(starts))
-        ends = _ends(rows, begin, horizons_s)
-        if ends[-1] >= len(rows.time_s):
-            break
         found = np.zeros((len(ends), 5))
         predict_ahead(
             *rows,
             model,
-            int(begin),
+            begin,
             ends.astype(np.float64),
             estimates.states,
             estimates.covariances,
             found,
             work,
         )
-        windows.append(Prediction(int(begin), ends, found[:, :2], found[:, 2:]))
+        windows.append(Prediction(begin, ends, found[:, :2], found[:, 2:]))
     return windows
 
 
-def _ends(rows: FilterRows, begin: np.intp, horizons_s: tuple[float, ...]) -> NDArray[np.intp]:
-    """The rows that lie `horizons_s` after row `begin`."""
-    ends: NDArray[np.intp] = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
-    return ends
+def _windows(
+    rows: FilterRows, starts: NDArray[np.intp], horizons_s: tuple[float, ...]
+) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Each of the rows `starts` with those that lie `horizons_s` after it, as long as there are such rows."""
+    for begin in starts.tolist():
+        ends = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+        if ends[-1] >= len(rows.time_s):
+            return
+        yield begin, ends
 
 
 def swings(
@@ -130,13 +132,10 @@ def swings(
     """Predictions by the vehicle's motion alone, as many of those from rows `starts` on as end within the
     rows: where they begin (k,), where they end (k, horizons), cable directions there (k, horizons, 2)."""
     windows = []
-    for begin in starts:
-        ends = _ends(rows, begin, horizons_s)
-        if ends[-1] >= len(rows.time_s):
-            break
+    for begin, ends in _windows(rows, starts, horizons_s):
         directions = np.zeros((len(ends), 2))
         swing_ahead(
-            *(rows.time_s, rows.drive, model, int(begin)),
+            *(rows.time_s, rows.drive, model, begin),
             *(ends.astype(np.float64), estimates.states, directions),
         )
         windows.append((ends, directions))
