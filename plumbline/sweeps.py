@@ -20,6 +20,7 @@ from plumbline.arguments import (
     file_path,
     items,
     numbers,
+    parameter_name,
     positive,
     setting_arguments,
     shown_value,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from plumbline.sensors import Sensors
     from plumbline.vehicles import Vehicle
 
+Values = Iterable[float] | str  # of a varied parameter
 _ERROR_PREFIX = "gcs: "  # begins the line of a known error
 
 
@@ -42,7 +44,7 @@ _ERROR_PREFIX = "gcs: "  # begins the line of a known error
 def sweep(
     mission: str | Path | Mission,
     *,
-    vary: Mapping[str, Iterable[float] | str] | None = None,
+    vary: Mapping[str, Values] | Mapping[str | tuple[str, ...], Values] | None = None,
     seeds: int = 1,
     sample: int | None = None,
     laws: Sequence[str] = (DEFAULT_LAW,),
@@ -65,6 +67,8 @@ def sweep(
     `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
     of `gcs sweep --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings
     (Latin hypercube) instead of the whole grid; of a list it draws the listed values, also if there are two.
+    Parameters that are a key together, as `("SIM_CABLE_LEN", "VEH_CABLE_LEN")`, have the same value in each
+    flight, and the table has the column of the first.
     `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
     of the vehicle's clock; by default one and a half times the expected duration plus a minute.
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
@@ -95,8 +99,8 @@ def sweep(
         for law in _laws(laws):
             arguments += ["--law", law_reference(law)]
         arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
-        for name, values in values_by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
-            arguments += ["--vary", f"{name}={_values(name, values)}"]
+        for varied in _varied(vary):
+            arguments += ["--vary", varied]
         if sample is not None:
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
         for setting in setting_arguments(settings):
@@ -116,6 +120,23 @@ def sweep(
         from pyarrow import parquet
 
         return as_frame(parquet.read_table(folder / "flights.parquet"), kind)
+
+
+def _varied(vary: Any) -> list[str]:
+    """Varied parameters with their values, as the command line writes them; or `Error`."""
+    together = {}
+    if isinstance(vary, Mapping):
+        together = {key: values for key, values in vary.items() if isinstance(key, tuple) and key}
+        vary = {key: values for key, values in vary.items() if key not in together}
+    example = "{'SIM_WIND_E': [0, 3]}"
+    texts = [
+        f"{name}={_values(name, values)}"
+        for name, values in values_by_parameter("vary", vary, example).items()
+    ]
+    for key, values in together.items():
+        names = "=".join(parameter_name("vary", name) for name in key)
+        texts.append(f"{names}={_values(names, values)}")
+    return texts
 
 
 def _values(name: str, values: Any) -> str:

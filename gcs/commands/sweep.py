@@ -48,7 +48,7 @@ from gcs.shell.display import notify, results_to_stdout
     metavar="NAME=VALUES",
     multiple=True,
     help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample NAME=LOW:HIGH or NAME=A,B,C; "
-    "repeatable.",
+    "NAME=NAME=... gives several the same values; repeatable.",
 )
 @click.option(
     "--set",
@@ -131,6 +131,7 @@ def sweep_command(
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5
     gcs sweep case-b --law plumbline --law thesis --vary SIM_NOISE_SCALE=0.5:4:8 --vary SIM_SENS_LAT_MS=0,5,10
     gcs sweep case-c --vary SIM_LOAD_MASS=0.05:0.15 --vary SIM_GUST_STD=0:2 --sample 500
+    gcs sweep case-b --vary SIM_CABLE_LEN=VEH_CABLE_LEN=0.5:2:4 --seeds 5
     """
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)

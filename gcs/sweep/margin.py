@@ -204,12 +204,15 @@ def linear_range(
     fixed = {known: value for known, value in plan.settings if known not in own_parameters}
     fixed["CTL_LAW"] = float(LAWS.index(law))
 
-    def is_stable(value: float) -> bool:
-        return eigenvalue_moduli(plan.vehicle, {**fixed, name: value})[-1] < STABILITY_LIMIT
+    def moduli(value: float) -> list[float]:
+        varied = plan.with_followers({name: value})
+        known = {one: value for one in varied if one not in own_parameters}
+        return eigenvalue_moduli(plan.vehicle, {**fixed, **known})
 
-    nominal, low, high = (
-        eigenvalue_moduli(plan.vehicle, {**fixed, name: value}) for value in (nominal_value, *limits)
-    )
+    def is_stable(value: float) -> bool:
+        return moduli(value)[-1] < STABILITY_LIMIT
+
+    nominal, low, high = (moduli(value) for value in (nominal_value, *limits))
     if nominal == low == high:
         return ""
     if nominal[-1] >= STABILITY_LIMIT:

@@ -54,11 +54,17 @@ class PlanError(GcsError):
 @dataclass(frozen=True)
 class VariedParameter:
     """A parameter and its values: on a grid, each of `values`; if drawn and `continuous`, any number between
-    the least and the greatest of them."""
+    the least and the greatest of them. The parameters in `followers` have the same value in each flight."""
 
     name: str
     values: tuple[float, ...]
     continuous: bool
+    followers: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All parameters that have the value."""
+        return (self.name, *self.followers)
 
 
 @dataclass(frozen=True)
@@ -110,7 +116,7 @@ class SweepPlan:
             return False
         if self.sample:  # what is drawn depends on all values
             return self.varied == other.varied
-        return [v.name for v in self.varied] == [v.name for v in other.varied] and all(
+        return [v.names for v in self.varied] == [v.names for v in other.varied] and all(
             set(old.values) <= set(new.values) for old, new in zip(other.varied, self.varied, strict=True)
         )
 
@@ -135,6 +141,7 @@ class SweepPlan:
     def conditions(self, case: Case) -> Conditions:
         """The conditions under which the flight is flown."""
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
+        varied = self.with_followers(varied)
         law = {"CTL_LAW": float(law_number(case.law))}
         settings = {**self.known_to(case.law, {**dict(self.settings), **varied}), **law}
         return Conditions(
@@ -146,6 +153,11 @@ class SweepPlan:
             self.limit_s,
             self.foreign_to(case.law),
         )
+
+    def with_followers(self, varied: Mapping[str, T]) -> dict[str, T]:
+        """The values of varied parameters by name, also under the names of those that have the same value."""
+        followers = {v.name: v.followers for v in self.varied}
+        return {name: value for one, value in varied.items() for name in (one, *followers.get(one, ()))}
 
     def known_to(self, law: str, settings: Mapping[str, T]) -> dict[str, T]:
         """Those of the settings (or of other values) by name that a flight with this law takes: not the
@@ -171,7 +183,10 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
         laws=tuple(values["laws"]),
         seeds=tuple(values["seeds"]),
         varied=tuple(
-            VariedParameter(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]
+            VariedParameter(
+                v["name"], tuple(v["values"]), bool(v["continuous"]), tuple(v.get("followers", ()))
+            )
+            for v in values["varied"]
         ),
         settings=tuple((name, float(value)) for name, value in values["settings"]),
         sample=int(values["sample"]),
@@ -189,10 +204,14 @@ def _drawn_value(varied: VariedParameter, fraction: float) -> float:
 
 
 def parse_varied(text: str, sampled: bool) -> VariedParameter:
-    """NAME=A,B,C, or NAME=LOW:HIGH:COUNT, or, if values are `sampled`, NAME=LOW:HIGH."""
-    name, equals, values = text.partition("=")
-    name = name.strip().upper()
-    if not equals or not name or not values.strip():
+    """NAME=A,B,C, or NAME=LOW:HIGH:COUNT, or, if values are `sampled`, NAME=LOW:HIGH.
+
+    NAME=NAME=... varies several parameters together: all of them have the same value.
+    """
+    *texts, values = text.split("=")
+    name, *others = [one.strip().upper() for one in texts] or [""]
+    followers = tuple(others)
+    if not all([name, *others]) or not values.strip():
         raise PlanError(
             f"--vary {text}: must be NAME=LOW:HIGH:COUNT or NAME=A,B,C, e.g. SIM_ACT_DELAY_MS=0:60:7"
         )
@@ -201,7 +220,7 @@ def parse_varied(text: str, sampled: bool) -> VariedParameter:
         duplicate = next((one for i, one in enumerate(listed) if one in listed[:i]), None)
         if duplicate is not None:
             raise PlanError(f"--vary {text}: {duplicate:g} is there twice; --seeds flies it more than once")
-        return VariedParameter(name, listed, False)
+        return VariedParameter(name, listed, False, followers)
     parts = values.split(":")
     if len(parts) not in (2, 3):
         raise PlanError(f"--vary {text}: must be NAME=LOW:HIGH:COUNT, or NAME=LOW:HIGH with --sample")
@@ -211,9 +230,9 @@ def parse_varied(text: str, sampled: bool) -> VariedParameter:
     if len(parts) == 2:
         if not sampled:
             raise PlanError(f"--vary {text}: a range without a count is for --sample; append a count, as :7")
-        return VariedParameter(name, (low, high), True)
+        return VariedParameter(name, (low, high), True, followers)
     if sampled:
-        without_count = f"{name}={parts[0].strip()}:{parts[1].strip()}"
+        without_count = f"{'='.join([name, *others])}={parts[0].strip()}:{parts[1].strip()}"
         raise PlanError(
             f"--vary {text}: --sample draws from the whole range, without a count; give {without_count}"
         )
@@ -222,9 +241,8 @@ def parse_varied(text: str, sampled: bool) -> VariedParameter:
         raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MAX_VALUES}")
     n = int(count)
     # rounded to twelve digits: 0.1 and not 0.30000000000000004
-    return VariedParameter(
-        name, tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n)), True
-    )
+    even = tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n))
+    return VariedParameter(name, even, True, followers)
 
 
 def _parse_number(text: str, number: str) -> float:
@@ -251,7 +269,7 @@ def make_plan(
 ) -> SweepPlan:
     """The plan; PlanError states what is wrong with it. The estimator and planner of `own` are those of all
     flights."""
-    names = [v.name for v in varied]
+    names = [name for v in varied for name in v.names]
     for name in names:
         if names.count(name) > 1:
             raise PlanError(f"--vary {name} is given twice; give all its values in one")
@@ -266,7 +284,7 @@ def make_plan(
         world, table = _tables(vehicle, own_of_law, foreign)
         if sample:
             varied = [_drawable(one, world, table) for one in varied]
-        values = [*((one.name, value) for one in varied for value in one.values), *settings.items()]
+        values = [*varied_values(varied), *settings.items()]
         known_values = [one for one in values if one[0] not in foreign]
         _check_values(world, table, known_values, settings)
         if any(own_of_law):
@@ -293,6 +311,11 @@ def make_plan(
     if plan.flights > MAX_FLIGHTS:
         raise PlanError(f"{plan.flights} flights are too many, {MAX_FLIGHTS} at most; --sample takes a few")
     return plan
+
+
+def varied_values(varied: Sequence[VariedParameter]) -> list[tuple[str, float]]:
+    """Each value that a parameter has in some flight, with its name."""
+    return [(name, value) for one in varied for name in one.names for value in one.values]
 
 
 def own_parameter_names(own: OwnCode) -> frozenset[str]:
@@ -345,16 +368,16 @@ def _tables(vehicle: str, own: OwnCode, foreign: frozenset[str]) -> tuple[Parame
 
 
 def _drawable(varied: VariedParameter, world: ParameterTable, table: ParameterTable) -> VariedParameter:
-    """What is drawn from a range: whole numbers, if the parameter takes no others."""
-    owner = world if varied.name in world else table
+    """What is drawn from a range: whole numbers, if one of the parameters takes no others."""
     low, high = min(varied.values), max(varied.values)
-    if not (varied.continuous and varied.name in owner and owner.describe(varied.name).integer):
+    described = [owner.describe(name) for name in varied.names for owner in (world, table) if name in owner]
+    if not (varied.continuous and any(parameter.integer for parameter in described)):
         return varied
     if not (low.is_integer() and high.is_integer()):
         return varied
     if high - low >= _MAX_VALUES:
         raise PlanError(f"--vary {varied.name}={low:g}:{high:g}: more than {_MAX_VALUES} whole numbers")
-    return VariedParameter(varied.name, tuple(map(float, range(int(low), int(high) + 1))), False)
+    return replace(varied, values=tuple(map(float, range(int(low), int(high) + 1))), continuous=False)
 
 
 def _check_values(

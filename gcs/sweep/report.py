@@ -87,7 +87,7 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
     """A map for `sweep.js`: cells in the order of the first parameter, then the second."""
     found = cells(flights, plan, names)
     rows = found.shown.ravel().tolist()
-    values = plan.known_to(flights.reference, flights.values)
+    values = plan.known_to(flights.reference, plan.with_followers(flights.values))
     return {
         "base": base_command(plan, flights.reference),
         "law": flights.law,

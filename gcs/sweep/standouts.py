@@ -83,7 +83,7 @@ def _standout(flights: Flights, kind: str, row: int) -> Standout:
 def flight_settings(plan: SweepPlan, law: str, varied: Mapping[str, float]) -> tuple[str, ...]:
     """NAME=VALUE for each setting of a flight with this law, with the digits that give exactly the same
     numbers."""
-    settings = plan.known_to(law, {**dict(plan.settings), **varied})
+    settings = plan.known_to(law, {**dict(plan.settings), **plan.with_followers(varied)})
     return tuple(f"{name}={value!r}" for name, value in settings.items())
 
 
@@ -110,7 +110,7 @@ def base_command(plan: SweepPlan, law: str) -> str:
 def repeat_command(plan: SweepPlan, flight: Standout, directory: Path) -> str:
     """The command that flies it again into the directory of the sweep, and overwrites an earlier repeat."""
     words = ["--law", flight.reference, "--seed", str(flight.seed)]
-    for name, value in plan.known_to(flight.reference, flight.varied).items():
+    for name, value in plan.known_to(flight.reference, plan.with_followers(flight.varied)).items():
         words += ["--set", f"{name}={value!r}"]
     out = shlex.join(["--out", str(directory / REPEATS_FOLDER / flight.name), "--overwrite"])
     return f"{base_command(plan, flight.reference)} {shlex.join(words)} {out}"

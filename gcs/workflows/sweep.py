@@ -17,7 +17,7 @@ from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied
+from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied, varied_values
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import SweepResult, sweep
@@ -177,7 +177,7 @@ def _print_warnings(plan: SweepPlan) -> None:
         notify(line)
     for option, values in (
         ("--set", list(plan.settings)),
-        ("--vary", [(one.name, value) for one in plan.varied for value in one.values]),
+        ("--vary", varied_values(plan.varied)),
     ):
         lines = setting_warnings(plan.vehicle, values)
         for line in {line.split(maxsplit=1)[0]: line for line in reversed(lines)}.values():

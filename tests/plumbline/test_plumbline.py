@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -150,10 +150,14 @@ def test_a_sweep_is_a_table() -> None:
 
 
 def test_settings_that_are_drawn() -> None:
-    vary = {"SIM_LOAD_MASS": "0.06:0.08", "SIM_ACT_DELAY_MS": [0, 12]}
+    vary: Mapping[str | tuple[str, ...], str | Sequence[float]] = {
+        ("SIM_LOAD_MASS", "veh_load_mass"): "0.06:0.08",
+        "SIM_ACT_DELAY_MS": [0, 12],
+    }
     found = plumbline.sweep("hover", vary=vary, sample=3, sensors="ideal", jobs=1)
     assert found["SIM_LOAD_MASS"].between(0.06, 0.08).all() and found["SIM_LOAD_MASS"].nunique() == 3
-    assert set(found["SIM_ACT_DELAY_MS"]) == {0.0, 12.0}
+    assert set(found["SIM_ACT_DELAY_MS"]) == {0.0, 12.0} and "VEH_LOAD_MASS" not in found
+    assert found["load_error_max_m"].max() < 0.01  # a wrong mass costs more
 
 
 def test_a_library_that_is_missing_is_named_before_anything_is_flown(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks import cascade_margin
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan import SweepPlan, VariedParameter
 
 
 def limits(law: str, name: str, nominal: float, to: tuple[float, float]) -> str:
@@ -23,6 +25,22 @@ def test_delay_of_the_thesis_cascade_is_that_of_the_margin_tool() -> None:
 
 def test_what_the_linear_loop_does_not_know_has_no_limit() -> None:
     assert limits("thesis", "SIM_NOISE_SCALE", 1.0, (0.5, 2.0)) == ""
+
+
+def test_parameters_that_are_varied_together_are_so_in_the_linear_loop() -> None:
+    noise = VariedParameter("SIM_NOISE_SCALE", (0.0, 5.0), True)
+    delay = replace(noise, followers=("SIM_ACT_DELAY_MS",))
+    alone, together = (
+        linear_range(
+            SweepPlan("hover", "bebop", "lab", ("thesis",), (1,), (one,), ()),
+            "thesis",
+            "SIM_NOISE_SCALE",
+            0.0,
+            (0.0, 5.0),
+        )
+        for one in (noise, delay)
+    )
+    assert (alone, together) == ("", "0 … > 5")
 
 
 def test_a_gain_of_no_damping_is_no_place_to_be() -> None:

@@ -35,6 +35,9 @@ def test_ranges_and_lists() -> None:
         "SIM_SENS_LAT_MS", (0.0, 5.0, 10.0), False
     )
     assert parse_varied("SIM_SENS_LAT_MS=0:10", True) == VariedParameter("SIM_SENS_LAT_MS", (0.0, 10.0), True)
+    assert parse_varied("SIM_CABLE_LEN = veh_cable_len = 0.5,1", False) == VariedParameter(
+        "SIM_CABLE_LEN", (0.5, 1.0), False, ("VEH_CABLE_LEN",)
+    )
 
 
 @pytest.mark.parametrize(
@@ -52,6 +55,8 @@ def test_ranges_and_lists() -> None:
         "SIM_WIND_E=1:2:2.5",
         "SIM_WIND_E=1:2:3:4",
         "SIM_WIND_E=1:2",
+        "SIM_WIND_E==1,2",
+        "SIM_WIND_E=SIM_WIND_N=",
     ],
 )
 def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
@@ -94,8 +99,14 @@ def test_wrong_combinations_are_refused(short: str) -> None:
     wind = VariedParameter("SIM_WIND_E", (1.0, 2.0), False)
     with pytest.raises(PlanError, match="twice"):
         planned(short, [wind, wind], {})
+    with pytest.raises(PlanError, match="--vary SIM_WIND_E is given twice"):
+        planned(short, [wind, VariedParameter("SIM_WIND_N", (1.0,), False, ("SIM_WIND_E",))], {})
     with pytest.raises(PlanError, match="varied and set"):
         planned(short, [wind], {"SIM_WIND_E": 1.0})
+    with pytest.raises(PlanError, match="SIM_WIND_N is both varied and set"):
+        planned(short, [replace(wind, followers=("SIM_WIND_N",))], {"SIM_WIND_N": 1.0})
+    with pytest.raises(PlanError, match="--vary SIM_CABLE_LEN = 80"):
+        planned(short, [VariedParameter("VEH_CABLE_LEN", (1.0, 80.0), False, ("SIM_CABLE_LEN",))], {})
     with pytest.raises(PlanError, match="there is none"):
         planned(short, [], {}, sample=3)
     with pytest.raises(PlanError, match="nowhere"):
@@ -114,6 +125,20 @@ def test_every_setting_is_flown_with_every_law_and_seed(short: str) -> None:
     conditions = plan.conditions(cases[-1])
     assert conditions.seed == 2
     assert conditions.settings == {"SIM_WIND_E": 2.0, "NGC_KX": 7.0, "SIM_WIND_N": 1.0, "CTL_LAW": 1.0}
+
+
+def test_parameters_that_are_varied_together_have_the_same_value(short: str) -> None:
+    length = VariedParameter("SIM_CABLE_LEN", (0.5, 1.0), False, ("VEH_CABLE_LEN",))
+    plan = planned(short, [length], {})
+    assert plan.points == 2 and from_json(plan.to_json()) == plan
+    settings = plan.conditions(next(plan.cases())).settings
+    assert (settings["SIM_CABLE_LEN"], settings["VEH_CABLE_LEN"]) == (0.5, 0.5)
+    told = flight_settings(plan, "thesis", {"SIM_CABLE_LEN": 0.5})
+    assert told == ("SIM_CABLE_LEN=0.5", "VEH_CABLE_LEN=0.5")
+    assert not plan.contains(replace(plan, varied=(replace(length, followers=()),)))
+    rotors = VariedParameter("SIM_WIND_E", (0.0, 4.0), True, ("SIM_ENGINE_FAIL",))
+    drawn = planned(short, [rotors], {}, sample=5)
+    assert sorted(case.varied[0] for case in drawn.cases()) == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 OWN_LAW = """
