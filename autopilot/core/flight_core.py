@@ -48,7 +48,7 @@ from autopilot.core.tick import (
     fly_tick,
     placeholder_law,
 )
-from autopilot.estimation.filter import NO_LOAD, NO_POSE, estimate_loss, estimate_problems
+from autopilot.estimation.filter import NO_LOAD, NO_POSE, estimate_loss, problem_texts
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import (
     Array,
@@ -238,12 +238,12 @@ class FlightCore:
         problems: tuple[str, ...] = ()
         loss_text = ""
         if summary.vehicle_problem or (carries_load and summary.load_problem):
-            estimator, silent_s = self.estimator, summary.inertial_age
-            oldest_s = self.settings.failsafe.sensor_age_limit_s
-            problems = estimate_problems(estimator, oldest_s, carries_load, silent_s)
+            estimator = self.estimator
+            load_problem = summary.load_problem if carries_load else 0
+            problems = problem_texts(estimator, summary.vehicle_problem, load_problem)
             if summary.vehicle_problem == NO_POSE and (reason := start_problem(estimator)):
                 problems = (reason,)
-            loss_text = estimate_loss(estimator, silent_s)
+            loss_text = estimate_loss(estimator, summary.vehicle_problem)
         slot = self._estimator_slot
         if slot is not None and not slot.fault and not slot.host.has_estimate:
             problems += (f"no estimate of {slot.host.estimator.label}",)

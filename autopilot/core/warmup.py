@@ -25,6 +25,7 @@ from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
 from autopilot.trajectory.splines import COLUMNS
+from autopilot.trajectory.timeline import AT_ORIGIN, state_after
 from autopilot.trajectory.waypoint_path import PathSegment
 from missions.model import Signals, Sine, Term, Waypoint
 
@@ -57,6 +58,7 @@ def warm_up_paths(setup: Setup) -> None:
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
     enu_from_ned(ZERO)  # for setpoints of a companion computer
+    state_after(wave, AT_ORIGIN)  # for missions that are decoded
     for leg in legs:
         leg.jet(0.5)
         jets_ahead((leg,), np.array([0.5]))

@@ -1,7 +1,8 @@
 """The estimator as the core uses it: one call for each tick's readings.
 
-`control_state` is the state passed to the control laws; `estimate_problems` states why the estimate
-is not good enough for flight, `estimate_loss` why it is not even good enough for a landing.
+`control_state` is the state passed to the control laws. `vehicle_problem` and `load_problem` decide
+whether the estimate is good enough for flight, `problem_texts` states why it is not, and `estimate_loss`
+why it is not even good enough for a landing.
 """
 
 from __future__ import annotations
@@ -310,24 +311,19 @@ def load_problem(state: EstimatorState, max_age_s: float) -> int:
     return 0 if uncertainty.load <= POSITION_STD_TO_FLY else LOAD_UNSETTLED
 
 
-def estimate_problems(
-    state: EstimatorState, max_age_s: float, carries_load: bool = True, silent_s: float = 0.0
-) -> tuple[str, ...]:
+def problem_texts(state: EstimatorState, *problems: int) -> tuple[str, ...]:
     """Why the estimate is not good enough for flight, in words for the operator; empty if it is.
 
-    Where no load is carried, it need not be known. `silent_s`: age of the last new inertial sample.
+    `problems` are results of `inertial_problem`, `vehicle_problem` and `load_problem`.
     """
-    problems = [inertial_problem(silent_s) or vehicle_problem(state, max_age_s)]
-    if carries_load:
-        problems.append(load_problem(state, max_age_s))
     return tuple(_PROBLEM_TEXTS[code].format(state.uncertainty.horizontal) for code in problems if code)
 
 
-def estimate_loss(state: EstimatorState, silent_s: float) -> str:
-    """Why the estimate is not even good enough for a landing, in words; empty if it is. Written so that NaN
-    is a loss."""
+def estimate_loss(state: EstimatorState, problem: int) -> str:
+    """Why the estimate, with this problem of the vehicle or of its inertial unit, is not even good enough for
+    a landing, in words; empty if it is. Written so that NaN is a loss."""
     uncertainty = state.uncertainty
-    if inertial_problem(silent_s):
+    if problem == NO_INERTIAL:
         return _PROBLEM_TEXTS[NO_INERTIAL]
     if state.vehicle.source == NO_SENSOR or not uncertainty.tilt <= TILT_STD_TO_LAND:
         return _PROBLEM_TEXTS[ATTITUDE_UNSETTLED]

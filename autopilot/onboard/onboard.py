@@ -727,7 +727,7 @@ class Onboard:
         """Call the kernels of the simulator link, of telemetry and of the flight log once."""
         self._sensors.read(b"", -1)
         warm_up_answer()
-        warm_up_telemetry(self.core.setup, self.parameters)
+        warm_up_telemetry(self.core.setup, self.parameters, self.endpoint.identity)
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):

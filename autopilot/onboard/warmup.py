@@ -14,8 +14,10 @@ from autopilot.onboard.log_records import SampleRecords
 from autopilot.onboard.log_topics import FAST, Sample
 from autopilot.onboard.snapshot import CoreSnapshot, Options, SnapshotSource
 from autopilot.onboard.tick_answer import answer_tick
+from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.stream_frames import BITS, StreamFrames
+from autopilot.services.telemetry import STREAMS
 from autopilot.vehicle.battery import Battery
 from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.vehicle.parameters import AutopilotParameters
@@ -25,14 +27,16 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.ulog import UlogWriter
 
 
-def warm_up_telemetry(setup: Setup, parameters: AutopilotParameters) -> None:
-    """Assemble an instant, write its streams, and log it."""
+def warm_up_telemetry(setup: Setup, parameters: AutopilotParameters, identity: Identity) -> None:
+    """Assemble an instant, build and write its streams, and log it."""
     core, options = FlightCore(setup), Options(Home(), 0)
     source = SnapshotSource(
         core, options, parameters, packed(Condition()), SensorInbox(options.home, core.rows.inbox)
     )
     snapshot = CoreSnapshot(source, StoredMission(), 0)
     StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2), Home()).frames(sum(BITS.values()), snapshot.instant)
+    for stream in STREAMS.values():
+        stream.build(snapshot, identity)
     imu = packed(ImuReading(ZERO, ZERO))
     sample = Sample(snapshot, snapshot.instant, imu, True, lambda: snapshot.estimator)
     SampleRecords(UlogWriter(topic for topic, _ in FAST), Home()).records_at(sample, 0)

@@ -16,7 +16,6 @@ from autopilot.control.laws import LAWS
 from autopilot.core.flight_core import FlightCore
 from autopilot.core.tick import FLOWN, TO_DECIDE, fly_tick
 from autopilot.estimation import inbox as box
-from autopilot.estimation.filter import estimate_problems
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import pack
@@ -32,6 +31,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterError
 from missions.model import Delay, Land, Takeoff
 from tests.doubles.craft import Craft
+from tests.doubles.estimate_problems import estimate_problems
 from tests.doubles.plain_python import in_plain_python
 
 TICK_US = 4000

@@ -6,7 +6,7 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.estimation.filter import estimate_problems, load_problem, vehicle_problem
+from autopilot.estimation.filter import load_problem, vehicle_problem
 from autopilot.estimation.records import (
     CAMERA,
     NO_SENSOR,
@@ -16,6 +16,7 @@ from autopilot.estimation.records import (
     Uncertainty,
     blank_state,
 )
+from tests.doubles.estimate_problems import estimate_problems
 
 OLDEST_S = 0.5
 PROMISED = 0.1  # m, slow part of a receiver's error

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from autopilot.estimation.filter import estimate_problems
 from autopilot.estimation.history import correct_past_states, interpolate3, interpolate4, row_before
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.pose import correct_pose
@@ -35,6 +34,7 @@ from autopilot.estimation.records import (
     new_history,
 )
 from autopilot.geometry.linear import ZERO
+from tests.doubles.estimate_problems import estimate_problems
 from tests.doubles.motion import CABLE_LENGTH, TICK_S, Array, Motion, Noise, Trace, bebop_tuning, track
 from tests.doubles.readings import Readings, estimate
 

@@ -33,7 +33,7 @@ TILT_TO_ARM_RAD = math.radians(20.0)
 
 def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str, ...]:
     """What keeps the vehicle from being armed, in words."""
-    # `view.estimate_problems` are the estimator's: `autopilot.estimation.filter.estimate_problems`
+    # `view.estimate_problems` are the estimator's: `autopilot.estimation.filter.problem_texts`
     problems = [*chain.from_iterable(flight.external_arming_problems.values()), *view.estimate_problems]
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         problems.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
