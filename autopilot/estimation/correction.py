@@ -221,6 +221,7 @@ def load_with_status(load: LoadEstimate, age_s: float, rejected: float, source: 
         age_s,
         rejected,
         source,
+        load.laid_height,
     )
 
 
@@ -261,6 +262,7 @@ def corrected_load(
         load.age_s,
         load.rejected,
         load.source,
+        load.laid_height,
     )
 
 

@@ -148,6 +148,7 @@ def predict_taut(
         load.age_s + dt,
         load.rejected,
         load.source,
+        load.laid_height,
     )
 
 
@@ -195,6 +196,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
         load.age_s + dt,
         load.rejected,
         load.source,
+        load.laid_height,
     )
 
 

@@ -177,6 +177,9 @@ class VehicleEstimate(NamedTuple):
     source: float  # NO_SENSOR, TRACKER or RECEIVER
 
 
+NOT_LAID = -1e6  # m, a height below all others
+
+
 class LoadEstimate(NamedTuple):
     """Load and cable. While the cable is slack, `covariance` is that of the load's position and velocity, the
     same on each axis."""
@@ -198,6 +201,7 @@ class LoadEstimate(NamedTuple):
     age_s: float
     rejected: float
     source: float  # NO_SENSOR, TRACKER or CAMERA
+    laid_height: float  # m, at which it lay when its cable came taut; NOT_LAID if it was in the air
 
 
 class SensorErrors(NamedTuple):
@@ -319,6 +323,7 @@ def blank_state() -> EstimatorState:
             age_s=inf,
             rejected=0.0,
             source=NO_SENSOR,
+            laid_height=NOT_LAID,
         ),
         sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0),

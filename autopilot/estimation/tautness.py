@@ -18,6 +18,7 @@ from autopilot.estimation.records import (
     DIRECTION,
     LENGTH,
     MOUNTING,
+    NOT_LAID,
     POSITION,
     RATE,
     SIZE,
@@ -32,6 +33,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, axpy, column, cross, norm, sub
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import force_along_cable, normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -47,11 +49,17 @@ MIN_FULL_PULL = 0.5  # share of the load's weight that this pull has at least
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 # What takes the pull of a load away that is above the ground by IN_AIR_HEIGHT (m) and some deviations is a
 # gust, or a slack cable that pulls again before anything could be done about it, as nothing shows where the
-# load falls; unless it was lost, which is certain after LOST_S.
-IN_AIR_HEIGHT, LOST_S = 0.1, 1.0
-# Share of the cable length below which a pull does not count, unless the load is above the ground by this
-# height (m) and some deviations: only the cable can hold it there.
-PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.5, 3.0
+# load falls; unless it was lost, which is certain after LOST_S without a pull. A camera that sees the load
+# where the pendulum says shows that it hangs: it is then lost only after LOST_IN_VIEW_S, longer than gusts
+# last. This view may be MAX_VIEW_AGE_S old.
+IN_AIR_HEIGHT, LOST_S, LOST_IN_VIEW_S, MAX_VIEW_AGE_S = 0.1, 1.0, 5.0, 0.3
+# A pull counts above the second share of the cable length less some deviations of the distance, and not below
+# the first, unless the load is above the ground by HELD_HEIGHT (m) and some deviations: only the cable can
+# hold it there.
+MIN_PULL_DISTANCE, PULL_DISTANCE, HELD_HEIGHT, HELD_SIGMAS = 0.75, 0.95, 0.5, 3.0
+# A load that is being lifted is not below the height (m) at which it lay, beyond this and some deviations: it
+# is a gust that pulls.
+SUNK_HEIGHT = 0.05
 # A cable whose upper end is this share of its length above the load, and some deviations of the height, must
 # be taut: less pull is enough there, since the load may be lighter than assumed, and a gust may hide some.
 STRETCHED_HEIGHT, STRETCHED_SIGMAS, STRETCHED_PULL = 1.02, 2.0, 0.4
@@ -131,11 +139,23 @@ def _is_above_ground(load: LoadEstimate, history: History, height: float, tuning
 
 
 @kernel
+def _is_sunk(load: LoadEstimate, history: History) -> bool:
+    """Whether a load without a tracker that is being lifted would be in the ground, so that its cable cannot
+    be taut."""
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    lowest = load.laid_height - SUNK_HEIGHT - HELD_SIGMAS * height_std
+    return load.tautness_age_s <= LIFTING_S and load.x_load[2] < lowest
+
+
+@kernel
 def _may_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
 ) -> bool:
     """Whether a cable that counts as slack, of a load without a tracker, may be what pulls at the vehicle."""
-    is_long = norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length
+    distance_std = sqrt(history.covariance[POSITION + 2, POSITION + 2] + load.covariance[0])
+    min_distance = PULL_DISTANCE * tuning.cable_length - HELD_SIGMAS * distance_std
+    distance = norm(sub(load.x_load, vehicle.x_quad))
+    is_long = distance > max(min_distance, MIN_PULL_DISTANCE * tuning.cable_length)
     return is_long or _is_above_ground(load, history, HELD_HEIGHT, tuning)
 
 
@@ -214,6 +234,7 @@ def _with_tautness(
         load.age_s,
         load.rejected,
         load.source,
+        load.laid_height,
     )
 
 
@@ -252,6 +273,8 @@ def tauten(
 ) -> LoadEstimate:
     """The load on a taut cable: direction and rate of the cable replace its own position and velocity."""
     P = history.covariance
+    is_in_air = _is_above_ground(load, history, IN_AIR_HEIGHT, tuning)
+    load = with_field(load, "laid_height", NOT_LAID if is_in_air else load.x_load[2])
     zero_covariance(P, DIRECTION, 5)
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
     across, along = load.across, cross(load.q_cable, load.across)
@@ -289,11 +312,14 @@ def tauten(
 
 @kernel
 def slacken(load: LoadEstimate, history: History, position_var: float, velocity_var: float) -> LoadEstimate:
-    """The load tracked separately from now on, with these variances; the cable's errors are dropped."""
+    """The load tracked separately from now on, with these variances; the cable's errors are dropped. A load
+    without a tracker that was being lifted lies at the height at which it lay before."""
     zero_covariance(history.covariance, DIRECTION, 5)
-    at_rest = (0.0, 0.0, 0.0)
+    at_rest, x_load = (0.0, 0.0, 0.0), load.x_load
+    if load.source != TRACKER and load.tautness_age_s <= LIFTING_S and load.laid_height > NOT_LAID:
+        x_load = (x_load[0], x_load[1], load.laid_height)
     return LoadEstimate(
-        load.x_load,
+        x_load,
         load.v_load if load.source == TRACKER else at_rest,
         load.q_cable,
         load.q_cable_dot,
@@ -308,7 +334,17 @@ def slacken(load: LoadEstimate, history: History, position_var: float, velocity_
         load.age_s,
         load.rejected,
         load.source,
+        load.laid_height,
     )
+
+
+@kernel
+def _slack_after_s(load: LoadEstimate, history: History, tuning: EstimatorTuning) -> float:
+    """The time (s) without a pull after which the cable of a load without a tracker is slack."""
+    if not _is_above_ground(load, history, IN_AIR_HEIGHT, tuning):
+        return PULL_SLACK_S
+    in_view = load.rejected == 0.0 and load.age_s < MAX_VIEW_AGE_S
+    return LOST_IN_VIEW_S if in_view else LOST_S
 
 
 @kernel
@@ -359,8 +395,7 @@ def detect_tautness(
     full_pull = max(weight - max(missing_pull, 0.0), MIN_FULL_PULL * weight)
     is_slack = pull + min(missing_pull, 0.0) < PULL_SLACK * full_pull
     load = _with_tautness(load, 1.0, load.length, pull, load.pull_duration_s + dt if is_slack else 0.0)
-    is_in_air = _is_above_ground(load, history, IN_AIR_HEIGHT, tuning)
-    if load.pull_duration_s > (LOST_S if is_in_air else PULL_SLACK_S):
+    if load.pull_duration_s > _slack_after_s(load, history, tuning) or _is_sunk(load, history):
         P = history.covariance
         L = load.length
         var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
@@ -387,4 +422,5 @@ def with_load_position(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
         load.age_s,
         load.rejected,
         load.source,
+        load.laid_height,
     )

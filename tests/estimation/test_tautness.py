@@ -13,6 +13,7 @@ from autopilot.estimation.records import (
     CAMERA,
     DIRECTION,
     MOUNTING,
+    NOT_LAID,
     POSITION,
     RATE,
     SIZE,
@@ -102,11 +103,18 @@ THRUST = 4.0
 HEIGHT_STD = 0.01
 
 
-def after(load: LoadEstimate, pull: float, missing: float, height: float, seconds: float) -> LoadEstimate:
-    """A load that a camera sees, with the vehicle level at a height over it and this pull (weights of the
-    load), of which this part has been missing for long."""
+def after(
+    load: LoadEstimate,
+    pull: float,
+    missing: float,
+    height: float,
+    seconds: float,
+    height_std: float = HEIGHT_STD,
+) -> LoadEstimate:
+    """A load that a camera sees, with the vehicle level at a height over it (cable lengths) and this pull
+    (weights of the load), of which this part has been missing for long."""
     history = new_history()
-    history.covariance[POSITION + 2, POSITION + 2] = HEIGHT_STD**2
+    history.covariance[POSITION + 2, POSITION + 2] = height_std**2
     vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
     specific_force = (THRUST - pull * WEIGHT) / TUNING.quad_mass
     imu = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, specific_force))
@@ -155,20 +163,71 @@ def test_a_load_that_comes_to_the_ground_slackens_the_cable_whatever_was_missing
     assert after(hanging, 1.0 - missing, missing, 1.0, 0.6).taut == (1.0 if missing < 0.9 else 0.0)
 
 
+IN_VIEW: dict[str, float] = {}
+HIDDEN, ELSEWHERE = {"age_s": 0.4}, {"rejected": 1.0}
+
+
 @pytest.mark.parametrize(
-    ("height_m", "seconds", "is_taut"),
+    ("height_m", "seconds", "seen", "is_taut"),
     [
-        (2.0, 0.9, True),  # a gust hides the pull, or the load is in the air for a moment
-        (2.0, 1.2, False),  # the load was lost
-        (TUNING.load_height + 0.2, 0.9, True),
-        (TUNING.load_height + 0.1, 0.4, False),  # perhaps on the ground
+        (2.0, 0.9, HIDDEN, True),  # a gust hides the pull, or the load is in the air for a moment
+        (2.0, 1.2, HIDDEN, False),  # the load was lost
+        (2.0, 1.2, ELSEWHERE, False),
+        (2.0, 4.9, IN_VIEW, True),  # it swings on
+        (2.0, 5.2, IN_VIEW, False),
+        (TUNING.load_height + 0.2, 0.9, IN_VIEW, True),
+        (TUNING.load_height + 0.1, 0.4, IN_VIEW, False),  # perhaps on the ground
     ],
 )
 def test_the_cable_of_a_load_in_the_air_is_not_slack_because_its_pull_is_gone_for_a_moment(
-    height_m: float, seconds: float, is_taut: bool
+    height_m: float, seconds: float, seen: dict[str, float], is_taut: bool
 ) -> None:
-    hanging = laid(height_m)._replace(taut=1.0, pull=WEIGHT, tension=WEIGHT)
+    hanging = laid(height_m)._replace(taut=1.0, pull=WEIGHT, tension=WEIGHT, **seen)
     assert after(hanging, 0.0, 0.0, 1.0, seconds).taut == is_taut
+
+
+@pytest.mark.parametrize(
+    ("sunk_m", "age_s", "is_taut"),
+    [(0.07, 1.0, True), (0.09, 1.0, False), (0.09, 4.1, True)],  # 0.05 m and three deviations
+)
+def test_a_load_that_is_lifted_and_would_be_in_the_ground_lies_where_it_lay(
+    sunk_m: float, age_s: float, is_taut: bool
+) -> None:
+    """A gust pulls at a vehicle that sinks."""
+    lay_m = 0.4  # the ground is not everywhere as high as at home
+    lifted = laid(lay_m - sunk_m)._replace(
+        taut=1.0, pull=WEIGHT, tension=WEIGHT, tautness_age_s=age_s, laid_height=lay_m
+    )
+    found = after(lifted, 1.0, 0.0, 1.0, DT)
+    assert (found.taut > 0.0, found.x_load[2]) == (is_taut, lay_m - sunk_m if is_taut else lay_m)
+
+
+def test_a_load_whose_cable_comes_taut_in_the_air_has_lain_nowhere() -> None:
+    def taut_at(height_m: float) -> LoadEstimate:
+        return after(laid(height_m), 1.0, 0.0, 0.99, 0.5)
+
+    assert taut_at(TUNING.load_height).laid_height == TUNING.load_height
+    assert taut_at(2.0).laid_height == NOT_LAID
+    falling = taut_at(2.0)._replace(x_load=(0.0, 0.0, 1.0), tension=WEIGHT)
+    assert after(falling, 1.0, 0.0, 1.0, 0.5).taut > 0.0
+    assert after(falling, 0.0, 0.0, 1.0, 5.5).x_load[2] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("place_std_m", "height_std_m", "height", "is_taut"),
+    [
+        (0.0, 0.01, 0.89, False),
+        (0.0, 0.01, 0.92, True),  # 0.95 of the cable less three deviations
+        (0.02, 0.01, 0.89, True),
+        (0.0, 0.05, 0.76, True),
+        (0.05, 0.05, 0.74, False),
+    ],
+)
+def test_a_pull_counts_where_the_cable_may_be_long_enough(
+    place_std_m: float, height_std_m: float, height: float, is_taut: bool
+) -> None:
+    load = laid()._replace(covariance=(place_std_m**2, 0.0, 0.0))
+    assert (after(load, 1.0, 0.0, height, 0.28, height_std_m).taut > 0.0) == is_taut
 
 
 def missed(load: LoadEstimate, before: float, height: float, seconds: float) -> float:

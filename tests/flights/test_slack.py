@@ -121,12 +121,14 @@ def test_of_a_load_that_no_tracker_sees_a_cable_that_is_slack_for_a_moment_is_no
     assert craft.truth.x_load[2] == pytest.approx(5.0, abs=0.1)
 
 
-@pytest.mark.parametrize("seed", [1, 6, 24])
-def test_a_gust_that_hides_the_pull_of_the_load_makes_no_vehicle_dive(seed: int) -> None:
-    """Gusts of 3 m/s around 5 m/s: of 32 such flights 14 used to be completed, 29 are now."""
+@pytest.mark.parametrize("seed", [24, 39, 120, 136, 173])
+def test_a_gust_that_hides_or_imitates_the_pull_of_the_load_makes_no_vehicle_dive(seed: int) -> None:
+    """Gusts of 3 m/s around 5 m/s: of 200 such flights, six used to be lost and eight dived after a load that
+    hung on the cable, or lay on the ground and was taken for one that hung."""
     mission = load_mission("case-b")
     gusts = {"SIM_WIND_E": 5.0, "SIM_GUST_STD": 3.0, "MIS_INFEASIBLE": 1.0}
     conditions = Conditions(sensors="rtk", seed=seed, settings=gusts)
     flown = fly(mission, conditions, start_times(mission, conditions))
-    assert not any("slack" in text.lower() for text in flown.texts)
+    assert not any("falling" in text for text in flown.texts)
     assert flown.outcome == "completed"
+    assert flown.load_error_max_m < 0.3  # of those that dived up to 2 m

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from autopilot.guidance.legs import CatchLoad, Hold
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.machine import transition
@@ -53,6 +55,29 @@ def test_a_catch_that_ends_on_the_ground_ends_the_flight() -> None:
     flight, report = advance(flight, at(1.2, 0.0), SETTINGS)
     assert flight.phase != Phase.HOLD
     assert [text for _, text in report.texts] == ["The load fell to the ground: landing"]
+
+
+def without_pull(phase: Phase, height_m: float) -> tuple[Flight, list[str]]:
+    """A flight after the estimator has found the cable slack of a load that no tracker sees, for 40 ms."""
+    flight, texts = entered(Flight(), phase, hanging(), SETTINGS), []
+    for k in range(11):
+        seen = hanging(2_000_000 + k * 4000, (0.0, 0.0, height_m))
+        seen = seen._replace(taut=False, pull_n=0.0, load_tracked=False)
+        flight, report = advance(flight, seen, SETTINGS)
+        texts += [text for _, text in report.texts]
+    return flight, texts
+
+
+@pytest.mark.parametrize("phase", [Phase.HOLD, Phase.LIFT, Phase.LOWER])
+def test_no_vehicle_dives_after_a_load_that_no_tracker_sees(phase: Phase) -> None:
+    """Nothing shows where it falls: it is lifted again or lowered on, or the vehicle lands."""
+    flight, texts = without_pull(phase, 3.0)
+    assert not any(isinstance(leg, CatchLoad) for leg in flight.legs)
+    assert (flight.phase, texts) == {
+        Phase.HOLD: (Phase.SET_DOWN, ["Cable without pull, load lost: landing"]),
+        Phase.LIFT: (Phase.TAUTEN, ["Cable slack, the load is not lifted: pulling it taut again"]),
+        Phase.LOWER: (Phase.LOWER, []),
+    }[phase]
 
 
 def test_a_load_that_was_not_lifted_is_tried_again_three_times() -> None:

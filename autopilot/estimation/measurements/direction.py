@@ -70,6 +70,7 @@ def with_observed_position(
         age_s,
         0.0,
         CAMERA,
+        load.laid_height,
     )
 
 

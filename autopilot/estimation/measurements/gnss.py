@@ -159,6 +159,7 @@ def load_ahead(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
         load.age_s,
         0.0,
         CAMERA,
+        load.laid_height,
     )
 
 
@@ -183,6 +184,7 @@ def suspended_load(state: EstimatorState, history: History, tuning: EstimatorTun
         load.age_s,
         0.0,
         CAMERA,
+        load.laid_height,
     )
     return tauten(at_end, state.vehicle, history, tuning, tuning.cable_length)
 

@@ -90,6 +90,7 @@ def with_tracked_motion(
         age_s,
         0.0,
         TRACKER,
+        load.laid_height,
     )
 
 

@@ -37,16 +37,18 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
         return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
     if isinstance(flight.legs[0], CatchLoad) and _is_down(flight, view):
-        flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
-        return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
+        return _after_loss(flight, "The load fell to the ground: landing")
     if flight.cable.slack_since_us < 0:
         return WatchResult(flight)
     lasted_us = view.now_us - flight.cable.slack_since_us
     if not isinstance(flight.legs[0], CatchLoad):
         if lasted_us < SLACK_US:
             return WatchResult(flight)
-        if flight.phase == Phase.LIFT and _lies(view) and flight.cable.failed_lifts < MAX_FAILED_LIFTS:
+        lies = not view.load_tracked or _lies(view)
+        if flight.phase == Phase.LIFT and lies and flight.cable.failed_lifts < MAX_FAILED_LIFTS:
             return _after_failed_lift(flight)
+        if not view.load_tracked:  # nothing shows where it falls
+            return _after_loss(flight, "Cable without pull, load lost: landing")
         cable = replace(flight.cable, slack_since_us=-1)
         catch = CatchLoad(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
         flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
@@ -68,6 +70,12 @@ def _is_down(flight: Flight, view: View) -> bool:
 def _lies(view: View) -> bool:
     """Whether the load seems to lie on the ground."""
     return view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < ON_GROUND_SPEED
+
+
+def _after_loss(flight: Flight, text: str) -> WatchResult:
+    """The load does not hang on the cable any more: the vehicle lands without it."""
+    flight = replace(interrupt_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
+    return WatchResult(flight, Event.LOAD_DOWN, ((CRITICAL, text),))
 
 
 def _after_failed_lift(flight: Flight) -> WatchResult:
@@ -96,7 +104,7 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
 
     A gust can hide or imitate a pull, and noise of a tracker a gap of a few millimetres: a small gap counts
     only if the pull confirms it. A load that is not tracked has no gap, its cable is taut or slack as the
-    estimator says.
+    estimator says; it is lowered to the ground whether its cable pulls or not.
     """
     if isinstance(flight.legs[0], CatchLoad):
         in_condition = view.taut
@@ -105,7 +113,8 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
         has_gap = view.load_tracked and gap > MIN_GAP
         is_slack = not view.taut or (has_gap and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
         lifting = flight.phase == Phase.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
-        on_ground = lifting or (flight.phase == Phase.LOWER and isinstance(flight.legs[0], Creep))
+        creeping = isinstance(flight.legs[0], Creep) or not view.load_tracked
+        on_ground = lifting or (flight.phase == Phase.LOWER and creeping)
         in_condition = is_slack and not on_ground
     if in_condition == (flight.cable.slack_since_us >= 0):
         return flight
