@@ -39,6 +39,7 @@ from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
 from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, PacketLoss
+from autopilot.onboard.path_work import PathWork, begin_now, path_work, use_paths
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
 from autopilot.onboard.snapshot import (
@@ -85,12 +86,11 @@ from autopilot.supervisor.recovery import RestartState
 from autopilot.supervisor.requests.mission_checks import (
     curve_exit_problem,
     forbidden_rally_text,
-    mission_begin,
     remaining_timeline,
 )
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, Report, interrupt_mission
-from autopilot.trajectory.prepare import AT_HOME, PENDING, MissionBegin, PathLimits, PreparedPaths, prepare
+from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
@@ -103,7 +103,7 @@ from autopilot.wire.items import WireItem, endless_jump_target, located_steps, u
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
 from autopilot.wire.statustext import TextReader, listed
-from missions.model import Land, ReturnHome, Signals, Step, Term, Waypoint
+from missions.model import Land, ReturnHome, Signals, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
 SIMULATOR_SYSTEM = 1  # our system id on the simulator link, whatever MAV_SYS_ID ground stations see
@@ -137,26 +137,6 @@ class SetupWork(NamedTuple):
 
     def failure(self, why: str) -> None:
         """The result if the work failed: none."""
-
-
-class PathWork(NamedTuple):
-    """Paths of a mission to be prepared, as plain data, so that another process can do it."""
-
-    steps: tuple[Step, ...]
-    sequence: tuple[int, ...]
-    limits: PathLimits
-    home: Vec3 = ZERO  # destination of a return
-    planner: OwnSetup | None = None  # custom planner
-    begin: MissionBegin = AT_HOME
-
-    def run(self) -> PreparedPaths:
-        """The result; takes from a millisecond to some seconds."""
-        planner = plan_function_for(self.planner)
-        return prepare(self.steps, self.sequence, self.limits, self.home, planner, self.begin)
-
-    def failure(self, why: str) -> PreparedPaths:
-        """The result if the work failed."""
-        return PreparedPaths(refusal=why, notes=(why,))
 
 
 class WarmupWork(NamedTuple):
@@ -713,10 +693,8 @@ class Onboard:
         """Work whose result is not used, with which a process loads what real work needs."""
         path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
         steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
-        path_work = PathWork(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
-        return WarmupWork(
-            path_work, SetupWork(self.parameters, self.core.setup.control_every, self._options.own)
-        )
+        paths = PathWork(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
+        return WarmupWork(paths, SetupWork(self.parameters, self.core.setup.control_every, self._options.own))
 
     def warm_up(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
@@ -843,21 +821,11 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
-        plan, setup = self.core.flight.mission.plan, self.core.setup
-        self._prepared_for = limits, planner = setup.settings.limits, setup.planner
-        begin = self._mission_begin() if self.core.flight.mission.waiting else AT_HOME
-        work = PathWork(plan.steps, plan.sequence, limits, self.core.flight.area.home, planner, begin)
-        self._path_work = work
-        self._set_prepared(PENDING)
-        if self._options.clock_waits or not plan.steps:
+        self._path_work = work = path_work(self.core, self.now_us)
+        self._prepared_for = work.limits, work.planner
+        use_paths(self.core, PENDING)
+        if self._options.clock_waits or not work.steps:
             self.finish(work, work.run())
-
-    def _mission_begin(self) -> MissionBegin:
-        """Where the mission would begin now."""
-        flight, settings = self.core.flight, self.core.settings
-        return mission_begin(
-            flight, remaining_timeline(flight, self.core.view(self.now_us), settings), settings
-        )
 
     @property
     def work(self) -> PathWork | SetupWork | None:
@@ -877,14 +845,14 @@ class Onboard:
         elif work is self._path_work:
             self._path_work = None
             self._set_paths(result)
-            if self.core.flight.mission.waiting and self._mission_begin() != work.begin:
+            if self.core.flight.mission.waiting and begin_now(self.core, self.now_us) != work.begin:
                 self._prepare()  # it begins elsewhere by now, and waits for other paths
 
     def _set_paths(self, prepared: PreparedPaths) -> None:
         """Take over the paths of the plan, and begin the mission if it waited for them."""
         for note in prepared.notes:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, note)
-        self._set_prepared(prepared)
+        use_paths(self.core, prepared)
         if self.core.flight.mission.waiting:
             self._begin_mission()
         elif self.tick >= 0:
@@ -908,11 +876,6 @@ class Onboard:
             self.core.replace_flight(interrupt_mission(self.core.flight))
             text, subject = verdict.text or "Mission denied", mavlink.MAV_CMD_MISSION_START
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text, subject)
-
-    def _set_prepared(self, prepared: PreparedPaths) -> None:
-        flight = self.core.flight
-        plan = replace(flight.mission.plan, prepared=prepared)
-        self.core.replace_flight(replace(flight, mission=replace(flight.mission, plan=plan)))
 
     def _snapshot(self) -> CoreSnapshot:
         return CoreSnapshot(self._snapshot_source, self.endpoint.mission, self.now_us)

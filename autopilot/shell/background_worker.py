@@ -11,7 +11,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkContext, SpawnContext
 from multiprocessing.process import BaseProcess
 
-from autopilot.onboard.onboard import Onboard, PathWork, SetupWork, WarmupWork
+from autopilot.onboard.onboard import Onboard, SetupWork, WarmupWork
+from autopilot.onboard.path_work import PathWork
 from autopilot.shell.options import can_fork
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.supervisor.state import ON_GROUND

@@ -22,6 +22,7 @@ from autopilot.geometry.packed import field_offset, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, flies_requested_path, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.path_work import path_work, use_paths
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.arming import arming_problems
@@ -263,6 +264,9 @@ class SweepFlight:
 
     def _request(self, request: Arm | StartMission, now_us: int) -> None:
         verdict = self.core.handle_request(request, now_us)
+        if self.core.flight.mission.waiting:  # for paths from where the vehicle believes it stands
+            use_paths(self.core, path_work(self.core, now_us).run())
+            verdict = self.core.handle_request(StartMission(None), now_us)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             self._end("refused", verdict.text or "")
 

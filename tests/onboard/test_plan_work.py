@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from autopilot.guidance.legs import Hold
-from autopilot.onboard.onboard import PathWork
+from autopilot.onboard.path_work import PathWork
 from autopilot.services import identity
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING, PreparedPaths

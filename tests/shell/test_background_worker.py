@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.onboard.onboard import PathWork
+from autopilot.onboard.path_work import PathWork
 from autopilot.own.own_code import OwnSetup
 from autopilot.shell.background_worker import BackgroundWorker
 from autopilot.supervisor.state import Phase

@@ -124,6 +124,13 @@ def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> No
     flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
 
 
+def test_same_bits_where_the_first_path_begins_where_the_receiver_places_the_load() -> None:
+    """A plain receiver is off by metres: the path of the mission as stored begins elsewhere."""
+    found, states = flown("delivery", Conditions(sensors="gps", seed=1))
+    assert found.outcome == "completed"
+    assert np.hypot(states[-1, 0] - states[0, 0], states[-1, 1] - states[0, 1]) > 1.0
+
+
 @pytest.mark.parametrize(("law", "sensors"), [(PLUMBLINE, "rtk"), (THESIS, "lab")])
 def test_same_bits_where_the_winch_works_both_ways(winched: str, law: float, sensors: str) -> None:
     found, states = flown(winched, Conditions(sensors=sensors, seed=1, settings={"CTL_LAW": law}))
