@@ -118,7 +118,7 @@ MIN_GAP_US = 500_000  # time without a tick after which a vehicle in the air has
 RATE_TICKS = 1  # ticks in which the tick rate is determined
 # ticks in a row in the past or far ahead, after which the clock is assumed to have changed
 CLOCK_CHANGE_TICKS = 3
-_SIMULATOR = "simulator"  # source of a reason that prevents arming
+_SIMULATOR, _GROUND_STATION = "simulator", "ground station"  # sources of reasons that prevent arming
 HOME_TOLERANCE_M = 1.0  # between the homes of simulator and autopilot: digits may have been left out
 MIN_THRUST_SHARE = 0.3  # share of the vehicle's weight: rotors commanded to less did not carry it
 
@@ -251,6 +251,7 @@ class Onboard:
         self._simulator_parameters = SimulatorParameters(parameters)
         self._punctuality = Punctuality()
         self._ground = GroundWatch()
+        self._ground_missing = False
         self._simulator_parameters_known = False  # the simulator has reported its parameters
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is requested to restart
@@ -367,6 +368,8 @@ class Onboard:
             self._restart_after_gap(period_us)
         if self._ground.has_changed(now_us, self.endpoint.gcs_heartbeat_us):
             self._handle_ground_loss()
+        elif self._ground_missing and not self._ground.lost:
+            self._set_ground_missing(False)
         if self.fault:
             return self._put_answer(tick, dt)
         core, sensors = self.core, self._sensors
@@ -477,6 +480,7 @@ class Onboard:
             self._ground.lost = False
             self.endpoint.send_text(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
             return
+        self._set_ground_missing(True)
         reaction = self._ground.request(self.phase)
         if (
             reaction is not None
@@ -486,6 +490,12 @@ class Onboard:
             self.core.replace_flight(replace(self.core.flight, is_failsafe=True))
             self.endpoint.state_changed()
             self.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, LOST_TEXT.format(reaction[1]))
+
+    def _set_ground_missing(self, missing: bool) -> None:
+        """Let a silent ground station prevent arming: the flight would end at once."""
+        self._ground_missing = missing
+        problem = "ground station silent (COM_DL_LOSS_T)"
+        self._set_arming_problems(_GROUND_STATION, (problem,) if missing else ())
 
     def _restart_after_gap(self, period_us: int) -> None:
         """Restart the estimate after a gap in the ticks so long that the estimate is lost and no command was

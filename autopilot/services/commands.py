@@ -156,6 +156,8 @@ def _arm(call: Call, context: Context) -> Request | Verdict:
 
 
 def _takeoff(call: Call, context: Context) -> Request | Verdict:
+    if call.frame is not None and call.frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
+        return _refused(f"Take-off: frame {call.frame}; must be 0, 3, 5 or 6")
     altitude_m = _altitude_above_home(call, context)
     if altitude_m is not None and altitude_m <= 0.0:
         reference = "above home" if altitude_m == call.z else f"above sea level, {altitude_m:g} m above home"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.guidance.legs import Leg
+from autopilot.guidance.legs import Creep, Leg
 from autopilot.supervisor.motion import damping_leg, tracks_attitude, with_control_modes
 from autopilot.supervisor.phase_legs import ENTRY_LEGS
 from autopilot.supervisor.settings import Settings
@@ -15,11 +15,21 @@ from autopilot.supervisor.state import CARRYING, ActionWhenArmed, Event, Flight,
 from autopilot.supervisor.step_legs import following_legs
 from autopilot.supervisor.table import TRANSITIONS
 
+STOPPING_HEIGHT_M = 0.12  # of the load: measured, with 0.02 m of margin
+
 
 def try_transition(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
     """The flight after an event; None if no transition exists."""
     phase = TRANSITIONS.get((flight.phase, event))
     return None if phase is None else _enter_phase(flight, phase, view, settings)
+
+
+def requested_transition(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
+    """As `try_transition`, on request: a load that is almost on the ground is set down first, as the vehicle
+    would lay it down while it stops."""
+    creeping = flight.phase == Phase.LOWER and isinstance(flight.legs[0], Creep)
+    touching = creeping and not flight.cable.released and view.x_load[2] < STOPPING_HEIGHT_M
+    return None if touching else try_transition(flight, event, view, settings)
 
 
 def transition(flight: Flight, event: Event, view: View, settings: Settings) -> Flight:

@@ -485,6 +485,18 @@ def test_a_ground_station_that_falls_silent_before_the_load_is_lifted(action: in
     assert craft.flight.phase == phase
 
 
+def test_a_vehicle_whose_ground_station_is_silent_is_not_armed() -> None:
+    craft = Craft(*ROUTE, NAV_DLL_ACT=2, COM_DL_LOSS_T=PATIENCE_S)
+    craft.wait(1.0)
+    craft.send(HEARTBEAT)
+    craft.wait(1.1 * PATIENCE_S)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert "".join(craft.texts).endswith("Arming denied: ground station silent (COM_DL_LOSS_T)")
+    craft.send(HEARTBEAT)
+    craft.wait(0.1)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+
+
 def test_a_ground_station_is_not_missed_unless_that_is_asked_for() -> None:
     craft = under_way(COM_DL_LOSS_T=1.0)
     craft.send(HEARTBEAT)

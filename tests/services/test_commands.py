@@ -345,6 +345,14 @@ def test_takeoff_above_home_by_frame(rig_with, frame):
     assert rig.asked == [Takeoff(4.0)]
 
 
+@pytest.mark.parametrize("frame", [1, 2, 8, 10, 77])
+def test_takeoff_in_a_frame_without_a_height_above_home_or_the_sea_is_refused(rig_with, frame):
+    rig = rig_with()
+    replies = rig.replies(as_int(22, frame, z=1.5))
+    assert replies[0].text == f"Take-off: frame {frame}; must be 0, 3, 5 or 6"
+    assert (acks(replies), rig.asked) == ([(22, DENIED)], [])
+
+
 def test_takeoff_below_home_says_the_height_it_understood(rig):
     replies = rig.replies(long(22, (0, 0, 0, 0, 0, 0, -4)))
     assert "-4" in replies[0].text

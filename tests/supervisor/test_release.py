@@ -68,7 +68,8 @@ def test_a_load_out_of_reach_is_not_taken() -> None:
     sky.view = sky.view._replace(x_load=(2.0, 0.0, 0.02))
     verdict = sky.ask(Grab())
     assert verdict.result == DENIED
-    assert verdict.text == "Gripper: the load lies 1.9 m away, the cable reaches 0.7 m"
-    sky.view = sky.view._replace(x_load=(0.5, 0.0, 0.02))
-    assert sky.ask(Grab()).result == ACCEPTED
+    assert verdict.text == "Gripper: the load lies 1.90 m away; must be within 0.52 m"
+    for beside_m, result in ((0.65, DENIED), (0.55, ACCEPTED)):  # the vehicle stands at 0.1 m
+        sky.view = sky.view._replace(x_load=(beside_m, 0.0, 0.02))
+        assert sky.ask(Grab()).result == result
     assert not sky.flight.cable.released

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import pytest
 
-from autopilot.guidance.legs import Hold, Transfer
+from autopilot.guidance.legs import Creep, Hold, Transfer
 from autopilot.services import identity, requests
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
@@ -279,6 +279,32 @@ def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
     assert isinstance(sky.flight.legs[0], Transfer)
     sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
     assert sky.view.x_load == pytest.approx((1.5, 0.0, 2.0))
+
+
+@pytest.mark.parametrize("asked", [R.Pause(), R.SetMode(4, 3, None, "Hold"), R.ReturnHome()])
+@pytest.mark.parametrize(("height_m", "result"), [(0.13, ACCEPTED), (0.11, LATER)])
+def test_a_load_that_is_almost_on_the_ground_is_set_down_before_anything_else(
+    asked: object, height_m: float, result: int
+) -> None:
+    """The vehicle would lay it down while it stops, and take that for a fall."""
+    flight = entered(Sky().airborne().flight, Phase.LOWER, hanging(), SETTINGS)
+    flight = replace(flight, legs=flight.legs[-1:])
+    assert isinstance(flight.legs[0], Creep)
+    _, verdict = decide(flight, asked, hanging(x=(0.0, 0.0, height_m)), SETTINGS)
+    assert verdict.result == result
+
+
+@pytest.mark.parametrize(
+    "steps", [(model.Land(),), (model.ReturnHome(),), (model.Delay(1.0), model.Release())]
+)
+def test_a_mission_of_which_no_item_takes_off_leaves_the_vehicle_on_the_ground(
+    steps: tuple[model.Step, ...],
+) -> None:
+    sky = Sky(*steps)
+    for _ in range(2):  # disarmed and armed
+        verdict = sky.ask(R.StartMission(None))
+        assert (verdict.result, verdict.text) == (DENIED, "Mission denied: no item of it takes off")
+        sky.ask(R.Arm(arm=True, force=False))
 
 
 def test_a_phase_is_named_in_words() -> None:

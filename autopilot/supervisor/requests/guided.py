@@ -16,7 +16,7 @@ from autopilot.guidance.setpoint_follower import (
     SetpointStream,
 )
 from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick, SetMode
-from autopilot.supervisor.machine import try_transition
+from autopilot.supervisor.machine import requested_transition
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, temporarily_denied, wrong_phase
@@ -67,7 +67,7 @@ def start_guided(
     if flight.legs and winch_hold_height(flight.legs[0]) is not None:
         return flight, temporarily_denied(f"{request_name} denied while the winch works")
     guided = replace(interrupt_mission(flight), setpoints=replace(flight.setpoints, source=source))
-    after = try_transition(guided, Event.GUIDE, view, settings)
+    after = requested_transition(guided, Event.GUIDE, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, request_name))
 
 

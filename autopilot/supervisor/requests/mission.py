@@ -33,6 +33,9 @@ from autopilot.supervisor.table import TRANSITIONS
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
+# steps for which a vehicle on the ground takes off
+_STEPS_IN_THE_AIR = model.Takeoff | model.Waypoint | model.Signals | model.AttitudeRun
+
 
 def _accepted_pending(what: str) -> Verdict:
     """The verdict on a request for which the vehicle holds, or stands armed, until paths are prepared."""
@@ -44,6 +47,9 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
     plan = flight.mission.plan
     if not plan.steps:
         return flight, denied("Mission denied: there is none")
+    remaining = plan.steps[flight.mission.step :]
+    if flight.phase in ON_GROUND and not any(isinstance(step, _STEPS_IN_THE_AIR) for step in remaining):
+        return flight, denied("Mission denied: no item of it takes off")
     ahead = remaining_timeline(flight, view, settings)
     prepared = not plan.prepared.pending and is_prepared_from_here(flight, ahead, settings)
     problem = mission_problem(flight, ahead, settings) or (plan.prepared.refusal if prepared else "")

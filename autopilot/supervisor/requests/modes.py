@@ -9,7 +9,7 @@ from typing import Any
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import EnableFence, SetHome, SetMode, Takeoff
-from autopilot.supervisor.machine import try_transition
+from autopilot.supervisor.machine import requested_transition, try_transition
 from autopilot.supervisor.requests.guided import offboard, position_control
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.mission import continue_mission
@@ -34,7 +34,7 @@ def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
     """Stop and hold; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
         return replace(interrupt_mission(flight), action_when_armed=ActionWhenArmed.NOTHING), ACCEPTED
-    after = try_transition(interrupt_mission(flight), Event.HOLD, view, settings)
+    after = requested_transition(interrupt_mission(flight), Event.HOLD, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
 
 
@@ -60,7 +60,7 @@ def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
 
 def return_home(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Fly to home or a nearer rally point, and land."""
-    after = try_transition(interrupt_mission(flight), Event.RETURN, view, settings)
+    after = requested_transition(interrupt_mission(flight), Event.RETURN, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Return"))
 
 

@@ -30,6 +30,9 @@ from autopilot.trajectory.timeline import MIN_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
 
 MIN_REEL_SPEED_M_S = 0.01
+# Of the cable's length, at which a load can be taken: over one that lies farther away the vehicle cannot move
+# before the cable is taut and drags it.
+GRAB_SHARE = 0.75
 
 
 def release_load(flight: Flight, request: Release, view: View, settings: Settings) -> Decision:
@@ -48,12 +51,9 @@ def grab(flight: Flight, request: Grab, view: View, settings: Settings) -> Decis
         return flight, ACCEPTED
     if flight.phase not in ON_GROUND:
         return flight, denied("Gripper: a load can be taken on the ground only; land beside it")
-    distance = norm(sub(view.x_load, view.x_quad))
-    if not distance <= settings.cable_length_m:
-        text = (
-            f"Gripper: the load lies {distance:.1f} m away, the cable reaches {settings.cable_length_m:g} m"
-        )
-        return flight, denied(text)
+    distance, reach = norm(sub(view.x_load, view.x_quad)), GRAB_SHARE * settings.cable_length_m
+    if not distance <= reach:
+        return flight, denied(f"Gripper: the load lies {distance:.2f} m away; must be within {reach:.2f} m")
     attached = replace(flight, cable=replace(flight.cable, released=False))
     return attached, Verdict(mavlink.MAV_RESULT_ACCEPTED, "Load taken")
 
