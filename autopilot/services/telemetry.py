@@ -202,12 +202,14 @@ def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    seq, total = uint16(s.mission_current), uint16(s.mission_total) if s.mission_total else _UINT16
+    total = _UINT16
+    if s.mission_total:  # without home, where home is an item: the last item has this number
+        total = uint16(s.mission_total - identity.flavour.home_is_item)
     in_mission_mode = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
     mission, fence, rally = s.plan_ids
     return (
         mavlink.MAVLink_mission_current_message(
-            seq,
+            uint16(s.mission_current),
             total,
             s.mission_state,
             mission_mode=_IN_MISSION_MODE if in_mission_mode else _SUSPENDED,

@@ -437,13 +437,15 @@ def test_the_supervisor_knows_the_name_of_the_requested_mode(rig_with, flavour, 
     assert [request.name for request in rig.asked] == [name]
 
 
-def test_set_current_message_is_answered_by_mission_current(rig):
+@pytest.mark.parametrize(("flavour", "total"), [(PX4, 9), (ARDUPILOT, 8)])  # item 0 of these is home
+def test_set_current_message_is_answered_by_mission_current(rig_with, flavour, total):
+    rig = rig_with(identity=Identity(flavour=flavour))
     rig.changes = {"mission_current": 5, "mission_total": 9, "mission_state": 3}
     rig.poll()
     rig.send(mavlink.MAVLink_mission_set_current_message(1, 1, 5))
     answers = [r.message for r in rig.poll()["gcs"]]
     (current,) = [m for m in answers if m.get_type() == "MISSION_CURRENT"]
-    assert (current.seq, current.total, current.mission_state) == (5, 9, 3)
+    assert (current.seq, current.total, current.mission_state) == (5, total, 3)
     assert rig.asked == [SetCurrent(5)]
 
 
