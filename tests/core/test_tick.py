@@ -253,7 +253,9 @@ def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_
     assert craft.worst_error < 0.02
 
 
-@pytest.mark.parametrize(("name", "value"), [("VEH_CABLE_LEN", 1.4), ("VEH_ATT_X", 0.1), ("VEH_QUAD_MASS", 0.6)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("VEH_CABLE_LEN", 1.4), ("VEH_ATT_X", 0.1), ("VEH_QUAD_MASS", 0.6)]
+)
 def test_what_describes_the_vehicle_for_a_whole_flight_is_set_on_the_ground_only(
     name: str, value: float
 ) -> None:
