@@ -71,8 +71,10 @@ class SimulatorParameters:
         value = decimal_from_float32(message.param_value)
         self._received.add(name)
         self._complete = len(self._received) >= message.param_count
-        was_requested = self._pending.pop(name, None) is not None
-        self._clients.pop(name, None)
+        was_requested = self._pending.get(name, (0.0, 0))[1] > 0  # else it answers an earlier request
+        if was_requested:
+            del self._pending[name]
+            self._clients.pop(name, None)
         if name in self._table.remote_names:
             new = self._table[name] != value
             if new:

@@ -83,6 +83,7 @@ _ORBIT_YAWS_NOT_OFFERED = (
     mavlink.ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED,
 )
 _NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
+MAX_INTERVAL_US = 2**31 - 1  # that MESSAGE_INTERVAL can state; longer ones count as this one
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _ABOVE_HOME_FRAMES = (
@@ -375,7 +376,7 @@ def _set_message_interval(call: Call, context: Context) -> Request | Verdict:
         return _refused(
             f"Message interval: interval (param2) = {interval:g} us; must be > 0, 0 (default) or -1 (off)"
         )
-    return SetMessageInterval(message_id, math.ceil(interval))
+    return SetMessageInterval(message_id, min(math.ceil(interval), MAX_INTERVAL_US))
 
 
 def _get_message_interval(call: Call, context: Context) -> Request | Verdict:

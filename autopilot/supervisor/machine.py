@@ -60,6 +60,7 @@ def _enter_phase(flight: Flight, phase: Phase, view: View, settings: Settings) -
         leg_start_us=view.now_us,
         condition_since_us=-1,
         following=(),
+        is_failsafe=flight.is_failsafe and phase != Phase.ARMED,  # another flight begins
         returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),
     )
     if phase == Phase.DISARMED:
@@ -75,5 +76,5 @@ def _reset_on_disarm(flight: Flight) -> Flight:
         heading=flight.heading.at_rest(),
         rotors_lost=0,  # whether they turn is detected after the next start
         mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
-        cable=replace(flight.cable, reel_target_m=None, failed_lifts=0),
+        cable=replace(flight.cable, reel_target_m=None, failed_lifts=0, slack_step=-1),
     )

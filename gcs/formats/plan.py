@@ -260,4 +260,7 @@ def _number(value: Any, where: str) -> float:
         return math.nan
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise FormatError(f"{where}: {value!r}; must be a number or null")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise FormatError(f"{where}: a number of {len(str(value))} digits is too great") from None

@@ -125,7 +125,7 @@ class SweepFlight:
         self.figures = packed(NO_FIGURES)
         self.requested_path: Floats = _NO_ROWS
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
-        self.arm_us, self.start_us = start_times.arm_us, start_times.start_us
+        self.arm_us, self.start_us = map(self._tick_from, (start_times.arm_us, start_times.start_us))
         self.result = FlightResult()
         self._warnings: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
         self.airborne_us = -1
@@ -246,6 +246,10 @@ class SweepFlight:
 
     # ---- what the ground station does
 
+    def _tick_from(self, time_us: int) -> int:
+        """The time of the first tick that is not before this time, at any rate of the simulator."""
+        return -(-time_us // self.tick_us) * self.tick_us
+
     def _ground_turn(self, now_us: int) -> None:
         """Arm and start at their instants; as long as the vehicle is not ready to be armed, postpone both."""
         if now_us not in (self.arm_us, self.start_us):
@@ -254,8 +258,8 @@ class SweepFlight:
         if now_us == self.arm_us and phase == Phase.DISARMED:
             problems = arming_problems(self.core.flight, self.core.view(now_us), self.core.settings)
             if problems and now_us < READY_LIMIT_US:
-                self.arm_us += GROUND_WINDOW_US
-                self.start_us += GROUND_WINDOW_US
+                self.arm_us = self._tick_from(self.arm_us + GROUND_WINDOW_US)
+                self.start_us = self._tick_from(self.start_us + GROUND_WINDOW_US)
                 return
             self._request(Arm(arm=True, force=False), now_us)
         elif now_us == self.start_us and phase == Phase.ARMED:
@@ -298,6 +302,9 @@ class SweepFlight:
             where: str = flight.phase.name.lower()
             limit = limit_text(self.cell.limit_us * 1e-6)
             self._end("timeout", f"not landed after {limit} of flight: still in phase {where}", where)
+        elif self.airborne_us < 0 and now_us > self.start_us + self.cell.limit_us:
+            where = flight.phase.name.lower()
+            self._end("timeout", f"not started after {limit_text(now_us * 1e-6)}: still {where}", where)
 
     def _end_landed(self) -> None:
         """End the flight of a vehicle that was disarmed, with outcome and reason as in `gcs fly`."""

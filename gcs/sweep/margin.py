@@ -25,6 +25,8 @@ from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.onboard.onboard import build_setup
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
+from autopilot.vehicle.rates import RateError
+from autopilot.wire.parameter_table import ParameterError
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan, own_parameter_names, simulator_settings
 from sitl.settings import settings_of
@@ -193,8 +195,9 @@ def linear_range(
     plan: SweepPlan, law: str, name: str, nominal_value: float, limits: tuple[float, float]
 ) -> str:
     """The range of the parameter, within `limits`, in which the linear loop is stable; empty if the parameter
-    is not part of the loop, CUSTOM_LAW if the law is a custom one, which is not linearised. All other
-    parameters have their defaults, or the values set for all flights."""
+    is not part of the loop, or takes only some of the values in between; CUSTOM_LAW if the law is a custom
+    one, which is not linearised. All other parameters have their defaults, or the values set for all
+    flights."""
     # parameters of custom laws, of the estimator and of the planner
     own_parameters = frozenset().union(*(own_parameter_names(plan.own(other)) for other in plan.laws))
     if law not in LAWS:
@@ -208,6 +211,18 @@ def linear_range(
         varied = plan.with_followers({name: value})
         known = {one: value for one in varied if one not in own_parameters}
         return eigenvalue_moduli(plan.vehicle, {**fixed, **known})
+
+    try:
+        return _stable_range(moduli, nominal_value, limits)
+    except (ParameterError, RateError):  # of whole numbers, or of parameters varied together
+        return ""
+
+
+def _stable_range(
+    moduli: Callable[[float], list[float]], nominal_value: float, limits: tuple[float, float]
+) -> str:
+    """The range around the nominal value in which the greatest of these moduli says that the loop is
+    stable."""
 
     def is_stable(value: float) -> bool:
         return moduli(value)[-1] < STABILITY_LIMIT

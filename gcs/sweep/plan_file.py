@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.shell.atomic_file import write_atomically
+from autopilot.vehicle.file import belief_of
 from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
@@ -24,7 +25,7 @@ ENTRIES = ("gcs.sweep.work",)  # modules whose imports are all the code that fli
 
 def sweep_origin(plan: SweepPlan) -> Origin:
     """The origin of the flights of a plan if they are flown now: settings, files, version and code."""
-    files = file_digests((plan.mission, plan.vehicle, plan.sensors))
+    files = file_digests((plan.mission, plan.vehicle, str(belief_of(plan.vehicle)), plan.sensors))
     for law in plan.laws:
         files |= {one.reference: one.digest for one in plan.own(law).load_classes()}
     return origin_of({"plan": plan.to_json(), "files": files}, ENTRIES)

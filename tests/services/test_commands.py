@@ -526,6 +526,12 @@ def test_interval_of_a_stream_of_a_message_on_request_and_of_neither(rig, messag
         assert (told.message_id, told.interval_us) == (message_id, interval_us)
 
 
+def test_an_interval_longer_than_can_be_stated_is_the_longest_that_can(rig):
+    assert acks(rig.replies(long(511, (30, 1e19)))) == [(511, OK)]
+    (told,) = [m for m in rig.replies(long(510, (30,))) if m.get_type() == "MESSAGE_INTERVAL"]
+    assert told.interval_us == 2**31 - 1
+
+
 def test_a_stream_turned_off_and_on_again(rig):
     rig.replies(long(511, (30, -1)))
     assert not [r for r in rig.run(1_000_000) if r.message.get_type() == "ATTITUDE"]

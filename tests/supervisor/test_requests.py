@@ -307,6 +307,13 @@ def test_a_mission_of_which_no_item_takes_off_leaves_the_vehicle_on_the_ground(
         sky.ask(R.Arm(arm=True, force=False))
 
 
+def test_a_flight_behind_a_failsafe_landing_is_none_in_failsafe() -> None:
+    sky = Sky()
+    sky.flight = replace(sky.flight, is_failsafe=True)
+    assert sky.ask(R.Arm(arm=True, force=False)).result == ACCEPTED
+    assert not sky.flight.is_failsafe
+
+
 def test_a_phase_is_named_in_words() -> None:
     flight = replace(Sky().airborne().flight, phase=Phase.SET_DOWN)
     _, verdict = decide(flight, R.Reposition(1.0, None, None, True), hanging(), SETTINGS)

@@ -124,6 +124,14 @@ def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> No
     flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
 
 
+@pytest.mark.parametrize("rate_hz", [125.0, 625.0])  # a tick of 8 and of 1.6 ms
+def test_a_flight_starts_at_any_rate_of_the_simulator(short: str, rate_hz: float) -> None:
+    mission = load_mission(short)
+    times = start_times(mission, Conditions(settings={"CTL_RATE_HZ": 125.0}))
+    at_rate = Conditions(settings={"CTL_RATE_HZ": 125.0, "SIM_RATE_HZ": rate_hz})
+    assert fly(mission, at_rate, times).outcome == "completed"
+
+
 def test_same_bits_where_the_first_path_begins_where_the_receiver_places_the_load() -> None:
     """A plain receiver is off by metres: the path of the mission as stored begins elsewhere."""
     found, states = flown("delivery", Conditions(sensors="gps", seed=1))

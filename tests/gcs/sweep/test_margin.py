@@ -43,6 +43,10 @@ def test_parameters_that_are_varied_together_are_so_in_the_linear_loop() -> None
     assert (alone, together) == ("", "0 … > 5")
 
 
+def test_a_rate_that_takes_some_values_only_has_no_linear_range() -> None:
+    assert limits("thesis", "CTL_RATE_HZ", 250.0, (125.0, 250.0)) == ""
+
+
 def test_a_gain_of_no_damping_is_no_place_to_be() -> None:
     plan = SweepPlan("hover", "bebop", "lab", ("thesis",), (1,), (), (("NGC_KOMEGA", 0.0),))
     assert linear_range(plan, "thesis", "SIM_ACT_DELAY_MS", 0.0, (0.0, 40.0)) == "nowhere"
