@@ -30,6 +30,11 @@ class GroundWatch:
         self._action = int(table["NAV_DLL_ACT"])
         self._timeout_us = round(table["COM_DL_LOSS_T"] * 1e6) if self._action else NEVER_US
 
+    @property
+    def enabled(self) -> bool:
+        """Whether the vehicle is to react at all."""
+        return self._action != 0
+
     def has_changed(self, now_us: int, heartbeat_us: int) -> bool:
         """Whether the ground station has become silent, or is heard again."""
         return (now_us - heartbeat_us > self._timeout_us) != self.lost

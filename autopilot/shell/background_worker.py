@@ -30,6 +30,7 @@ class BackgroundWorker:
         self._work: PathWork | SetupWork | None = None  # present work of the process
         self._start_s = 0.0  # when it began
         self._loaded = False
+        self._was_started = False  # a process that has died is replaced
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
 
@@ -54,6 +55,7 @@ class BackgroundWorker:
         parent_end = self._pipe if isinstance(context, ForkContext) else None
         self._process = context.Process(target=_serve, args=(child_end, parent_end), daemon=True)
         self._process.start()
+        self._was_started = True
         child_end.close()
 
     def update(self, onboard: Onboard) -> None:
@@ -67,7 +69,7 @@ class BackgroundWorker:
                 return
             self.close()
             self.start(onboard.warmup_work)
-        if self._pipe is None and onboard.phase in ON_GROUND:
+        if self._pipe is None and onboard.phase in ON_GROUND and not self._was_started:
             onboard.finish(onboard.work, onboard.work.run())
             return
         if self._pipe is None:

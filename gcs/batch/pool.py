@@ -95,6 +95,10 @@ class PoolBackend(Generic[F, R]):
 
     def collect(self) -> Sequence[R]:
         done, self._futures = wait(self._futures, _POLL_S, FIRST_COMPLETED)
+        failed = {future for future in done if future.exception() is not None}
+        if len(failed) < len(done):  # what others have flown is kept; the next call meets the failure
+            self._futures |= failed
+            done -= failed
         with _killed_worker_as_error():
             return [result for future in done for result in future.result()]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -81,6 +82,18 @@ def table_of(rows: Sequence[Row], column_schema: pyarrow.Schema) -> pyarrow.Tabl
     return pa.Table.from_arrays([column(field) for field in column_schema], schema=column_schema)
 
 
+def _distinct_flights(plan: SweepPlan) -> list[tuple[Any, ...]]:
+    """What distinguishes each flight of a plan: law, varied values, seed, and which it is of those in which
+    all of these are equal (drawn points of whole numbers can be)."""
+    counts: Counter[tuple[Any, ...]] = Counter()
+    flights = []
+    for case in plan.cases():
+        flight = (case.law, case.varied, case.seed)
+        flights.append((*flight, counts[flight]))
+        counts[flight] += 1
+    return flights
+
+
 class Store:
     """The flights of a sweep's directory."""
 
@@ -150,10 +163,10 @@ class Store:
         stored = table.schema.metadata[METADATA_KEY]
         if stored == self._schema.metadata[METADATA_KEY]:
             return table
-        number = {(case.law, case.varied, case.seed): case.index for case in self._plan.cases()}
-        cases = list(from_json(json.loads(stored)).cases())
-        flown = [cases[index] for index in table.column("index").to_pylist()]
-        numbers = np.array([number[case.law, case.varied, case.seed] for case in flown], np.int64)
+        number = {flight: index for index, flight in enumerate(_distinct_flights(self._plan))}
+        flights = _distinct_flights(from_json(json.loads(stored)))
+        flown = [flights[index] for index in table.column("index").to_pylist()]
+        numbers = np.array([number[flight] for flight in flown], np.int64)
         return table.set_column(table.schema.get_field_index("index"), "index", array_of(numbers))
 
     def clear(self) -> None:

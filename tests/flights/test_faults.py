@@ -485,6 +485,16 @@ def test_a_ground_station_that_falls_silent_before_the_load_is_lifted(action: in
     assert craft.flight.phase == phase
 
 
+def test_a_reaction_that_is_switched_off_claims_no_ground_station() -> None:
+    craft = under_way(NAV_DLL_ACT=1, COM_DL_LOSS_T=PATIENCE_S)
+    craft.send(HEARTBEAT)
+    craft.wait(1.1 * PATIENCE_S)
+    assert craft.texts == ["Ground station lost: holding"]
+    set_parameter(craft, "NAV_DLL_ACT", 0)
+    craft.wait(1.0)
+    assert craft.texts == ["Ground station lost: holding"]
+
+
 def test_a_vehicle_whose_ground_station_is_silent_is_not_armed() -> None:
     craft = Craft(*ROUTE, NAV_DLL_ACT=2, COM_DL_LOSS_T=PATIENCE_S)
     craft.wait(1.0)

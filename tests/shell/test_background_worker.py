@@ -149,6 +149,19 @@ def test_a_process_that_dies_at_its_work_is_a_refusal(aside: BackgroundWorker) -
     assert prepared.refusal == "the process that prepares paths has died"
 
 
+def test_a_process_that_died_is_replaced_on_the_ground_too(aside: BackgroundWorker) -> None:
+    onboard = Waiting(Phase.DISARMED)
+    aside.start(onboard.warmup_work)
+    (process,) = multiprocessing.active_children()
+    process.kill()
+    attend(aside, onboard, lambda: not multiprocessing.active_children())
+    onboard.ask(1.0)
+    aside.update(onboard)  # type: ignore[arg-type]
+    assert not onboard.finished, "the loop does not do the work itself"
+    attend(aside, onboard, lambda: onboard.work is None)
+    assert not onboard.finished[-1][1].refusal
+
+
 def test_a_process_that_died_idle_is_replaced(aside: BackgroundWorker) -> None:
     onboard = Waiting()
     aside.start(onboard.warmup_work)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +20,7 @@ SECOND = 1_000_000_000
     [([], 0.5, 0), ([7], 0.0, 7), ([7], 1.0, 7), (list(range(1, 101)), 0.99, 99), ([1, 2, 3], 0.5, 2)],
 )
 def test_percentile(values: list[int], share: float, expected: int) -> None:
-    assert percentile(values, share) == expected
+    assert percentile(Counter(values), share) == expected
 
 
 def test_figures_of_the_last_second() -> None:

@@ -275,6 +275,22 @@ def test_another_item_is_not_jumped_to_over_the_fence() -> None:
     assert sky.ask(SetCurrent(7)).result == ACCEPTED, "to land where it is"
 
 
+@pytest.mark.parametrize("phase", [Phase.TAUTEN, Phase.LIFT])
+def test_while_it_takes_off_another_item_is_checked_like_the_mission(phase: Phase) -> None:
+    steps = (*AROUND, Waypoint(3.0, 4.5, 2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0), Land())
+    sky = fenced(*steps)
+    sky.ask(StartMission(None))
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == phase)
+    before = sky.flight
+    verdict = sky.ask(SetCurrent(3))
+    assert (verdict.result, verdict.text) == (DENIED, f"Mission item 3 denied: item 3 leads {ZONE}")
+    assert sky.flight == before
+    assert sky.ask(SetCurrent(5)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.MISSION)
+    assert sky.flight.mission.step == 5
+
+
 # ---- winch and release before flight
 
 

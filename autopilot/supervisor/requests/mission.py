@@ -12,6 +12,7 @@ from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import start_step, step_event, with_current_step
 from autopilot.supervisor.requests.mission_checks import (
     is_prepared_from_here,
+    is_taking_off,
     lift_altitude_m,
     mission_problem,
     remaining_timeline,
@@ -130,6 +131,10 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
             return _hold_until_prepared(at_item, view, settings), _accepted_pending(item)
         at_item = with_step_heading_aims(at_item, view, settings)
         return start_step(at_item, step_event(at_item), view, settings), ACCEPTED
+    if is_taking_off(flight):
+        problem = mission_problem(at_item, remaining_timeline(at_item, view, settings), settings)
+        if problem:
+            return flight, denied(f"{item} denied: {problem}")
     return at_item, ACCEPTED
 
 

@@ -17,6 +17,7 @@ from autopilot.supervisor.state import (
     ON_GROUND,
     Flight,
     MissionPlan,
+    Phase,
     View,
     fence_problem,
     fence_violation,
@@ -72,10 +73,11 @@ def upload_problem(
 
 
 def remaining_timeline(flight: Flight, view: View, settings: Settings) -> RemainingSteps:
-    """The remaining steps of the mission, flown from where the load is or comes to rest."""
+    """The remaining steps of the mission, flown from where the load is or comes to rest; on the ground and
+    while it takes off, the load is lifted before them."""
     mission, cable = flight.mission, flight.cable
     steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
-    if flight.phase in ON_GROUND:
+    if flight.phase in ON_GROUND or is_taking_off(flight):
         start = _on_ground(flight, view, settings)
         lift = Takeoff(lift_altitude_m(mission.plan, settings))
         if isinstance(steps[0], Takeoff):
@@ -91,6 +93,11 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+
+
+def is_taking_off(flight: Flight) -> bool:
+    """Whether the load is tautened or lifted for the mission, which begins afterwards."""
+    return flight.mission.active and flight.phase in (Phase.TAUTEN, Phase.LIFT)
 
 
 def mission_begin(flight: Flight, ahead: RemainingSteps, settings: Settings) -> MissionBegin:

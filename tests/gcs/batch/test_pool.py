@@ -59,6 +59,25 @@ def test_groups_and_flights_that_have_not_begun_are_recalled(recalled: threading
     assert stored == [0, 1, 2]
 
 
+def test_what_others_have_flown_is_kept_when_a_worker_fails() -> None:
+    both_begun = threading.Barrier(2)
+
+    def fly(group: tuple[int, ...], clock: Any, stopped: Any) -> list[int]:
+        both_begun.wait(60.0)
+        if group == (1,):
+            raise OSError("killed")
+        return list(group)
+
+    with ThreadPoolExecutor(2) as executor:
+        crew: PoolBackend[int, int] = PoolBackend(executor, 2, fly)
+        crew.start((0,))
+        crew.start((1,))
+        executor.shutdown(wait=True)  # both have ended before the first is asked for
+        assert list(crew.collect()) == [0]
+        with pytest.raises(OSError, match="killed"):
+            crew.collect()
+
+
 def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     flown: list[int] = []
 
