@@ -6,10 +6,12 @@ import io
 import time
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError, write_error
@@ -46,7 +48,7 @@ Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot b
 
 @called_by_scripts
 def fly(
-    mission: str | Path | model.Mission,
+    mission: str | Path | Mission,
     *,
     law: str | type = DEFAULT_LAW,
     estimator: str | type | None = None,
@@ -79,10 +81,9 @@ def fly(
     from autopilot.shell.options import MAX_SEED
     from gcs.workflows.in_process_flight import fly_in_process
 
-    known = isinstance(mission, model.Mission)
-    flown = mission if isinstance(mission, model.Mission) else Mission.load(name_or_path("mission", mission))
+    flown = mission if isinstance(mission, Mission) else Mission.load(mission)
     options = FlightOptions(
-        mission=flown.name if known else str(mission),
+        mission=name_or_path("mission", mission),
         law=law_reference(law),
         sensors=name_or_path("sensors", sensors),
         vehicle=name_or_path("vehicle", vehicle),
@@ -104,7 +105,10 @@ def fly(
     with errors_for_python():
         outcome = fly_in_process(flown, options, TlogWriter(log), _warn)
     wall_s = time.perf_counter() - started_s
-    return Flight(log.getvalue(), meta_of(flown, options, outcome, wall_s), flown)
+    meta = meta_of(flown, options, outcome, wall_s)
+    if flown is mission:  # the path of its file is of interest to the command alone
+        meta = replace(meta, mission=flown.name)
+    return Flight(log.getvalue(), meta, flown)
 
 
 def _warn(line: str) -> None:
@@ -206,7 +210,7 @@ class Flight:
                 )
             for name in LOGS:  # of another flight
                 (folder / name).unlink(missing_ok=True)
-            (folder / TLOG_FILE).write_bytes(self.tlog)
+            write_atomically(folder / TLOG_FILE, self.tlog)
             make_report(folder / TLOG_FILE, folder, self._meta, quiet, all_pictures=pictures)
         return folder / PAGE_FILE
 
@@ -252,7 +256,7 @@ class Picture:
         if file.suffix.lower() not in ("", ".png"):
             raise GcsError(f"{file}: a picture is written as PNG alone; name it {file.stem}.png")
         try:
-            file.write_bytes(self.png)
+            write_atomically(file, self.png)
         except OSError as error:
             message = (
                 f"{file}: cannot be written: {error.strerror}; name a file in a folder that can be written"

@@ -10,7 +10,7 @@ import math
 import queue
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
@@ -326,7 +326,7 @@ class RunningVehicle:
         while not self._closing.is_set():
             try:
                 self._session.watch(lambda: self._closing.is_set() or not self._jobs.empty(), None)
-            except GcsError:  # the next request meets the same error and reports it
+            except Exception:  # the next request meets the same error and reports it
                 self._closing.wait(_RETRY_S)
             while not self._jobs.empty():
                 self._jobs.get()()
@@ -343,6 +343,9 @@ class RunningVehicle:
                 future.set_exception(error)
 
         self._jobs.put(job)
+        while not wait([future], _RETRY_S).done:
+            if not self._thread.is_alive() and not future.done():  # it was closed at this moment
+                raise GcsError("the link was closed")
         return future.result()
 
     def _with_retries(self, work: Callable[[], Value]) -> Value:

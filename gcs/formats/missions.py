@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from autopilot.shell.atomic_file import write_atomically
 from autopilot.wire.command_names import numbered_name
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -70,10 +71,8 @@ def write_foreign(
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
     in_plan = path.suffix.lower() == PLAN_ENDING
     text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items)
-    partial = path.with_name(path.name + ".part")
     try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        write_atomically(path, text.encode())
     except OSError as error:
         raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from autopilot.shell.atomic_file import write_atomically
 from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
@@ -98,7 +99,7 @@ def build_report(
         replay = replay_of(telemetry, samples, meta)
         drawing.finish(lambda picture: done(picture.file))
     page = render_page(record, meta, replay, changed_settings(telemetry, meta), out_dir)
-    (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
+    write_atomically(out_dir / PAGE_FILE, page.encode())
     done(PAGE_FILE)
     return record
 
@@ -128,6 +129,5 @@ def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -
 
 
 def _write_json(path: Path, values: Record) -> None:
-    path.write_text(
-        json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(path, text.encode())

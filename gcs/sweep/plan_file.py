@@ -124,14 +124,6 @@ def _stored_value(value: object) -> str:
     return f" ({value})" if isinstance(value, str | int | float) else ""
 
 
-def load_plan(directory: Path) -> SweepPlan:
-    """The plan of a sweep's directory."""
-    try:
-        return from_json(_read(directory)["origin"]["settings"]["plan"])
-    except (KeyError, TypeError):
-        raise _unreadable(directory) from None
-
-
 def load_command(directory: Path) -> tuple[str, str]:
     """The command that made the sweep, and the version of Plumbline that flew it."""
     found = _read(directory)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.own.own_code import parameters_for
+from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
@@ -69,7 +70,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         curves=curves,
         maps=maps,
     )
-    page.write_text(text, encoding="utf-8")
+    write_atomically(page, text.encode())
     return page
 
 

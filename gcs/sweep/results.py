@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -130,7 +129,7 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
         if len(rated):
             median[cell], worst[cell] = np.median(errors), errors.max()
         shown[cell] = lost[0] if len(lost) else rated[np.argmax(errors)] if len(rated) else rows[0]
-    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         success = np.where(flown > 0.0, completed_flights / flown, np.nan)
     return Cells(
         axes,

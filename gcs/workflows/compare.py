@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from autopilot.shell.atomic_file import write_atomically
 from gcs.errors import EXIT_USAGE, GcsError, write_error
 from gcs.folders import TLOG_FILE
 from gcs.workflows.report import find_log
@@ -44,9 +45,10 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
         if run.record["outcome"] == "no telemetry":
             raise CompareError(f"{source}: holds no telemetry of a Plumbline vehicle")
     page = out or COMPARISONS_FOLDER / f"{_page_name(names, logs)}.html"
+    text = comparison_page(runs)
     try:
         page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(comparison_page(runs), encoding="utf-8")
+        write_atomically(page, text.encode())
     except OSError as error:
         raise write_error(error, page, "file") from None
     return runs, page

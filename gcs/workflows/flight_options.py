@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,11 +55,12 @@ class FlightOptions:
 
     def command_line(self) -> str:
         """The command that flies it again."""
-        words = ["gcs fly", self.mission]
+        words = ["gcs", "fly", self.mission]
         if self.connect is not None:
             words += ["--connect", str(self.connect)]
             words += ["--sysid", str(self.connect.system)] if self.connect.system is not None else []
-            return " ".join([*words, "--truth", str(self.truth_at)] if self.truth_at else words)
+            words += ["--truth", str(self.truth_at)] if self.truth_at else []
+            return shlex.join([*words, *self._time_limit])
         if self.firmware is None:
             words += ["--law", self.law, *own_part_options(self.estimator, self.planner)]
             words += ignore_options(self.ignored)
@@ -71,7 +73,11 @@ class FlightOptions:
         for setting in self.settings:
             words += ["--set", setting]
         words += ["--force"] if self.force else []
-        return " ".join(words)
+        return shlex.join([*words, *self._time_limit])
+
+    @property
+    def _time_limit(self) -> list[str]:
+        return [] if self.limit_s is None else ["--timeout", f"{self.limit_s!r}"]
 
     @property
     def allows_infeasible(self) -> bool:

@@ -6,6 +6,7 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
+from autopilot.shell.atomic_file import write_atomically
 from autopilot.shell.options import unknown_setting
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
@@ -84,10 +85,8 @@ def save_parameters(file: Path, address: Address) -> int:
         values = _read_all(session, target)
     is_qgc = file.suffix.lower() == QGC_ENDING
     text = qgc_parameters(values, target) if is_qgc else parameter_lines(values)
-    partial = file.with_name(file.name + ".part")
     try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(file)
+        write_atomically(file, text.encode())
     except OSError as error:
         raise GcsError(f"{file}: cannot be written: {error.strerror}") from None
     return len(values)

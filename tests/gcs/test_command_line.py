@@ -37,13 +37,20 @@ def test_the_command_names_the_vehicle_that_was_chosen() -> None:
 
 
 def test_the_recorded_command_gives_the_options_back() -> None:
-    for options in (ASKED, replace(ASKED, force=True), replace(ASKED, speed=2.0, real_time=True), IGNORING):
+    others = (
+        {"force": True},
+        {"speed": 2.0, "real_time": True},
+        {"limit_s": 12.5},
+        {"mission": "my hover.toml"},
+    )
+    for options in (ASKED, IGNORING, *(replace(ASKED, **changes) for changes in others)):
         program, command, *words = shlex.split(options.command_line())
         assert (program, command) == ("gcs", "fly")
         fly = gcs.get_command(click.Context(gcs), command)
         assert fly is not None
         given = fly.make_context(command, words).params
         assert given["mission"] == options.mission
+        assert given["limit_s"] == options.limit_s
         assert tuple(given["settings"]) == options.settings
         assert given["ignore"] == options.ignored
         for name in ("law", "sensors", "vehicle", "seed", "speed", "real_time", "force"):

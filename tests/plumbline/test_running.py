@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 import plumbline
+from gcs.clients.operation import Target
 from gcs.shell.link import UdpSocket, free_port
 from plumbline import RunningVehicle
 
@@ -73,3 +76,50 @@ def test_a_port_that_is_taken_and_free_again_after_a_failure() -> None:
     with pytest.raises(plumbline.Error, match="no vehicle heard"):
         plumbline.connect(str(port), timeout_s=0.1)
     UdpSocket("127.0.0.1", port).close()
+
+
+class QuietSession:
+    """A session that hears nothing, and fails `failures` times at listening."""
+
+    def __init__(self, failures: int = 0) -> None:
+        self.failures = failures
+        self.target = Target(1, 1)
+
+    def find(self) -> None:
+        """The vehicle is there."""
+
+    def watch(self, done: Callable[[], bool], seconds: float | None) -> bool:
+        if self.failures > 0:
+            self.failures -= 1
+            raise ValueError("a message that cannot be read")
+        idle = threading.Event()
+        while not done():
+            idle.wait(0.001)
+        return True
+
+    def run(self, operation: Any) -> Any:
+        """Every request is answered."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_a_request_at_the_moment_of_closing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    vehicle = RunningVehicle(QuietSession(), 1.0)  # type: ignore[arg-type]
+    put = vehicle._jobs.put
+
+    def close_first(job: Callable[[], None]) -> None:
+        vehicle.close()
+        put(job)
+
+    monkeypatch.setattr(vehicle._jobs, "put", close_first)
+    with pytest.raises(plumbline.Error, match="the link was closed"):
+        vehicle.pause()
+
+
+def test_a_link_that_fails_while_it_listens_serves_the_next_request() -> None:
+    session = QuietSession(failures=3)
+    with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
+        for _ in range(4):
+            vehicle.pause()
+    assert session.failures == 0

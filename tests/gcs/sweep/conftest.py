@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gcs.sweep.plan import SweepPlan, VariedParameter
+from gcs.folders import PLAN_FILE
+from gcs.sweep.plan import SweepPlan, VariedParameter, from_json
 
 SHORT = """
 title = "Up, aside and down"
@@ -101,6 +103,12 @@ def plan(short: str) -> SweepPlan:
     """Six flights, of which those with the long delay are lost."""
     delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
     return SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
+
+
+def stored_plan(directory: Path) -> SweepPlan:
+    """The plan in the directory of a sweep."""
+    stored = json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))
+    return from_json(stored["origin"]["settings"]["plan"])
 
 
 class AtOnce(Executor):

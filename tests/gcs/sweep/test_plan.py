@@ -22,10 +22,11 @@ from gcs.sweep.plan import (
     make_plan,
     parse_varied,
 )
-from gcs.sweep.plan_file import default_directory, load_command, load_plan, store_plan, sweep_origin
+from gcs.sweep.plan_file import default_directory, load_command, store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.standouts import base_command, flight_settings
 from missions.fileformat import load_mission
+from tests.gcs.sweep.conftest import stored_plan
 
 
 def test_ranges_and_lists() -> None:
@@ -268,7 +269,7 @@ def origin(plan: SweepPlan, version: str = "1", code: str = "code") -> Origin:
 def test_a_directory_holds_one_plan(plan: SweepPlan, tmp_path: Path) -> None:
     store_plan(tmp_path, plan, "gcs sweep", origin(plan))
     store_plan(tmp_path, plan, "gcs sweep again", origin(plan))
-    assert load_plan(tmp_path) == plan
+    assert stored_plan(tmp_path) == plan
     assert load_command(tmp_path) == ("gcs sweep", "1")
     other = SweepPlan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
     with pytest.raises(PlanError, match=r"another sweep, with other --law, --seeds, --vary; name"):
@@ -278,7 +279,7 @@ def test_a_directory_holds_one_plan(plan: SweepPlan, tmp_path: Path) -> None:
     with pytest.raises(PlanError, match="another version"):
         store_plan(tmp_path, plan, "gcs sweep", origin(plan, version="2"))
     with pytest.raises(PlanError, match="no sweep"):
-        load_plan(tmp_path / "empty")
+        load_command(tmp_path / "empty")
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"plan": {}, "code": "x"}'])
@@ -287,7 +288,7 @@ def test_a_plan_that_cannot_be_read_is_not_overwritten(plan: SweepPlan, tmp_path
     with pytest.raises(PlanError, match="--fresh"):
         store_plan(tmp_path, plan, "gcs sweep", origin(plan))
     with pytest.raises(PlanError, match="no sweep"):
-        load_plan(tmp_path)
+        load_command(tmp_path)
     assert (tmp_path / "plan.json").read_text(encoding="utf-8") == text
 
 

@@ -23,13 +23,13 @@ from gcs.cli import gcs
 from gcs.errors import GcsError
 from gcs.sweep import run, work
 from gcs.sweep.plan import PlanError, SweepPlan
-from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
+from gcs.sweep.plan_file import store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, completion_range, flights_by_law
 from gcs.sweep.standouts import repeat_command, stored_standouts
 from gcs.sweep.store import Row, Store, columns
 from tests.doubles.browser import Browser
-from tests.gcs.sweep.conftest import AtOnce
+from tests.gcs.sweep.conftest import AtOnce, stored_plan
 
 
 def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.SweepResult:
@@ -76,7 +76,7 @@ def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Sweep
     errors = table.column("load_error_max_m").to_pylist()[:4]
     assert all(0.001 < error < 0.3 for error in errors)
     assert not (directory / "parts").exists()
-    assert load_plan(directory) == plan
+    assert stored_plan(directory) == plan
 
 
 def test_a_sweep_that_was_stopped_goes_on(
@@ -151,7 +151,7 @@ def test_a_sweep_is_extended_by_seeds_and_values(
     rest = swept(plan, tmp_path)
     assert (rest.flights, rest.flown) == (6, 6 - first.flights)
     assert without_clock(tmp_path) == without_clock(complete)
-    assert load_plan(tmp_path) == plan
+    assert stored_plan(tmp_path) == plan
     with pytest.raises(PlanError, match="another sweep, with other --seeds, --vary"):
         swept(less, tmp_path)
 
