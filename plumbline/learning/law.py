@@ -26,7 +26,7 @@ class PolicyLaw:
     def __init__(self, parameters: Mapping[str, float]) -> None:
         if not hasattr(self, "file"):
             raise GcsError(f"{type(self).__name__}: file, the path of the policy (.npz), is not set")
-        self._pilot = PolicyPilot(load_policy(self.file))
+        self._pilot = PolicyPilot(load_policy(self.file), parameters["CTL_RATE_HZ"])
 
     def start(self, now: Now) -> None:
         """Reset the policy, as at the beginning of an episode."""

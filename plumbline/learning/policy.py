@@ -6,10 +6,12 @@ actions. It is read by numpy alone: the libraries that trained the policy are no
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +20,13 @@ from autopilot.control.actuators.mixer import new_rotors
 from autopilot.control.records import State
 from autopilot.control.thesis_cascade import ThesisMemory, start
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+from autopilot.shell.atomic_file import write_atomically
 from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MAX_ROTORS
+from autopilot.vehicle.rates import RateError, divider
 from autopilot.vehicle.rotors import mixer_table
-from gcs.errors import GcsError
+from gcs.errors import GcsError, write_error
+from plumbline.arguments import file_path
 from plumbline.learning.actions import Mixing, apply_action, clipped
 from plumbline.learning.initial_world import hover_forces
 from plumbline.learning.observations import observation_size, write_observation
@@ -48,10 +53,11 @@ _AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 
 class Policy:
     """A network with tanh between its layers. Of the `options` of its environment, those in `KEPT_OPTIONS`
-    are kept; `Error` (plumbline.Error) if there is no such option."""
+    are kept; `Error` (plumbline.Error) if there is no such option, or if the layers do not fit each other."""
 
     def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
         self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+        _require_network(self.layers)
         checked = options_of(options)
         self.options = {name: options[name] for name in KEPT_OPTIONS if name in options}
         if "vehicle" in self.options:
@@ -67,11 +73,23 @@ class Policy:
         return actions
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file that ends in .npz."""
+        """Write it to a file that ends in .npz; an existing file is replaced once the new one is complete.
+        `Error` (plumbline.Error) if it cannot be written."""
+        file = file_path("path", path)
+        if file.suffix != ".npz":
+            raise GcsError(f"{file}: a policy is written as .npz; name it {file.stem}.npz")
         arrays = {f"weights_{k}": w for k, (w, _) in enumerate(self.layers)}
         arrays |= {f"biases_{k}": b for k, (_, b) in enumerate(self.layers)}
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        np.savez(path, options=np.array(json.dumps(self.options)), **arrays)  # type: ignore[arg-type]
+        options = json.dumps(
+            self.options, default=lambda number: number.tolist()
+        )  # NumPy's numbers and arrays
+        content = io.BytesIO()
+        np.savez(content, options=np.array(options), **arrays)  # type: ignore[arg-type]
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(file, content.getvalue())
+        except OSError as error:
+            raise write_error(error, file, "file", option="") from None
 
 
 def load_policy(path: str | Path) -> Policy:
@@ -80,14 +98,26 @@ def load_policy(path: str | Path) -> Policy:
         with np.load(path) as file:
             options = json.loads(str(file["options"]))
             count = sum(name.startswith("weights_") for name in file.files)
-            layers = [(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)]
+            policy = Policy([(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)], options)
     except OSError as error:
         raise GcsError(f"{path}: {error.strerror or error}") from None
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, EOFError, BadZipFile, GcsError) as error:
         raise GcsError(f"{path}: it holds no policy: {error}") from None
+    return policy
+
+
+def _require_network(layers: Layers) -> None:
+    """GcsError unless each layer takes the numbers that the one before gives, and all weights are finite."""
     if not layers:
-        raise GcsError(f"{path}: it holds no policy: there are no weights")
-    return Policy(layers, options)
+        raise GcsError("there are no weights")
+    for k, (weights, biases) in enumerate(layers):
+        if weights.ndim != 2 or biases.shape != weights.shape[:1]:
+            shapes = f"weights {weights.shape}, biases {biases.shape}"
+            raise GcsError(f"layer {k}: {shapes}; must be (outputs, inputs) and (outputs,)")
+        if k and weights.shape[1] != len(layers[k - 1][1]):
+            raise GcsError(f"layer {k} takes {weights.shape[1]} numbers, and gets {len(layers[k - 1][1])}")
+        if not (np.isfinite(weights).all() and np.isfinite(biases).all()):
+            raise GcsError(f"layer {k}: all weights and biases must be finite")
 
 
 def policy_of_sb3(model: Any, options: Mapping[str, Any]) -> Policy:
@@ -106,11 +136,27 @@ def policy_of_sb3(model: Any, options: Mapping[str, Any]) -> Policy:
     return Policy(layers, options)
 
 
-class PolicyPilot:
-    """A policy that flies one vehicle: it is called at each tick of the autopilot."""
+def _options_at(options: Mapping[str, Any], control_hz: float | None) -> Mapping[str, Any]:
+    """The options of an environment with so many ticks in a second."""
+    if control_hz is None:
+        return options
+    step_hz = options_of(options).rate_hz
+    try:
+        divider(control_hz, step_hz, "rate_hz")
+    except RateError:
+        raise GcsError(
+            f"the policy acts at {step_hz:g} Hz, which does not divide CTL_RATE_HZ = {control_hz:g} Hz"
+        ) from None
+    rates = {"CTL_RATE_HZ": control_hz, "SIM_RATE_HZ": control_hz}
+    return {**options, "settings": {**options.get("settings", {}), **rates}}
 
-    def __init__(self, policy: Policy) -> None:
-        scenario = Scenario(options_of(policy.options))
+
+class PolicyPilot:
+    """A policy that flies one vehicle: it is called at each tick of the autopilot, which has `control_hz` of
+    them in a second; None: as many as in the environment."""
+
+    def __init__(self, policy: Policy, control_hz: float | None = None) -> None:
+        scenario = Scenario(options_of(_options_at(policy.options, control_hz)))
         task = scenario.task
         self._policy, self._model, self._observation_model, self._ticks = (
             policy,

@@ -91,6 +91,73 @@ def test_what_is_no_policy_is_told(tmp_path: Path) -> None:
         load_policy(tmp_path / "other.npz")
     with pytest.raises(plumbline.Error, match="does not fit its options: they show 28 numbers"):
         PolicyPilot(made(12, 4, {}))
+    with pytest.raises(plumbline.Error, match=r"is written as .npz; name it best.npz"):
+        made(28, 4, {}).save(tmp_path / "best.policy")
+    (tmp_path / "file").touch()
+    with pytest.raises(plumbline.Error, match="name another file"):
+        made(28, 4, {}).save(tmp_path / "file" / "policy.npz")
+
+
+def broken(folder: Path, kind: str) -> Path:
+    """A file of which something is wrong."""
+    path = folder / "policy.npz"
+    policy = made(28, 4, {"rate_hz": np.int64(50)})
+    policy.save(path)
+    with np.load(path) as file:
+        parts = dict(file)
+    if kind == "empty":
+        path.write_bytes(b"")
+    elif kind == "cut":
+        path.write_bytes(path.read_bytes()[:500])
+    elif kind == "array":
+        with path.open("wb") as out:
+            np.save(out, np.zeros(3))
+    else:
+        changed: dict[str, dict[str, Any]] = {
+            "no biases": {"biases_0": None},
+            "no weights": {"weights_0": None, "weights_1": None},
+            "options": {"options": np.array("[1]")},
+            "option": {"options": np.array('{"preveiw": 1}')},
+            "shapes": {"weights_1": np.zeros((4, 7))},
+            "flat": {"weights_1": np.zeros(4)},
+            "not finite": {"biases_1": np.full(4, np.nan)},
+        }
+        kept = {name: part for name, part in (parts | changed[kind]).items() if part is not None}
+        np.savez(path, **kept)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("empty", "it holds no policy"),
+        ("cut", "it holds no policy"),
+        ("array", "it holds no policy"),
+        ("no biases", "it holds no policy"),
+        ("no weights", "it holds no policy: there are no weights"),
+        ("options", "it holds no policy"),
+        ("option", "it holds no policy: preveiw: there is no such option"),
+        ("shapes", "it holds no policy: layer 1 takes 7 numbers, and gets 8"),
+        ("flat", r"it holds no policy: layer 1: weights \(4,\), biases \(4,\); must be"),
+        ("not finite", "it holds no policy: layer 1: all weights and biases must be finite"),
+    ],
+)
+def test_a_broken_file_is_named(tmp_path: Path, kind: str, told: str) -> None:
+    with pytest.raises(plumbline.Error, match=rf"policy\.npz: {told}"):
+        load_policy(broken(tmp_path, kind))
+
+
+def test_a_policy_acts_at_its_rate_whatever_the_rate_of_the_autopilot() -> None:
+    up = plumbline.Mission("up", [Takeoff(0.6), Waypoint(0.0, 0.0, 0.6, hold_s=2.0), Land()])
+    law = "plumbline.examples.hover_policy:HoverPolicy"
+    fast = {"SIM_RATE_HZ": 500, "CTL_RATE_HZ": 500}
+    flight = plumbline.fly(up, law=law, settings=fast)
+    assert (flight.outcome, flight.reason) == ("completed", "")
+    assert 0.002 < flight.summary["load_error_max_m"] < 0.05
+    with pytest.raises(
+        plumbline.Error, match="the policy acts at 50 Hz, which does not divide CTL_RATE_HZ = 125"
+    ):
+        plumbline.fly(up, law=law, settings={"CTL_RATE_HZ": 125})
 
 
 class Tensor:
