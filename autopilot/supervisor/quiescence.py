@@ -42,7 +42,7 @@ from autopilot.supervisor.state import (
     needs_load_estimate,
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, TAUT_PULL_SHARE
-from autopilot.supervisor.watches.fence import NO_ACTION
+from autopilot.supervisor.watches.fence import NO_ACTION, has_fence
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
 from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, last_setpoint_height
@@ -171,7 +171,6 @@ def _uncontrolled_end_us(flight: Flight, now_us: int) -> int:
 
 
 def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> bool:
-    has_fence = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
     return bool(
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
         or isinstance(leg, CatchLoad)
@@ -179,7 +178,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or flight.phase == Phase.GUIDED
         or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)
         or not flight.heading.is_settled
-        or (has_fence and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
+        or (settings.fence.action != NO_ACTION and flight.phase in CARRYING and has_fence(flight, settings))
     )
 
 

@@ -7,8 +7,8 @@ numbered: in a sweep that was extended, they have other numbers than in the file
 
 from __future__ import annotations
 
+import io
 import json
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from autopilot.own.law import law_name
+from autopilot.shell.atomic_file import write_atomically
 from gcs.formats.arrow import array_of, text_array
 from gcs.sweep.flight import FlightResult
 from gcs.sweep.plan import Case, SweepPlan, from_json
@@ -128,13 +129,13 @@ class Store:
         self._write(folder / f"{first:09d}-{len(rows)}.parquet", table_of(rows, self._schema))
 
     def merge(self) -> pyarrow.Table:
-        """Merge all that is stored into one table, in the order of the flights; delete the parts when the
-        table is on disk."""
+        """Merge all that is stored into one table, in the order of the flights; delete the parts, also
+        unfinished ones of a sweep that was killed, when the table is on disk."""
         table = self.read()
         self._write(self.path, table)
-        for path in self.parts():
-            path.unlink()
         folder = self._directory / PARTS
+        for path in (*self.parts(), *folder.glob("*.new")):
+            path.unlink()
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         return table
@@ -180,6 +181,6 @@ class Store:
     def _write(self, path: Path, table: pyarrow.Table) -> None:
         import pyarrow.parquet as pq
 
-        unfinished = path.with_suffix(f".{os.getpid()}.unfinished")
-        pq.write_table(table, unfinished, compression="zstd")
-        unfinished.replace(path)
+        content = io.BytesIO()
+        pq.write_table(table, content, compression="zstd")
+        write_atomically(path, content.getvalue())

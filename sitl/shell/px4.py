@@ -62,13 +62,13 @@ class FirmwareGate:
         self._last_poll_s = 0.0
 
     def accept_next(self) -> tuple[socket.socket, Address] | None:
-        """The firmware that is served from now on; None if none has connected for LOOK_S."""
+        """The firmware that is served from now on; None if none has connected for POLL_S."""
         connection, self._next = self._next or self._accept_within(POLL_S), None
         self._served = None if connection is None else connection[1]
         return connection
 
     def refuse_others(self) -> None:
-        """Refuse a firmware that connects while another answers; checks at most once in LOOK_S."""
+        """Refuse a firmware that connects while another answers; checks at most once in POLL_S."""
         connection = self._poll_for_next()
         if connection is not None:
             connection[0].close()

@@ -74,8 +74,8 @@ def _send_tick(buffers: SocketBuffers, batch: TickBatch) -> None:
 
 @nogil_kernel
 def exchange(buffers: SocketBuffers, batch: TickBatch) -> int:
-    """Run ticks of the world, each as soon as the one before is answered. Returns SILENCE or HEARD if the
-    present tick is not answered, MOVED if the world is at a tick of which no frames are written yet."""
+    """Run ticks of the world, each as soon as the one before is answered. Returns TIMED_OUT or RECEIVED if
+    the present tick is not answered, ADVANCED if the world is at a tick whose frames are not written yet."""
     while True:
         buffers.sizes[_ADDRESS] = SYSTEM_ADDRESS_BYTES
         size = receive_from_at(

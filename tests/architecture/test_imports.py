@@ -47,6 +47,7 @@ GCS = (
     "autopilot.geometry",
     "autopilot.trajectory",
     "autopilot.wire",
+    "autopilot.shell.atomic_file",
     "autopilot.shell.compiling",
     "autopilot.shell.options",
     *OWN,
@@ -94,6 +95,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "autopilot.services",
         "autopilot.supervisor",
     ),
+    "autopilot.shell.atomic_file": (),
     "autopilot.shell.options": ("autopilot.wire",),
     "autopilot.shell": ("autopilot",),
     "autopilot.__main__": ("autopilot",),
@@ -154,6 +156,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "plumbline": (
         *OWN,
         *VEHICLE,
+        "autopilot.shell.atomic_file",
         "autopilot.shell.options",
         "autopilot.vehicle.parameters",
         "autopilot.wire",

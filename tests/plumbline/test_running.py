@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -106,13 +107,13 @@ class QuietSession:
 
 def test_a_request_at_the_moment_of_closing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     vehicle = RunningVehicle(QuietSession(), 1.0)  # type: ignore[arg-type]
-    put = vehicle._jobs.put
+    put = queue.Queue.put
 
-    def close_first(job: Callable[[], None]) -> None:
+    def close_first(jobs: queue.Queue[Any], job: Callable[[], None]) -> None:
         vehicle.close()
-        put(job)
+        put(jobs, job)
 
-    monkeypatch.setattr(vehicle._jobs, "put", close_first)
+    monkeypatch.setattr(queue.Queue, "put", close_first)
     with pytest.raises(plumbline.Error, match="the link was closed"):
         vehicle.pause()
 
