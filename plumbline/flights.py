@@ -48,7 +48,7 @@ Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot b
 
 @called_by_scripts
 def fly(
-    mission: str | Path | Mission,
+    mission: str | Path | model.Mission,
     *,
     law: str | type = DEFAULT_LAW,
     estimator: str | type | None = None,
@@ -81,9 +81,11 @@ def fly(
     from autopilot.shell.options import MAX_SEED
     from gcs.workflows.in_process_flight import fly_in_process
 
-    flown = mission if isinstance(mission, Mission) else Mission.load(mission)
+    given = Mission.of(mission) if isinstance(mission, model.Mission) else mission
+    mission_file = name_or_path("mission", given)
+    flown = mission if isinstance(mission, model.Mission) else Mission.load(mission_file)
     options = FlightOptions(
-        mission=name_or_path("mission", mission),
+        mission=mission_file,
         law=law_reference(law),
         sensors=name_or_path("sensors", sensors),
         vehicle=name_or_path("vehicle", vehicle),

@@ -64,7 +64,14 @@ class Mission(model.Mission):
             found = load_mission(name_or_file("mission", name_or_path))
         except MissionFileError as error:
             raise input_error(error) from None
-        return cls(found.name, found.steps, found.title, found.description, found.assumptions)
+        return cls.of(found)
+
+    @classmethod
+    def of(cls, mission: model.Mission) -> Mission:
+        """A mission as one that can be saved; it is checked like any other."""
+        if isinstance(mission, cls):
+            return mission
+        return cls(mission.name, mission.steps, mission.title, mission.description, mission.assumptions)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the mission as a file, which `load` and every command read; an existing file is replaced."""

@@ -62,7 +62,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     sky = fenced().airborne()
     farthest = eastward(sky, 12.0)
     assert sky.flight.phase == Phase.HOLD
-    assert sky.texts[-1] == "Fence: outside the fence, holding"
+    assert sky.texts[-1] == "Fence: would stop outside the fence, holding"
     # stopped shortly before the fence: measured 4.89 m
     assert 3.5 < farthest < 5.0
     assert sky.flight.area.breaches == 1
@@ -104,7 +104,7 @@ def test_each_action_during_the_lift(action: int, phase: Phase) -> None:
     sky.settings = replace(sky.settings, fence=replace(sky.settings.fence, height_m=4.0))
     sky.run(lambda s: s.flight.phase != Phase.LIFT)
     assert sky.flight.phase == phase
-    assert sky.texts[-1].startswith("Fence: beyond the fence, GF_MAX_VER_DIST 4 m above home")
+    assert sky.texts[-1].startswith("Fence: would stop beyond the fence, GF_MAX_VER_DIST 4 m above home")
     assert sky.view.x_quad[2] < 4.0
 
 
@@ -136,7 +136,7 @@ def test_a_fence_that_is_switched_off_stops_nobody() -> None:
 def test_distance_and_height() -> None:
     sky = fenced(radius_m=3.0).airborne()
     assert eastward(sky, 10.0) < 3.0
-    assert sky.texts[-1] == "Fence: beyond the fence, GF_MAX_HOR_DIST 3 m from home, holding"
+    assert sky.texts[-1] == "Fence: would stop beyond the fence, GF_MAX_HOR_DIST 3 m from home, holding"
     high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED

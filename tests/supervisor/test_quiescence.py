@@ -322,7 +322,7 @@ def fenced() -> Watched:
     for _ in range(400):
         sky.ask(east)
         sky.tick()
-    assert sky.texts[-1] == "Fence: outside the fence, holding"
+    assert sky.texts[-1] == "Fence: would stop outside the fence, holding"
     return landed(sky)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from autopilot.geometry.linear import axpy, sub
+from autopilot.geometry.linear import Vec3, axpy, sub
 from autopilot.guidance.legs import CatchLoad, LevelHold
 from autopilot.supervisor.motion import commanded_motion, stopping_legs, tracks_attitude
 from autopilot.supervisor.settings import Settings
@@ -62,14 +63,18 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
 
 def _breach(flight: Flight, view: View, settings: Settings) -> str:
     """Why the fence is breached, or is about to be; an empty string if it is not."""
+    released = flight.cable.released
     load_below = load_position_below(view.x_quad, settings)
-    places = [load_below] if flight.cable.released else [view.x_load, load_below]
-    if not tracks_attitude(flight.legs[0]):
-        here, end = commanded_motion(flight, view, settings)[0], stopping_legs(flight, view, settings)[1]
-        stop_places = [here, axpy(STOP_MARGIN, sub(end, here), end)]
-        places += (
-            [load_position_below(place, settings) for place in stop_places]
-            if flight.cable.released
-            else stop_places
-        )
+    breach = _first_violation(flight, [load_below] if released else [view.x_load, load_below], settings)
+    if breach or tracks_attitude(flight.legs[0]):
+        return breach
+    here, end = commanded_motion(flight, view, settings)[0], stopping_legs(flight, view, settings)[1]
+    places = [here, axpy(STOP_MARGIN, sub(end, here), end)]
+    if released:
+        places = [load_position_below(place, settings) for place in places]
+    ahead = _first_violation(flight, places, settings)
+    return ahead and f"would stop {ahead}"
+
+
+def _first_violation(flight: Flight, places: Sequence[Vec3], settings: Settings) -> str:
     return next(filter(None, (fence_violation(flight.area.fence, place, settings) for place in places)), "")
