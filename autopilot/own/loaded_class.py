@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from autopilot.own.source import OwnError, source_digest, source_file
 from autopilot.wire import parameter_table as table
+from missions.nearest import did_you_mean
 
 _VALID_NAME = re.compile(r"[A-Za-z][\w-]{0,31}")
 
@@ -23,6 +24,15 @@ class Parameter(NamedTuple):
     high: float
     unit: str = ""
     text: str = ""
+
+
+class _ParametersByName(dict[str, float]):
+    """All parameters of the autopilot, as a custom class is given them; a wrong name is answered by the
+    nearest."""
+
+    def __missing__(self, name: object) -> float:
+        hint = did_you_mean(str(name), self).strip()
+        raise KeyError(f"{name}: there is no such parameter{f'; {hint}' if hint else ''}")
 
 
 @dataclass(frozen=True)
@@ -53,10 +63,11 @@ class LoadedClass:
 
     def new_instance(self, parameters: Mapping[str, float]) -> Any:
         """An instance with these parameters."""
+        by_name = _ParametersByName(parameters)
         build = getattr(self.kind, "build", None)
         if build is not None:
-            return build(parameters)
-        return self.kind(parameters) if signature(self.kind).parameters else self.kind()
+            return build(by_name)
+        return self.kind(by_name) if signature(self.kind).parameters else self.kind()
 
     def location(self, method: str) -> str:
         """File and line of a method; of the class if the method is not in the file of the class."""

@@ -72,6 +72,8 @@ class EnvOptions:
         _one_of("action", self.action, tuple(ACTIONS))
         _one_of("observation", self.observation, OBSERVATIONS)
         _one_of("start", self.start, STARTS)
+        if self.start == "random" and self.mission is None:
+            raise GcsError("start = 'random' begins anywhere on the path of a mission; name one by mission=")
         for name in ("history", "preview"):
             whole_number(name, getattr(self, name), 0, 1000)
         for name in ("rate_hz", "preview_s", "reach_m"):

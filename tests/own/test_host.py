@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import signal
 import threading
 import time
@@ -161,12 +162,15 @@ def test_what_fails_in_what_it_is_made_of_is_told_with_the_line_of_the_class() -
 def test_a_law_that_cannot_be_made_is_told() -> None:
     class Unmade:
         def __init__(self, parameters: Any) -> None:
-            self.gain = parameters["NO_SUCH"]
+            self.gain = parameters["CTL_RATE_HTZ"]
 
         def load_position(self, memory: Any, now: Now) -> Any:
             return memory, UPWARD
 
-    with pytest.raises(OwnError, match=r"Law Unmade failed: KeyError: 'NO_SUCH' \(test_host\.py:\d+\)"):
+    told = "'CTL_RATE_HTZ: there is no such parameter; did you mean CTL_RATE_HZ?'"
+    with pytest.raises(
+        OwnError, match=rf"Law Unmade failed: KeyError: {re.escape(told)} \(test_host\.py:\d+\)"
+    ):
         tried(Unmade)
 
 
