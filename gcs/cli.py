@@ -48,6 +48,9 @@ COMMANDS = {
     "takeoff": ("control", "Lift the load and hold it."),
     "goto": ("control", "Move the load to a position and hold it there."),
     "land": ("control", "Set the load down, and the vehicle beside it."),
+    "winch": ("control", "Make the cable longer or shorter."),
+    "release": ("control", "Let the load go."),
+    "grab": ("control", "Take the load again."),
     "mode": ("control", "Change the flight mode."),
     "param": ("param", "Read and write parameters."),
 }

@@ -57,6 +57,7 @@ _MAX_STALL_S = 60.0  # how long the vehicle's clock may stand still while its he
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
+_STILL_S = 1.5  # twice the interval of WINCH_STATUS, and its delay
 _NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
     "holding": lambda state: state.phase == "hold",
@@ -95,9 +96,9 @@ class RunningVehicle:
     """A running vehicle, as `connect` returns it. Use it in a `with` block, or `close` it.
 
     A command returns when the vehicle has accepted it; a refusal raises an `Error` with the vehicle's reason.
-    `takeoff`, `goto` and `land` also wait until the manoeuvre is finished, unless `wait=False`. Time limits
-    of waiting are in seconds of the vehicle's clock, so that they mean the same at any simulation speed and
-    on a busy machine. Positions are those of the load: metres east, north and up from home.
+    `takeoff`, `goto`, `winch` and `land` also wait until the manoeuvre is finished, unless `wait=False`. Time
+    limits of waiting are in seconds of the vehicle's clock, so that they mean the same at any simulation
+    speed and on a busy machine. Positions are those of the load: metres east, north and up from home.
     """
 
     def __init__(self, session: Session, timeout_s: float) -> None:
@@ -225,6 +226,34 @@ class RunningVehicle:
     def start(self) -> None:
         """Fly the mission from its first item; a disarmed vehicle begins when it is armed."""
         self._command(lambda session: command.start_mission(session.target))
+
+    @checked_flags
+    def winch(
+        self,
+        length_m: float,
+        *,
+        speed_m_s: float | None = None,
+        wait: bool = True,
+        timeout_s: float = 300.0,
+    ) -> None:
+        """Make the cable longer by a length, or shorter if it is negative, while the vehicle stays in place.
+
+        The vehicle must hold the load in the air. The default speed is WNC_SPEED.
+        """
+        checked_m = number("length_m", length_m)
+        checked_speed_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
+        limit_s = positive("timeout_s", timeout_s)
+        self._command(lambda session: command.winch(session.target, checked_m, checked_speed_m_s))
+        if wait:
+            self.wait(_winch_stands(), limit_s)
+
+    def release(self) -> None:
+        """Let the load go. In the air it falls, and the vehicle holds its position."""
+        self._command(lambda session: command.release(session.target))
+
+    def grab(self) -> None:
+        """Take the load again: on the ground, with the load within 0.75 cable lengths of the vehicle."""
+        self._command(lambda session: command.grab(session.target))
 
     def pause(self) -> None:
         """Hold the load where it is."""
@@ -413,6 +442,22 @@ class _Clock:
     def stalled_s(self) -> float:
         """How long the vehicle's clock has stood still, by the clock of this machine."""
         return (monotonic_us() - self._changed_us) * 1e-6
+
+
+def _winch_stands() -> Condition:
+    """That winch and load have stood still for `_STILL_S`: longer than it takes until the vehicle, which may
+    have to stop first, reports that its winch moves."""
+    clock, still_since_s = _Clock(), 0.0
+
+    def condition(state: State) -> bool:
+        nonlocal still_since_s
+        now_s = clock.elapsed_s(state)
+        speed = state.load_speed_m_s
+        if state.winch_moving is not False or (speed is not None and speed > _SLOW_M_S):
+            still_since_s = now_s
+        return now_s - still_since_s > _STILL_S
+
+    return condition
 
 
 def _has_arrived(state: State, place: tuple[float, float, float | None]) -> bool:

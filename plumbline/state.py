@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.vehicle_view import VehicleView
 from gcs.workflows.status import status_record
 
@@ -33,6 +34,8 @@ class State:
     rotor_use: float | None  # the greatest rotor force, divided by its limit
     battery_v: float | None
     load_speed_m_s: float | None
+    cable_length_m: float | None  # from vehicle to load; as set by the winch while the cable is slack
+    winch_moving: bool | None
 
     @property
     def load_m(self) -> tuple[float, float, float] | None:
@@ -50,4 +53,10 @@ def state_of(view: VehicleView) -> State:
     record = {name: value for name, value in status_record(view).items() if name in _NAMES}
     load = view.latest.get("LOAD_STATE")
     speed = None if load is None else float((load.vx**2 + load.vy**2 + load.vz**2) ** 0.5)
-    return State(**record, load_speed_m_s=speed)
+    winch = view.latest.get("WINCH_STATUS")
+    return State(
+        **record,
+        load_speed_m_s=speed,
+        cable_length_m=None if winch is None else float(winch.line_length),
+        winch_moving=None if winch is None else bool(winch.status & mavlink.MAV_WINCH_STATUS_MOVING),
+    )

@@ -148,6 +148,25 @@ def land(target: Target) -> CommandOperation:
     return CommandOperation(target, "land", mavlink.MAV_CMD_NAV_LAND, (UNUSED,) * 7)
 
 
+def winch(target: Target, length_m: float, speed_m_s: float | None = None) -> CommandOperation:
+    """Make the cable longer by a length (negative: shorter); speed None: that of the vehicle's parameter."""
+    by_length = float(mavlink.WINCH_RELATIVE_LENGTH_CONTROL)
+    parameters = (1.0, by_length, length_m, 0.0 if speed_m_s is None else speed_m_s)
+    return CommandOperation(target, "winch", mavlink.MAV_CMD_DO_WINCH, parameters)
+
+
+def release(target: Target) -> CommandOperation:
+    """Open the gripper that holds the cable: the load falls."""
+    parameters = (1.0, float(mavlink.GRIPPER_ACTION_RELEASE))
+    return CommandOperation(target, "release", mavlink.MAV_CMD_DO_GRIPPER, parameters)
+
+
+def grab(target: Target) -> CommandOperation:
+    """Take the load that lies within reach of a vehicle on the ground."""
+    parameters = (1.0, float(mavlink.GRIPPER_ACTION_GRAB))
+    return CommandOperation(target, "grab", mavlink.MAV_CMD_DO_GRIPPER, parameters)
+
+
 def reposition(
     target: Target,
     latitude_degE7: int,

@@ -1,4 +1,5 @@
-"""gcs arm, disarm, start, pause, resume, takeoff, goto, land, mode: each sends one command to the vehicle."""
+"""gcs arm, disarm, start, pause, resume, takeoff, goto, land, winch, release, grab, mode: each sends one
+command to the vehicle."""
 
 from __future__ import annotations
 
@@ -153,6 +154,39 @@ def goto_command(
 def land_command(address: Address) -> None:
     """Set the load down, and the vehicle beside it."""
     _send(address, lambda session: command.land(session.target))
+
+
+@click.command("winch", context_settings={"ignore_unknown_options": True})  # -1 is a number here
+@click.argument("length", type=FiniteType())
+@click.option("--speed", type=PositiveType(), help="Speed of the cable in m/s, instead of WNC_SPEED.")
+@connect_option
+def winch_command(length: float, speed: float | None, address: Address) -> None:
+    """Make the cable longer or shorter.
+
+    LENGTH is the change in m; a negative one shortens the cable. The vehicle stays in place, and the load
+    sinks or rises. The vehicle must hold the load in the air.
+    """
+    _send(address, lambda session: command.winch(session.target, length, speed))
+
+
+@click.command("release")
+@connect_option
+def release_command(address: Address) -> None:
+    """Let the load go.
+
+    In the air the load falls, and the vehicle holds its position. gcs land then sets the vehicle down alone.
+    """
+    _send(address, lambda session: command.release(session.target))
+
+
+@click.command("grab")
+@connect_option
+def grab_command(address: Address) -> None:
+    """Take the load again.
+
+    The vehicle must be on the ground, with the load within 0.75 cable lengths.
+    """
+    _send(address, lambda session: command.grab(session.target))
 
 
 @click.command("mode")

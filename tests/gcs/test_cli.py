@@ -366,6 +366,13 @@ def test_single_commands(live):
     assert by_command[mavlink.MAV_CMD_NAV_TAKEOFF].param7 == 3.0
     mode = by_command[mavlink.MAV_CMD_DO_SET_MODE]
     assert (mode.param1, mode.param2, mode.param3) == (129.0, 4.0, 3.0)
+    assert run("winch", "-0.25", "--speed", "0.5", "--connect", port).stdout == "winch: accepted\n"
+    winch = vehicle.commands[-1]
+    assert (winch.command, winch.param2, winch.param3, winch.param4) == (42600, 1.0, -0.25, 0.5)
+    for name, action in (("release", 0.0), ("grab", 1.0)):
+        assert run(name, "--connect", port).stdout == f"{name}: accepted\n"
+        gripper = vehicle.commands[-1]
+        assert (gripper.command, gripper.param1, gripper.param2) == (211, 1.0, action)
     assert run("disarm", "--connect", port).exit_code == EXIT_DONE
     assert not vehicle.armed
 

@@ -36,6 +36,8 @@ ARGUMENTS: dict[str, tuple[Any, str]] = {
     "goto nowhere": (lambda: UNMET.goto(float("nan"), 0, 1), "east_m = nan; must be a finite number"),
     "goto height": (lambda: UNMET.goto(0, 0, [1]), "up_m = [1]; must be a finite number"),  # type: ignore[arg-type]
     "goto speed": (lambda: UNMET.goto(0, 0, speed_m_s=0), "speed_m_s = 0; must be greater than 0"),
+    "winch": (lambda: UNMET.winch("out"), "length_m = 'out'; must be a finite number"),  # type: ignore[arg-type]
+    "winch speed": (lambda: UNMET.winch(0.1, speed_m_s=-1.0), "speed_m_s = -1.0; must be greater than 0"),
     "takeoff": (lambda: UNMET.takeoff("high"), "up_m = 'high'; must be a finite number"),  # type: ignore[arg-type]
     "arm": (lambda: UNMET.arm(timeout_s=None), "timeout_s = None; must be a finite number"),  # type: ignore[arg-type]
     "land": (lambda: UNMET.land(timeout_s=-1), "timeout_s = -1; must be greater than 0"),

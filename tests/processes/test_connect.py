@@ -75,6 +75,14 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
         assert vehicle.state.load_m == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
         vehicle.goto(0.6, -0.4, 1.3, speed_m_s=1.0)
         assert vehicle.state.load_m == pytest.approx((0.6, -0.4, 1.3), abs=0.15)
+        before_m = vehicle.state.cable_length_m
+        with pytest.raises(plumbline.Error, match=r"Winch denied: .*; must be 0.01 \.\.\."):
+            vehicle.winch(0.2, speed_m_s=9.0)
+        vehicle.winch(0.2)
+        assert before_m is not None and vehicle.state.cable_length_m == pytest.approx(
+            before_m + 0.2, abs=0.02
+        )
+        assert vehicle.state.load_m == pytest.approx((0.6, -0.4, 1.1), abs=0.15)
         began_s = vehicle.state.time_s
         after_s = vehicle.wait(1.5).time_s
         assert began_s is not None and after_s is not None and after_s - began_s > 1.4
@@ -87,6 +95,10 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
             vehicle.mode("land")
             vehicle.wait("mission complete")
         assert "Landed, disarmed" in vehicle.texts
+
+        vehicle.release()
+        vehicle.grab()
+        vehicle.wait(lambda _: vehicle.texts[-2:] == ["Load released", "Load taken"])
 
         vehicle.set_parameter("mis_speed", 1.25)
         assert vehicle.parameter("MIS_SPEED") == 1.25
