@@ -10,12 +10,12 @@ from numba.extending import overload
 from autopilot.control.law_exchange import ATTITUDE, FORCE, RATES, WRENCH, Asked
 from autopilot.geometry.compiler import INLINE_OPTIONS
 from autopilot.geometry.linear import IDENTITY, ZERO
-from autopilot.own.vectors import three_numbers
+from autopilot.own.vectors import one_number, three_numbers
 
 
 def wrench(thrust: float, moment: Sequence[float]) -> Asked:
     """Thrust (N) along the body's upward axis and moment (N m, body), as they go to the mixer."""
-    return Asked(WRENCH, float(thrust), three_numbers(moment, "the moment"), IDENTITY)
+    return Asked(WRENCH, one_number(thrust, "the thrust"), three_numbers(moment, "the moment"), IDENTITY)
 
 
 def force(F: Sequence[float]) -> Asked:
@@ -30,12 +30,12 @@ def attitude(R_d: Sequence[Sequence[float]], thrust: float) -> Asked:
     if len(R_d) != 3:
         raise ValueError(f"the attitude has {len(R_d)} rows; must be 3 rows of 3 numbers")
     first, second, third = (three_numbers(row, "a row of the attitude") for row in R_d)
-    return Asked(ATTITUDE, float(thrust), ZERO, (first, second, third))
+    return Asked(ATTITUDE, one_number(thrust, "the thrust"), ZERO, (first, second, third))
 
 
 def rates(thrust: float, omega_d: Sequence[float]) -> Asked:
     """Thrust (N) and body rate (rad/s, body), which the built-in loop holds."""
-    return Asked(RATES, float(thrust), three_numbers(omega_d, "the rate"), IDENTITY)
+    return Asked(RATES, one_number(thrust, "the thrust"), three_numbers(omega_d, "the rate"), IDENTITY)
 
 
 @overload(wrench, jit_options=INLINE_OPTIONS)

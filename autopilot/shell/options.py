@@ -327,11 +327,10 @@ def ignore_option(function: F) -> F:
 def unknown_setting(name: str, names: Iterable[str]) -> str:
     """A text for a name that is unknown, with suggestions: if several names continue it (SIM_WIND), all of
     them, as none is nearer than the others; else as `unknown_parameter_text`."""
-    from autopilot.wire.parameter_names import unknown_parameter_text  # only if needed
+    from autopilot.wire.parameter_names import suggestion_text, unknown_parameter_text  # only if needed
 
     known = sorted(names)
     longer_names = [one for one in known if "_" in name and one.startswith(f"{name}_")]
     if len(longer_names) < 2:
         return unknown_parameter_text(name, known)
-    choices = f"{', '.join(longer_names[:-1])} or {longer_names[-1]}"
-    return f"{name}: no such parameter; did you mean {choices}? docs/parameters.md lists all"
+    return suggestion_text(name, longer_names)

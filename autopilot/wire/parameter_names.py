@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from missions.nearest import nearest
 
@@ -10,21 +10,29 @@ _MIN_SIMILARITY = 0.75  # names of one group are much alike
 _MAX_SUGGESTIONS = 4
 
 
+def suggestion_text(name: str, meant: Sequence[str]) -> str:
+    """The text that `name` does not exist, and which names may be meant."""
+    choices = " or ".join(filter(None, [", ".join(meant[:-1]), meant[-1]]))
+    return f"{name}: no such parameter; did you mean {choices}? docs/parameters.md lists all"
+
+
 def unknown_parameter_text(name: str, names: Iterable[str]) -> str:
     """The text that `name` does not exist, with the names that may be meant, or else all of its group.
 
-    These are the nearest spelling, and names that differ only in the group, as those of other autopilots may:
-    WPNAV_SPEED is MIS_SPEED.
+    These are names that contain all words of this one (SIM_DELAY: SIM_ACT_DELAY_MS), the nearest spelling,
+    and names that differ only in the group, as those of other autopilots may: WPNAV_SPEED is MIS_SPEED.
     """
     known = sorted(names)
     group, _, quantity = name.partition("_")
+    words = set(name.upper().split("_"))
+    longer = [one for one in known if len(words) > 1 and words < set(one.split("_"))]
     near = nearest(name, known, _MIN_SIMILARITY)
     same_quantity = [
         one for one in known if quantity and one.partition("_")[2] == quantity.upper() and one != near
     ]
-    meant = [*filter(None, [near]), *same_quantity][:_MAX_SUGGESTIONS]
+    meant = list(dict.fromkeys([*longer, *filter(None, [near]), *same_quantity]))[:_MAX_SUGGESTIONS]
     if meant:
-        return f"{name}: no such parameter; did you mean {' or '.join(meant)}? docs/parameters.md lists all"
+        return suggestion_text(name, meant)
     same_group = [one for one in known if one.startswith(group + "_")]
     if same_group:
         return f"{name}: no such parameter; there are {', '.join(same_group)}"

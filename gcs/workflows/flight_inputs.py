@@ -43,6 +43,8 @@ def check_flight_inputs(
     given = list(settings)
     autopilot, simulator = _table(believed, own_parts, ignored), sim_parameters(truth_of(found))
     for name, value in given:
+        if name == "CTL_LAW":
+            raise InputError("--set CTL_LAW is what --law names; give --law")
         table = simulator if name.startswith(SIMULATOR_PREFIX) and name not in autopilot else autopilot
         if name not in table:
             raise InputError(f"--set {unknown_setting(name, [*autopilot.names, *simulator.names])}")

@@ -101,11 +101,17 @@ def test_unknown_vehicles_and_sensors_get_the_names_there_are():
         ("SIM_WINDE=3", "--set SIM_WINDE: no such parameter; did you mean SIM_WIND_E? docs/parameters.md "),
         ("SIM_BRIGHT=3", "--set SIM_BRIGHT: no such parameter; there are SIM_ACC_NOISE, SIM_ACT_DELAY_MS, "),
         ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? docs/parameters.md lists all"),
+        (
+            "SIM_NOISE=1",
+            "--set SIM_NOISE: no such parameter; did you mean SIM_ACC_NOISE, SIM_GYR_NOISE, SIM_NOISE_SCALE or ",
+        ),
+        ("SIM_DELAY=1", "--set SIM_DELAY: no such parameter; did you mean SIM_ACT_DELAY_MS? "),
         ("WPNAV_SPEED=3", "--set WPNAV_SPEED: no such parameter; did you mean WNC_SPEED or MIS_SPEED? "),
         ("WIND=3", "--set WIND: no such parameter; names begin with one of BAT_, COM_, "),
         ("SIM_WIND_E=300", "--set SIM_WIND_E = 300.0 m/s; must be -50 ... 50"),
         ("SIM_LOSS_PCT=101", "--set SIM_LOSS_PCT = 101.0 %; must be 0 ... 100"),
-        ("CTL_LAW=1.5", "--set CTL_LAW = 1.5; must be a whole number"),
+        ("GF_ACTION=1.5", "--set GF_ACTION = 1.5; must be a whole number"),
+        ("CTL_LAW=1", "--set CTL_LAW is what --law names; give --law"),
     ],
 )
 def test_a_setting_that_cannot_be_is_refused_with_what_there_is(setting, part):

@@ -103,6 +103,14 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),
         "commands an attitude that is not a number",
     ),
+    "complex": (
+        lambda memory, now: (memory, force((0.0, 0.0, 5.0 + 1.0j))),  # type: ignore[arg-type]
+        r"the force is \(0\.0, 0\.0, \(5\+1j\)\); must be 3 real numbers",
+    ),
+    "swapped": (
+        lambda memory, now: (memory, rates((0.0, 0.0, 0.0), 5.0)),  # type: ignore[arg-type]
+        r"the thrust is \(0\.0, 0\.0, 0\.0\); must be a number",
+    ),
     "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), r"the rate is 3\.0; must be 3 numbers"),  # type: ignore[arg-type]
 }
 

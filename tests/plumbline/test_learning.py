@@ -217,6 +217,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "sensors": ({"sensors": "eyes"}, "eyes"),
     "mission": ({"mission": UP_AND_DOWN}, r"mission up: there is no path .*; items\[1\] \(land\) ends it"),
     "start": ({"start_m": 3.0}, "start_m = 3.0"),
+    "law": ({"settings": {"CTL_LAW": 1}}, "CTL_LAW has no effect: actions fly an environment"),
     "start without a path": ({"start": "random"}, "name one by mission="),
 }
 

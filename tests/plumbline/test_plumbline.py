@@ -265,6 +265,10 @@ WRONG: dict[str, tuple[Any, str]] = {
         lambda: plumbline.sweep("hover", settings={"CTL_LAW": 1}),
         "CTL_LAW is what laws says; give laws instead",
     ),
+    "set law": (
+        lambda: plumbline.fly("hover", settings={"CTL_LAW": 1}),
+        "settings: CTL_LAW is what law names; give law",
+    ),
     "out": (lambda: plumbline.sweep("hover", out="/dev/null/x"), "out /dev/null/x: Not a directory"),
     "kind": (lambda: plumbline.sweep("hover", kind="csv"), "must be pandas, polars or arrow"),
 }
