@@ -103,7 +103,7 @@ def test_unknown_vehicles_and_sensors_get_the_names_there_are():
         ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? docs/parameters.md lists all"),
         (
             "SIM_NOISE=1",
-            "--set SIM_NOISE: no such parameter; did you mean SIM_ACC_NOISE, SIM_GYR_NOISE, SIM_NOISE_SCALE or ",
+            "--set SIM_NOISE: no such parameter; did you mean SIM_ACC_NOISE, SIM_GYR_NOISE, SIM_NOISE_SCALE ",
         ),
         ("SIM_DELAY=1", "--set SIM_DELAY: no such parameter; did you mean SIM_ACT_DELAY_MS? "),
         ("WPNAV_SPEED=3", "--set WPNAV_SPEED: no such parameter; did you mean WNC_SPEED or MIS_SPEED? "),
