@@ -17,11 +17,12 @@ def check_options(options: FlightOptions) -> list[str]:
     custom code cannot fly; else a line for each option that may be unintended."""
     if _only_shipped_inputs(options):
         return []
-    from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings
+    from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings, vehicle_warnings
 
     settings = list(map(parse_setting, options.settings))
     check_flight_inputs(options.vehicle, options.sensors, settings, options.own, options.ignored)
     warnings = [f"--set {line}" for line in setting_warnings(options.vehicle, settings)]
+    warnings += vehicle_warnings(options.vehicle)
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings
 

@@ -71,6 +71,14 @@ def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> lis
     ]
 
 
+def vehicle_warnings(vehicle: str) -> list[str]:
+    """A line if the file of the vehicle chooses a law: in flights of `gcs` that of `--law` flies."""
+    _, believed = load_truth_and_belief(vehicle)
+    if "CTL_LAW" not in believed.parameters:
+        return []
+    return [f"{vehicle}: parameters.CTL_LAW has no effect; --law names the law"]
+
+
 def split_settings(
     vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:

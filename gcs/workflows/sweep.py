@@ -30,7 +30,7 @@ from gcs.sweep.standouts import (
 )
 from gcs.sweep.store import TABLE_FILE
 from gcs.workflows.before_flight import planner_warnings
-from gcs.workflows.flight_inputs import setting_warnings
+from gcs.workflows.flight_inputs import setting_warnings, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
@@ -173,7 +173,8 @@ def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Exe
 def _print_warnings(plan: SweepPlan) -> None:
     """Print what can be flown but may be unintended; of several values of a parameter only the first."""
     own = [line for law in plan.laws for line in misspelling_warnings(plan.own(law))]
-    for line in dict.fromkeys([*own, *planner_warnings(plan.planner, load(plan.mission))]):
+    others = [*planner_warnings(plan.planner, load(plan.mission)), *vehicle_warnings(plan.vehicle)]
+    for line in dict.fromkeys([*own, *others]):
         notify(line)
     for option, values in (
         ("--set", list(plan.settings)),

@@ -8,11 +8,12 @@ from importlib.resources import files
 import pytest
 from click.testing import CliRunner
 
+import plumbline
 from autopilot.vehicle.shipped import VEHICLES
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings
+from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings, vehicle_warnings
 from sitl.sensors.shipped import PROFILES
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
@@ -163,3 +164,10 @@ def test_it_is_told_on_stderr_before_anything_flies(tmp_path, words, told):
     *lines, last = result.stderr.splitlines()
     assert "holds a flight" in last
     assert [line.split(" is in milliseconds")[0] for line in lines] == [f"gcs: {one}" for one in told]
+
+
+def test_a_law_in_the_file_of_a_vehicle_is_said_to_have_no_effect(tmp_path):
+    file = tmp_path / "mine.toml"
+    plumbline.Vehicle.load("bebop").replace(name="mine", parameters={"CTL_LAW": 1}).save(file)
+    assert vehicle_warnings(str(file)) == [f"{file}: parameters.CTL_LAW has no effect; --law names the law"]
+    assert vehicle_warnings("bebop") == []
