@@ -119,6 +119,8 @@ class TomlFiles:
             return tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise self.error([_toml_problem(error, text, where)]) from None
+        except ValueError:  # of a whole number with thousands of digits
+            raise self.error([f"{where}: a number has too many digits"]) from None
         except RecursionError:
             raise self.error([f"{where}: nested too deeply"]) from None
 

@@ -214,6 +214,7 @@ def test_a_height_is_given_either_way_and_once():
         ("torn.toml", "not TOML"),
         ("nan.toml", "finite"),
         ("deep.toml", "nested too deeply"),
+        ("long.toml", "long.toml: a number has too many digits"),
         ("pipe.toml", "a device or a pipe"),
         ("/dev/zero", "a device or a pipe"),
     ],
@@ -228,6 +229,7 @@ def test_a_bad_mission_is_one_line_and_code_2(tmp_path, monkeypatch, command, mi
     Path("bad.toml").write_text(text.format(-2.0))
     Path("nan.toml").write_text(text.format("nan"))
     Path("torn.toml").write_text("[[items")
+    Path("long.toml").write_text("a = " + "9" * 5000)
     Path("deep.toml").write_text("a = " + "[" * 5000 + "]" * 5000)
     os.mkfifo("pipe.toml")
     before = sorted(tmp_path.iterdir())

@@ -258,7 +258,7 @@ REFUSALS = [
     ([item(16, math.nan, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = nan s"),
     ([item(16, -1.0, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = -1 s"),
     ([item(16, frame=1, z=5.0)], 0, "INVALID_PARAM7", "height above home = -5 m"),
-    ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "latitude"),
+    ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "; it is not given"),
     ([item(16, frame=6, x=473977420, y=2**31 - 1, z=5.0)], 0, "INVALID_PARAM6_Y", "longitude"),
     ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "north of home"),
     ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "are 0, so the place may be missing"),

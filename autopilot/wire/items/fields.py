@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
 from typing import Any, ClassVar, Protocol
 
 from autopilot.geometry.frames import enu_from_ned
@@ -182,8 +183,8 @@ class Place:
         hint = ""
         if item.frame in GLOBAL_FRAMES:
             hint = _NO_PLACE_HINT if item.x == item.y == 0 else ""
-            check(seq, 5, "latitude", item.x * 1e-7, "deg", -90.0, 90.0)
-            check(seq, 6, "longitude", item.y * 1e-7, "deg", -180.0, 180.0)
+            _check_degrees(seq, 5, "latitude", item.x, 90.0)
+            _check_degrees(seq, 6, "longitude", item.y, 180.0)
             east, north, _ = enu_from_geodetic(item.x, item.y, 0, home)
         elif item.frame == mavlink.MAV_FRAME_LOCAL_NED:
             east, north, _ = enu_from_ned((item.x / 1e4, item.y / 1e4, 0.0))
@@ -201,6 +202,12 @@ class Place:
 
     def describe(self) -> str:
         return f"x, y place within {FARTHEST_M / 1e3:g} km of home"
+
+
+def _check_degrees(seq: int, param: int, name: str, coordinate: int, limit: float) -> None:
+    if coordinate == _INT32_MAX:  # not given
+        check(seq, param, name, nan, "deg", -limit, limit, "; it is not given")
+    check(seq, param, name, coordinate * 1e-7, "deg", -limit, limit)
 
 
 @dataclass(frozen=True)
