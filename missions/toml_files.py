@@ -38,7 +38,7 @@ _BARE_TEXT = re.compile(r"\s*(\w+)\s*=\s*([^\W\d][^\"'#\\\x00-\x1f]*?)\s*(?:#.*)
 # plainer texts for what the parser says in its own terms
 _DUPLICATES = {
     "Cannot overwrite": "{key} is given twice in this table",
-    "Cannot declare": "[{key}] stands there twice; each table of a list is written [[{key}]]",
+    "Cannot declare": "[{key}] stands there twice; keep one, or write [[{key}]] for each table of a list",
 }
 
 
@@ -343,6 +343,9 @@ def _allowed(error: dict[str, Any], field: FieldInfo | None) -> str:
         "int_from_float": "a whole number",
         "int_parsing": "a whole number",
         "float_parsing": "a number",
+        "int_parsing_size": "a smaller whole number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
         "string_type": "a text in quotes",
         "list_type": "a list",
         "tuple_type": "a list",

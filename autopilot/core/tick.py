@@ -37,7 +37,12 @@ from autopilot.control.actuators.mixer import (
 )
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control.actuators.thrust_factor import applied_factor, learned_factor, mix_with_factor
+from autopilot.control.actuators.thrust_factor import (
+    applied_factor,
+    full_speed_force,
+    learned_factor,
+    mix_with_factor,
+)
 from autopilot.control.drag import Drag, drag_force
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
 from autopilot.control.laws.interface import constants_of, kernels_of, memory_of
@@ -221,7 +226,7 @@ def measured_pull(control: ControlMemory, state: State, constants: CoreConstants
 
 
 @kernel
-def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
+def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle, limited: float) -> int:
     """The rotors (as bits) whose reported speeds, in the inbox, show repeatedly that they do not follow their
     commands, and those that are known to be lost."""
     table, rotors = rows.table, rows.rotors
@@ -230,7 +235,7 @@ def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
             continue
         first = int(rows.inbox[i, READING])
         for j in range(first, min(first + 4, table.shape[0] - 1)):
-            full = table[j, STRENGTH] * vehicle.rotor_max
+            full = full_speed_force(table[j, STRENGTH], vehicle, limited)
             reported_force = force_at(rows.inbox[i, READING + 1 + j - first], full)
             required_force = LOST_SHARE * rotors[EXPECTED_FORCE, j] - SPEED_TOLERANCE * full
             rotors[REPORTED_SPEED, j] = rows.inbox[i, READING + 1 + j - first]
@@ -287,7 +292,7 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SAMPLE_TIME_US] == now_us
         if new and is_valid_imu(unpack(ImuReading, rows.inbox[i], READING)):
             silent_s = 0.0
-    lost = rotors_lost(rows, count, constants.vehicle)
+    lost = rotors_lost(rows, count, constants.vehicle, constants.limited)
     problem = inertial_problem(silent_s)
     if problem == 0:
         problem = vehicle_problem(estimator, constants.sensor_age_s)
@@ -377,7 +382,13 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     if control.was_taut and not summary.taut and not stretch.released:
         slack_events += 1
     factor = learned_factor(
-        control.thrust_factor, control.thrust, vehicle, rows.table, rows.rotors, constants.factor_share
+        control.thrust_factor,
+        control.thrust,
+        vehicle,
+        constants.limited,
+        rows.table,
+        rows.rotors,
+        constants.factor_share,
     )
     estimator = unpack(EstimatorState, rows.estimator, 0)
     observed = observe(

@@ -261,6 +261,12 @@ class Vehicle(BaseModel):
         return thrust_and_moment_per_force(mixer_table(self.layout))[0] * self.rotor_max_n
 
     @property
+    def hover_force_n(self) -> float:
+        """Force (N) of a rotor of strength 1 while the vehicle hovers with its load."""
+        weight = (self.quad_mass_kg + self.load_mass_kg) * self.gravity_m_s2
+        return weight / thrust_and_moment_per_force(mixer_table(self.layout))[0]
+
+    @property
     def limited(self) -> bool:
         """Whether the force of a rotor has an upper limit."""
         return self.rotor_max_n < inf

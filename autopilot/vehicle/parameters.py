@@ -107,12 +107,18 @@ def _with_law(parameter: Parameter, law: str) -> Parameter:
     return replace(parameter, default=number, high=number, text=text)
 
 
+_MAX_TO_HOVER_FORCE = 1.598  # of a rotor of the vehicle of Table 4-1 with its load, rounded down
+
+
 def vehicle_values(belief: Vehicle) -> dict[str, float]:
     """The numbers of the vehicle by the names that `from_vehicle` and `proportional_to` use."""
     from autopilot.wire.convert.simulator import ROTOR_FMAX
 
-    # without limits the parameters keep the forces of Table 4-1, and the mixer ignores them
-    rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)
+    # without limits the mixer ignores these, and gains are designed for the forces of Table 4-1, or for a
+    # heavier vehicle for forces that are as large in proportion to its weight
+    rotor_min, rotor_max = 0.0, max(ROTOR_FMAX, _MAX_TO_HOVER_FORCE * belief.hover_force_n)
+    if belief.limited:
+        rotor_min, rotor_max = belief.rotor_min_n, belief.rotor_max_n
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
     attached_x, attached_y, attached_z = belief.attachment_m
     return {

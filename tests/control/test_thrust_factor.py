@@ -43,7 +43,7 @@ def test_the_factor_is_found_in_the_time_constant(bebop):
     factor, factors = 1.0, []
     for _ in range(2000):
         rotors = told([0.8 * HOVER_N / factor / 4.0] * 4, bebop)
-        factor = learned_factor(factor, HOVER_N, bebop, TABLE, rotors, SHARE)
+        factor = learned_factor(factor, HOVER_N, bebop, 1.0, TABLE, rotors, SHARE)
         factors.append(factor)
     assert factors[-1] == pytest.approx(0.8, abs=1e-3)
     # with F / f = 0.8 / k the law of the module is k' = (0.8 - k) / T
@@ -61,13 +61,13 @@ def test_the_factor_is_found_in_the_time_constant(bebop):
 def test_what_tells_nothing_is_not_learned_from(bebop, forces, thrust, missed):
     rotors = told(forces, bebop)
     rotors[MISSED_COUNT, 3] = missed
-    assert learned_factor(0.9, thrust, bebop, TABLE, rotors, SHARE) == 0.9
+    assert learned_factor(0.9, thrust, bebop, 1.0, TABLE, rotors, SHARE) == 0.9
 
 
 def test_it_stays_within_its_bounds(bebop):
     factor = 1.0
     for _ in range(3000):
-        factor = learned_factor(factor, HOVER_N, bebop, TABLE, told([0.35] * 4, bebop), SHARE)
+        factor = learned_factor(factor, HOVER_N, bebop, 1.0, TABLE, told([0.35] * 4, bebop), SHARE)
     assert factor == MIN_FACTOR
 
 

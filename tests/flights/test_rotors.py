@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import dist
 from pathlib import Path
 
@@ -94,3 +95,11 @@ def test_rotors_that_answer_late_are_not_taken_for_lost(delay_ms: int) -> None:
     craft.begin()
     craft.run(at_phase(Phase.DISARMED), 60.0)
     assert craft.texts[-1] == "Landed, disarmed"
+
+
+@pytest.mark.parametrize("name", ["heavy", "iris", "hexarotor"])
+def test_rotors_without_limits_carry_a_heavy_vehicle(tmp_path: Path, name: str) -> None:
+    text = VEHICLES.read(name).text
+    path = tmp_path / "strong.toml"
+    path.write_text(re.sub(r"(?m)^rotor_max_n = .*$", "rotor_max_n = inf", text), encoding="utf-8")
+    held(Craft(*ROUTE, vehicle=str(path)))

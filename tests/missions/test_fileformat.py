@@ -226,7 +226,8 @@ def test_several_problems_are_all_told() -> None:
         ('title = "T"\n title= "U"', "x.toml:2:12: not TOML: title is given twice in this table"),
         (
             'title = "T"\n[items]\n[items]',
-            "x.toml:3:7: not TOML: [items] stands there twice; each table of a list is written [[items]]",
+            "x.toml:3:7: not TOML: [items] stands there twice; keep one, or write [[items]] for each "
+            "table of a list",
         ),
         ('titel = "T"\n[[items]]\ntype = "land"', "x.toml: titel: unknown key; write title"),
         (

@@ -197,6 +197,7 @@ BROKEN = [
         "4.8e-2]",
         "inertia_kg_m2 = [0.00223, 0.00299, 0.048]; each must be <= the sum of the other two",
     ),
+    ("friction = 0.6", "battery = 1", "battery = 1; must be true or false"),
     ("friction = 0.6", "friction = 9.0", "friction = 9.0; must be >= 0 and <= 5"),
     ("slip_rate_1_s = 500.0", "slip_rate_1_s = 0.0", "slip_rate_1_s = 0.0; must be >= 0.001 and <= 600"),
     ("rotor_tau_s = 0.020", "rotor_tau_s = -0.01", "rotor_tau_s = -0.01; must be >= 0 and <= 1"),

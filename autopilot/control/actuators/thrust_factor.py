@@ -26,7 +26,7 @@ from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import with_field
 from autopilot.vehicle.rotors import STRENGTH
-from autopilot.wire.convert.simulator import force_at
+from autopilot.wire.convert.simulator import ROTOR_FMAX, force_at
 
 Array = NDArray[np.float64]
 
@@ -36,16 +36,21 @@ _MIN_THRUST_SHARE = 0.25  # of the vehicle's weight: less thrust than that is no
 
 
 @kernel
+def full_speed_force(strength: float, vehicle: Vehicle, limited: float) -> float:
+    """The force (N) of a rotor at full speed; rotors without limits report speeds of the nominal force."""
+    return if_above(limited, 0.0, strength * vehicle.rotor_max, ROTOR_FMAX)
+
+
+@kernel
 def learned_factor(
-    factor: float, thrust: float, vehicle: Vehicle, table: Array, rotors: Array, share: float
+    factor: float, thrust: float, vehicle: Vehicle, limited: float, table: Array, rotors: Array, share: float
 ) -> float:
     """The factor after a period that is `share` of the time constant; `thrust` (N) is the assumed thrust now.
     The factor is kept while no speeds have been reported or a rotor gives less than it must."""
     reported_thrust = missed_count = 0.0
     for i in range(table.shape[0] - 1):
-        reported_thrust = reported_thrust + force_at(
-            rotors[REPORTED_SPEED, i], table[i, STRENGTH] * vehicle.rotor_max
-        )
+        full = full_speed_force(table[i, STRENGTH], vehicle, limited)
+        reported_thrust = reported_thrust + force_at(rotors[REPORTED_SPEED, i], full)
         missed_count = missed_count + rotors[MISSED_COUNT, i]
     min_thrust = _MIN_THRUST_SHARE * vehicle.quad_mass * vehicle.gravity
     updated = factor * (1.0 + share * (reported_thrust - thrust) / max(thrust, min_thrust))
