@@ -159,7 +159,8 @@ def test_same_end_at_the_fence(swung: str, action: float, outcome: str) -> None:
     fence = {"GF_MAX_HOR_DIST": FENCE_M, "GF_ACTION": action}
     found, states = flown(swung, Conditions(sensors="lab", seed=1, settings=fence))
     assert found.outcome == outcome
-    assert any("ence: would stop beyond the fence, GF_MAX_HOR_DIST 0.3 m from home" in text for text in found.texts)
+    told = "ence: would stop beyond the fence, GF_MAX_HOR_DIST 0.3 m from home"
+    assert any(told in text for text in found.texts)
     if action == LAND:
         assert np.hypot(states[:, 0], states[:, 1]).max() < FENCE_M + 0.05
 
