@@ -13,6 +13,8 @@ from gcs.folders import TLOG_FILE
 from gcs.shell.display import StepDisplay, notify_if_slow
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from gcs.recorded.column_map import ColumnMap
     from gcs.recorded.estimates import Estimates, FilterRows
     from gcs.recorded.identification import Identified
@@ -86,15 +88,18 @@ def replay(
     with StepDisplay("estimating the load", quiet, long=True) as display:
         display.update(0, 0)
         rows = filter_rows(motion, model)
-        load_is_measured = bool(np.isfinite(motion.load).all())
-        doubt = length_warning(motion) if load_is_measured else ""
+        measured: NDArray[np.bool_] = np.asarray(np.isfinite(motion.load).all(axis=1))
+        load_is_measured = bool(measured.all())
+        doubt = length_warning(motion) if load_is_measured else _gap_text(measured)
         record: dict[str, Any] = {**_rows_record(path, motion), "doubt": doubt}
         if load_is_measured and not doubt and record["duration_s"] >= MIN_DURATION_S:
             with suppress(TooLittleMotionError):
                 record["doubt"] = map_warning(identify_vehicle(motion, model))
         found = filtered_estimates(rows, model, load=False, tilt=True, smoothed=True)
         if load_is_measured:
-            record |= _scores(motion, rows, model, found, display)
+            record |= _prediction_scores(motion, rows, model, display)
+        if measured.any():
+            record["pose_alone"] = _pose_alone_scores(motion, model, found)
         load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
         sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
         display.update(0, 0, "writing table and picture")
@@ -108,12 +113,23 @@ def replay(
     return record, folder
 
 
-def _scores(
-    motion: Motion, rows: FilterRows, model: LoadModel, by_pose: Estimates, display: StepDisplay
+def _gap_text(measured: NDArray[np.bool_]) -> str:
+    """A line if the load was measured in some rows only."""
+    if not measured.any():
+        return ""
+    missing = int(np.sum(~measured))
+    return (
+        f"the load was not measured in {missing} of {len(measured)} rows: in the others the estimate by the "
+        "pose is scored, but nothing is predicted"
+    )
+
+
+def _prediction_scores(
+    motion: Motion, rows: FilterRows, model: LoadModel, display: StepDisplay
 ) -> dict[str, Any]:
-    """The scores of a load that was measured; `by_pose`: its smoothed estimates from the pose alone."""
+    """Innovations and predictions of a load that was measured in every row."""
     from gcs.recorded.estimates import filtered_estimates
-    from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
+    from gcs.recorded.scoring import HORIZONS_S, score_ahead
 
     by_load = filtered_estimates(rows, model, load=True, tilt=True)
     scores: dict[str, Any] = {
@@ -132,13 +148,19 @@ def _scores(
     ahead = score_ahead(motion, rows, model, by_load, report_progress)
     for horizon, score in zip(HORIZONS_S, ahead, strict=True):
         scores[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
+    return scores
+
+
+def _pose_alone_scores(motion: Motion, model: LoadModel, by_pose: Estimates) -> dict[str, float]:
+    """The scores of smoothed estimates from the pose alone, in the rows in which the load was measured."""
+    from gcs.recorded.scoring import score_pose_alone
+
     pose_alone = score_pose_alone(motion, model, by_pose)
-    scores["pose_alone"] = {
+    return {
         "median_m": pose_alone.median_m,
-        "nees_per_axis": float(np.mean(pose_alone.square) / 2.0),
+        "nees_per_axis": float(np.nanmean(pose_alone.square) / 2.0),
         "inside_95": pose_alone.inside,
     }
-    return scores
 
 
 def find_recording(source: Path) -> Path:

@@ -6,6 +6,7 @@ import json
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,6 +115,24 @@ def test_the_load_is_known_from_the_vehicle_alone(flown: Path, tmp_path: Path) -
     error = np.linalg.norm(table[:, 1:4] - table[:, 6:9], axis=1)
     assert np.median(error) == pytest.approx(alone["median_m"], abs=2e-6)
     assert (tmp_path / "replay" / "load.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_load_that_was_not_measured_in_every_row_is_scored_in_the_others(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_with_gap(path: Path, columns: Any) -> Any:
+        found = read_recording(path, columns)
+        load = found.load.copy()
+        load[1000:1003] = np.nan
+        return found._replace(load=load)
+
+    monkeypatch.setattr("gcs.recorded.recording.read_recording", read_with_gap)
+    asked = ["replay", str(flown), "--out", str(tmp_path / "replay"), "--json"]
+    result = CliRunner().invoke(gcs, asked, prog_name="gcs")
+    record = json.loads(result.stdout)
+    assert f"not measured in 3 of {record['rows']} rows" in result.stderr
+    assert record["pose_alone"]["median_m"] < 1e-3 and record["pose_alone"]["nees_per_axis"] > 0.0
+    assert "ahead_5s" not in record
 
 
 def test_a_long_replay_tells_what_it_is_doing(
