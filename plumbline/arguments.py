@@ -39,7 +39,7 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
         r'(another address: connect("udpin:127.0.0.1:\1"))',
     ),
     (r"--connect (?=[A-Z0-9])", "connect to "),
-    (r"(?<![\w-])--([a-z]+)", r"\1"),
+    (r"(?<![\w-])(?<!gcs sweep )--([a-z]+)", r"\1"),  # a command that is quoted keeps its options
 )
 
 

@@ -74,10 +74,14 @@ class Mission(model.Mission):
         return cls(mission.name, mission.steps, mission.title, mission.description, mission.assumptions)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the mission as a file, which `load` and every command read; an existing file is replaced."""
+        """Write the mission as a TOML file, which `load` and every command read; an existing file is
+        replaced."""
+        file = file_path("path", path)
+        if file.suffix.lower() not in ("", ".toml"):
+            raise GcsError(f"{file}: a mission is written as TOML; name it {file.stem}.toml")
         table = mission_table(self.title, self.description, self.assumptions, self.steps)
         try:
-            write_toml(file_path("path", path), table)
+            write_toml(file, table)
         except FileError as error:
             raise input_error(error) from None
 

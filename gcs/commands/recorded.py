@@ -122,9 +122,8 @@ def replay_command(file: Path, columns: str | None, out: Path | None, as_json: b
             scores_text = ", ".join(
                 _score_text(key, value) for key, value in scores.items() if math.isfinite(value)
             )
-            click.echo(
-                f"{_SCORE_TITLES[name]}: {scores_text or 'nothing; no stretch without a break is so long'}"
-            )
+            nothing = "nothing; no stretch without a break is so long" if record["breaks"] else "nothing"
+            click.echo(f"{_SCORE_TITLES[name]}: {scores_text or nothing}")
     for name, one in record.get("innovations", {}).items():
         click.echo(
             f"innovations of {name}: {one['mean_square_per_axis']:.2f} per axis, {one['refused']} refused"

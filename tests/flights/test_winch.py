@@ -8,6 +8,7 @@ import pytest
 
 from autopilot.guidance.legs import Hold
 from autopilot.supervisor.state import Phase
+from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED
@@ -124,6 +125,10 @@ def test_a_mission_lowers_its_load_by_the_winch() -> None:
 
     craft.tick()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    refused = craft.command(mavlink.MAV_CMD_DO_WINCH, 1.0, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, 0.1)
+    assert refused == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    craft.tick()
+    assert "".join(craft.texts).endswith("Winch denied: pause the mission first")
     craft.run(watched)
     assert lowest == pytest.approx(0.9, abs=0.01)
     assert craft.flight.mission.done

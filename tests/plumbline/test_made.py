@@ -239,3 +239,11 @@ def test_importing_is_light() -> None:
     """The simulator is loaded only for a flight."""
     program = "import sys, plumbline; sys.exit('numba' in sys.modules or 'sitl.world' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["there.plan", "there.waypoints", "there.txt"])
+def test_a_mission_is_not_saved_under_the_ending_of_another_format(tmp_path: Path, name: str) -> None:
+    mission = Mission("there", [Takeoff(1.0), Land()])
+    with pytest.raises(plumbline.Error, match=r"a mission is written as TOML; name it there\.toml"):
+        mission.save(tmp_path / name)
+    assert not list(tmp_path.iterdir())
