@@ -36,6 +36,9 @@ from gcs.shell.link import LOOPBACK, free_port
 PROGRAMS = Path(__file__).with_name("programs")
 LONG_S = 300.0  # on a busy machine
 END_S = 10.0
+# for programs that threads start: pytest changes the variables of this process at each test, and a program
+# that inherits them at that moment cannot be started (EFAULT)
+ENVIRONMENT = dict(os.environ)
 AT_ONCE = 2  # flights: as many as two cores fly, beside other tests, without a client that loses messages
 
 # Words that no client may print, whatever it means by them
@@ -154,6 +157,7 @@ class Mavproxy:
                 f"--state-basedir={directory}",
             ],
             cwd=directory,
+            env=ENVIRONMENT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -256,6 +260,7 @@ class Stage:
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 cwd=self.directory,
+                env=ENVIRONMENT,
             )
         self._running.append(process)
         return process, log
@@ -269,6 +274,7 @@ class Stage:
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 cwd=self.directory,
+                env=ENVIRONMENT,
             )
         self._running.append(process)
         self._programs.append((process, log))
@@ -297,6 +303,7 @@ class Stage:
             text=True,
             timeout=LONG_S,
             cwd=self.directory,
+            env=ENVIRONMENT,
             check=False,
         )
 
