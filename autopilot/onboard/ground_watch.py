@@ -26,14 +26,10 @@ class GroundWatch:
         self.lost = False  # the ground station is lost, and the vehicle has reacted
 
     def update_parameters(self, table: ParameterTable) -> None:
-        """Take over changed parameters."""
+        """Take over changed parameters; without a reaction nothing counts as lost."""
         self._action = int(table["NAV_DLL_ACT"])
+        self.lost = self.lost and self._action != 0
         self._timeout_us = round(table["COM_DL_LOSS_T"] * 1e6) if self._action else NEVER_US
-
-    @property
-    def enabled(self) -> bool:
-        """Whether the vehicle is to react at all."""
-        return self._action != 0
 
     def has_changed(self, now_us: int, heartbeat_us: int) -> bool:
         """Whether the ground station has become silent, or is heard again."""

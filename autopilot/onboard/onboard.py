@@ -478,8 +478,7 @@ class Onboard:
         """React to a silent ground station as soon as the phase allows it, or report that it is back."""
         if self._ground.lost:
             self._ground.lost = False
-            if self._ground.enabled:  # else the reaction was switched off
-                self.endpoint.send_text(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
             return
         self._set_ground_missing(True)
         reaction = self._ground.request(self.phase)

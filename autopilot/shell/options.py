@@ -12,7 +12,7 @@ import socket
 import struct
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO, TypeVar, cast
@@ -322,15 +322,3 @@ def ignore_option(function: F) -> F:
         callback=in_capitals,
         help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
     )(function)
-
-
-def unknown_setting(name: str, names: Iterable[str]) -> str:
-    """A text for a name that is unknown, with suggestions: if several names continue it (SIM_WIND), all of
-    them, as none is nearer than the others; else as `unknown_parameter_text`."""
-    from autopilot.wire.parameter_names import suggestion_text, unknown_parameter_text  # only if needed
-
-    known = sorted(names)
-    longer_names = [one for one in known if "_" in name and one.startswith(f"{name}_")]
-    if len(longer_names) < 2:
-        return unknown_parameter_text(name, known)
-    return suggestion_text(name, longer_names)

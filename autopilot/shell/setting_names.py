@@ -9,8 +9,8 @@ from importlib.resources import files
 
 import click
 
-from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.parameters import definitions
+from autopilot.wire.parameter_names import unknown_parameter_text
 
 
 def check_names(settings: Iterable[tuple[str, float]], own_names: Iterable[str] = ()) -> None:
@@ -19,7 +19,7 @@ def check_names(settings: Iterable[tuple[str, float]], own_names: Iterable[str] 
     known = {*own_names, *definitions().parameters, *_simulator_names()}
     for name, _ in settings:
         if name not in known:
-            raise click.UsageError(f"--set {unknown_setting(name, known)}")
+            raise click.UsageError(f"--set {unknown_parameter_text(name, known)}")
 
 
 def _simulator_names() -> set[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from math import hypot, nan, sqrt
@@ -237,6 +237,11 @@ def follow_limits(flight: Flight, settings: Settings) -> FollowLimits:
     return FollowLimits(
         flight.mission.speed_m_s, settings.setpoints.max_speed_m_s, settings.motion.accel_m_s2, rate
     )
+
+
+def first_fence_violation(fence: Fence, places: Iterable[Vec3], settings: Settings) -> str:
+    """Why the load may not be at one of these places; an empty string if it may be at all of them."""
+    return next(filter(None, (fence_violation(fence, place, settings) for place in places)), "")
 
 
 def fence_violation(fence: Fence, x_load: Vec3, settings: Settings) -> str:

@@ -14,7 +14,7 @@ from gcs.folders import REPEATS_FOLDER
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Flights, flights_by_law
 from gcs.sweep.store import Store
-from gcs.workflows.flight_options import ignore_options, own_part_options
+from gcs.workflows.flight_options import ignore_options, own_part_options, time_limit_option
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def base_command(plan: SweepPlan, law: str) -> str:
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_part_options(plan.estimator, plan.planner)
     words += ignore_options(ignored_parameters(plan, law))
-    words += [] if plan.limit_s is None else ["--timeout", f"{plan.limit_s!r}"]
+    words += time_limit_option(plan.limit_s)
     for setting in flight_settings(plan, law, {}):
         words += ["--set", setting]
     return shlex.join(words)

@@ -10,11 +10,11 @@ from collections.abc import Collection, Iterable
 
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
-from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import RateError, control_divider
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
 from gcs.workflows.flight_options import SIMULATOR_PREFIX
@@ -47,7 +47,7 @@ def check_flight_inputs(
             raise InputError("--set CTL_LAW is what --law names; give --law")
         table = simulator if name.startswith(SIMULATOR_PREFIX) and name not in autopilot else autopilot
         if name not in table:
-            raise InputError(f"--set {unknown_setting(name, [*autopilot.names, *simulator.names])}")
+            raise InputError(f"--set {unknown_parameter_text(name, [*autopilot.names, *simulator.names])}")
         _check(table, name, value)
         table.set(name, value)
     try:

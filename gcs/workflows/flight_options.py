@@ -60,7 +60,7 @@ class FlightOptions:
             words += ["--connect", str(self.connect)]
             words += ["--sysid", str(self.connect.system)] if self.connect.system is not None else []
             words += ["--truth", str(self.truth_at)] if self.truth_at else []
-            return shlex.join([*words, *self._time_limit])
+            return shlex.join([*words, *time_limit_option(self.limit_s)])
         if self.firmware is None:
             words += ["--law", self.law, *own_part_options(self.estimator, self.planner)]
             words += ignore_options(self.ignored)
@@ -73,11 +73,7 @@ class FlightOptions:
         for setting in self.settings:
             words += ["--set", setting]
         words += ["--force"] if self.force else []
-        return shlex.join([*words, *self._time_limit])
-
-    @property
-    def _time_limit(self) -> list[str]:
-        return [] if self.limit_s is None else ["--timeout", f"{self.limit_s!r}"]
+        return shlex.join([*words, *time_limit_option(self.limit_s)])
 
     @property
     def allows_infeasible(self) -> bool:
@@ -96,6 +92,11 @@ def own_part_options(estimator: str, planner: str) -> list[str]:
 def ignore_options(ignored: Iterable[str]) -> list[str]:
     """The words of a command line for parameters in the vehicle's file that have no effect."""
     return [word for name in ignored for word in ("--ignore", name)]
+
+
+def time_limit_option(limit_s: float | None) -> list[str]:
+    """The words of a command line for a time limit, if there is one."""
+    return [] if limit_s is None else ["--timeout", f"{limit_s!r}"]
 
 
 def parse_setting(text: str) -> tuple[str, float]:

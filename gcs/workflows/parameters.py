@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from autopilot.shell.atomic_file import write_atomically
-from autopilot.shell.options import unknown_setting
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
@@ -75,7 +75,7 @@ def exchange(
     known_names = [] if names is None else names
     if not known_names:
         known_names += _read_all(session, session.target)
-    raise RefusedError(unknown_setting(operation.name, known_names))
+    raise RefusedError(unknown_parameter_text(operation.name, known_names))
 
 
 def save_parameters(file: Path, address: Address) -> int:

@@ -80,9 +80,8 @@ class Policy:
             raise GcsError(f"{file}: a policy is written as .npz; name it {file.stem}.npz")
         arrays = {f"weights_{k}": w for k, (w, _) in enumerate(self.layers)}
         arrays |= {f"biases_{k}": b for k, (_, b) in enumerate(self.layers)}
-        options = json.dumps(
-            self.options, default=lambda number: number.tolist()
-        )  # NumPy's numbers and arrays
+        # options may be NumPy's numbers and arrays
+        options = json.dumps(self.options, default=lambda number: number.tolist())
         content = io.BytesIO()
         np.savez(content, options=np.array(options), **arrays)  # type: ignore[arg-type]
         try:
@@ -98,12 +97,11 @@ def load_policy(path: str | Path) -> Policy:
         with np.load(path) as file:
             options = json.loads(str(file["options"]))
             count = sum(name.startswith("weights_") for name in file.files)
-            policy = Policy([(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)], options)
+            return Policy([(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)], options)
     except OSError as error:
         raise GcsError(f"{path}: {error.strerror or error}") from None
     except (KeyError, ValueError, TypeError, AttributeError, EOFError, BadZipFile, GcsError) as error:
         raise GcsError(f"{path}: it holds no policy: {error}") from None
-    return policy
 
 
 def _require_network(layers: Layers) -> None:

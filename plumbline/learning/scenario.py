@@ -12,10 +12,10 @@ from autopilot.core.flight_core import Setup
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import packed
 from autopilot.guidance.jet_table import COLUMNS
-from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import divider
+from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError, input_error
@@ -113,7 +113,7 @@ class Scenario:
         table = self._simulator
         for name, value in zip(self._names, values, strict=True):
             if name not in table and name.startswith(SIMULATOR_PREFIX):
-                raise GcsError(f"randomise {unknown_setting(name, table.names)}")
+                raise GcsError(f"randomise {unknown_parameter_text(name, table.names)}")
             if name not in table or name in _FIXED:
                 hint = "" if name in table else did_you_mean(name, table.names)
                 reason = f"{hint}must be a parameter of the simulator that may change"

@@ -122,20 +122,19 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
     at_item = with_current_step(flight, step, done=False)
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, item)
-    if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
-        ahead = remaining_timeline(at_item, view, settings)
-        problem = mission_problem(at_item, ahead, settings)
-        if problem:
-            return flight, denied(f"{item} denied: {problem}")
-        if not is_prepared_from_here(at_item, ahead, settings):
-            return _hold_until_prepared(at_item, view, settings), _accepted_pending(item)
-        at_item = with_step_heading_aims(at_item, view, settings)
-        return start_step(at_item, step_event(at_item), view, settings), ACCEPTED
-    if is_taking_off(flight):
-        problem = mission_problem(at_item, remaining_timeline(at_item, view, settings), settings)
-        if problem:
-            return flight, denied(f"{item} denied: {problem}")
-    return at_item, ACCEPTED
+    flies_on = flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER)
+    if not flies_on and not is_taking_off(flight):
+        return at_item, ACCEPTED
+    ahead = remaining_timeline(at_item, view, settings)
+    problem = mission_problem(at_item, ahead, settings)
+    if problem:
+        return flight, denied(f"{item} denied: {problem}")
+    if not flies_on:  # it is flown when the load is lifted
+        return at_item, ACCEPTED
+    if not is_prepared_from_here(at_item, ahead, settings):
+        return _hold_until_prepared(at_item, view, settings), _accepted_pending(item)
+    at_item = with_step_heading_aims(at_item, view, settings)
+    return start_step(at_item, step_event(at_item), view, settings), ACCEPTED
 
 
 def replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:

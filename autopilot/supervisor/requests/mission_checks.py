@@ -20,7 +20,7 @@ from autopilot.supervisor.state import (
     Phase,
     View,
     fence_problem,
-    fence_violation,
+    first_fence_violation,
     is_fence_active,
     load_position_below,
 )
@@ -183,7 +183,7 @@ def _first_violation(flight: Flight, entry: TimelineEntry, places: Iterable[Vec3
     if cable is not None:
         settings = replace(settings, cable_length_m=cable)
     loads = (load_position_below(place, settings) if entry.after.released else place for place in places)
-    return next(filter(None, (fence_violation(flight.area.fence, load, settings) for load in loads)), "")
+    return first_fence_violation(flight.area.fence, loads, settings)
 
 
 def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-from autopilot.geometry.linear import Vec3, axpy, sub
+from autopilot.geometry.linear import axpy, sub
 from autopilot.guidance.legs import CatchLoad, LevelHold
 from autopilot.supervisor.motion import commanded_motion, stopping_legs, tracks_attitude
 from autopilot.supervisor.settings import Settings
@@ -15,7 +14,7 @@ from autopilot.supervisor.state import (
     Event,
     Flight,
     View,
-    fence_violation,
+    first_fence_violation,
     interrupt_mission,
     is_fence_active,
     load_position_below,
@@ -65,16 +64,13 @@ def _breach(flight: Flight, view: View, settings: Settings) -> str:
     """Why the fence is breached, or is about to be; an empty string if it is not."""
     released = flight.cable.released
     load_below = load_position_below(view.x_quad, settings)
-    breach = _first_violation(flight, [load_below] if released else [view.x_load, load_below], settings)
+    places = [load_below] if released else [view.x_load, load_below]
+    breach = first_fence_violation(flight.area.fence, places, settings)
     if breach or tracks_attitude(flight.legs[0]):
         return breach
     here, end = commanded_motion(flight, view, settings)[0], stopping_legs(flight, view, settings)[1]
     places = [here, axpy(STOP_MARGIN, sub(end, here), end)]
     if released:
         places = [load_position_below(place, settings) for place in places]
-    ahead = _first_violation(flight, places, settings)
+    ahead = first_fence_violation(flight.area.fence, places, settings)
     return ahead and f"would stop {ahead}"
-
-
-def _first_violation(flight: Flight, places: Sequence[Vec3], settings: Settings) -> str:
-    return next(filter(None, (fence_violation(flight.area.fence, place, settings) for place in places)), "")

@@ -205,9 +205,9 @@ class Place:
 
 
 def _check_degrees(seq: int, param: int, name: str, coordinate: int, limit: float) -> None:
-    if coordinate == _INT32_MAX:  # not given
-        check(seq, param, name, nan, "deg", -limit, limit, "; it is not given")
-    check(seq, param, name, coordinate * 1e-7, "deg", -limit, limit)
+    is_given = coordinate != _INT32_MAX
+    degrees, hint = (coordinate * 1e-7, "") if is_given else (nan, "; it is not given")
+    check(seq, param, name, degrees, "deg", -limit, limit, hint)
 
 
 @dataclass(frozen=True)
