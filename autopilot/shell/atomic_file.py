@@ -41,7 +41,7 @@ def _checksum_text(body: bytes) -> bytes:
 
 def write_atomically(path: Path, data: bytes, private: bool = False) -> None:
     """Replace a file by this content; OSError leaves the old one. `private`: readable by this user only."""
-    new = path.with_suffix(".new")
+    new = path.with_name(f".{path.name}.new")  # a hidden name, no file of the user's
     new.unlink(missing_ok=True)  # it may be readable by others
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
     try:

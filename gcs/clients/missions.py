@@ -67,7 +67,9 @@ class MissionUpload:
     def _acknowledged(self, result: int) -> None:
         if result == mavlink.MAV_MISSION_ACCEPTED:
             if self._next == len(self._items):  # else it belongs to an older transfer
-                self.result = Result(Status.DONE, f"{self._name}: {len(self._items)} items accepted")
+                count = len(self._items)
+                text = f"{self._name}: {count} item{'s' * (count != 1)} accepted"
+                self.result = Result(Status.DONE, text)
         elif result == mavlink.MAV_MISSION_INVALID_SEQUENCE:
             return  # an item that came twice or too late; the vehicle requests again what it lacks
         elif result == mavlink.MAV_MISSION_OPERATION_CANCELLED:

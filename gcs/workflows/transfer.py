@@ -8,7 +8,7 @@ from pathlib import Path
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients.missions import MissionDownload, MissionUpload
-from gcs.errors import GcsError
+from gcs.errors import GcsError, RefusedError
 from gcs.formats.missions import PLAN_ENDING, CheckedPlan, check_plan, is_foreign, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_items import items_of
@@ -65,12 +65,20 @@ def _upload_foreign(
         with notify_if_slow(CHECKING_TEXT):
             check_items(path.name, items, home, vehicle)
     # the fence first: the vehicle checks the mission against it
-    for kind, points in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
+    replaced = []
+    for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
         if points is not None:
             text = session.run(MissionUpload(session.target, points, kind)).text
+            replaced.append(name)
             if points:
                 print_line(text)
-    print_line(session.run(MissionUpload(session.target, items), "upload").text)
+    try:
+        print_line(session.run(MissionUpload(session.target, items), "upload").text)
+    except RefusedError as error:
+        if replaced:
+            names = " and ".join(replaced)
+            raise RefusedError(f"{error}; the vehicle has {path.name}'s {names} now") from None
+        raise
 
 
 def _flyable_items(path: Path, checked: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:

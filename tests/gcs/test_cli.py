@@ -507,13 +507,28 @@ def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp
     assert vehicle.areas == {}
     result = run("upload", str(file), "--skip", "--connect", port)
     assert result.exit_code == EXIT_DONE
-    assert "fence: 1 items accepted" in result.stdout
+    assert "fence: 1 item accepted" in result.stdout
     assert [item.command for item in vehicle.mission] == [22, 2000]
     assert [item.command for item in vehicle.areas[1]] == [5003]
     back = tmp_path / "back.plan"
     done = run("download", str(back), "--connect", port)
     assert done.stdout == f"2 items, 1 fence item written to {back}\n"
     assert json.loads(back.read_text())["geoFence"] == plan["geoFence"]
+
+
+def test_a_refused_mission_of_a_plan_says_that_its_fence_was_taken(live, tmp_path):
+    vehicle, port = live
+    file = tmp_path / "in.plan"
+    plan = plan_of((22, [0, 0, 0, None, 47.397742, 8.545594, 2.5]), (21, [0, 0, 0, None, 0, 0, 0]))
+    plan["geoFence"]["circles"] = [
+        {"version": 1, "inclusion": True, "circle": {"center": [47.3977, 8.5456], "radius": 9.5}}
+    ]
+    file.write_text(json.dumps(plan))
+    vehicle.refuse_item = 1
+    result = run("upload", str(file), "--connect", port)
+    assert result.exit_code == EXIT_ERROR
+    assert result.stderr.endswith("the vehicle has in.plan's fence now\n")
+    assert [item.command for item in vehicle.areas[1]] == [5003]
 
 
 def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):

@@ -184,7 +184,7 @@ def test_a_process_killed_as_it_sets_a_damaged_file_aside_loses_none(tmp_path: P
         path.write_bytes(RUBBISH)
         killed = killed_at(number, lambda storage=storage: replace(storage))
         found = path.read_bytes() if path.exists() else None
-        aside = list(path.parent.glob("*.corrupt*"))
+        aside = list(path.parent.glob("[!.]*.corrupt*"))
         assert found == RUBBISH or (found == new and len(aside) == 1)
         assert all(one.read_bytes() == RUBBISH for one in aside), "whole or not at all"
         replace(Storage(path.parent))  # at the next start
@@ -228,4 +228,13 @@ def test_the_directory_is_brought_to_the_disk_after_the_new_name(tmp_path: Path,
     )
     monkeypatch.setattr(os, "replace", lambda a, b: (done.append("replace"), replace(a, b)))
     write_atomically(tmp_path / "a", b"1")
-    assert done == [f"fsync {tmp_path / 'a.new'}", "replace", f"fsync {tmp_path}"]
+    assert done == [f"fsync {tmp_path / '.a.new'}", "replace", f"fsync {tmp_path}"]
+
+
+def test_a_file_of_the_same_stem_is_left_alone(tmp_path: Path) -> None:
+    users = [tmp_path / name for name in ("mine.new", "mine.part", "mine.txt.new")]
+    for file in users:
+        file.write_text("the user's own")
+    write_atomically(tmp_path / "mine.txt", b"1")
+    assert [file.read_text() for file in users] == ["the user's own"] * 3
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", *(file.name for file in users)}

@@ -241,8 +241,8 @@ def test_a_directory_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
     storage.store_parameter("NGC_KX", 5.0)
-    (tmp_path / "parameters.new").mkdir()  # has the effect of a full or read-only disk, also for root
-    with pytest.raises(OSError, match=r"parameters\.new"):
+    (tmp_path / ".parameters.txt.new").mkdir()  # has the effect of a full or read-only disk, also for root
+    with pytest.raises(OSError, match=r"\.parameters\.txt\.new"):
         storage.store_parameter("NGC_KX", 7.0)
     again = table()
     Storage(tmp_path).load_parameters(again)

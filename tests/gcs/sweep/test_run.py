@@ -148,7 +148,7 @@ def test_a_sweep_is_extended_by_seeds_and_values(
         rows = pq.read_table(tmp_path / "flights.parquet").to_pylist()
         (tmp_path / "flights.parquet").unlink()
         Store(tmp_path, less).add(rows)
-        (tmp_path / "parts" / "000000005-1.new").write_bytes(b"PAR1")  # it was writing another part
+        (tmp_path / "parts" / ".000000005-1.parquet.new").write_bytes(b"PAR1")  # it was writing another part
     rest = swept(plan, tmp_path)
     assert (rest.flights, rest.flown) == (6, 6 - first.flights)
     assert not (tmp_path / "parts").exists()
