@@ -253,7 +253,7 @@ def _hover_violations(limits: VehicleLimits) -> list[Violation]:
     vehicle = limits.vehicle
     weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
     if weight <= limits.usable_thrust_n:
-        return []
+        return _balance_violations(limits)
     too_heavy = vehicle.quad_mass_kg * vehicle.gravity_m_s2 >= limits.usable_thrust_n
     text = (
         f"vehicle ({vehicle.quad_mass_kg:g} kg) and load ({vehicle.load_mass_kg:g} kg) weigh {weight:.2f} N; "
@@ -261,6 +261,28 @@ def _hover_violations(limits: VehicleLimits) -> list[Violation]:
         f"lower {'quad_mass_kg' if too_heavy else 'load_mass_kg'}, or raise rotor_max_n"
     )
     return [Violation(0, "thrust", weight, limits.usable_thrust_n, 0.0, text)]
+
+
+def _balance_violations(limits: VehicleLimits) -> list[Violation]:
+    """The violation of a vehicle that its load tips over, since the cable is attached too far from the centre
+    of mass; empty if its rotors hold it level."""
+    vehicle = limits.vehicle
+    forward, left, _ = vehicle.attachment_m
+    load_n = vehicle.load_mass_kg * vehicle.gravity_m_s2
+    total_n = load_n + vehicle.quad_mass_kg * vehicle.gravity_m_s2
+    arm_m = vehicle.arm_m
+    demand = np.array([total_n, load_n * left / arm_m, -load_n * forward / arm_m, 0.0])
+    forces_n = np.array(limits.body.efforts) @ demand
+    if not vehicle.limited or vehicle.rotor_min_n <= forces_n.min() <= forces_n.max() <= vehicle.rotor_max_n:
+        return []
+    is_low = forces_n.min() < vehicle.rotor_min_n
+    value, limit = (forces_n.min(), vehicle.rotor_min_n) if is_low else (forces_n.max(), vehicle.rotor_max_n)
+    text = (
+        f"the cable is attached {np.hypot(forward, left):.2f} m beside the centre of mass: to hover, one rotor "
+        f"has to give {value:.2f} N; it gives {limit:.2f} N at {'least' if is_low else 'most'}; lower "
+        "attachment_m"
+    )
+    return [Violation(0, "rotor force", float(value), limit, 0.0, text)]
 
 
 def paths(

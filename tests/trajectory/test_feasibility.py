@@ -20,6 +20,7 @@ from autopilot.trajectory.timeline import (
 )
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.model import OneRotor
 from missions.fileformat import load_mission, shipped
 from missions.model import (
     AttitudeRun,
@@ -223,6 +224,30 @@ def test_a_vehicle_that_cannot_hover_is_not_advised_to_fly_slower() -> None:
     assert found.value > found.limit == pytest.approx(heavy.usable_thrust_n)
     assert "it cannot hover; lower load_mass_kg, or raise rotor_max_n" in found.text
     assert "speed_m_s" not in found.text
+
+
+@pytest.mark.parametrize(
+    ("forward_m", "front", "quantity"),
+    [(-0.3, False, "most"), (-0.7, True, "least"), (0.9, True, "most"), (1.5, False, "least")],
+)
+def test_a_load_that_tips_the_vehicle_over_is_found_by_the_law_of_the_lever(
+    forward_m: float, front: bool, quantity: str
+) -> None:
+    # two rotors 0.2 m ahead of the centre of mass, two 0.1 m behind it
+    places = ((0.2, 0.1, "+"), (-0.1, 0.2, "-"), (-0.1, -0.2, "+"), (0.2, -0.1, "-"))
+    rotors = tuple(OneRotor(x_m=x, y_m=y, spin=spin) for x, y, spin in places)
+    vehicle = WITHOUT_DRAG.model_copy(update={"rotor": rotors, "attachment_m": (forward_m, 0.0, 0.0)})
+    load_n, total_n = (
+        mass * vehicle.gravity_m_s2
+        for mass in (vehicle.load_mass_kg, vehicle.load_mass_kg + vehicle.quad_mass_kg)
+    )
+    front_pair_n = (load_n * forward_m + 0.1 * total_n) / (0.2 + 0.1)
+    expected_n = (front_pair_n if front else total_n - front_pair_n) / 2.0
+    (found,) = check(mission(), VehicleLimits(vehicle))
+    assert found.value == pytest.approx(expected_n)
+    assert f"it gives {found.limit:.2f} N at {quantity}; lower attachment_m" in found.text
+    level = vehicle.model_copy(update={"attachment_m": (0.01, 0.01, -0.5)})
+    assert check(mission(), VehicleLimits(level)) == []
 
 
 def test_a_vehicle_that_can_hardly_lift_its_load_is_not_advised_to_change_what_a_takeoff_has_not() -> None:
