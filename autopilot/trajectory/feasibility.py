@@ -277,10 +277,10 @@ def _balance_violations(limits: VehicleLimits) -> list[Violation]:
         return []
     is_low = forces_n.min() < vehicle.rotor_min_n
     value, limit = (forces_n.min(), vehicle.rotor_min_n) if is_low else (forces_n.max(), vehicle.rotor_max_n)
+    beside_m, bound = np.hypot(forward, left), "least" if is_low else "most"
     text = (
-        f"the cable is attached {np.hypot(forward, left):.2f} m beside the centre of mass: to hover, one rotor "
-        f"has to give {value:.2f} N; it gives {limit:.2f} N at {'least' if is_low else 'most'}; lower "
-        "attachment_m"
+        f"the cable is attached {beside_m:.2f} m beside the centre of mass: to hover, one rotor "
+        f"must give {value:.2f} N and gives {limit:.2f} N at {bound}; lower attachment_m"
     )
     return [Violation(0, "rotor force", float(value), limit, 0.0, text)]
 

@@ -292,6 +292,6 @@ def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
         return "diverged"
     if failure_s(telemetry, samples) is not None and _disarmed(telemetry):
         return "interrupted"
-    if np.isin(phase, CARRIED).any() and _disarmed(telemetry):
+    if np.isin(phase, (*CARRIED, mavlink.PLUMBLINE_PHASE_LOWER)).any() and _disarmed(telemetry):
         return "completed"
     return "incomplete"

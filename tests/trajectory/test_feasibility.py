@@ -245,7 +245,7 @@ def test_a_load_that_tips_the_vehicle_over_is_found_by_the_law_of_the_lever(
     expected_n = (front_pair_n if front else total_n - front_pair_n) / 2.0
     (found,) = check(mission(), VehicleLimits(vehicle))
     assert found.value == pytest.approx(expected_n)
-    assert f"it gives {found.limit:.2f} N at {quantity}; lower attachment_m" in found.text
+    assert f"gives {found.limit:.2f} N at {quantity}; lower attachment_m" in found.text
     level = vehicle.model_copy(update={"attachment_m": (0.01, 0.01, -0.5)})
     assert check(mission(), VehicleLimits(level)) == []
 

@@ -9,6 +9,7 @@ from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.metrics import clock_numbers
 from gcs.analysis.record import FlightMeta, flight_record
+from gcs.analysis.samples import CARRIED
 from gcs.analysis.step import Step, find_step, step_response
 from gcs.analysis.telemetry import telemetry_of
 from tests.doubles import recorded_flights as flights
@@ -328,6 +329,21 @@ def test_the_heartbeat_tells_of_the_landing_before_the_phase():
     landed = replace(aloft, heartbeat=replace(aloft.heartbeat, base_mode=modes))
     found = [flight_record(one, FlightMeta())["outcome"] for one in (aloft, landed)]
     assert found == ["incomplete", "completed"]
+
+
+@pytest.mark.parametrize(
+    ("after", "outcome"),
+    [(mavlink.PLUMBLINE_PHASE_LOWER, "completed"), (mavlink.PLUMBLINE_PHASE_SET_DOWN, "incomplete")],
+)
+def test_a_flight_that_takes_off_and_lands_and_nothing_else_is_completed_if_it_lifted_the_load(
+    after, outcome
+):
+    flight = flights.flight(4.0, flights.still)
+    landing = flight.phase > mavlink.PLUMBLINE_PHASE_MISSION
+    flight.phase[np.isin(flight.phase, CARRIED)] = mavlink.PLUMBLINE_PHASE_TAUTEN
+    flight.phase[landing] = after
+    flight.phase[-40:] = mavlink.PLUMBLINE_PHASE_DISARMED
+    assert record(flight)["outcome"] == outcome
 
 
 def test_the_figures_of_a_failure():
