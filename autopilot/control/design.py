@@ -30,10 +30,20 @@ holds for every delay between d - delta and d + delta, by the small-gain theorem
 S is the response of the commanded moment to a torque: by the feedback after the torque has moved the vehicle,
 and by the estimate of the torque.
 
-delta is specified, and the ratios of the bandwidths are given. All three bandwidths are as high as three
-conditions allow: the loop tolerates delta; three standard deviations of each rotor's command, for the assumed
-noise of the estimate, fit between hover and the nearest limit of a rotor; and 1.5 of them fit into the share
-of the range that paths leave to control, because gusts cannot use what noise takes of this share.
+delta is specified, and the ratios of the bandwidths are given. All three bandwidths are as high as five
+conditions allow:
+
+* the loop tolerates delta;
+* three standard deviations of each rotor's command, for the assumed noise of the estimate, fit between hover
+  and the nearest limit of a rotor;
+* 1.5 of them fit into the share of the range that paths leave to control, because gusts cannot use what noise
+  takes of this share;
+* the loop is stable with `SATURATED_LAG_SHARE` of the rotors' lag even without lag compensation: rotors at
+  their limits cannot be compensated, and after a large error a loop that depends on it goes on from limit to
+  limit;
+* omega_x is at most `MAX_SWING_RATIO` times sqrt(m g / m_Q L), the frequency of the load on its cable. The
+  force across the cable is limited (`MAX_ACROSS_SHARE`), so the cable's rate changes by at most 0.7 of this
+  frequency squared, and a loop that asks for more after a large error overshoots by more each time.
 """
 
 from __future__ import annotations
@@ -57,6 +67,10 @@ Array = NDArray[np.float64]
 # motion capture
 NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
 SIGMAS, SIGMAS_RESERVED = 3.0, 1.5
+# of omega_x and the frequency of the load on its cable (docs/control-log.md)
+MAX_SWING_RATIO = 1.4
+# of the rotors' lag, with which the loop must be stable without compensation (docs/control-log.md)
+SATURATED_LAG_SHARE = 0.9
 # rad/s, range of omega_R in which the greatest is searched
 _MIN_OMEGA_R, _MAX_OMEGA_R = 0.5, 200.0
 _MIN_LAG = 1e-4  # s; rotors without lag are treated as rotors of this lag
@@ -96,6 +110,13 @@ class Design(NamedTuple):
     rotor_deviation: float  # N, standard deviation of a rotor's command
 
 
+def swing_stiffness(vehicle: Vehicle) -> float:
+    """Square of the frequency (rad/s) of the load on its cable, below a vehicle that is free and level."""
+    return (
+        (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / (vehicle.quad_mass * vehicle.cable_length)
+    )
+
+
 def yaw_bandwidth_ratio(vehicle: Vehicle) -> float:
     """Ratio of the bandwidth of yaw to that of roll and pitch at which equal errors demand the same share of
     what the rotors can give about the axis. About the thrust axis they turn the vehicle by their drag alone.
@@ -131,9 +152,7 @@ def gains_of(
 
 def level_axis_model(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
     """(A, b) of e_i, x_L, v_L, q, q', theta, Omega, M along a level axis; u, N m, is the commanded moment."""
-    stiffness = (
-        (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / (vehicle.quad_mass * vehicle.cable_length)
-    )
+    stiffness = swing_stiffness(vehicle)
     A, b = np.zeros((_STATES + 1, _STATES + 1)), np.zeros(_STATES + 1)
     A[0, 1] = A[1, 2] = A[3, 4] = A[5, 6] = 1.0
     A[2, 3] = -vehicle.gravity
@@ -148,7 +167,7 @@ def frequency_response(
 ) -> NDArray[np.complex128]:
     """(s - A)^-1 b exp(-s T / 2) at s = i omega, one row for each omega (rad/s)."""
     s = 1j * omegas
-    stiffness = -level_axis_model(vehicle, J, lag)[0][4, 3]
+    stiffness = swing_stiffness(vehicle)
     M = np.exp(-0.5 * s * period) / (lag * s + 1.0)
     Omega = M / (J * s)
     theta = Omega / s
@@ -171,6 +190,18 @@ def ackermann_gain(A: Array, J: float, polynomial: Array) -> Array:
     return np.append(last @ closed, 0.0)
 
 
+def sampled_loop(A: Array, b: Array, K: Array, period: float) -> tuple[Array, Array]:
+    """Of x' = A x + b u with u = -K x, held for a period (s): the matrix of the loop, and that of u."""
+    n = len(A)
+    discrete = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * period)
+    b_d = discrete[:n, n]
+    return discrete[:n, :n] - np.outer(b_d, K), b_d
+
+
+def _is_stable(loop: Array) -> bool:
+    return bool(np.abs(np.linalg.eigvals(loop)).max() < 1.0)
+
+
 def evaluate(
     omega_i: float,
     omega_x: float,
@@ -181,7 +212,8 @@ def evaluate(
     timing: Timing,
     vehicle: Vehicle,
 ) -> tuple[float, float]:
-    """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) if unstable."""
+    """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) if unstable, with the
+    rotors' lag compensated or not."""
     lag, T = max(_MIN_LAG, timing.effective_lag), timing.period
     J = min(vehicle.inertia[0], vehicle.inertia[1])
     A, b = level_axis_model(vehicle, J, lag)
@@ -191,11 +223,13 @@ def evaluate(
     K = ackermann_gain(A, J, polynomial)
     K_ahead = K @ expm(A * timing.delay)
 
-    n = len(A)
-    discrete = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * T)
-    A_d, b_d = discrete[:n, :n], discrete[:n, n]
-    closed = A_d - np.outer(b_d, K)
-    if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
+    closed, b_d = sampled_loop(A, b, K, T)
+    if not _is_stable(closed):
+        return 0.0, math.inf
+    saturated_lag = SATURATED_LAG_SHARE * timing.lag
+    if saturated_lag > lag and not _is_stable(
+        sampled_loop(*level_axis_model(vehicle, J, saturated_lag), K, T)[0]
+    ):
         return 0.0, math.inf
     omegas = np.geomspace(0.02 * omega_x, 0.99 * math.pi / T, 300)
     G = frequency_response(vehicle, J, lag, T, omegas)
@@ -205,7 +239,7 @@ def evaluate(
         S = S * (1.0 - Q * np.exp(-1j * omegas * timing.delay)) + Q
     tolerance = 1.0 / float(np.max(omegas * np.abs(S)))
 
-    W = np.zeros((n, n))
+    W = np.zeros_like(A)
     W[:_STATES, :_STATES] = np.diag((noise * np.array(NOISE)) ** 2)
     input_variance = float(K_ahead @ W @ K_ahead)
     with warnings.catch_warnings():
@@ -241,6 +275,7 @@ def design(requirements: Requirements, timing: Timing, vehicle: Vehicle) -> Desi
             low = middle
         else:
             high = middle
-    omegas = bandwidths(math.exp(low))
+    max_omega_q = requirements.cable_ratio * MAX_SWING_RATIO * math.sqrt(swing_stiffness(vehicle))
+    omegas = bandwidths(min(math.exp(low), requirements.attitude_ratio * max_omega_q))
     gains = gains_of(*omegas, requirements.zeta, vehicle)
     return Design(gains, *omegas, *evaluate_at(omegas[-1]))

@@ -7,7 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from autopilot.control.design import Requirements, Timing, ackermann_gain, design, gains_of, level_axis_model
+from autopilot.control.design import (
+    MAX_SWING_RATIO,
+    SATURATED_LAG_SHARE,
+    Requirements,
+    Timing,
+    ackermann_gain,
+    design,
+    gains_of,
+    level_axis_model,
+    sampled_loop,
+)
 from autopilot.control.records import Vehicle
 
 WANTED = Requirements(0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0)
@@ -71,3 +81,33 @@ def test_another_vehicle_gets_gains_of_its_own() -> None:
     assert found.tolerance == pytest.approx(0.012, rel=1e-3)
     assert 3.0 * found.rotor_deviation < HEAVY.rotor_max - 0.25 * 2.5 * 9.81
     assert found.gains.k_R[0] == pytest.approx(0.02 * found.omega_R**2)
+
+
+def test_the_load_is_followed_hardly_faster_than_it_swings() -> None:
+    """A light load on a long cable: nothing else would limit the bandwidth so far."""
+    light = HEAVY._replace(load_mass=0.05, inertia=(0.01, 0.01, 0.02))
+    timing = Timing(0.0, 0.01, 0.01, 0.004)
+    for length in (8.0, 4.0, 1.0):
+        found = design(WANTED, timing, light._replace(cable_length=length))
+        frequency = math.sqrt((1.0 + 0.05 / 2.0) * 9.81 / length)
+        assert found.omega_x <= MAX_SWING_RATIO * frequency * (1.0 + 1e-12)
+        assert (found.omega_x == pytest.approx(MAX_SWING_RATIO * frequency)) == (length > 1.0)
+        assert found.tolerance >= 0.012 * (1.0 - 1e-3)
+
+
+def test_slow_rotors_need_no_compensation_to_be_stable() -> None:
+    """At the limits of the rotors their lag cannot be compensated."""
+    lag, period, J = 0.09, 0.004, HEAVY.inertia[0]
+    found = design(WANTED, Timing(0.0, lag, 0.01, period), HEAVY)
+    polynomial = np.array([1.0, found.omega_i])
+    for omega in (found.omega_x, found.omega_q, found.omega_R):
+        polynomial = np.convolve(polynomial, [1.0, 2.0 * 0.9 * omega, omega * omega])
+
+    def growth(rotor_lag: float) -> float:
+        A, b = level_axis_model(HEAVY, J, rotor_lag)
+        loop, _ = sampled_loop(A, b, ackermann_gain(A, J, polynomial), period)
+        return float(np.abs(np.linalg.eigvals(loop)).max())
+
+    assert growth(SATURATED_LAG_SHARE * lag) < 1.0
+    assert growth(1.02 * SATURATED_LAG_SHARE * lag) > 1.0, "it is not slower than it must be"
+    assert found.omega_R < 0.8 * design(WANTED, Timing(0.0, 0.02, 0.01, period), HEAVY).omega_R

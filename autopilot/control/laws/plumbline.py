@@ -9,6 +9,7 @@ other two modes are the loops of the thesis's cascade with its filters and the g
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control import plumbline_cascade as cascade
@@ -23,6 +24,7 @@ from autopilot.control.actuators.lag_compensation import compensate_lag, lag_gai
 from autopilot.control.actuators.predictor import Prediction, predict, predict_on_ground
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.believed import believed_actuation, believed_design, believed_drag
+from autopilot.control.design import MAX_SWING_RATIO, swing_stiffness
 from autopilot.control.drag import Drag, drag_force
 from autopilot.control.laws import thesis
 from autopilot.control.laws.interface import Kernels, Law
@@ -49,6 +51,7 @@ class PlumblineConstants(NamedTuple):
     lag_gain: float
     period: float  # s
     vehicle: Vehicle
+    full_pace_length: float  # m, of the longest cable on which the load is followed at the bandwidth designed
 
 
 class PlumblineLaw(NamedTuple):
@@ -78,7 +81,8 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
     """From PLB_ and VEH_ parameters; filters and position gains of the other modes from NGC_ and QP_."""
     period = 1.0 / table["CTL_RATE_HZ"]
     lag, target_lag = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
-    gains = believed_design(table, vehicle).gains
+    found = believed_design(table, vehicle)
+    gains = found.gains
     constants = PlumblineConstants(
         gains,
         believed_drag(table),
@@ -86,6 +90,7 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
         lag_gain(lag, target_lag, period),
         period,
         vehicle,
+        (MAX_SWING_RATIO / found.omega_x) ** 2 * swing_stiffness(vehicle) * vehicle.cable_length,
     )
     other_modes = thesis.build(table, vehicle)
     other_modes = other_modes._replace(
@@ -98,11 +103,13 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
 
 @kernel
 def with_cable(law: PlumblineLaw, cable: Cable) -> PlumblineLaw:
-    """The law for the present cable; gains scaled so that the cable's loop keeps its bandwidth."""
+    """The law for the present cable; gains scaled so that the cable's loop keeps its bandwidth, but for a
+    long cable on which the load swings too slowly for it (`autopilot.control.design`)."""
     c = law.constants
     length_ratio = cable.length / c.vehicle.cable_length
     gains = with_field(c.gains, "k_q", length_ratio * c.gains.k_q)
     gains = with_field(gains, "k_omega", length_ratio * c.gains.k_omega)
+    gains = cascade.with_pace(gains, min(1.0, sqrt(c.full_pace_length / cable.length)))
     constants = with_field(
         with_field(c, "gains", gains), "vehicle", with_cable_length(c.vehicle, cable.length)
     )
