@@ -190,6 +190,7 @@ def built_law(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
         lag_gain(assumed["believed_tau"], assumed["wanted_tau"], settings.period),
         settings.period,
         vehicle,
+        vehicle.cable_length,
     )
     # the other modes have no effect in load position
     filters = thesis.thesis_filters(settings.period)
