@@ -119,7 +119,7 @@ def sweep(
 
         from pyarrow import parquet
 
-        return as_frame(parquet.read_table(folder / "flights.parquet"), kind)
+        return as_frame(parquet.read_table((folder / "flights.parquet").absolute()), kind)
 
 
 def _varied(vary: Any) -> list[str]:

@@ -163,11 +163,15 @@ def source_file(kind: type) -> Path | None:
 
 
 def source_digest(kind: type) -> str:
-    """A hash of the file in which a class is written, and of all loaded modules in its folder and below."""
+    """A hash of the file in which a class is written, of all loaded modules in its folder and below, and of
+    the file with its data that it names by an attribute `file`, such as a trained policy."""
     path = source_file(kind)
     digest = hashlib.sha256()
     for file in sorted(_loaded_files_beside(path)) if path is not None else ():
         digest.update(file.relative_to(path.parent).as_posix().encode() + b"\0" + file.read_bytes())  # type: ignore[union-attr]
+    data = getattr(kind, "file", None)
+    if isinstance(data, str | Path) and Path(data).is_file():
+        digest.update(Path(data).read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -146,4 +146,6 @@ def write_flight(path: Path, telemetry: Telemetry, samples: Samples, metadata: d
     """Write flight.parquet."""
     from pyarrow import parquet
 
-    parquet.write_table(flight_table(telemetry, samples, metadata), path, compression="zstd")
+    table = flight_table(telemetry, samples, metadata)
+    with path.open("wb") as file:  # a relative path with a colon would be taken for a URI
+        parquet.write_table(table, file, compression="zstd")

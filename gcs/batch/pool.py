@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
@@ -90,16 +90,16 @@ class PoolBackend(Generic[F, R]):
         return not self._futures
 
     def start(self, group: tuple[F, ...]) -> None:
-        with _killed_worker_as_error():
+        with _lost_worker_as_error():
             self._futures.add(self._executor.submit(fly_group, self._fly, group))
 
     def collect(self) -> Sequence[R]:
         done, self._futures = wait(self._futures, _POLL_S, FIRST_COMPLETED)
-        failed = {future for future in done if future.exception() is not None}
+        failed = {future for future in done if not _has_result(future)}
         if len(failed) < len(done):  # what others have flown is kept; the next call meets the failure
             self._futures |= failed
             done -= failed
-        with _killed_worker_as_error():
+        with _lost_worker_as_error():
             return [result for future in done for result in future.result()]
 
     def running(self) -> Running:
@@ -113,7 +113,7 @@ class PoolBackend(Generic[F, R]):
             future.cancel()
         ended, _ = wait([future for future in self._futures if not future.cancelled()])
         self._futures = set()
-        return [result for future in ended if future.exception() is None for result in future.result()]
+        return [result for future in ended if _has_result(future) for result in future.result()]
 
 
 @contextmanager
@@ -148,14 +148,23 @@ def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
         client.close()
 
 
+def _has_result(future: Future[Any]) -> bool:
+    return not future.cancelled() and future.exception() is None
+
+
 @contextmanager
-def _killed_worker_as_error() -> Iterator[None]:
+def _lost_worker_as_error() -> Iterator[None]:
+    """Report the death of a worker process, and of a Dask scheduler, which cancels all its flights."""
     try:
         yield
-    except BrokenProcessPool:
+    except (BrokenProcessPool, CancelledError) as error:
+        lost = (
+            "the Dask scheduler is gone"
+            if isinstance(error, CancelledError)
+            else "a worker process was killed"
+        )
         raise GcsError(
-            "a worker process was killed; completed flights are stored, run the same command again to"
-            " continue"
+            f"{lost}; completed flights are stored, run the same command again to continue"
         ) from None
 
 

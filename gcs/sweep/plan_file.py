@@ -23,12 +23,18 @@ _OPTIONS = {
 ENTRIES = ("gcs.sweep.work",)  # modules whose imports are all the code that flies a sweep
 
 
-def sweep_origin(plan: SweepPlan) -> Origin:
-    """The origin of the flights of a plan if they are flown now: settings, files, version and code."""
+def sweep_files(plan: SweepPlan) -> dict[str, str]:
+    """A hash of the content of each file of the user's own that the plan names, and of the custom classes.
+    ValueError if one cannot be read."""
     files = file_digests((plan.mission, plan.vehicle, str(belief_of(plan.vehicle)), plan.sensors))
     for law in plan.laws:
         files |= {one.reference: one.digest for one in plan.own(law).load_classes()}
-    return origin_of({"plan": plan.to_json(), "files": files}, ENTRIES)
+    return files
+
+
+def sweep_origin(plan: SweepPlan) -> Origin:
+    """The origin of the flights of a plan if they are flown now: settings, files, version and code."""
+    return origin_of({"plan": plan.to_json(), "files": sweep_files(plan)}, ENTRIES)
 
 
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:
@@ -109,7 +115,12 @@ def _differing_options(origin: Origin, found: Mapping[str, Any]) -> list[str]:
     try:
         stored, requested = found["origin"]["settings"], origin.to_json()["settings"]
         pairs = [(name, stored["plan"].get(name), value) for name, value in requested["plan"].items()]
-        other_files = stored["files"] != requested["files"]
+        files = {**stored["files"], **requested["files"]}
+        other_files = [
+            f"content of {name}"
+            for name in files
+            if stored["files"].get(name) != requested["files"].get(name)
+        ]
     except (KeyError, TypeError, AttributeError):
         return ["settings"]
     differing = [
@@ -117,7 +128,7 @@ def _differing_options(origin: Origin, found: Mapping[str, Any]) -> list[str]:
         for name, stored_value, requested_value in pairs
         if stored_value != requested_value
     ]
-    return differing or (["files of your own"] if other_files else [])
+    return [*other_files, *differing]
 
 
 def _stored_value(value: object) -> str:

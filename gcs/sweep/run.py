@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -63,9 +63,10 @@ def sweep(
         if fresh:
             store.clear()
             (directory / PLAN_FILE).unlink(missing_ok=True)
-        store_plan(directory, plan, command, sweep_origin(plan))
+        origin = sweep_origin(plan)
+        store_plan(directory, plan, command, origin)
         try:
-            return _fly_missing(plan, store, workers, stopped, quiet, warm)
+            return _fly_missing(plan, origin.settings["files"], store, workers, stopped, quiet, warm)
         except OSError as error:
             if not disk_problem(error):
                 raise
@@ -77,6 +78,7 @@ def sweep(
 
 def _fly_missing(
     plan: SweepPlan,
+    files: Mapping[str, str],
     store: Store,
     workers: AbstractContextManager[tuple[Executor, int]],
     stopped: Callable[[], bool],
@@ -89,7 +91,7 @@ def _fly_missing(
     missing = [case for case in plan.cases() if case.index not in stored]
     is_complete, flown, wall_s = True, 0, 0.0
     if missing:
-        work = prepare(plan, warm, quiet)
+        work = prepare(plan, files, warm, quiet)
         with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
             def report(rows: Sequence[Row], running: Running) -> None:

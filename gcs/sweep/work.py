@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from pathlib import Path
 
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.own.law import law_name
 from autopilot.shell.compiling import Part
 from autopilot.shell.watched_calls import watched_calls
+from gcs.errors import GcsError
 from gcs.shell.display import notify_if_slow
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import FlightResult, StartTimes, SweepFlight, fly, start_times
 from gcs.sweep.group import MIN_FLIGHTS, LaneGroup, fits_in_lanes
 from gcs.sweep.plan import Case, PlanError, SweepPlan
+from gcs.sweep.plan_file import sweep_files
 from gcs.sweep.store import Row, row_of
 from gcs.sweep.warmup import lanes_part, sweep_parts
 from missions.fileformat import load_mission
@@ -26,6 +29,10 @@ MIN_FLIGHTS_FOR_LANES = 1000  # least number of flights with a law for which its
 _MAX_BATCH = 2 * LANES  # flights that one worker is given at a time
 
 _FLIGHT_ERRORS = (ValueError, ArithmeticError)
+_FILES_TEXT = (
+    "completed flights are stored: restore it and run the same command again, or fly anew with another "
+    "--out; workers of --scheduler need the same files at the same paths"
+)
 
 
 @dataclass(frozen=True)
@@ -35,11 +42,17 @@ class Work:
     plan: SweepPlan
     mission: Mission
     start_times_by_law: dict[str, StartTimes]  # by law
+    files: Mapping[str, str]  # of the user's own: `sweep_files` as the sweep began
     lane_laws: frozenset[str] = frozenset()  # laws with which eight flights are flown at once
 
 
-def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool = True) -> Work:
-    """The work of a plan; flies the beginning of one flight for each law.
+def prepare(
+    plan: SweepPlan,
+    files: Mapping[str, str],
+    warm: Callable[[Iterable[Part]], None],
+    quiet: bool = True,
+) -> Work:
+    """The work of a plan whose `sweep_files` are given; flies the beginning of one flight for each law.
 
     `warm` compiles the given parts of the flight software that are not compiled yet. The instants of arming
     and starting are those of a flight with only the settings that all flights share. A vehicle that is not
@@ -61,7 +74,7 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool
         if _lanes_are_worthwhile(plan, law) and fits_in_lanes(one):
             warm([lanes_part(law)])
             lane_laws.add(law)
-    return Work(plan, mission, start_times_by_law, frozenset(lane_laws))
+    return Work(plan, mission, start_times_by_law, files, frozenset(lane_laws))
 
 
 def _lanes_are_worthwhile(plan: SweepPlan, law: str) -> bool:
@@ -76,7 +89,27 @@ def fly_cases(
     work: Work, cases: Sequence[Case], clock: Clock, stopped: Callable[[], bool] = lambda: False
 ) -> list[Row]:
     """Fly these flights, up to eight of a cell at once if that is prepared; if `stopped`, only those that
-    have begun."""
+    have begun. GcsError if files of the user's own are others than as the sweep began: for a worker that
+    runs elsewhere, or because they were changed, also while these flights were flown."""
+    check_files(work)
+    rows = _rows_of(work, cases, clock, stopped)
+    check_files(work)
+    return rows
+
+
+def check_files(work: Work) -> None:
+    """GcsError if a file of the user's own is not that with which the sweep began."""
+    try:
+        found = sweep_files(work.plan)
+    except (OSError, ValueError) as error:
+        raise GcsError(f"{error} for a worker in {Path.cwd()}; {_FILES_TEXT}") from None
+    for name, digest in work.files.items():
+        if found.get(name) != digest:
+            state = "another file than as the sweep began" if name in found else "no such file"
+            raise GcsError(f"{name}: {state}, for a worker in {Path.cwd()}; {_FILES_TEXT}")
+
+
+def _rows_of(work: Work, cases: Sequence[Case], clock: Clock, stopped: Callable[[], bool]) -> list[Row]:
     rows: list[Row] = []
     for (law, _), cell in groupby(cases, key=lambda case: (case.law, case.varied)):
         members = list(cell)

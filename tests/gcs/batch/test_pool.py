@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 from gcs.batch import pool
 from gcs.batch.pool import PoolBackend
 from gcs.batch.runner import fly_all
+from gcs.errors import GcsError
 from gcs.sweep import work
 
 GROUPS = [tuple(range(first, first + 16)) for first in range(0, 160, 16)]
@@ -78,6 +79,25 @@ def test_what_others_have_flown_is_kept_when_a_worker_fails() -> None:
             crew.collect()
 
 
+class Gone(Executor):
+    """Cancels what it is given, as the client of a Dask scheduler that has gone does."""
+
+    def submit(self, *_: Any, **__: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.cancel()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def test_a_scheduler_that_is_gone_is_told() -> None:
+    crew: PoolBackend[int, int] = PoolBackend(Gone(), 1, lambda group, clock, stopped: list(group))
+    crew.start((0,))
+    with pytest.raises(GcsError, match="the Dask scheduler is gone; completed flights are stored"):
+        crew.collect()
+    crew.start((1,))
+    assert crew.stop() == []
+
+
 def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     flown: list[int] = []
 
@@ -86,10 +106,11 @@ def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.Monke
         return {"index": case.index}
 
     monkeypatch.setattr(work, "fly_one", fly_one)
+    monkeypatch.setattr(work, "sweep_files", lambda plan: {})
     cases: Any = [SimpleNamespace(law="plumbline", varied=(), index=index) for index in range(20)]
     for own in ((), ("mine.py",)):
         flown.clear()
         plan = SimpleNamespace(own=lambda _law, own=own: own)
-        prepared: Any = SimpleNamespace(plan=plan, lane_laws=frozenset())
+        prepared: Any = SimpleNamespace(plan=plan, files={}, lane_laws=frozenset())
         rows = work.fly_cases(prepared, cases, lambda: 0.0, lambda: len(flown) == 11)
         assert [row["index"] for row in rows] == flown == list(range(11))

@@ -166,7 +166,7 @@ def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:
     """Five seeds of two settings, of which one loses readings."""
     lost = VariedParameter("SIM_DROP_PCT", (0.0, 5.0), False)
     plan = SweepPlan(short, "bebop", "lab", ("plumbline",), (1, 2, 3, 4, 5), (lost,), ())
-    prepared = work.prepare(plan, as_needed)
+    prepared = work.prepare(plan, {}, as_needed)
     cases, clock = list(plan.cases()), partial(next, count(1.0))
     without = fly_cases(replace(prepared, lane_laws=frozenset()), cases, clock)
     lanes: Work = replace(prepared, lane_laws=frozenset({"plumbline"}))
@@ -185,12 +185,12 @@ def test_lanes_are_compiled_where_many_flights_differ_by_their_seeds(
         compiled.extend(part.mark for part in parts)
 
     monkeypatch.setattr(Part, "ready", property(lambda part: part.mark in compiled))
-    assert work.prepare(plan, warm).lane_laws == frozenset()
+    assert work.prepare(plan, {}, warm).lane_laws == frozenset()
     assert "alone" in compiled and "lanes-plumbline" not in compiled
     monkeypatch.setattr(work, "MIN_FLIGHTS_FOR_LANES", 20)
-    assert work.prepare(plan, warm).lane_laws == {"plumbline"}
+    assert work.prepare(plan, {}, warm).lane_laws == {"plumbline"}
     assert compiled.count("lanes-plumbline") == 1
     # once they are compiled, fewer flights suffice if there are enough seeds
     monkeypatch.setattr(work, "MIN_FLIGHTS_FOR_LANES", 1000)
-    assert work.prepare(plan, warm).lane_laws == {"plumbline"}
-    assert work.prepare(replace(plan, seeds=(1, 2)), warm).lane_laws == frozenset()
+    assert work.prepare(plan, {}, warm).lane_laws == {"plumbline"}
+    assert work.prepare(replace(plan, seeds=(1, 2)), {}, warm).lane_laws == frozenset()

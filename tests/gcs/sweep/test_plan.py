@@ -302,6 +302,19 @@ def test_a_mission_file_that_changed_is_another_sweep(plan: SweepPlan, tmp_path:
     assert sweep_origin(moved).differences(before.to_json()) == ("settings",)
 
 
+def test_a_file_that_changed_is_named_and_not_the_seeds_that_are_added(
+    plan: SweepPlan, tmp_path: Path
+) -> None:
+    mission = tmp_path / "mission.toml"
+    mission.write_bytes(Path(plan.mission).read_bytes())
+    moved = replace(plan, mission=str(mission), seeds=(1, 2))
+    store_plan(tmp_path, moved, "gcs sweep", sweep_origin(moved))
+    mission.write_text(mission.read_text(encoding="utf-8").replace("0.4", "0.5"), encoding="utf-8")
+    more = replace(moved, seeds=(1, 2, 3))
+    with pytest.raises(PlanError, match=r"another sweep, with other content of .*mission\.toml"):
+        store_plan(tmp_path, more, "gcs sweep", sweep_origin(more))
+
+
 def test_sweeps_without_a_name_do_not_get_into_each_others_way(
     plan: SweepPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

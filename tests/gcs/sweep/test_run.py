@@ -6,6 +6,7 @@ import errno
 import json
 import re
 import shlex
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
@@ -17,13 +18,14 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from autopilot.own.own_code import OwnCode
 from autopilot.shell.compiling import Part
 from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.errors import GcsError
 from gcs.sweep import run, work
 from gcs.sweep.plan import PlanError, SweepPlan
-from gcs.sweep.plan_file import store_plan, sweep_origin
+from gcs.sweep.plan_file import store_plan, sweep_files, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, completion_range, flights_by_law
 from gcs.sweep.standouts import repeat_command, stored_standouts
@@ -156,6 +158,65 @@ def test_a_sweep_is_extended_by_seeds_and_values(
     assert stored_plan(tmp_path) == plan
     with pytest.raises(PlanError, match="another sweep, with other --seeds, --vary"):
         swept(less, tmp_path)
+
+
+@pytest.fixture
+def of_a_file(short: str, tmp_path: Path) -> tuple[work.Work, Path]:
+    """Flights of a vehicle in a file of the user's own."""
+    file = tmp_path / "mine.toml"
+    file.write_text('believed = "bebop"\nload_mass_kg = 0.11\n')
+    plan = SweepPlan(short, str(file), "lab", ("plumbline",), (1, 2), (), ())
+    return work.prepare(plan, sweep_files(plan), lambda parts: None), file
+
+
+def test_a_worker_that_has_other_files_flies_nothing(of_a_file: tuple[work.Work, Path]) -> None:
+    prepared, file = of_a_file
+    cases, clock = list(prepared.plan.cases()), time.monotonic
+    assert [row["outcome"] for row in work.fly_cases(prepared, cases, clock)] == ["completed"] * 2
+    file.write_text('believed = "bebop"\nload_mass_kg = 0.12\n')
+    with pytest.raises(GcsError, match=r"mine\.toml: another file than as the sweep began, for a worker in "):
+        work.fly_cases(prepared, cases, clock)
+    file.unlink()
+    with pytest.raises(GcsError, match=r"mine\.toml.*no such file.*need the same files at the same paths"):
+        work.fly_cases(prepared, cases, clock)
+
+
+def test_flights_during_which_a_file_was_changed_do_not_count(
+    of_a_file: tuple[work.Work, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared, file = of_a_file
+
+    def fly_one(_: object, case: Any, clock: object) -> Row:
+        file.write_text('believed = "bebop"\nload_mass_kg = 0.12\n')
+        return {"index": case.index}
+
+    monkeypatch.setattr(work, "fly_one", fly_one)
+    with pytest.raises(GcsError, match="another file than as the sweep began"):
+        work.fly_cases(prepared, list(prepared.plan.cases()), time.monotonic)
+
+
+def test_a_retrained_policy_is_another_law(tmp_path: Path) -> None:
+    law = tmp_path / "mine.py"
+    law.write_text(
+        "from pathlib import Path\nfrom plumbline.learning.law import PolicyLaw\n"
+        "class Mine(PolicyLaw):\n    file = Path(__file__).with_name('hover.npz')\n"
+    )
+    (tmp_path / "hover.npz").write_bytes(b"first")
+    before = OwnCode(law=str(law)).digests
+    assert OwnCode(law=str(law)).digests == before
+    (tmp_path / "hover.npz").write_bytes(b"second")
+    assert OwnCode(law=str(law)).digests != before
+
+
+def test_a_folder_with_a_colon_is_a_folder(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, complete, _ = whole
+    monkeypatch.chdir(tmp_path)
+    folder = Path("run-14:30")
+    assert swept(replace(plan, seeds=(1,)), folder).is_complete
+    assert swept(plan, folder).is_complete
+    assert without_clock(tmp_path / folder) == without_clock(complete)
 
 
 def test_equal_drawn_points_are_told_apart_when_a_sweep_is_extended(
@@ -432,7 +493,7 @@ def test_a_sweep_with_a_part_that_is_not_compiled_says_that_it_compiles(
     command = ("-n", "1", "-r", "1", "pass")  # of the standard library
     cold = Part("the sweep's flight", "timeit", command, Path(__file__), "cold", 8.0)
 
-    def prepare(plan: SweepPlan, warm: Callable[[list[Part]], None], quiet: bool) -> None:
+    def prepare(plan: object, files: object, warm: Callable[[list[Part]], None], quiet: bool) -> None:
         warm([cold])
         raise PlanError("not flown")
 
