@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -133,6 +134,8 @@ def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
         from distributed import Client
     except ImportError:
         raise GcsError(f"--scheduler needs Dask; install it with: pip install {from_clone('dask')}") from None
+    # it would log the loss of the scheduler, which is reported as an error, with a traceback
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

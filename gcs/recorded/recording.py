@@ -85,9 +85,9 @@ def is_table(path: Path) -> bool:
 
 
 def _has_headings(path: Path) -> bool:
-    """Whether the first line of a table holds no number at all, and the second is a row of numbers."""
-    first, second = _first_lines(path)
-    return not any(_is_number(cell) for cell in first.split(b",")) and _is_row(second)
+    """Whether the first line of a table holds no number at all."""
+    first, _ = _first_lines(path)
+    return bool(first.strip()) and not _has_number(first)
 
 
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
@@ -108,6 +108,10 @@ def _is_row(line: bytes) -> bool:
     return len(cells) > 1 and all(_is_number(cell or b"nan") for cell in cells)
 
 
+def _has_number(line: bytes) -> bool:
+    return any(_is_number(cell) for cell in line.split(b","))
+
+
 def _is_number(cell: bytes) -> bool:
     try:
         float(cell)
@@ -124,7 +128,8 @@ def _first_non_number(path: Path, headings: int, missing: Collection[str]) -> st
             for cell in line.split(b",") if number > headings else ():
                 word = cell.decode(errors="replace").strip(' \t\r\n"')
                 if not (word in missing or _is_number(word.encode())):
-                    hint = "; one line of headings can be skipped, no more" if number == 1 else ""
+                    is_heading = number == headings + 1 and not _has_number(line)
+                    hint = "; one line of headings can be skipped, no more" if is_heading else ""
                     return f"line {number}: {word[:40]!r} is not a number{hint}"
     return ""
 
@@ -141,6 +146,8 @@ def _read_table(path: Path, columns: ColumnMap) -> Recording:
     if path.stat().st_size > _MAX_BYTES:
         raise RecordingError(f"{path}: more than {_MAX_BYTES // 2**20} MiB")
     headings = int(_has_headings(path))
+    if headings and not _first_lines(path)[1]:
+        raise RecordingError(f"{path}: not rows of comma-separated numbers: a line of headings and no rows")
     try:
         table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True, skip_rows=headings))
         values = np.column_stack([np.asarray(column, dtype=np.float64) for column in table.columns])
