@@ -110,10 +110,13 @@ def flights_of(seed: int) -> list[Flight]:
         found.append(Flight(seed, mission, world, flight.outcome, flight.summary["load_error_max_m"]))
         return flight
 
+    refused = [Flight(seed, mission, world, REFUSED, None) for world in WORLDS]
     try:
         calm = fly(AS_ASSUMED, {})
     except plumbline.Error:
-        return [Flight(seed, mission, world, REFUSED, None) for world in WORLDS]
+        return refused
+    if calm.outcome == REFUSED:  # by the autopilot
+        return refused
     fly(DISTURBED, disturbance(seed, vehicle))
     fly(GUST, gust(seed, calm))
     return found

@@ -62,7 +62,10 @@ def test_columns_are_taken_as_the_map_says(tmp_path: Path, columns: Path) -> Non
         (b"a,b,c\n" * 300, "line 2: 'a' is not a number; one line of headings can be skipped, no more"),
         (b"a,b,c\n" + b"1,2,note\n" * 300, "numbers: line 2: 'note' is not a number"),
         (b"a,b,c\n", "numbers: a line of headings and no rows"),
-        (b"t" + b",x" * 10 + b"\ns" + b",m" * 10 + b"\n" + rows().encode(), "line 2: 's' is not a number; one line"),
+        (
+            b"t" + b",x" * 10 + b"\ns" + b",m" * 10 + b"\n" + rows().encode(),
+            "line 2: 's' is not a number; one line",
+        ),
         (b"t,x\n" + rows().encode() + b"NA" + b",y" * 10, "line 302: 'y' is not a number"),
         (rows().replace("0,0,2", "o,0,2", 1).encode(), "line 1: 'o' is not a number"),
         (b"1,2,3\n" * 300, "3 columns; the column map asks for column 10"),
