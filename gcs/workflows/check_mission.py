@@ -24,6 +24,7 @@ from gcs.expected_flight import expected_flight_s, time_limit_s
 from gcs.formats.missions import check_plan, is_foreign, planned_home, read_foreign
 from gcs.mission_items import in_mission_terms, items_of
 from gcs.workflows.before_flight import unused_planner_text
+from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import mission_of, violations
 from gcs.workflows.mission_file import load
 from gcs.workflows.refusals import Answer, ItemLists, ask_supervisor
@@ -237,6 +238,7 @@ def check_mission(
         *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
         *margin_warnings(reports, vehicle, limits.vehicle),
+        *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
     )
     if not foreign:  # which `gcs fly` does not fly
         warnings += tuple(timeout_warnings(mission, reports, table))

@@ -72,11 +72,19 @@ def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> lis
 
 
 def vehicle_warnings(vehicle: str) -> list[str]:
-    """A line if the file of the vehicle chooses a law: in flights of `gcs` that of `--law` flies."""
-    _, believed = load_truth_and_belief(vehicle)
-    if "CTL_LAW" not in believed.parameters:
-        return []
-    return [f"{vehicle}: parameters.CTL_LAW has no effect; --law names the law"]
+    """A line if the file of the vehicle chooses a law: in flights of `gcs` that of `--law` flies; and one if
+    it is harder to turn than any body of its mass and size."""
+    found, believed = load_truth_and_belief(vehicle)
+    warnings = []
+    if "CTL_LAW" in believed.parameters:
+        warnings.append(f"{vehicle}: parameters.CTL_LAW has no effect; --law names the law")
+    greatest = found.quad_mass_kg * found.rotor_reach_m**2  # all of the mass at the tips of the rotors
+    if max(found.inertia_kg_m2) > greatest:
+        warnings.append(
+            f"{vehicle}: inertia_kg_m2 = {list(found.inertia_kg_m2)}: a body of {found.quad_mass_kg:g} kg "
+            f"within {found.rotor_reach_m:g} m has {greatest:.2g} at most; check quad_mass_kg and arm_m"
+        )
+    return warnings
 
 
 def split_settings(
