@@ -233,6 +233,20 @@ def test_a_rotor_that_fails_can_be_drawn_by_episode() -> None:
     assert crashed
 
 
+def test_which_rotors_fail_can_be_drawn_by_episode() -> None:
+    ranges = {"SIM_ENGINE_FAIL": (0, 3), "SIM_WIND_E": (0.0, 1.0)}
+    envs = gymnasium.make_vec(HOVER, 2, randomise=ranges)
+    for seed in range(3):
+        envs.reset(seed=seed)
+    scenario, rng = envs.unwrapped.scenario, np.random.default_rng(1)  # type: ignore[attr-defined]
+    failing, winds = zip(*(scenario.draw(rng).values for _ in range(400)), strict=True)
+    counts = {number: failing.count(number) for number in set(failing)}
+    assert set(counts) == {0.0, 1.0, 2.0, 3.0} and min(counts.values()) > 70
+    assert len(set(winds)) == 400
+    with pytest.raises(plumbline.Error, match=r"randomise SIM_ENGINE_FAIL = 0\.5; must be a whole number"):
+        gymnasium.make(HOVER, randomise={"SIM_ENGINE_FAIL": (0.5, 3)})
+
+
 def test_a_rate_and_an_acceleration_are_what_is_asked_for() -> None:
     env = gymnasium.make(HOVER, start_m=0.0)
     env.reset(seed=1)
