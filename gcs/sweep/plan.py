@@ -26,6 +26,7 @@ from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
+from gcs.sweep.drawing import drawn_index, drawn_number, draws_whole_numbers
 from missions.fileformat import load_mission
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
@@ -198,9 +199,8 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
 
 def _drawn_value(varied: VariedParameter, fraction: float) -> float:
     if varied.continuous:
-        low, high = min(varied.values), max(varied.values)
-        return low + fraction * (high - low)
-    return varied.values[min(int(fraction * len(varied.values)), len(varied.values) - 1)]
+        return drawn_number(min(varied.values), max(varied.values), fraction, whole=False)
+    return varied.values[drawn_index(fraction, len(varied.values))]
 
 
 def parse_varied(text: str, sampled: bool) -> VariedParameter:
@@ -371,9 +371,7 @@ def _drawable(varied: VariedParameter, world: ParameterTable, table: ParameterTa
     """What is drawn from a range: whole numbers, if one of the parameters takes no others."""
     low, high = min(varied.values), max(varied.values)
     described = [owner.describe(name) for name in varied.names for owner in (world, table) if name in owner]
-    if not (varied.continuous and any(parameter.integer for parameter in described)):
-        return varied
-    if not (low.is_integer() and high.is_integer()):
+    if not (varied.continuous and draws_whole_numbers(low, high, described)):
         return varied
     if high - low >= _MAX_VALUES:
         raise PlanError(f"--vary {varied.name}={low:g}:{high:g}: more than {_MAX_VALUES} whole numbers")

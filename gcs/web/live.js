@@ -163,8 +163,12 @@
 
   // ---- commands of the user
 
+  function isConnected() {
+    return page.socket !== null && page.socket.readyState === WebSocket.OPEN;
+  }
+
   function ask(action, words) {
-    if (!page.socket || page.socket.readyState !== WebSocket.OPEN || page.chosen === null) return;
+    if (!isConnected() || page.chosen === null) return;
     page.requests += 1;
     page.socket.send(JSON.stringify({ vehicle: page.chosen, request: page.requests, action, arguments: words }));
   }
@@ -183,7 +187,7 @@
   if (scene) {
     scene.onPick((place, ground, clicks) => {
       const vehicle = page.vehicles.get(page.chosen);
-      if (clicks !== 2 || !vehicle || !vehicle.state || page.session.outcome) return;
+      if (clicks !== 2 || !vehicle || !vehicle.state || page.session.outcome || !isConnected()) return;
       const goal = place.map((value) => Math.round(value * 1000) / 1000);
       scene.setGoal(goal);
       ask("goto", { place: goal });
@@ -269,9 +273,17 @@
     }
   }
 
+  /** Shows whether the server of the page has ended, until it says otherwise. */
+  function showServer(hasEnded) {
+    const chosen = page.vehicles.get(page.chosen);
+    panels.setServer(hasEnded, chosen ? chosen.state : null);
+    if (hasEnded) byId("hint").textContent = noPicture; // nothing can be commanded
+  }
+
   function connect() {
     const socket = new WebSocket(new URL("socket", location.href.replace(/^http/, "ws")));
     page.socket = socket;
+    socket.addEventListener("open", () => showServer(false));
     socket.addEventListener("message", (event) => {
       const record = JSON.parse(event.data);
       if (TAKE[record.type]) TAKE[record.type](record);
@@ -279,10 +291,7 @@
     socket.addEventListener("close", () => {
       controls.enable(false);
       page.enabled = false;
-      if (!page.session.outcome) {
-        byId("phase").textContent = "the server of this page has ended";
-        byId("phase").className = "chip bad";
-      }
+      showServer(true);
       setTimeout(connect, RETRY_MS);
     });
   }

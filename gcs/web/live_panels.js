@@ -5,6 +5,7 @@
   const TOAST_S = 6; // by the vehicle's clock
   const MOST_TEXTS = 40;
   const SHOWN_TEXTS = 8;
+  const NO_VEHICLE = "waiting for a vehicle", NO_SERVER = "the server of this page has ended";
   const WARNING = 4, ERROR = 3; // MAV_SEVERITY
   const byId = (id) => document.getElementById(id);
 
@@ -47,6 +48,24 @@
       this.texts = [];
       this.bars = [];
       this.banner = "";
+      this.serverEnded = false;
+    }
+
+    /** Whether what is shown is no longer true: the server has ended, and not because the flight is over. */
+    get isStale() {
+      return this.serverEnded && !this.session.outcome;
+    }
+
+    /** Shows from now on whether the server has ended; `state` is the last one of the vehicle, null if there is none. */
+    setServer(hasEnded, state) {
+      if (this.serverEnded === hasEnded) return;
+      this.serverEnded = hasEnded;
+      document.body.classList.toggle("stale", this.isStale);
+      if (state) this.show(state);
+      else if (!this.session.outcome) {
+        this.showBanner(null);
+        this.showChip(hasEnded ? NO_SERVER : NO_VEHICLE, hasEnded ? "bad" : "");
+      }
     }
 
     setSession(session) {
@@ -83,14 +102,17 @@
     showToast(state) {
       const box = byId("toast"), last = this.texts[0];
       const age = last && last.time !== null && state.time !== null ? state.time - last.time : Infinity;
-      box.hidden = !(age >= -1 && age < TOAST_S);
+      box.hidden = this.isStale || !(age >= -1 && age < TOAST_S);
       if (box.hidden) return;
       put(box, last.text);
       box.className = levelOf(last);
     }
 
     showPhase(state) {
-      const chip = byId("phase");
+      if (this.isStale) {
+        this.showChip(NO_SERVER, "bad");
+        return;
+      }
       let text = state.phase || state.mode || "on the ground", kind = state.armed ? "live" : "";
       if (this.session.outcome) {
         text = this.session.outcome;
@@ -107,6 +129,11 @@
       }
       if (state.load && !state.load.attached) text += ", without the load";
       else if (state.armed && state.taut === false) text += ", cable slack";
+      this.showChip(text, kind);
+    }
+
+    showChip(text, kind) {
+      const chip = byId("phase");
       put(chip, text);
       chip.className = `chip ${kind}`;
     }
@@ -141,8 +168,8 @@
       if (link.loss > 0) words.push(`${(100 * link.loss).toFixed(1)} % lost`);
       if (link.lost) words.push(`silent for ${link.age.toFixed(0)} s`);
       const box = byId("link");
-      put(box, words.join(" · "));
-      box.classList.toggle("bad", link.lost && !this.session.outcome);
+      put(box, this.isStale ? NO_SERVER : words.join(" · "));
+      box.classList.toggle("bad", this.isStale || (link.lost && !this.session.outcome));
     }
 
     showWind(wind) {
@@ -158,6 +185,9 @@
       if (outcome) {
         text = reason ? `${outcome}: ${reason}` : outcome;
         good = outcome === "completed";
+      } else if (this.isStale) {
+        text = "The server of this page has ended";
+        if (state) text += "; the page shows the last state that it has received";
       } else if (state && state.link.lost) {
         text = `Nothing heard of the vehicle for ${state.link.age.toFixed(0)} s`;
       }

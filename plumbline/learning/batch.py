@@ -143,6 +143,8 @@ class Episodes:
 
     def start(self, chosen: Sequence[int], draws: Sequence[Draw]) -> None:
         """Begin an episode in each chosen environment; its first observation is in `observations`."""
+        if not chosen:
+            return
         jets = self.scenario.reference[[draw.first_row for draw in draws]]
         velocities = np.ascontiguousarray(jets[:, 3:6])
         places = jets[:, :3] + np.array([draw.offset for draw in draws])

@@ -6,8 +6,10 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from plumbline.arguments import whole_number
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import EnvOptions, options_of
 from plumbline.learning.ready import compile_step
@@ -39,17 +41,22 @@ class LoadEnv(gymnasium.Env[Array, Array]):
         self.action_space = action_space(self.scenario)
         self.observation_space = observation_space(self.scenario)
         self._shape = (self.scenario.task.observation_model.actions,)
+        self._has_begun = False  # it has been reset
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Begin a new episode and return its first observation; the same seed gives the same episode."""
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else whole_number("seed", seed, 0))
         self.episodes.start([0], [self.scenario.draw(self.np_random)])
+        self._has_begun = True
         return self.episodes.observations[0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Observation, reward, whether it crashed, whether the path has ended, and an empty dictionary."""
+        """Observation, reward, whether it crashed, whether the path has ended, and an empty dictionary.
+        `ResetNeeded` (gymnasium.error) before the first `reset`."""
+        if not self._has_begun:
+            raise ResetNeeded("step() needs an episode; call reset() first")
         self.episodes.step(checked_actions("action", action, self._shape)[None])
         end = int(self.episodes.ends[0])
         reward = float(self.episodes.rewards[0])

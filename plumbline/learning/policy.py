@@ -10,7 +10,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
@@ -51,13 +51,31 @@ KEPT_OPTIONS = (  # options that determine the observations and actions of a pol
 _AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
 
 
-class Policy:
-    """A network with tanh between its layers. Of the `options` of its environment, those in `KEPT_OPTIONS`
-    are kept; `Error` (plumbline.Error) if there is no such option, or if the layers do not fit each other."""
+class Normalisation(NamedTuple):
+    """How a network scales what it observes: (observation - mean) / deviation, within -limit ... limit."""
 
-    def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
+    mean: NDArray[np.float64]  # (size,)
+    deviation: NDArray[np.float64]  # (size,)
+    limit: float
+
+    def __call__(self, observation: Floats) -> Floats:
+        """The scaled numbers of one observation, or of many (n, size)."""
+        scaled = (observation - self.mean) / self.deviation
+        return np.clip(scaled, -self.limit, self.limit).astype(np.float32)
+
+
+class Policy:
+    """A network with tanh between its layers, whose first layer takes the observation, or what the
+    `normalisation` makes of it. Of the `options` of its environment, those in `KEPT_OPTIONS` are kept;
+    `Error` (plumbline.Error) if there is no such option, or if the layers do not fit each other."""
+
+    def __init__(
+        self, layers: Layers, options: Mapping[str, Any], normalisation: Normalisation | None = None
+    ) -> None:
         self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
         _require_network(self.layers)
+        size = self.layers[0][0].shape[1]
+        self.normalisation = None if normalisation is None else _checked(normalisation, size)
         checked = options_of(options)
         self.options = {name: options[name] for name in KEPT_OPTIONS if name in options}
         if "vehicle" in self.options:
@@ -66,7 +84,7 @@ class Policy:
     def __call__(self, observation: Floats) -> Floats:
         """Actions for one observation, or for many (n, size)."""
         *hidden, (last, shift) = self.layers
-        x = observation
+        x = observation if self.normalisation is None else self.normalisation(observation)
         for weights, biases in hidden:
             x = np.tanh(x @ weights.T + biases)
         actions: Floats = np.clip(x @ last.T + shift, -1.0, 1.0)
@@ -78,8 +96,10 @@ class Policy:
         file = file_path("path", path)
         if file.suffix != ".npz":
             raise GcsError(f"{file}: a policy is written as .npz; name it {file.stem}.npz")
-        arrays = {f"weights_{k}": w for k, (w, _) in enumerate(self.layers)}
+        arrays: dict[str, NDArray[Any]] = {f"weights_{k}": w for k, (w, _) in enumerate(self.layers)}
         arrays |= {f"biases_{k}": b for k, (_, b) in enumerate(self.layers)}
+        if self.normalisation is not None:
+            arrays |= {name: np.asarray(part) for name, part in self.normalisation._asdict().items()}
         # options may be NumPy's numbers and arrays
         options = json.dumps(self.options, default=lambda number: number.tolist())
         content = io.BytesIO()
@@ -97,7 +117,10 @@ def load_policy(path: str | Path) -> Policy:
         with np.load(path) as file:
             options = json.loads(str(file["options"]))
             count = sum(name.startswith("weights_") for name in file.files)
-            return Policy([(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)], options)
+            layers = [(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)]
+            scaled = any(name in file.files for name in Normalisation._fields)
+            parts = [file[name] for name in Normalisation._fields] if scaled else []
+            return Policy(layers, options, Normalisation(*parts) if scaled else None)
     except OSError as error:
         raise GcsError(f"{path}: {error.strerror or error}") from None
     except (KeyError, ValueError, TypeError, AttributeError, EOFError, BadZipFile, GcsError) as error:
@@ -118,20 +141,69 @@ def _require_network(layers: Layers) -> None:
             raise GcsError(f"layer {k}: all weights and biases must be finite")
 
 
+def _checked(normalisation: Normalisation, size: int) -> Normalisation:
+    """The normalisation with its numbers as arrays; GcsError unless it can scale observations of `size`."""
+    mean, deviation = (np.asarray(part, np.float64) for part in normalisation[:2])
+    limit = float(normalisation.limit)
+    if mean.shape != (size,) or deviation.shape != (size,):
+        shapes = f"mean {mean.shape}, deviation {deviation.shape}"
+        raise GcsError(f"normalisation: {shapes}; must be ({size},), as the first layer takes {size} numbers")
+    if not (np.isfinite(mean).all() and np.isfinite(deviation).all() and (deviation > 0.0).all()):
+        raise GcsError("normalisation: mean and deviation must be finite, and each deviation above 0")
+    if not limit > 0.0:
+        raise GcsError(f"normalisation: limit = {limit:g}; must be above 0")
+    return Normalisation(mean, deviation, limit)
+
+
 def policy_of_sb3(model: Any, options: Mapping[str, Any]) -> Policy:
     """The deterministic policy of a PPO or A2C of Stable-Baselines3 with an `MlpPolicy`.
 
-    `options` are those with which its environment was made.
+    `options` are those with which its environment was made. The statistics of a `VecNormalize` around the
+    environment become the policy's normalisation. `Error` (plumbline.Error) if the model has a network that a
+    `Policy` cannot express.
     """
-    net = model.policy
-    linear = [part for part in net.mlp_extractor.policy_net if hasattr(part, "weight")]
-    others = {type(part).__name__ for part in net.mlp_extractor.policy_net} - {"Linear", "Tanh"}
+    net: Any = getattr(model, "policy", None)
+    policy_net = getattr(getattr(net, "mlp_extractor", None), "policy_net", None)
+    if policy_net is None or not hasattr(net, "action_net") or hasattr(net, "lstm_actor"):
+        given = f"a {type(model).__name__}" + ("" if net is None else f" with a {type(net).__name__}")
+        raise GcsError(f"model: {given}; must be a PPO or A2C of Stable-Baselines3 with an MlpPolicy")
+    extractor = type(getattr(net, "features_extractor", None)).__name__
+    if extractor != "FlattenExtractor":
+        raise GcsError(
+            f"the policy extracts features by {extractor}; must be FlattenExtractor, the default of MlpPolicy"
+        )
+    others = {type(part).__name__ for part in policy_net} - {"Linear", "Tanh"}
     if others:
         raise GcsError(f"the policy has {', '.join(sorted(others))} between its layers; must be Tanh")
-    layers = [
-        (part.weight.detach().numpy(), part.bias.detach().numpy()) for part in (*linear, net.action_net)
-    ]
-    return Policy(layers, options)
+    linear = [part for part in policy_net if hasattr(part, "weight")]
+    layers = [(_array(part.weight), _array(part.bias)) for part in (*linear, net.action_net)]
+    if getattr(net, "squash_output", False):  # another tanh, after the last layer
+        actions = len(layers[-1][1])
+        layers.append((np.eye(actions, dtype=np.float32), np.zeros(actions, np.float32)))
+    return Policy(layers, options, _normalisation_of_sb3(model))
+
+
+def _array(tensor: Any) -> Floats:
+    """The numbers of a tensor of PyTorch, on whatever device it is."""
+    numbers: Floats = tensor.detach().cpu().numpy()
+    return numbers
+
+
+def _normalisation_of_sb3(model: Any) -> Normalisation | None:
+    """What the `VecNormalize` of the model's environment does to observations; None if it has none, or one
+    that leaves them alone. GcsError if the model has lost it: files of models do not hold it."""
+    scaling = model.get_vec_normalize_env()
+    if scaling is None:
+        if getattr(model, "_last_original_obs", None) is not None:  # set while learning with a VecNormalize
+            raise GcsError(
+                "model: trained with a VecNormalize, which is missing; load the model with it: "
+                f"{type(model).__name__}.load(file, env=VecNormalize.load(statistics, envs))"
+            )
+        return None
+    if not scaling.norm_obs:
+        return None
+    deviation = np.sqrt(scaling.obs_rms.var + scaling.epsilon)
+    return Normalisation(scaling.obs_rms.mean, deviation, scaling.clip_obs)
 
 
 def _options_at(options: Mapping[str, Any], control_hz: float | None) -> Mapping[str, Any]:

@@ -20,6 +20,7 @@ from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError, input_error
 from gcs.sweep.cell import Cell, cell_of
+from gcs.sweep.drawing import drawn_number, draws_whole_numbers
 from gcs.sweep.plan import simulator_settings
 from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import SIMULATOR_PREFIX
@@ -64,14 +65,17 @@ class Scenario:
         self.options = options
         self.estimated = options.observation == "estimate"
         self._names = tuple(options.randomise)
-        lows = tuple(low for low, _ in options.randomise.values())
-        highs = tuple(high for _, high in options.randomise.values())
-        self._lows, self._spans = lows, tuple(b - a for a, b in zip(lows, highs, strict=True))
+        self._lows = tuple(float(low) for low, _ in options.randomise.values())
+        self._highs = tuple(float(high) for _, high in options.randomise.values())
         self.cell = self._cell()
         self.tick_us = self.cell.settings.tick_us
         self.ticks = self._ticks()
-        for values in (lows, highs):
+        for values in (self._lows, self._highs):
             self._conditions(values)
+        self._ranges = tuple(
+            (low, high, draws_whole_numbers(low, high, [self._simulator.describe(name)]))
+            for name, low, high in zip(self._names, self._lows, self._highs, strict=True)
+        )
         self.reference, self.task = self._reference(), self._task()
 
     # ---- what is random
@@ -84,7 +88,10 @@ class Scenario:
         first_row = 0
         if self.options.start == "random":
             first_row = int(u_row * len(self.reference)) // self.ticks * self.ticks
-        values = tuple(low + span * u for low, span, u in zip(self._lows, self._spans, others, strict=True))
+        values = tuple(
+            drawn_number(low, high, u, whole)
+            for (low, high, whole), u in zip(self._ranges, others, strict=True)
+        )
         return Draw(int(seed * 2**31), offset, first_row, values)
 
     def world(self, draw: Draw) -> tuple[WorldRows, Truth, Settings]:
@@ -99,8 +106,7 @@ class Scenario:
     def max_capacities(self) -> tuple[int, int]:
         """How many commands, and readings of one sensor, can be in transit at most in any episode."""
         commands, readings = [], []
-        for share in (0.0, 1.0):
-            values = tuple(a + share * b for a, b in zip(self._lows, self._spans, strict=True))
+        for values in (self._lows, self._highs):
             rows, _, settings = self.world(Draw(1, HOVER_AT, 0, values))
             commands.append(command_capacity(settings))
             readings.append(rows.queue.shape[1])

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from gcs.errors import GcsError
-from plumbline.arguments import whole_number
+from plumbline.arguments import items, whole_number
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
 from plumbline.learning.ready import compile_step
@@ -65,6 +66,7 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self._max_steps = max_episode_steps
         self._steps = np.zeros(num_envs, np.int64)
         self._is_over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not reset yet
+        self._has_begun = False  # all environments have been reset
         self._generators: list[np.random.Generator | None] = [None] * num_envs
 
     def reset(
@@ -74,23 +76,31 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
         """Begin new episodes, in all environments or in those that `options["reset_mask"]` marks; returns the
-        observations of all.
+        observations of all. A mask that marks none leaves all of them as they are.
 
         `seed`: a seed for each environment, or that of the first; those of the others count up from it.
+        `ResetNeeded` (gymnasium.error) if the mask leaves out an environment that was never reset.
         """
         seeds = self._seeds(seed)
         chosen = np.arange(self.num_envs)
         if options is not None and "reset_mask" in options:
             chosen = np.flatnonzero(_checked(options["reset_mask"], self.num_envs))
+        if not self._has_begun and len(chosen) < self.num_envs:
+            raise ResetNeeded(
+                "reset_mask leaves out environments that were never reset; first reset all of them"
+            )
         for i in chosen.tolist():
             if seeds[i] is not None or self._generators[i] is None:
                 self._generators[i] = np_random(seeds[i])[0]
         self._start(chosen)
+        self._has_begun = True
         return self.episodes.observations.copy(), {}
 
     def step(self, actions: Array) -> Stepped:
         """Observations, rewards, which episodes crashed, which reached the end of their path or their time
-        limit, and what `autoreset_mode` adds."""
+        limit, and what `autoreset_mode` adds. `ResetNeeded` (gymnasium.error) before the first `reset`."""
+        if not self._has_begun:
+            raise ResetNeeded("step() needs an episode; call reset() first")
         episodes, next_step = self.episodes, self.autoreset_mode == AutoresetMode.NEXT_STEP
         if self.autoreset_mode == AutoresetMode.DISABLED and self._is_over.any():
             raise GcsError("an episode is over; reset it with options={'reset_mask': ...}")
@@ -136,11 +146,16 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self._is_over[chosen] = False
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None or isinstance(seed, int | np.integer):
-            return [None if seed is None else int(seed) + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise GcsError(f"seed: {len(seed)} seeds; must be {self.num_envs}")
-        return seed
+        count = self.num_envs
+        if seed is None:
+            return [None] * count
+        if isinstance(seed, int | np.integer):
+            first = whole_number("seed", seed, 0)
+            return [first + i for i in range(count)]
+        seeds = items("seed", seed, f"a whole number, 0 or more, or a list of {count} of them")
+        if len(seeds) != count:
+            raise GcsError(f"seed: {len(seeds)} seeds; must be {count}")
+        return [None if one is None else whole_number(f"seed[{i}]", one, 0) for i, one in enumerate(seeds)]
 
 
 def _autoreset_mode(given: AutoresetMode | str) -> AutoresetMode:

@@ -14,6 +14,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
@@ -102,6 +103,53 @@ def test_episodes_that_are_not_begun_by_themselves() -> None:
         envs.reset(options={"reset_mask": np.array([True])})
 
 
+@pytest.mark.parametrize("options", [{}, {"randomise": CHANGING}, {"observation": "estimate"}])
+def test_a_mask_that_marks_no_environment_changes_nothing(options: dict[str, Any]) -> None:
+    envs, untouched = (gymnasium.make_vec(HOVER, 3, autoreset_mode="Disabled", **options) for _ in range(2))
+    actions = np.full(envs.action_space.shape, 0.1, np.float32)
+    for one in (envs, untouched):
+        one.reset(seed=1)
+        present, *_ = one.step(actions)
+    kept, infos = envs.reset(seed=9, options={"reset_mask": np.zeros(3, np.bool_)})
+    assert np.array_equal(kept, present) and infos == {}
+    assert np.array_equal(envs.step(actions)[0], untouched.step(actions)[0])
+    assert np.array_equal(envs.reset()[0], untouched.reset()[0]), "the same random numbers follow"
+
+
+def test_a_step_comes_after_a_reset() -> None:
+    env = gymnasium.make(HOVER).unwrapped
+    with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
+        env.step(np.zeros(4, np.float32))
+    envs = gymnasium.make_vec(HOVER, 2, autoreset_mode="Disabled")
+    with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
+        envs.step(np.zeros((2, 4), np.float32))
+    for mask in ([False, False], [True, False]):
+        with pytest.raises(ResetNeeded, match="first reset all of them"):
+            envs.reset(options={"reset_mask": np.array(mask)})
+    envs.reset(options={"reset_mask": np.array([True, True])})
+    envs.step(np.zeros((2, 4), np.float32))
+
+
+WRONG_SEEDS = {
+    "text": ("a", "seed = 'a'; must be a whole number, 0 or more, or a list of 2 of them"),
+    "fraction": (1.5, "seed = 1.5; must be a whole number, 0 or more, or a list of 2 of them"),
+    "negative": (-1, "seed = -1; must be a whole number, 0 or more"),
+    "few": ([1], "seed: 1 seeds; must be 2"),
+    "text of one": ([1, "b"], r"seed\[1\] = 'b'; must be a whole number, 0 or more"),
+    "negative one": ([None, -3], r"seed\[1\] = -3; must be a whole number, 0 or more"),
+}
+
+
+@pytest.mark.parametrize(("seed", "told"), WRONG_SEEDS.values(), ids=WRONG_SEEDS)
+def test_a_seed_that_is_none_is_told(seed: Any, told: str) -> None:
+    envs = gymnasium.make_vec(HOVER, 2)
+    with pytest.raises(plumbline.Error, match=told):
+        envs.reset(seed=seed)
+    if not isinstance(seed, list):
+        with pytest.raises(plumbline.Error, match=r"seed = .*; must be a whole number, 0 or more"):
+            gymnasium.make(HOVER).reset(seed=seed)
+
+
 def test_the_same_seed_is_the_same_episode() -> None:
     def episode(seed: int) -> list[bytes]:
         env = gymnasium.make(HOVER, observation="estimate", randomise=CHANGING)
@@ -183,6 +231,20 @@ def test_a_rotor_that_fails_can_be_drawn_by_episode() -> None:
         if crashed:
             break
     assert crashed
+
+
+def test_which_rotors_fail_can_be_drawn_by_episode() -> None:
+    ranges = {"SIM_ENGINE_FAIL": (0, 3), "SIM_WIND_E": (0.0, 1.0)}
+    envs = gymnasium.make_vec(HOVER, 2, randomise=ranges)
+    for seed in range(3):
+        envs.reset(seed=seed)
+    scenario, rng = envs.unwrapped.scenario, np.random.default_rng(1)  # type: ignore[attr-defined]
+    failing, winds = zip(*(scenario.draw(rng).values for _ in range(400)), strict=True)
+    counts = {number: failing.count(number) for number in set(failing)}
+    assert set(counts) == {0.0, 1.0, 2.0, 3.0} and min(counts.values()) > 70
+    assert len(set(winds)) == 400
+    with pytest.raises(plumbline.Error, match=r"randomise SIM_ENGINE_FAIL = 0\.5; must be a whole number"):
+        gymnasium.make(HOVER, randomise={"SIM_ENGINE_FAIL": (0.5, 3)})
 
 
 def test_a_rate_and_an_acceleration_are_what_is_asked_for() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -13,7 +14,7 @@ import plumbline.learning
 from plumbline import Land, Takeoff, Waypoint
 from plumbline.learning import HOVER, LOAD_TRACKING
 from plumbline.learning.baseline import LawPolicy
-from plumbline.learning.policy import Policy, PolicyPilot, load_policy, policy_of_sb3
+from plumbline.learning.policy import Normalisation, Policy, PolicyPilot, load_policy, policy_of_sb3
 
 TICK_HZ = 250.0
 
@@ -120,6 +121,8 @@ def broken(folder: Path, kind: str) -> Path:
             "option": {"options": np.array('{"preveiw": 1}')},
             "shapes": {"weights_1": np.zeros((4, 7))},
             "flat": {"weights_1": np.zeros(4)},
+            "half a normalisation": {"mean": np.zeros(28)},
+            "limits": {"mean": np.zeros(28), "deviation": np.ones(28), "limit": np.zeros(2)},
             "not finite": {"biases_1": np.full(4, np.nan)},
         }
         kept = {name: part for name, part in (parts | changed[kind]).items() if part is not None}
@@ -139,6 +142,8 @@ def broken(folder: Path, kind: str) -> Path:
         ("option", "it holds no policy: preveiw: there is no such option"),
         ("shapes", "it holds no policy: layer 1 takes 7 numbers, and gets 8"),
         ("flat", r"it holds no policy: layer 1: weights \(4,\), biases \(4,\); must be"),
+        ("half a normalisation", "it holds no policy"),
+        ("limits", "it holds no policy"),
         ("not finite", "it holds no policy: layer 1: all weights and biases must be finite"),
     ],
 )
@@ -167,6 +172,9 @@ class Tensor:
     def detach(self) -> Tensor:
         return self
 
+    def cpu(self) -> Tensor:
+        return self
+
     def numpy(self) -> Any:
         return self._values
 
@@ -184,19 +192,111 @@ class ReLU:
     pass
 
 
-class Model:
-    def __init__(self, between: Any) -> None:
-        self.policy = self.mlp_extractor = self
+class FlattenExtractor:
+    pass
+
+
+class NatureCNN:
+    pass
+
+
+class ActorCriticPolicy:
+    def __init__(self, between: Any, squash_output: bool) -> None:
+        self.mlp_extractor, self.features_extractor = self, FlattenExtractor()
         self.policy_net = [Linear([[2.0]], [0.0]), between, Linear([[1.0]], [0.5]), between]
         self.action_net = Linear([[1.0], [3.0]], [0.0, 0.0])
+        self.squash_output = squash_output
+
+
+class VecNormalize:
+    """As the wrapper of Stable-Baselines3 of that name."""
+
+    def __init__(self, norm_obs: bool = True) -> None:
+        self.norm_obs, self.epsilon, self.clip_obs = norm_obs, 1e-8, 2.0
+        self.obs_rms = SimpleNamespace(mean=np.array([0.3]), var=np.array([0.04]))
+
+
+class PPO:
+    def __init__(
+        self, between: Any = None, squash_output: bool = False, scaling: VecNormalize | None = None
+    ) -> None:
+        self.policy: Any = ActorCriticPolicy(between or Tanh(), squash_output)
+        self._last_original_obs = None if scaling is None else np.zeros((1, 1), np.float32)
+        self.scaling = scaling
+
+    def get_vec_normalize_env(self) -> VecNormalize | None:
+        return self.scaling
+
+
+class SACPolicy:
+    """Has an actor in place of what an ActorCriticPolicy has."""
+
+
+class SAC:
+    policy = SACPolicy()
+
+
+def inner(observation: float) -> float:
+    """What the last layer of an `ActorCriticPolicy` above takes."""
+    return float(np.tanh(np.tanh(2.0 * observation) + 0.5))
+
+
+def observed(value: float) -> Any:
+    return np.array([value], np.float32)
 
 
 def test_a_network_of_stable_baselines_becomes_one() -> None:
-    policy = policy_of_sb3(Model(Tanh()), {})
-    inner = np.tanh(np.tanh(2.0 * 0.1) + 0.5)
-    assert policy(np.array([0.1], np.float32)) == pytest.approx([inner, 1.0])  # the second is clipped
+    policy = policy_of_sb3(PPO(), {})
+    assert policy(observed(0.1)) == pytest.approx([inner(0.1), 1.0])  # the second is clipped
     with pytest.raises(plumbline.Error, match="ReLU between its layers"):
-        policy_of_sb3(Model(ReLU()), {})
+        policy_of_sb3(PPO(ReLU()), {})
+
+
+def test_actions_that_stable_baselines_squashes_are_squashed() -> None:
+    policy = policy_of_sb3(PPO(squash_output=True), {})
+    assert policy(observed(0.1)) == pytest.approx(np.tanh([inner(0.1), 3.0 * inner(0.1)]))
+
+
+def test_observations_that_stable_baselines_normalises_are_normalised(tmp_path: Path) -> None:
+    policy_of_sb3(PPO(scaling=VecNormalize()), {}).save(tmp_path / "policy.npz")
+    policy = load_policy(tmp_path / "policy.npz")
+    for value, scaled in ((0.25, -0.25), (0.3, 0.0), (9.0, 2.0), (-9.0, -2.0)):  # the last two are clipped
+        assert policy(observed(value))[0] == pytest.approx(inner(scaled), abs=1e-6)
+    many = policy(np.array([[0.25], [9.0]], np.float32))
+    assert many.dtype == np.float32 and many[:, 0] == pytest.approx([inner(-0.25), inner(2.0)], abs=1e-6)
+    only_rewards = policy_of_sb3(PPO(scaling=VecNormalize(norm_obs=False)), {})
+    assert only_rewards(observed(0.25))[0] == pytest.approx(inner(0.25))
+
+
+def test_a_model_that_a_policy_cannot_express_is_refused() -> None:
+    with pytest.raises(plumbline.Error, match="model: a SAC with a SACPolicy; must be a PPO or A2C"):
+        policy_of_sb3(SAC(), {})
+    with pytest.raises(plumbline.Error, match="model: a dict; must be a PPO or A2C"):
+        policy_of_sb3({}, {})
+    recurrent, pictures, lost = PPO(), PPO(), PPO(scaling=VecNormalize())
+    recurrent.policy.lstm_actor = Linear([[1.0]], [0.0])
+    with pytest.raises(plumbline.Error, match="with an MlpPolicy"):
+        policy_of_sb3(recurrent, {})
+    pictures.policy.features_extractor = NatureCNN()
+    with pytest.raises(plumbline.Error, match="extracts features by NatureCNN; must be FlattenExtractor"):
+        policy_of_sb3(pictures, {})
+    lost.scaling = None  # the file of a model does not hold it
+    with pytest.raises(plumbline.Error, match=r"PPO\.load\(file, env=VecNormalize\.load\("):
+        policy_of_sb3(lost, {})
+
+
+@pytest.mark.parametrize(
+    ("normalisation", "told"),
+    [
+        (Normalisation(np.zeros(3), np.ones(28), 10.0), r"mean \(3,\), deviation \(28,\); must be \(28,\)"),
+        (Normalisation(np.full(28, np.nan), np.ones(28), 10.0), "must be finite"),
+        (Normalisation(np.zeros(28), np.zeros(28), 10.0), "each deviation above 0"),
+        (Normalisation(np.zeros(28), np.ones(28), 0.0), "limit = 0; must be above 0"),
+    ],
+)
+def test_a_normalisation_that_scales_nothing_is_refused(normalisation: Normalisation, told: str) -> None:
+    with pytest.raises(plumbline.Error, match=told):
+        Policy(made(28, 4, {}).layers, {}, normalisation)
 
 
 @pytest.mark.parametrize(("action", "rate_hz", "limit_m"), [("rotors", TICK_HZ, 0.004), ("ctbr", 50.0, 0.01)])

@@ -164,3 +164,29 @@ def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
         browser.listen()
         assert browser.errors == []
     assert view.interrupt() == 0
+
+
+def test_a_page_says_that_its_server_was_killed(start: Callable[..., Any], browser: Browser) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        view = start("gcs", "view", "--connect", str(port), "--no-open", "--no-truth")
+        browser.open(page_of(view))
+        browser.wait("Plumbline.live.page.socket.readyState === WebSocket.OPEN")
+        beat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
+        vehicle.sendto(FrameWriter(4, 1).frame(beat), ("127.0.0.1", port))
+        browser.wait("document.getElementById('phase').textContent === 'link lost'")
+        view.process.kill()
+        browser.wait("document.getElementById('phase').textContent === 'the server of this page has ended'")
+        # the page tries to connect again, which changes nothing that it shows
+        browser.run(
+            """const chip = document.getElementById("phase");
+            globalThis.seen = [];
+            new MutationObserver(() => seen.push(chip.textContent)).observe(chip, { childList: true });
+            globalThis.last = Plumbline.live.page.socket;"""
+        )
+        browser.wait("Plumbline.live.page.socket !== last && Plumbline.live.page.socket.readyState === 3")
+        assert browser.run("return seen") == []
+        assert browser.find("#banner").text.startswith("The server of this page has ended")
