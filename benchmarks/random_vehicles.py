@@ -26,7 +26,7 @@ from gcs.experiments.marked_text import write_between
 
 MISSIONS = ("hover", "square", "delivery", "case-a", "case-b", "case-c")
 AS_ASSUMED, DISTURBED, GUST = WORLDS = ("as assumed", "disturbed", "gust")
-REFUSED = "refused"
+REFUSED, COMPLETED = "refused", "completed"
 GUST_M_S, GUST_S, GUST_AFTER_S = 10.0, 2.0, 3.0
 BEGIN, END = "<!-- measured: benchmarks/random_vehicles.py -->\n", "<!-- end of measured -->"
 
@@ -43,7 +43,7 @@ class Flight(NamedTuple):
 
 def random_vehicle(seed: int) -> plumbline.Vehicle:
     """A quadrotor of 0.1 to 20 kg, proportioned about as those that are built, with a load of 5 to 70 % of
-    its mass on 0.4 to 6 m of cable; its rotors give 1.6 to 3.5 times the weight of both."""
+    its mass on 0.4 to 6 m of cable, at least 1.5 arms; its rotors give 1.6 to 3.5 times the weight of both."""
     draw = Random(seed)
 
     def log_uniform(low: float, high: float) -> float:
@@ -63,7 +63,9 @@ def random_vehicle(seed: int) -> plumbline.Vehicle:
         arm_m=arm,
         inertia_kg_m2=(roll, pitch, (roll + pitch) * draw.uniform(0.8, 0.99)),
         load_mass_kg=load,
-        cable_length_m=log_uniform(0.4, 6.0),
+        cable_length_m=max(
+            1.5 * arm, log_uniform(0.4, 6.0)
+        ),  # on a shorter one the load lies under the vehicle
         gravity_m_s2=gravity,
         rotor_min_n=0.0,
         rotor_max_n=draw.uniform(1.6, 3.5) * (mass + load) * gravity / 4.0,
@@ -118,7 +120,10 @@ def flights_of(seed: int) -> list[Flight]:
     if calm.outcome == REFUSED:  # by the autopilot
         return refused
     fly(DISTURBED, disturbance(seed, vehicle))
-    fly(GUST, gust(seed, calm))
+    if calm.outcome == COMPLETED:
+        fly(GUST, gust(seed, calm))
+    else:  # nor is it in a gust
+        found.append(found[0]._replace(world=GUST))
     return found
 
 
@@ -132,7 +137,7 @@ def table(flights: list[Flight]) -> Iterator[str]:
     for mission in MISSIONS:
         for world in WORLDS:
             group = groups[mission, world]
-            errors = [1e3 * one.error_m for one in group if one.outcome == "completed" and one.error_m]
+            errors = [1e3 * one.error_m for one in group if one.outcome == COMPLETED and one.error_m]
             refused = sum(one.outcome == REFUSED for one in group)
             figures = ["", "", ""]
             if len(errors) > 1:
@@ -154,7 +159,7 @@ def main() -> int:
         for found in pool.map(flights_of, range(1, options.vehicles + 1)):
             flights += found
             for one in found:
-                if one.outcome not in (REFUSED, "completed"):
+                if one.outcome not in (REFUSED, COMPLETED):
                     print(one, flush=True)
     lines = list(table(flights))
     print("\n".join(lines))

@@ -72,8 +72,9 @@ def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> lis
 
 
 def vehicle_warnings(vehicle: str) -> list[str]:
-    """A line if the file of the vehicle chooses a law: in flights of `gcs` that of `--law` flies; and one if
-    it is harder to turn than any body of its mass and size."""
+    """A line each if the file of the vehicle chooses a law (in flights of `gcs` that of `--law` flies), if
+    the vehicle is harder to turn than any body of its mass and size, and if its cable is shorter than its
+    arms."""
     found, believed = load_truth_and_belief(vehicle)
     warnings = []
     if "CTL_LAW" in believed.parameters:
@@ -83,6 +84,12 @@ def vehicle_warnings(vehicle: str) -> list[str]:
         warnings.append(
             f"{vehicle}: inertia_kg_m2 = {list(found.inertia_kg_m2)}: a body of {found.quad_mass_kg:g} kg "
             f"within {found.rotor_reach_m:g} m has {greatest:.2g} at most; check quad_mass_kg and arm_m"
+        )
+    if found.cable_length_m < found.arm_m:
+        warnings.append(
+            f"{vehicle}: cable_length_m = {found.cable_length_m:g} is less than arm_m, {found.arm_m:g}: the "
+            "load lies under the vehicle, whose feet may strike the ground as it pulls the cable taut; use a "
+            "longer cable"
         )
     return warnings
 

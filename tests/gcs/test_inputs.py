@@ -182,3 +182,12 @@ def test_an_inertia_that_no_body_of_this_size_has_is_told(tmp_path):
     assert not any(vehicle_warnings(name) for name in VEHICLES.names())
     result = CliRunner().invoke(gcs, ["check", "hover", "--vehicle", str(file)], prog_name="gcs")
     assert f"warning: {line}" in result.output
+
+
+def test_a_cable_that_is_shorter_than_the_arms_is_told(tmp_path):
+    file = tmp_path / "mine.toml"
+    bebop = plumbline.Vehicle.load("bebop")
+    for length, told in ((0.16, 0), (0.12, 1)):
+        bebop.replace(cable_length_m=length, load_radius_m=0.01).save(file)
+        assert len(vehicle_warnings(str(file))) == told
+    assert "cable_length_m = 0.12 is less than arm_m, 0.126" in vehicle_warnings(str(file))[0]
