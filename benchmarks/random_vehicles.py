@@ -43,7 +43,8 @@ class Flight(NamedTuple):
 
 def random_vehicle(seed: int) -> plumbline.Vehicle:
     """A quadrotor of 0.1 to 20 kg, proportioned about as those that are built, with a load of 5 to 70 % of
-    its mass on 0.4 to 6 m of cable, at least 1.5 arms; its rotors give 1.6 to 3.5 times the weight of both."""
+    its mass on 0.4 to 6 m of cable, at least 1.5 arms. Its rotors give 1.6 to 3.5 times the weight of
+    both."""
     draw = Random(seed)
 
     def log_uniform(low: float, high: float) -> float:
