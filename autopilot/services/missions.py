@@ -41,10 +41,10 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.command_names import numbered_name
-from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import AREA_READERS
-from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
+from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, home_item, located_steps
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
 MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
@@ -115,7 +115,7 @@ class MissionService:
 
     def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
-        self._home_items = (_home_item(home),) if home_is_item else ()
+        self._home_items = (home_item(home),) if home_is_item else ()
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
@@ -454,12 +454,6 @@ class MissionService:
     def receive_partial(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_WRITE_PARTIAL_LIST and MISSION_REQUEST_PARTIAL_LIST: not served."""
         return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)]
-
-
-def _home_item(home: Home) -> WireItem:
-    x, y, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
-    frame, command = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT
-    return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
 
 
 def _upload_of(kind: int) -> tuple[str, int]:

@@ -28,6 +28,14 @@ _LOCAL = frozenset(
 )
 
 
+# which only messages have: ground stations take an item of a file with another frame for one of another kind
+_FRAMES_OF_MESSAGES = {
+    mavlink.MAV_FRAME_GLOBAL_INT: mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+
+
 class FormatError(InputError):
     """An invalid file; the text says where and what."""
 
@@ -58,6 +66,11 @@ def params_of(item: WireItem) -> list[float]:
     scale = _scale(item.frame)
     places = [math.nan if value == NO_COORDINATE else value / scale for value in (item.x, item.y)]
     return [*floats, *places, decimal_from_float32(item.z)]
+
+
+def frame_in_file(item: WireItem) -> int:
+    """The frame of an item as files have it: that of the same meaning without _INT."""
+    return _FRAMES_OF_MESSAGES.get(item.frame, item.frame)
 
 
 def _scale(frame: int) -> float:

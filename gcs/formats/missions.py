@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -20,8 +21,9 @@ from autopilot.wire.items import (
     located_steps,
 )
 from gcs.formats.items import FormatError
+from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
-from gcs.formats.waypoints import HEADER, read_waypoints, write_waypoints
+from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
@@ -52,7 +54,7 @@ def read_foreign(path: Path) -> Plan:
     try:
         if path.suffix.lower() == PLAN_ENDING and not text.startswith(HEADER):
             return read_plan(text)
-        return Plan(read_waypoints(text), [])
+        return Plan(read_waypoints(text), [], counts_home=True)
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from None
 
@@ -69,8 +71,10 @@ def write_foreign(
     if not is_foreign(path):
         endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
+    if items and is_home_row(items[0]) and not _is_not_home(items[0], home):  # ArduPilot's item 0
+        items = redirected(items[1:], lambda target: max(target - 1, 0))
     in_plan = path.suffix.lower() == PLAN_ENDING
-    text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items)
+    text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items, home)
     try:
         write_atomically(path, text.encode())
     except OSError as error:
@@ -95,16 +99,22 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     numbers = list(range(len(remaining)))
     problems: list[tuple[int, str]] = []
     kept_items: dict[int, list[int]] = {}
-    if _begins_with_other_home(plan, home):
+    row = _home_row(plan)
+    if row is not None:
         numbers.pop(0)
         _, where = remaining.pop(0)
-        problems.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
+        if _is_not_home(row, home):
+            text = f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"
+            problems.append((0, text))
     for number, (item, _) in zip(numbers, remaining, strict=True):
         if handling_of(item.command) is Handling.KEPT:
             kept_items.setdefault(item.command, []).append(number)
     while True:
         try:
-            steps = located_steps([one.item for one in remaining], home)
+            items = redirected(
+                (one.item for one in remaining), lambda target: bisect_left(numbers, target)
+            )  # items that are left out move those behind them; a jump to one of them goes to the next
+            steps = located_steps(items, home)
             break
         except MissionItemError as error:
             place = min(max(error.seq, 0), len(remaining) - 1)
@@ -120,28 +130,15 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
         kept.append(f"{places}: not flown; the mission ends with the landing of item {numbers[landing]}")
-    return CheckedPlan(
-        tuple(one.item for one in remaining), [*(line for _, line in problems), *plan.not_converted], kept
-    )
-
-
-def _begins_with_other_home(plan: Plan, home: Home) -> bool:
-    """Whether the list begins with a home item that is not the vehicle's."""
-    row = _home_row(plan)
-    return row is not None and _is_not_home(row, home)
+    return CheckedPlan(tuple(items), [*(line for _, line in problems), *plan.not_converted], kept)
 
 
 def _home_row(plan: Plan) -> WireItem | None:
     """The home item with which the list begins, as Mission Planner writes it; None if it does not."""
-    if len(plan.items) < 2:
+    if not plan.items or not is_home_row(plan.items[0].item):
         return None
-    (first, _), (second, _) = plan.items[:2]
-    is_home_row = (
-        first.command == mavlink.MAV_CMD_NAV_WAYPOINT
-        and first.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
-        and second.command == mavlink.MAV_CMD_NAV_TAKEOFF
-    )
-    return first if is_home_row else None
+    takes_off = len(plan.items) > 1 and plan.items[1].item.command == mavlink.MAV_CMD_NAV_TAKEOFF
+    return plan.items[0].item if plan.counts_home or takes_off else None
 
 
 def _is_not_home(item: WireItem, home: Home) -> bool:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 from autopilot.wire.convert.geodesy import Home, home_from_text
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
-from gcs.formats.items import FileItem, FormatError, item_of, params_of
+from gcs.formats.items import FileItem, FormatError, frame_in_file, item_of, params_of
+from gcs.formats.jumps import redirected, target_of
 
 _TRANSECT = "TransectStyleComplexItem"  # surveys and corridors contain the simple items that they consist of
 _PARAMS = 7
@@ -25,7 +26,8 @@ _RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 class Plan(NamedTuple):
     """The content of a file; `not_converted` has a line for each part for which there are no mission items.
 
-    Fence, rally points and the planned home are None if the file does not mention them.
+    Fence, rally points and the planned home are None if the file does not mention them. `counts_home`: the
+    list begins with the home, if its first item can be that.
     """
 
     items: list[FileItem]
@@ -33,6 +35,7 @@ class Plan(NamedTuple):
     fence: tuple[WireItem, ...] | None = None
     rally: tuple[WireItem, ...] | None = None
     home: Home | None = None
+    counts_home: bool = False
 
 
 def read_plan(text: str) -> Plan:
@@ -44,18 +47,19 @@ def read_plan(text: str) -> Plan:
     if not isinstance(document, dict) or document.get("fileType") != "Plan":
         raise FormatError('"fileType" must be "Plan"')
     mission = _member(document, "mission", dict, "mission")
-    items: list[FileItem] = []
+    entries: list[tuple[dict[str, Any], str]] = []
     not_converted: list[str] = []
     for number, entry in enumerate(_member(mission, "items", list, "mission.items")):
         where = f"mission.items[{number}]"
         if not isinstance(entry, dict):
             raise FormatError(f"{where}: must be an object")
         if entry.get("type") == "ComplexItem":
-            items += _complex(entry, where, not_converted)
+            entries += _complex(entry, where, not_converted)
         elif entry.get("type", "SimpleItem") == "SimpleItem":
-            items.append(_simple(entry, where))
+            entries.append((entry, where))
         else:
             raise FormatError(f"{where}.type: {entry['type']!r}; must be SimpleItem or ComplexItem")
+    items = _with_jumps_by_number([_simple(*one) for one in entries], [one for one, _ in entries])
     return Plan(items, not_converted, _fence(document), _rally(document), _planned_home(mission))
 
 
@@ -70,10 +74,10 @@ def write_plan(
             "autoContinue": bool(item.autocontinue),
             "command": item.command,
             "doJumpId": number,
-            "frame": item.frame,
+            "frame": frame_in_file(item),
             "params": [_json_number(value, number) for value in params_of(item)],
         }
-        for number, item in enumerate(items, start=1)
+        for number, item in enumerate(redirected(items, lambda target: target + 1), start=1)
     ]
     record = {
         "fileType": "Plan",
@@ -95,6 +99,18 @@ def write_plan(
     return json.dumps(record, indent=4, allow_nan=False) + "\n"
 
 
+def _with_jumps_by_number(items: list[FileItem], entries: list[dict[str, Any]]) -> list[FileItem]:
+    """The items with jumps to the number of an item, in place of the `doJumpId` that it has in the file."""
+    numbers = {entry.get("doJumpId", number): number - 1 for number, entry in enumerate(entries, start=1)}
+    found = []
+    for item, where in items:
+        target = target_of(item)
+        if target is not None and target not in numbers:
+            raise FormatError(f"{where}: jumps to the item with doJumpId {target}, which there is not")
+        found.append(FileItem(redirected([item], lambda target: numbers[target])[0], where))
+    return found
+
+
 def _json_number(value: float, number: int) -> float | None:
     if math.isinf(value):
         raise FormatError(f"item {number - 1}: a parameter is infinite, for which JSON has no number")
@@ -112,7 +128,10 @@ def _simple(entry: dict[str, Any], where: str) -> FileItem:
     return FileItem(item_of(frame, command, 0, int(autocontinue), numbers, where), where)
 
 
-def _complex(entry: dict[str, Any], where: str, not_converted: list[str]) -> Iterator[FileItem]:
+def _complex(
+    entry: dict[str, Any], where: str, not_converted: list[str]
+) -> Iterator[tuple[dict[str, Any], str]]:
+    """The simple items that a complex one consists of, each with its place in the file."""
     kind = str(entry.get("complexItemType", "?"))
     transect = entry.get(_TRANSECT)
     if not isinstance(transect, dict) or not isinstance(transect.get("Items"), list):
@@ -122,7 +141,7 @@ def _complex(entry: dict[str, Any], where: str, not_converted: list[str]) -> Ite
         place = f"{where}.{_TRANSECT}.Items[{number}]"
         if not isinstance(inner, dict):
             raise FormatError(f"{place}: must be an object")
-        yield _simple(inner, place)
+        yield inner, place
 
 
 def _planned_home(mission: dict[str, Any]) -> Home | None:

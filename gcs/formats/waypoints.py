@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from autopilot.wire.items import WireItem
-from gcs.formats.items import FileItem, FormatError, item_of, params_of
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem, home_item
+from gcs.formats.items import FileItem, FormatError, frame_in_file, item_of, params_of
+from gcs.formats.jumps import redirected
 
 Number = TypeVar("Number", int, float)
 
 HEADER = "QGC WPL 110"
+_HOME, _HOME_FRAME = mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL
 _COLUMNS = 12
 _WHOLE_COLUMNS = (0, 1, 2, 3, 11)  # of whole numbers
 
@@ -47,11 +51,17 @@ def _parsed(kind: Callable[[str], Number], words: Sequence[str], column: int, wh
         raise FormatError(f"{where}: column {column + 1} is {words[column]!r}; must be {what}") from None
 
 
-def write_waypoints(items: Sequence[WireItem]) -> str:
-    """The text of a file with these items; numbers have enough digits to restore the same items."""
+def write_waypoints(items: Sequence[WireItem], home: Home) -> str:
+    """The text of a file with the home in row 0, as ground stations read it, and these items behind it, so
+    that jumps go to an item with a number greater by one. Numbers have enough digits to restore the items."""
     lines = [HEADER]
-    for seq, item in enumerate(items):
+    for seq, item in enumerate((home_item(home), *redirected(items, lambda target: target + 1))):
         params = map(repr, params_of(item))
-        columns = (seq, item.current, item.frame, item.command, *params, item.autocontinue)
+        columns = (seq, item.current, frame_in_file(item), item.command, *params, item.autocontinue)
         lines.append("\t".join(map(str, columns)))
     return "\n".join(lines) + "\n"
+
+
+def is_home_row(item: WireItem) -> bool:
+    """Whether the first item of a file can be the home."""
+    return item.command == _HOME and frame_in_file(item) == _HOME_FRAME

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem
+from autopilot.wire.items import WireItem, home_item
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.errors import GcsError, RefusedError
+from gcs.formats.jumps import redirected
 from gcs.formats.missions import PLAN_ENDING, CheckedPlan, check_plan, is_foreign, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_items import items_of
@@ -51,7 +53,8 @@ def checked_upload(
         loaded = load_checked(mission, vehicle, force)
 
     def send(session: Session) -> None:
-        items = items_of(loaded, vehicle_home(session))
+        home = vehicle_home(session)
+        items = _as_counted(items_of(loaded, home), home, session)
         print_line(session.run(MissionUpload(session.target, items), "upload").text)
 
     return send
@@ -73,12 +76,23 @@ def _upload_foreign(
             if points:
                 print_line(text)
     try:
-        print_line(session.run(MissionUpload(session.target, items), "upload").text)
+        counted = _as_counted(items, home, session)
+        print_line(session.run(MissionUpload(session.target, counted), "upload").text)
     except RefusedError as error:
         if replaced:
             names = " and ".join(replaced)
             raise RefusedError(f"{error}; the vehicle has {path.name}'s {names} now") from None
         raise
+
+
+def _as_counted(items: Sequence[WireItem], home: Home, session: Session) -> Sequence[WireItem]:
+    """The items as the vehicle counts them: one that presents itself as ArduPilot takes a waypoint in the
+    first place for its home, which is therefore put before it."""
+    heartbeat = session.request(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    takes_home = heartbeat.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    if not takes_home or items[0].command != mavlink.MAV_CMD_NAV_WAYPOINT:
+        return items
+    return [home_item(home), *redirected(items, lambda target: target + 1)]
 
 
 def _flyable_items(path: Path, checked: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:

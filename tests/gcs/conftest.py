@@ -42,6 +42,7 @@ class ScriptedVehicle:
         self.lost_list_indices: set[int] = set()
         self.mission: list[WireItem] = []
         self.refuse_item: int | None = None
+        self.autopilot = mavlink.MAV_AUTOPILOT_PX4
         self.command_results: dict[int, list[int]] = {}
         self.commands: list[Any] = []
         self.silent = False
@@ -82,7 +83,7 @@ class ScriptedVehicle:
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
         self.send(
             mavlink.MAVLink_heartbeat_message(
-                mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 29 | armed, self.custom_mode, 3, 3
+                mavlink.MAV_TYPE_QUADROTOR, self.autopilot, 29 | armed, self.custom_mode, 3, 3
             )
         )
         self.out.append(

@@ -516,6 +516,23 @@ def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp
     assert json.loads(back.read_text())["geoFence"] == plan["geoFence"]
 
 
+@pytest.mark.parametrize("autopilot", [mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA])
+def test_a_waypoint_in_the_first_place_is_not_taken_for_the_home(live, tmp_path, autopilot):
+    """ArduPilot's item 0 is the home."""
+    vehicle, port = live
+    vehicle.autopilot = autopilot
+    file = tmp_path / "in.plan"
+    places = [(16, [0, 0, 0, None, 47.397745 + 1e-5 * k, 8.5455941, 3.25]) for k in range(2)]
+    file.write_text(json.dumps(plan_of(*places, (177, [1, 2, 0, 0, 0, 0, 0]))))
+    assert run("upload", str(file), "--connect", port).exit_code == EXIT_DONE
+    found = [(item.command, item.param1) for item in vehicle.mission]
+    if autopilot == mavlink.MAV_AUTOPILOT_PX4:
+        assert found == [(16, 0.0), (16, 0.0), (177, 0.0)]
+    else:
+        assert found == [(16, 0.0), (16, 0.0), (16, 0.0), (177, 1.0)]
+        assert vehicle.mission[0].z == 0.0
+
+
 def test_a_refused_mission_of_a_plan_says_that_its_fence_was_taken(live, tmp_path):
     vehicle, port = live
     file = tmp_path / "in.plan"

@@ -119,6 +119,19 @@ def test_setpoints_for_the_vehicle_are_a_cable_above_those_for_the_load() -> Non
     assert asked.position[2] == pytest.approx(5.0 - CABLE_LENGTH)
 
 
+def test_offboard_that_asks_for_nothing_above_the_ground_is_disarmed_with_the_reason() -> None:
+    for asked in (FollowAttitude((0.0, 0.0, 1.0), 0.7), at(0.0, 0.0, 0.0)):
+        sky = Sky()
+        stream(sky, asked, 0.1)
+        assert sky.ask(OFFBOARD).result == ACCEPTED
+        assert sky.ask(Arm(True, False)).result == ACCEPTED
+        stream(sky, asked, 9.9)
+        assert sky.flight.phase == Phase.ARMED
+        stream(sky, asked, 0.2)
+        assert sky.flight.phase == Phase.DISARMED
+        assert "Disarmed: no setpoint (position or velocity) above the ground for 10 s" in sky.texts
+
+
 def test_offboard_from_the_ground_takes_off_when_asked_up() -> None:
     sky = Sky()
     stream(sky, at(0.0, 0.0, 0.0), 0.1)

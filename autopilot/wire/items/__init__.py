@@ -11,7 +11,7 @@ step after them. DO_JUMP is flown by flying its items again.
 
 from autopilot.wire.items.command import Command, Handling
 from autopilot.wire.items.decode import decode_items, endless_jump_target, located_steps, unflown_items
-from autopilot.wire.items.encode import encode_mission, encode_steps, step_index
+from autopilot.wire.items.encode import encode_mission, encode_steps, home_item, step_index
 from autopilot.wire.items.heading import turn_heading
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import AREA_COMMANDS, COMMAND, COMMANDS, handling_of
@@ -30,6 +30,7 @@ __all__ = [
     "encode_steps",
     "endless_jump_target",
     "handling_of",
+    "home_item",
     "located_steps",
     "step_index",
     "turn_heading",

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import Any
 
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Command
 from autopilot.wire.items.decode import located_steps
 from autopilot.wire.items.fields import WIRE_FIELD, Height, Place
@@ -18,6 +19,13 @@ from missions.model import Mission, Signals, Step
 _DEFAULT_COMMAND: dict[type[Any], Command] = {
     row.record_type: row for row in COMMANDS if row.record_type and row.is_default
 }
+
+
+def home_item(home: Home) -> WireItem:
+    """The home as item 0, as ArduPilot and files of other ground stations have it."""
+    x, y, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
+    frame, command = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT
+    return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
 
 
 def encode_mission(mission: Mission, home: Home) -> tuple[WireItem, ...]:

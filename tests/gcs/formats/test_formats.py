@@ -188,7 +188,7 @@ def test_shipped_missions_pass_through_files_unchanged(name: str, ending: str, t
     write_foreign(path, items, HOME)
     judged = check_plan(read_foreign(path), HOME)
     assert judged.left_out == judged.kept == []
-    assert judged.items == items
+    assert judged.items == as_in_files(items)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
@@ -196,9 +196,14 @@ FLOAT32 = st.floats(width=32, allow_infinity=False)
 WHOLE = st.integers(-(2**31) + 2, 2**31 - 1)
 FRAMES = st.sampled_from([0, 1, 2, 3, 5, 6, 10])
 ITEM = st.builds(
-    WireItem, FRAMES, st.integers(0, 65535), st.just(0), st.integers(0, 1),
+    WireItem, FRAMES, st.integers(0, 65535).filter(177 .__ne__), st.just(0), st.integers(0, 1),
     FLOAT32, FLOAT32, FLOAT32, FLOAT32, WHOLE, WHOLE, FLOAT32,
 )  # fmt: skip
+
+
+def as_in_files(items: Any) -> tuple[WireItem, ...]:
+    """Items with the frames that files have: those without _INT."""
+    return tuple(item._replace(frame={5: 0, 6: 3}.get(item.frame, item.frame)) for item in items)
 
 
 def bits(items: Any) -> list[bytes]:
@@ -209,9 +214,12 @@ def bits(items: Any) -> list[bytes]:
 
 @given(items=st.lists(ITEM, max_size=5))
 def test_any_items_come_back_bit_for_bit(items: list[WireItem]) -> None:
-    assert bits(one.item for one in read_plan(write_plan(items, HOME)).items) == bits(items)
+    in_files = as_in_files(items)
+    assert bits(one.item for one in read_plan(write_plan(items, HOME)).items) == bits(in_files)
     current = [item._replace(current=1) for item in items]
-    assert bits(one.item for one in read_waypoints(write_waypoints(current))) == bits(current)
+    home, *others = read_waypoints(write_waypoints(current, HOME))
+    assert (home.item.command, home.item.x) == (16, 473977420)
+    assert bits(one.item for one in others) == bits(item._replace(current=1) for item in in_files)
 
 
 def test_what_is_not_given_is_null() -> None:
@@ -230,8 +238,8 @@ def test_pymavlink_reads_our_waypoints_and_we_read_its(tmp_path: Path) -> None:
     items = encode_mission(load_mission("square"), HOME)
     write_foreign(ours, items, HOME)
     loader = mavwp.MAVWPLoader()
-    assert loader.load(str(ours)) == len(items)
-    for seq, item in enumerate(items):
+    assert loader.load(str(ours)) == 1 + len(items), "the home, too"
+    for seq, item in enumerate(as_in_files(items), start=1):
         point = loader.wp(seq)
         assert (point.command, point.frame, point.autocontinue) == (
             item.command,
@@ -240,8 +248,8 @@ def test_pymavlink_reads_our_waypoints_and_we_read_its(tmp_path: Path) -> None:
         )
         assert (round(point.x * 1e7), round(point.y * 1e7)) == (item.x, item.y) or item.frame == 2
     loader.save(str(theirs))
-    read = [one.item for one in read_foreign(theirs).items]
-    for got, item in zip(read, items, strict=True):
+    _, *read = [one.item for one in read_foreign(theirs).items]
+    for got, item in zip(read, as_in_files(items), strict=True):
         assert (got.x, got.y) == pytest.approx((item.x, item.y), abs=6)  # it writes six decimals of a degree
         assert got._replace(current=0, x=item.x, y=item.y) == item
 
@@ -253,7 +261,7 @@ def test_a_home_row_of_another_place_is_not_flown() -> None:
 
     at_home = check_plan(rows(47.397742), HOME)
     assert at_home.left_out == []
-    assert len(at_home.items) == 2
+    assert [item.command for item in at_home.items] == [22], "it is no step to fly"
     for current in (0, 1):
         elsewhere = check_plan(rows(47.39, current), HOME)
         assert planned_home(rows(47.39, current)) == Home(47.39, 8.545594, 0.0)
@@ -339,3 +347,58 @@ def test_parameter_files_of_both_kinds_are_read_back() -> None:
     text = qgc_parameters(values, Target(1, 1))
     assert parse_text(text) == values
     assert "1\t1\tNGC_KX\t6\t9\n" in text
+
+
+PLACES = [simple(16, params=[0, 0, 0, None, 47.3977 + 1e-4 * k, 8.5456, 3], doJumpId=k) for k in (2, 3)]
+
+
+def jump_in_plan(target: int) -> dict[str, Any]:
+    return simple(177, 2, [target, -1, 0, 0, 0, 0, 0], doJumpId=4)
+
+
+def flown(plan: Plan) -> list[tuple[int, float]]:
+    return [(item.command, item.param1) for item in check_plan(plan, HOME).items]
+
+
+def test_a_jump_in_a_plan_goes_to_the_item_with_that_id() -> None:
+    """QGroundControl counts items from 1, and those inside of a survey have numbers of their own."""
+    plan = read_plan(plan_text(TAKEOFF, *PLACES, jump_in_plan(2)))
+    assert flown(plan) == [(22, 0.0), (16, 0.0), (16, 0.0), (177, 1.0)]
+    inside = survey(*({**place, "doJumpId": 10 + place["doJumpId"]} for place in PLACES))
+    assert flown(read_plan(plan_text(TAKEOFF, inside, jump_in_plan(12))))[-1] == (177, 1.0)
+    with pytest.raises(
+        FormatError, match=r"items\[3\]: jumps to the item with doJumpId 7, which there is not"
+    ):
+        read_plan(plan_text(TAKEOFF, *PLACES, jump_in_plan(7)))
+
+
+def test_items_that_are_left_out_move_the_targets_of_jumps() -> None:
+    unknown = simple(84, doJumpId=9)
+    plan = read_plan(plan_text(TAKEOFF, unknown, *PLACES, jump_in_plan(2)))
+    assert flown(plan) == [(22, 0.0), (16, 0.0), (16, 0.0), (177, 1.0)]
+    to_what_is_left_out = read_plan(plan_text(TAKEOFF, unknown, *PLACES, jump_in_plan(9)))
+    assert flown(to_what_is_left_out)[-1] == (177, 1.0), "to the next item"
+
+
+@pytest.mark.parametrize("ending", [".plan", ".waypoints"])
+@pytest.mark.parametrize("counts_home", [False, True])
+def test_jumps_and_home_are_written_as_ground_stations_count_them(
+    ending: str, counts_home: bool, tmp_path: Path
+) -> None:
+    """`counts_home`: the vehicle's item 0 is the home, as ArduPilot has it."""
+    path = tmp_path / f"mission{ending}"
+    plan = read_plan(plan_text(TAKEOFF, *PLACES, jump_in_plan(2)))
+    items = check_plan(plan, HOME).items
+    home = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, 473977420, 85455940, 0.0)
+    on_vehicle = (home, *items[:-1], items[-1]._replace(param1=2.0)) if counts_home else items
+    write_foreign(path, on_vehicle, HOME)
+    if ending == ".plan":
+        entries = json.loads(path.read_text())["mission"]["items"]
+        assert [entry["command"] for entry in entries] == [22, 16, 16, 177]
+        assert entries[-1]["params"][0] == entries[1]["doJumpId"] == 2
+    else:
+        rows = [line.split("\t") for line in path.read_text().splitlines()[1:]]
+        assert [row[3] for row in rows] == ["16", "22", "16", "16", "177"]
+        assert (rows[0][2], rows[0][8:11]) == ("0", ["47.397742", "8.545594", "0.0"])
+        assert rows[-1][4] == "2.0", "the item behind the take-off"
+    assert bits(check_plan(read_foreign(path), HOME).items) == bits(items)
