@@ -101,7 +101,10 @@ def write_plan(
 
 def _with_jumps_by_number(items: list[FileItem], entries: list[dict[str, Any]]) -> list[FileItem]:
     """The items with jumps to the number of an item, in place of the `doJumpId` that it has in the file."""
-    numbers = {entry.get("doJumpId", number): number - 1 for number, entry in enumerate(entries, start=1)}
+    numbers: dict[int, int] = {}
+    for number, entry in enumerate(entries):
+        given = entry.get("doJumpId")
+        numbers.setdefault(given if isinstance(given, int) else number + 1, number)
     found = []
     for item, where in items:
         target = target_of(item)
