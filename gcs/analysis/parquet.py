@@ -147,5 +147,4 @@ def write_flight(path: Path, telemetry: Telemetry, samples: Samples, metadata: d
     from pyarrow import parquet
 
     table = flight_table(telemetry, samples, metadata)
-    with path.open("wb") as file:  # a relative path with a colon would be taken for a URI
-        parquet.write_table(table, file, compression="zstd")
+    parquet.write_table(table, path.absolute(), compression="zstd")  # one with a colon would be a URI

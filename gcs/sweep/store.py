@@ -157,9 +157,9 @@ class Store:
         import pyarrow.parquet as pq
 
         for path in self._files():
-            with path.open("rb") as file:  # a relative path with a colon would be taken for a URI
-                table = pq.ParquetFile(file).read(columns=names)  # `read_table` would import pandas
-            yield self._numbered(table)
+            # absolute: one with a colon would be taken for a URI; no file of Python: the threads that read it
+            # may abort the process as it ends. `read_table` would import pandas
+            yield self._numbered(pq.ParquetFile(path.absolute()).read(columns=names))
 
     def _numbered(self, table: pyarrow.Table) -> pyarrow.Table:
         """The table of a file with its flights numbered by the present plan, which has all of them."""

@@ -16,6 +16,7 @@ import pytest
 
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.dialect import plumbline as m
 from gcs.shell.link import LOOPBACK, free_port
 
 if TYPE_CHECKING:
@@ -152,7 +153,8 @@ def test_a_plan_means_the_same_to_mavsdk(port: str, gcs: Gcs, tmp_path: Path) ->
         assert done.returncode == 0, done.stderr
     told = told_by("mavsdk_plan.py", port, str(plan))
     assert len(told["plan"]) > 2
-    assert told["plan"] == told["vehicle"]
+    files_frame = {m.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: m.MAV_FRAME_GLOBAL_RELATIVE_ALT}
+    assert told["plan"] == [[files_frame.get(frame, frame), *rest] for frame, *rest in told["vehicle"]]
 
 
 def test_a_signed_vehicle_hears_who_knows_the_key(start: Start, gcs: Gcs, tmp_path: Path) -> None:
