@@ -120,7 +120,8 @@ class VehicleLimits:
             vehicle.rotor_max_n - margin if vehicle.limited else inf,
             self.min_tension_share * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
-            vehicle.rotor_tau_s,
+            # by way of the milliseconds of VEH_ROTOR_TAU: where shaping just succeeds, the last bit decides
+            1e-3 * (1e3 * vehicle.rotor_tau_s),
         )
         return PathLimits(
             self.body,

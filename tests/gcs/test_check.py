@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from math import radians
 from pathlib import Path
 
@@ -178,9 +179,19 @@ def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Pa
     assert found.shaping == path_limits(table, True)
 
 
-def test_limits_are_those_that_the_autopilot_shapes_to() -> None:
-    shaping = load_limits("heavy-real").shaping
-    assert shaping == path_limits(autopilot_parameters(load_belief("heavy-real")), True)
+def test_limits_are_those_that_the_autopilot_shapes_to(tmp_path: Path) -> None:
+    """To the last bit, which decides where the shaping of a path just succeeds."""
+    odd = tmp_path / "odd.toml"
+    odd.write_text('believed = "heavy"\n[parameters]\nMIS_ROTOR_MARG = 33.3\n', encoding="utf-8")
+    slow = tmp_path / "slow.toml"
+    slow.write_text(
+        (files("autopilot.vehicle") / "vehicles" / "bebop.toml")
+        .read_text()
+        .replace("rotor_tau_s = 0.020", "rotor_tau_s = 0.02325609888173066"),
+        encoding="utf-8",
+    )
+    for vehicle in ("heavy-real", str(odd), str(slow)):
+        assert load_limits(vehicle).shaping == path_limits(autopilot_parameters(load_belief(vehicle)), True)
 
 
 PLANNERS = """
