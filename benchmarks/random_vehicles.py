@@ -64,9 +64,8 @@ def random_vehicle(seed: int) -> plumbline.Vehicle:
         arm_m=arm,
         inertia_kg_m2=(roll, pitch, (roll + pitch) * draw.uniform(0.8, 0.99)),
         load_mass_kg=load,
-        cable_length_m=max(
-            1.5 * arm, log_uniform(0.4, 6.0)
-        ),  # on a shorter one the load lies under the vehicle
+        # on a shorter one the load lies under the vehicle
+        cable_length_m=max(1.5 * arm, log_uniform(0.4, 6.0)),
         gravity_m_s2=gravity,
         rotor_min_n=0.0,
         rotor_max_n=draw.uniform(1.6, 3.5) * (mass + load) * gravity / 4.0,

@@ -119,7 +119,9 @@ def sweep(
 
         from pyarrow import parquet
 
-        return as_frame(parquet.read_table((folder / "flights.parquet").absolute()), kind)
+        from gcs.formats.arrow import path_for_arrow
+
+        return as_frame(parquet.read_table(path_for_arrow(folder / "flights.parquet")), kind)
 
 
 def _varied(vary: Any) -> list[str]:

@@ -16,7 +16,7 @@ from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.samples import PHASE_NAMES, Samples
 from gcs.analysis.tracks import Telemetry, rotor_names
-from gcs.formats.arrow import array_of, text_array
+from gcs.formats.arrow import array_of, path_for_arrow, text_array
 
 if TYPE_CHECKING:
     import pyarrow
@@ -147,4 +147,4 @@ def write_flight(path: Path, telemetry: Telemetry, samples: Samples, metadata: d
     from pyarrow import parquet
 
     table = flight_table(telemetry, samples, metadata)
-    parquet.write_table(table, path.absolute(), compression="zstd")  # one with a colon would be a URI
+    parquet.write_table(table, path_for_arrow(path), compression="zstd")

@@ -1,4 +1,4 @@
-"""Builds Arrow arrays from buffers.
+"""Builds Arrow arrays from buffers, and names files for Arrow.
 
 `pyarrow.array`, `table`, `read_table`, `to_numpy` and the sorting functions import pandas if it is installed,
 which takes as long as a report.
@@ -7,12 +7,20 @@ which takes as long as a report.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     import pyarrow
+
+
+def path_for_arrow(path: Path) -> Path:
+    """The path by which Arrow opens a file: absolute, because a relative one with a colon is taken for a URI.
+    Arrow must not be given a file object of Python: the threads that read it may abort the process as it
+    ends."""
+    return path.absolute()
 
 
 def array_of(values: Any, missing: Any = None) -> pyarrow.Array:

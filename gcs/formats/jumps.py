@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterable
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 
-JUMP = mavlink.MAV_CMD_DO_JUMP
-
 
 def target_of(item: WireItem) -> int | None:
     """The number of the item to which it jumps; None if it is no jump, or goes to no whole number."""
-    return int(item.param1) if item.command == JUMP and item.param1.is_integer() else None
+    is_jump = item.command == mavlink.MAV_CMD_DO_JUMP and item.param1.is_integer()
+    return int(item.param1) if is_jump else None
 
 
 def redirected(items: Iterable[WireItem], new_number: Callable[[int], int]) -> list[WireItem]:

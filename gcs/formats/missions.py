@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,7 +72,7 @@ def write_foreign(
     if not is_foreign(path):
         endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
-    if items and is_home_row(items[0]) and not _is_not_home(items[0], home):  # ArduPilot's item 0
+    if items and is_home_row(items[0]) and _is_home(items[0], home):  # ArduPilot's item 0
         items = redirected(items[1:], lambda target: max(target - 1, 0))
     in_plan = path.suffix.lower() == PLAN_ENDING
     text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items, home)
@@ -103,7 +104,7 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     if row is not None:
         numbers.pop(0)
         _, where = remaining.pop(0)
-        if _is_not_home(row, home):
+        if not _is_home(row, home):
             text = f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"
             problems.append((0, text))
     for number, (item, _) in zip(numbers, remaining, strict=True):
@@ -111,9 +112,8 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
             kept_items.setdefault(item.command, []).append(number)
     while True:
         try:
-            items = redirected(
-                (one.item for one in remaining), lambda target: bisect_left(numbers, target)
-            )  # items that are left out move those behind them; a jump to one of them goes to the next
+            # items that are left out move those behind them; a jump to one of them goes to the next
+            items = redirected((one.item for one in remaining), partial(bisect_left, numbers))
             steps = located_steps(items, home)
             break
         except MissionItemError as error:
@@ -141,12 +141,12 @@ def _home_row(plan: Plan) -> WireItem | None:
     return plan.items[0].item if plan.counts_home or takes_off else None
 
 
-def _is_not_home(item: WireItem, home: Home) -> bool:
-    """Whether the vehicle would fly the item as a step, or refuse it, instead of taking it as its home."""
+def _is_home(item: WireItem, home: Home) -> bool:
+    """Whether the vehicle takes the item as its home, instead of flying it as a step or refusing it."""
     try:
-        return bool(located_steps([item], home))
+        return not located_steps([item], home)
     except MissionItemError:
-        return True
+        return False
 
 
 def _item_title(number: int, item: WireItem, where: str) -> str:

@@ -59,8 +59,9 @@ def read_plan(text: str) -> Plan:
             entries.append((entry, where))
         else:
             raise FormatError(f"{where}.type: {entry['type']!r}; must be SimpleItem or ComplexItem")
-    items = _with_jumps_by_number([_simple(*one) for one in entries], [one for one, _ in entries])
-    return Plan(items, not_converted, _fence(document), _rally(document), _planned_home(mission))
+    return Plan(
+        _numbered_items(entries), not_converted, _fence(document), _rally(document), _planned_home(mission)
+    )
 
 
 def write_plan(
@@ -99,19 +100,20 @@ def write_plan(
     return json.dumps(record, indent=4, allow_nan=False) + "\n"
 
 
-def _with_jumps_by_number(items: list[FileItem], entries: list[dict[str, Any]]) -> list[FileItem]:
-    """The items with jumps to the number of an item, in place of the `doJumpId` that it has in the file."""
+def _numbered_items(entries: list[tuple[dict[str, Any], str]]) -> list[FileItem]:
+    """The items of simple entries with their places. Jumps lead to the number of an item in this list, in
+    place of the `doJumpId` that it has in the file."""
+    items = [_simple(entry, where) for entry, where in entries]
     numbers: dict[int, int] = {}
-    for number, entry in enumerate(entries):
+    for number, (entry, _) in enumerate(entries):
         given = entry.get("doJumpId")
         numbers.setdefault(given if isinstance(given, int) else number + 1, number)
-    found = []
     for item, where in items:
         target = target_of(item)
         if target is not None and target not in numbers:
             raise FormatError(f"{where}: jumps to the item with doJumpId {target}, which there is not")
-        found.append(FileItem(redirected([item], lambda target: numbers[target])[0], where))
-    return found
+    moved = redirected((item for item, _ in items), numbers.__getitem__)
+    return [FileItem(item, where) for item, (_, where) in zip(moved, items, strict=True)]
 
 
 def _json_number(value: float, number: int) -> float | None:

@@ -84,12 +84,6 @@ def is_table(path: Path) -> bool:
     return any(_is_row(line) for line in _first_lines(path))
 
 
-def _has_headings(path: Path) -> bool:
-    """Whether the first line of a table holds no number at all."""
-    first, _ = _first_lines(path)
-    return bool(first.strip()) and not _has_number(first)
-
-
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
     """The first two lines; empty if they cannot be read."""
     try:
@@ -145,8 +139,9 @@ def _read_table(path: Path, columns: ColumnMap) -> Recording:
         raise RecordingError(f"{path}: the column map says neither time nor rate_hz")
     if path.stat().st_size > _MAX_BYTES:
         raise RecordingError(f"{path}: more than {_MAX_BYTES // 2**20} MiB")
-    headings = int(_has_headings(path))
-    if headings and not _first_lines(path)[1]:
+    first, second = _first_lines(path)
+    headings = int(bool(first.strip()) and not _has_number(first))
+    if headings and not second:
         raise RecordingError(f"{path}: not rows of comma-separated numbers: a line of headings and no rows")
     try:
         table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True, skip_rows=headings))

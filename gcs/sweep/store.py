@@ -19,7 +19,7 @@ import numpy as np
 
 from autopilot.own.law import law_name
 from autopilot.shell.atomic_file import write_atomically
-from gcs.formats.arrow import array_of, text_array
+from gcs.formats.arrow import array_of, path_for_arrow, text_array
 from gcs.sweep.flight import FlightResult
 from gcs.sweep.plan import Case, SweepPlan, from_json
 
@@ -157,9 +157,8 @@ class Store:
         import pyarrow.parquet as pq
 
         for path in self._files():
-            # absolute: one with a colon would be taken for a URI; no file of Python: the threads that read it
-            # may abort the process as it ends. `read_table` would import pandas
-            yield self._numbered(pq.ParquetFile(path.absolute()).read(columns=names))
+            file = pq.ParquetFile(path_for_arrow(path))  # `read_table` would import pandas
+            yield self._numbered(file.read(columns=names))
 
     def _numbered(self, table: pyarrow.Table) -> pyarrow.Table:
         """The table of a file with its flights numbered by the present plan, which has all of them."""

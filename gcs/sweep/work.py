@@ -91,13 +91,13 @@ def fly_cases(
     """Fly these flights, up to eight of a cell at once if that is prepared; if `stopped`, only those that
     have begun. GcsError if files of the user's own are others than as the sweep began: for a worker that
     runs elsewhere, or because they were changed, also while these flights were flown."""
-    check_files(work)
+    _check_files(work)
     rows = _rows_of(work, cases, clock, stopped)
-    check_files(work)
+    _check_files(work)
     return rows
 
 
-def check_files(work: Work) -> None:
+def _check_files(work: Work) -> None:
     """GcsError if a file of the user's own is not that with which the sweep began."""
     try:
         found = sweep_files(work.plan)

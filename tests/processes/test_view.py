@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -138,9 +139,11 @@ def test_a_lockstep_flight_is_the_same_with_the_page_open(start: Callable[..., A
     assert max(heights) > 0.9  # the page has seen it fly
 
 
-def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
+@contextmanager
+def viewed_vehicle(
     start: Callable[..., Any], browser: Browser
-) -> None:
+) -> Iterator[tuple[Any, Callable[[bytes], object]]]:
+    """`gcs view` with its page open, and what sends a datagram to it as a vehicle does."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind(("127.0.0.1", 0))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -149,13 +152,20 @@ def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
         view = start("gcs", "view", "--connect", str(port), "--no-open", "--no-truth")
         browser.open(page_of(view))
         browser.wait("Plumbline.live.page.socket.readyState === WebSocket.OPEN")
+        yield view, lambda datagram: vehicle.sendto(datagram, ("127.0.0.1", port))
+
+
+def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
+    start: Callable[..., Any], browser: Browser
+) -> None:
+    with viewed_vehicle(start, browser) as (view, send):
         markup = "<img src=x onerror='document.title=0'>"
         writer = FrameWriter(4, 1)
         for message in (
             mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3),
             mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, markup.encode()),
         ):
-            vehicle.sendto(writer.frame(message), ("127.0.0.1", port))
+            send(writer.frame(message))
         browser.wait("document.querySelector('#texts span')")
         assert browser.find("#texts span").text == markup
         assert browser.run("return document.querySelectorAll('img').length") == 0
@@ -167,16 +177,9 @@ def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
 
 
 def test_a_page_says_that_its_server_was_killed(start: Callable[..., Any], browser: Browser) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
-        vehicle.bind(("127.0.0.1", 0))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
-        view = start("gcs", "view", "--connect", str(port), "--no-open", "--no-truth")
-        browser.open(page_of(view))
-        browser.wait("Plumbline.live.page.socket.readyState === WebSocket.OPEN")
+    with viewed_vehicle(start, browser) as (view, send):
         beat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
-        vehicle.sendto(FrameWriter(4, 1).frame(beat), ("127.0.0.1", port))
+        send(FrameWriter(4, 1).frame(beat))
         browser.wait("document.getElementById('phase').textContent === 'link lost'")
         view.process.kill()
         browser.wait("document.getElementById('phase').textContent === 'the server of this page has ended'")
