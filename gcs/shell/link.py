@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import secrets
 import select
 import socket
 import struct
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Protocol
 
 from gcs.errors import GcsError
@@ -18,6 +20,7 @@ API_PORT = 14540
 PAGE_PORT = 8090  # TCP, of the live page
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
+_CHOSEN_PORTS = range(20_000, 32_000)  # systems choose from 32,768 (Linux) or from 49,152 (others)
 _BUFFER = 4 * 1024 * 1024  # bytes: a second of the fast streams, in case a report is being written meanwhile
 
 
@@ -52,11 +55,26 @@ def parse_address(text: str) -> Address:
     return Address(host or LOOPBACK, int(port), listen=not text.startswith("udpout:"))
 
 
-def free_port() -> int:
-    """A UDP port on the loopback interface that is not in use now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((LOOPBACK, 0))
-        return int(probe.getsockname()[1])
+def free_port(count: int = 1, among: range = _CHOSEN_PORTS) -> int:
+    """The first of `count` consecutive ports on the loopback interface that neither UDP nor TCP uses now.
+
+    Systems do not give these ports to sockets that ask for any, so that the port is still free when the
+    program for which it is meant opens it. GcsError if none is free.
+    """
+    first = secrets.choice(among)
+    for port in chain(range(first, among.stop), range(among.start, first)):
+        if all(_is_free(port + i) for i in range(count)):
+            return port
+    raise GcsError(f"all ports of {LOOPBACK} from {among[0]} to {among[-1]} are in use")
+
+
+def _is_free(port: int) -> bool:
+    try:
+        with socket.create_server((LOOPBACK, port)), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.bind((LOOPBACK, port))
+    except OSError:
+        return False
+    return True
 
 
 class UdpSocket:

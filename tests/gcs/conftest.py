@@ -16,6 +16,7 @@ import pytest
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
+from gcs.shell.link import free_port
 
 TICK_US = 20_000
 PX4_HOLD = 0x03040000
@@ -388,9 +389,7 @@ class LiveVehicle(threading.Thread):
 @pytest.fixture
 def live() -> Iterator[tuple[ScriptedVehicle, str]]:
     """A running vehicle, and the port to which it sends."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     thread = LiveVehicle(port)
     thread.vehicle.HEARTBEAT_US = 50_000
     thread.start()

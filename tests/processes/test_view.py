@@ -17,6 +17,7 @@ import missions
 import plumbline
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.shell.link import free_port
 from tests.doubles.browser import Browser
 
 pytestmark = pytest.mark.processes
@@ -146,9 +147,7 @@ def viewed_vehicle(
     """`gcs view` with its page open, and what sends a datagram to it as a vehicle does."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind(("127.0.0.1", 0))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         view = start("gcs", "view", "--connect", str(port), "--no-open", "--no-truth")
         browser.open(page_of(view))
         browser.wait("Plumbline.live.page.socket.readyState === WebSocket.OPEN")

@@ -16,16 +16,11 @@ import pytest
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded_forces
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.shell.link import free_port
 
 PATIENCE_S = 30.0  # the first start compiles
 
 pytestmark = pytest.mark.processes
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -26,7 +26,16 @@ from gcs.errors import GcsError, NoVehicleError
 from gcs.shell import display as display_module
 from gcs.shell import processes as processes_module
 from gcs.shell.display import FlightDisplay, StepDisplay, notify, write_to_stdout
-from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
+from gcs.shell.link import (
+    LOOPBACK,
+    Address,
+    AddressError,
+    UdpSocket,
+    free_port,
+    open_address,
+    parse_address,
+    wait,
+)
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
 from gcs.workflows import flight_loops as loops_module
@@ -491,5 +500,14 @@ def poll_until(condition, child) -> None:
     pytest.fail("never came")
 
 
-def test_free_ports_are_free():
-    UdpSocket(port=free_port()).close()
+def test_free_ports_are_free_for_udp_and_tcp_and_no_other_socket_is_given_them_meanwhile():
+    port = free_port(2)
+    UdpSocket(port=port).close()
+    told = f"all ports of {LOOPBACK} from {port} to {port + 1} are in use"
+    with (
+        socket.create_server((LOOPBACK, port)),
+        closing(UdpSocket(port=port + 1)),
+        pytest.raises(GcsError, match=told),
+    ):
+        free_port(among=range(port, port + 2))
+    assert port < 32_768

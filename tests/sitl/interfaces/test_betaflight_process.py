@@ -12,6 +12,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from gcs.shell.link import free_port
+
 PATIENCE_S = 30.0  # the first start compiles
 STATE = struct.Struct("<18d")
 
@@ -20,18 +22,8 @@ pytestmark = pytest.mark.processes
 
 def free_ports() -> tuple[int, int]:
     """A free port for the motors, and the next one, on which the firmware receives."""
-    while True:
-        with (
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as next_one,
-        ):
-            one.bind(("127.0.0.1", 0))
-            port = int(one.getsockname()[1])
-            try:
-                next_one.bind(("127.0.0.1", port + 1))
-            except (OSError, OverflowError):
-                continue
-            return port, port + 1
+    port = free_port(2)
+    return port, port + 1
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

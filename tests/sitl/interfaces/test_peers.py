@@ -20,17 +20,12 @@ import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.shell.link import free_port
 from sitl.interfaces.px4 import Stream
 
 PATIENCE_S = 40.0  # the first start compiles
 
 pytestmark = pytest.mark.processes
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Simulator:

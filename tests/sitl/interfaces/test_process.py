@@ -12,15 +12,11 @@ from collections.abc import Iterator
 
 import pytest
 
+from gcs.shell.link import free_port
+
 PATIENCE_S = 30.0  # the first start compiles
 
 pytestmark = pytest.mark.processes
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
