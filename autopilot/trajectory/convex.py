@@ -45,6 +45,12 @@ _COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # convert an excess of cosine and tension
 _START_EXCESS_N = 0.05  # largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
 _INACTIVE_N = 0.6  # a round leaves out bounds that are at least this far from the demand
+_NO_SOLUTION = (
+    clarabel.SolverStatus.PrimalInfeasible,
+    clarabel.SolverStatus.AlmostPrimalInfeasible,
+    clarabel.SolverStatus.DualInfeasible,
+    clarabel.SolverStatus.AlmostDualInfeasible,
+)
 _ACCURACY = 1e-7  # of the solver; the cost is of order one
 
 
@@ -71,14 +77,6 @@ class Objective(NamedTuple):
     target: Array  # (n, 3)
     tracking_weight: float
     smoothness_weights: tuple[tuple[int, float], ...]
-
-
-class Solution(NamedTuple):
-    """Coefficients (count, 3); the greatest excess over a bound in N; whether the solver succeeded."""
-
-    coefficients: Array
-    excess_n: float
-    solved: bool
 
 
 class Problem:
@@ -168,11 +166,9 @@ class Problem:
         """(n,) the greatest excess at each sample, N."""
         return excess(demand(jets, self.body), self.spacing, self.bounds)
 
-    def _merit(self, free: Array, jets: Array, bounded: bool) -> float:
+    def _merit(self, free: Array, jets: Array) -> float:
         """The cost plus the price of all excess over the bounds and the linear constraints."""
-        total = self._cost(jets)
-        if bounded:
-            total += _EXCESS_WEIGHT * self.spacing * float(np.sum(self._excess(jets)))
+        total = self._cost(jets) + _EXCESS_WEIGHT * self.spacing * float(np.sum(self._excess(jets)))
         if len(self.constraints.time):
             here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
             violation = np.maximum(here - self.constraints.high, self.constraints.low - here)
@@ -181,20 +177,22 @@ class Problem:
 
     # ---- one round
 
-    def solve(self, bounded: bool = True) -> Solution:
-        """The coefficients with the least cost; without `bounded` the bounds are ignored."""
-        free = self._initial_guess() if bounded else self._unbounded(1.0)
+    def solve(self) -> Array | None:
+        """The coefficients (count, 3) with the least cost; None if there are none within the constraints."""
+        free = self._initial_guess()
         jets = self.jets(self._all_coefficients(free))
-        merit = self._merit(free, jets, bounded)
-        for _ in range(_ROUNDS):
-            step = self._solve_subproblem(free, jets if bounded else None)
+        merit = self._merit(free, jets)
+        for i in range(_ROUNDS):
+            step = self._solve_subproblem(free, jets)
             if step is None:
-                return Solution(self._all_coefficients(free), np.inf, False)
+                if i == 0:
+                    return None
+                break
             better, share = False, 1.0
             for _ in range(_HALVINGS):
                 candidate = free + share * (step - free)
                 candidate_jets = self.jets(self._all_coefficients(candidate))
-                candidate_merit = self._merit(candidate, candidate_jets, bounded)
+                candidate_merit = self._merit(candidate, candidate_jets)
                 if candidate_merit < merit:
                     better = True
                     break
@@ -205,8 +203,7 @@ class Problem:
             free, jets, merit = candidate, candidate_jets, candidate_merit
             if share == 1.0 and decrease < _CONVERGENCE * max(merit, 0.1):
                 break
-        worst = float(self._excess(jets).max()) if bounded else 0.0
-        return Solution(self._all_coefficients(free), worst, True)
+        return self._all_coefficients(free)
 
     def _gradient(self, jets: Array) -> Array:
         """(size, 3) gradient of the cost by the free coefficients."""
@@ -249,25 +246,22 @@ class Problem:
         coefficients[self.basis.free] = free
         return coefficients
 
-    def _solve_subproblem(self, free: Array, jets: Array | None) -> Array | None:
-        """The free coefficients that solve the programme linearised along `jets`; None if the solver fails.
+    def _solve_subproblem(self, free: Array, jets: Array) -> Array | None:
+        """The free coefficients that solve the programme linearised along `jets`; None if there are none.
 
-        The unknowns are changes from `free`: in the path itself they would affect only the last digits.
+        The unknowns are changes from `free`: in the path itself they would affect only the last digits. Where
+        the solver cannot become as accurate as asked, which rounding alone may decide, its last iterate is as
+        good: a step is taken only as far as the merit improves.
         """
         n, size = len(self.times), self.size
         gradient = self._gradient(self.jets(self._all_coefficients(free)))
-        excesses = 0 if jets is None else n
-        hessian = sparse.block_diag(
-            [self._hessian] * 3 + [sparse.csc_matrix((excesses, excesses))], format="csc"
-        )
-        linear = np.concatenate([gradient.T.ravel(), np.full(excesses, _EXCESS_WEIGHT * self.spacing)])
+        hessian = sparse.block_diag([self._hessian] * 3 + [sparse.csc_matrix((n, n))], format="csc")
+        linear = np.concatenate([gradient.T.ravel(), np.full(n, _EXCESS_WEIGHT * self.spacing)])
         blocks: list[sparse.csr_matrix] = []
         limits: list[Array] = []
         equal = self.constraints.low == self.constraints.high
         here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
-        rows = sparse.hstack(
-            [self._constraint_matrix, sparse.csr_matrix((len(equal), excesses))], format="csr"
-        )
+        rows = sparse.hstack([self._constraint_matrix, sparse.csr_matrix((len(equal), n))], format="csr")
         if equal.any():
             blocks.append(rows[equal])
             limits.append((self.constraints.high - here)[equal])
@@ -276,24 +270,21 @@ class Problem:
             if keep.any():
                 blocks.append(sign * rows[keep])
                 limits.append((bound - sign * here)[keep])
-        if jets is not None:
-            matrix, limit = self._linearised_bounds(jets)
-            blocks.append(matrix)
-            limits.append(limit)
-        variables = 3 * size + excesses
-        constraints = sparse.vstack(blocks, format="csc") if blocks else sparse.csc_matrix((0, variables))
-        right = np.concatenate(limits) if limits else np.zeros(0)
+        matrix, limit = self._linearised_bounds(jets)
+        blocks.append(matrix)
+        limits.append(limit)
+        constraints = sparse.vstack(blocks, format="csc")
+        right = np.concatenate(limits)
         zeros = int(equal.sum())
         cones = [clarabel.ZeroConeT(zeros)] if zeros else []
-        if len(right) > zeros:
-            cones.append(clarabel.NonnegativeConeT(len(right) - zeros))
+        cones.append(clarabel.NonnegativeConeT(len(right) - zeros))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_threads = 1
         settings.tol_gap_abs = settings.tol_gap_rel = _ACCURACY
         # scaled to units in which the curvature of the cost is about one
         unit = np.concatenate(
-            [np.full(3 * size, 1.0 / np.sqrt(np.median(self._hessian.diagonal()))), np.ones(excesses)]
+            [np.full(3 * size, 1.0 / np.sqrt(np.median(self._hessian.diagonal()))), np.ones(n)]
         )
         units = sparse.diags(unit)
         solver = clarabel.DefaultSolver(
@@ -305,10 +296,10 @@ class Problem:
             settings,
         )
         solution = solver.solve()
-        if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        change: Array = (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
+        if solution.status in _NO_SOLUTION or not np.isfinite(change).all():
             return None
-        new_free: Array = free + (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
-        return new_free
+        return free + change
 
     def _linearised_bounds(self, jets: Array) -> tuple[sparse.csr_matrix, Array]:
         """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""

@@ -288,7 +288,7 @@ def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple
 def _solve(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
 ) -> _Window | None:
-    """The spline from begin to end; None if the solver finds none."""
+    """The spline from begin to end; None if there is none within the constraints."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
     ends = requested_jets(table, step.duration_s, np.array([begin, end]))
@@ -306,10 +306,10 @@ def _solve(
     problem = Problem(
         basis, fixed, body, inner, objective, _path_constraints(step, table, begin, end, origin)
     )
-    solution = problem.solve()
-    if not solution.solved:
+    coefficients = problem.solve()
+    if coefficients is None:
         return None
-    pieces = basis.pieces(solution.coefficients, origin)
+    pieces = basis.pieces(coefficients, origin)
     return _Window(begin, end, pieces, _fine_excess(pieces, begin, end, body, bounds))
 
 
