@@ -120,7 +120,7 @@ class VehicleLimits:
             vehicle.rotor_max_n - margin if vehicle.limited else inf,
             self.min_tension_share * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
-            # by way of the milliseconds of VEH_ROTOR_TAU: where shaping just succeeds, the last bit decides
+            # by way of the milliseconds of VEH_ROTOR_TAU: the same limits to the last bit give the same paths
             1e-3 * (1e3 * vehicle.rotor_tau_s),
         )
         return PathLimits(

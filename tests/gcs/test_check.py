@@ -180,7 +180,7 @@ def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Pa
 
 
 def test_limits_are_those_that_the_autopilot_shapes_to(tmp_path: Path) -> None:
-    """To the last bit, which decides where the shaping of a path just succeeds."""
+    """To the last bit: the paths that are checked are those that are flown."""
     odd = tmp_path / "odd.toml"
     odd.write_text('believed = "heavy"\n[parameters]\nMIS_ROTOR_MARG = 33.3\n', encoding="utf-8")
     slow = tmp_path / "slow.toml"
