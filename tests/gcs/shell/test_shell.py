@@ -369,7 +369,7 @@ def test_a_loaded_program_starts_with_the_arguments_that_follow_and_writes_to_it
     with Processes() as processes:
         processes.load("sitl")
         assert processes.end_reason() == "", "it is none of the flight's yet"
-        child = processes.start("sitl", ["--vehicle", "no such"], log)
+        child = processes.start("sitl", ["--vehicle", "no such", "--listen", str(free_port())], log)
         assert child.wait(WAIT_S)
         assert processes.end_reason().startswith("sitl ended with exit code 2: unknown vehicle 'no such'")
     assert log.read_text().startswith("sitl: unknown vehicle 'no such'")
