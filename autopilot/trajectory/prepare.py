@@ -25,6 +25,7 @@ from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import (
     MAX_POINTS,
     MIN_WAYPOINT_DISTANCE_M,
+    NoPathError,
     PathSegment,
     plan_waypoint_path,
     ride,
@@ -192,13 +193,16 @@ def _waypoint_segments(
     entries: Sequence[TimelineEntry], limits: PathLimits
 ) -> tuple[dict[int, PathSegment], list[SlowPath]]:
     """For each step that is flown through, by its index, its segment of a path through waypoints, and the
-    slow ones of these paths. Paths that would touch the ground are left out."""
+    slow ones of these paths. Paths that would touch the ground or be slower than stops are left out."""
     segments: dict[int, PathSegment] = {}
     slow_paths: list[SlowPath] = []
     for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
-        table, times, lowest_m = _planned_path(tuple(points), speed, limits)
+        try:
+            table, times, lowest_m = _planned_path(tuple(points), speed, limits)
+        except NoPathError:
+            continue
         if lowest_m + points[0][2] > 0.0:
             for i in range(len(points) - 1):
                 segments[first + i] = PathSegment(table, times[i], times[i + 1], points[0])

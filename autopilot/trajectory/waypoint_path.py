@@ -6,9 +6,9 @@ The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint 
 
 x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
 matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
-are those of the least integral for a given total time (`optimal_time_shares`); for many waypoints those of a
-ride along the straight lines between them (`ride_time_shares`). The total follows from the form that was
-requested:
+are those of the least integral for a given total time (`optimal_time_shares`); for many waypoints they follow
+from a ride along the straight lines between them that is slow in turns (`ride_through`). The total follows
+from the form that was requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -19,14 +19,15 @@ In either form the bounds hold along the whole path, drag of the vehicle include
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, dist, sqrt
+from math import acos, ceil, dist, inf, sqrt, tan
+from operator import itemgetter
 
 import numpy as np
 import scipy
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -45,8 +46,11 @@ Indices = NDArray[np.int64]
 ROTATION_TIME_S = 0.25  # tau
 MIN_WAYPOINT_DISTANCE_M = 0.05  # waypoints closer to each other than this are flown from rest to rest
 MAX_POINTS = 40  # of one path
-_PER_SEGMENT = 8  # intervals to the shortest segment
+_PER_SEGMENT = 8  # intervals to the shortest segment, up to _MAX_INTERVALS
 _MAX_INTERVALS = 400
+# the least of them, up to _MOST_INTERVALS: with fewer some points would have no interval of their own
+_MIN_PER_SEGMENT = 2
+_MOST_INTERVALS = 2000
 _SAMPLES = 4  # to an interval, of the integral
 _FINE_S = 0.01
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
@@ -57,10 +61,16 @@ _MAX_OPTIMISED_SEGMENTS = 8
 _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
 _RIDE_ACCEL_SHARE = 2.0 / 3.0  # of the peak acceleration, for speeding up; the rest is left for turns
-_RIDE_SAMPLES = 400  # of speeding up
-# way while speeding up, as a share of cruise speed times the time of speeding up: the integral of the s of
-# `autopilot.trajectory.transfer`, whose slope is 12012 u^6 (1 - u)^6
-_RAMP = (12012.0 * Polynomial([0.0, 1.0]) ** 6 * Polynomial([1.0, -1.0]) ** 6).integ(2)
+_RIDE_TURN_SHARE = sqrt(1.0 - _RIDE_ACCEL_SHARE**2)
+# of the speed that is reached over half of the shorter line beside it: a ride never turns more slowly
+_MIN_TURN_SPEED_SHARE = 0.3
+# The path of least snap swings far out on a line that takes many times as long as the turn or the line at its
+# end. Such a line is divided: its parts grow by a factor from the turn on.
+_DIVIDED_FROM, _DIVISION_GROWTH = 3.0, 1.2
+# A turn takes one of these multiples of speed divided by peak acceleration, whichever path is quicker.
+_TURN_TIMES = (2.0, 8.0)
+_STRETCHING_ROUNDS = 5
+_STRETCHING, _MIN_STRETCH, _MAX_STRETCH = 0.7, 0.6, 1.6  # exponent, and limits of its base
 _BAND = DEGREE + 1
 
 
@@ -104,6 +114,10 @@ def sample_path(table: PieceTable, times: Array) -> Array:
     return out
 
 
+class NoPathError(ValueError):
+    """There is no useful path through the points without a stop; the text says why."""
+
+
 class _Grid:
     """The spline of a path of `total_s` seconds in `intervals` parts, and the integral as a quadratic form of
     its coefficients, whatever points the path passes."""
@@ -140,10 +154,13 @@ class MinimumSnap:
     """The smoothest path from rest at the first point, past others at their times, to rest at the last."""
 
     def __init__(self, points: Array, times: Array) -> None:
-        segments = np.diff(times)
-        count = ceil(_PER_SEGMENT * times[-1] / segments.min())
-        # `_PER_SEGMENT` intervals to the shortest segment, but within the limits on their number
-        grid = _grid(float(times[-1]), int(np.clip(count, 2 * ORDERS, _MAX_INTERVALS)))
+        """NoPathError if the shortest segment is too short beside the total time."""
+        shortest_share = float(np.diff(times).min() / times[-1])
+        count = int(np.clip(ceil(_PER_SEGMENT / shortest_share), 2 * ORDERS, _MAX_INTERVALS))
+        count = max(count, ceil(_MIN_PER_SEGMENT / shortest_share))
+        if count > _MOST_INTERVALS:
+            raise NoPathError(f"a segment takes {shortest_share:.2g} of the whole time")
+        grid = _grid(float(times[-1]), count)
         self.basis = basis = grid.basis
         self.origin: Array = points[0]
         ends = np.zeros((2, ORDERS, 3))
@@ -227,20 +244,120 @@ def ride(length: float, speed: float, accel: float) -> tuple[float, float, float
     return cruise, ramp_s, ramp_s + length / cruise
 
 
-def ride_time_shares(points: Array, speed: float, accel: float) -> Array:
-    """The share of the total time for each segment on a ride along the straight lines between the points, at
-    up to `speed` (m/s) and `accel` (m/s^2): however close the points are, only the ends of the ride are slow.
+@dataclass(frozen=True, slots=True)
+class TimedPoints:
+    """Points that a path is to pass and the times at them: waypoints, and places between waypoints."""
 
-    The speed rises along the s of `autopilot.trajectory.transfer`, stays, and falls as it rose.
+    points: Array  # (n, 3), m
+    times: Array  # (n,), s
+    waypoints: Indices  # which of the points are waypoints
+
+    def stretched(self, factors: Array) -> TimedPoints:
+        """The same with each of the n - 1 segments so many times as long."""
+        times = np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times))])
+        return replace(self, times=times)
+
+
+def ride_through(points: Array, speed: float, accel: float, turn_time: float) -> TimedPoints:
+    """A ride along the straight lines between the points, from rest to rest, at up to `speed` (m/s) and
+    `accel` (m/s^2): slow in sharp turns, quick elsewhere, however close the points are.
+
+    A turn of theta between lines of l m and more is as round as a circle of radius l / (2 tan(theta / 2)).
+    `turn_time`, in speeds divided by `accel`, is how long a turn takes: long lines are divided accordingly.
     """
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    length = float(travelled[-1])
-    cruise, ramp_s, total_s = ride(length, speed, accel)
-    u = np.linspace(0.0, 1.0, _RIDE_SAMPLES + 1)
-    ramp_m = cruise * ramp_s * _RAMP(u)
-    times = np.concatenate([ramp_s * u, total_s - ramp_s * u[::-1]])
-    at_points = np.interp(travelled, np.concatenate([ramp_m, length - ramp_m[::-1]]), times)
-    return np.asarray(np.diff(at_points) / total_s)
+    lines = np.diff(points, axis=0)
+    lengths = np.linalg.norm(lines, axis=1)
+    directions = lines / lengths[:, None]
+    mean_accel = _RIDE_ACCEL_SHARE * accel / PEAK_SPEED  # of the s of `autopilot.trajectory.transfer`
+    speeds = np.full(len(points), speed)
+    speeds[0] = speeds[-1] = 0.0
+    for i in range(1, len(lines)):
+        shorter = float(min(lengths[i - 1], lengths[i]))
+        half_turn = 0.5 * acos(float(np.clip(directions[i - 1] @ directions[i], -1.0, 1.0)))
+        radius = 0.5 * shorter / max(tan(half_turn), 1e-9)
+        slowest = _MIN_TURN_SPEED_SHARE * sqrt(mean_accel * shorter)
+        speeds[i] = min(speed, max(slowest, sqrt(_RIDE_TURN_SHARE * accel * radius)))
+    for i, length in enumerate(lengths):
+        speeds[i + 1] = min(speeds[i + 1], sqrt(speeds[i] ** 2 + 2.0 * mean_accel * length))
+    for i, length in reversed(list(enumerate(lengths))):
+        speeds[i] = min(speeds[i], sqrt(speeds[i + 1] ** 2 + 2.0 * mean_accel * length))
+    begin, end = speeds[:-1], speeds[1:]
+    peaks = np.minimum(speed, np.sqrt(0.5 * (begin**2 + end**2) + mean_accel * lengths))
+    rising, falling = (peaks - begin) / mean_accel, (peaks - end) / mean_accel
+    steady = (lengths - 0.5 * (begin + peaks) * rising - 0.5 * (peaks + end) * falling) / peaks
+    durations = rising + np.maximum(steady, 0.0) + falling
+
+    def share_after(i: int, time: float) -> float:
+        """The share of line i after `time` s on it."""
+        left = durations[i] - time
+        if time < rising[i]:
+            way = begin[i] * time + 0.5 * mean_accel * time * time
+        elif left < falling[i]:
+            way = lengths[i] - end[i] * left - 0.5 * mean_accel * left * left
+        else:
+            way = 0.5 * (begin[i] + peaks[i]) * rising[i] + peaks[i] * (time - rising[i])
+        return float(way / lengths[i])
+
+    ends_s = [inf, *(turn_time / accel * speeds[1:-1]), inf]  # at rest nothing is to be divided
+    beside_s = [inf, *durations, inf]
+    places, times, waypoints = [points[0]], [0.0], [0]
+    for i, duration in enumerate(durations):
+        after_begin, before_end = min(beside_s[i], ends_s[i]), min(beside_s[i + 2], ends_s[i + 1])
+        start_s = float(durations[:i].sum())
+        for time in _divisions(float(duration), after_begin, before_end):
+            places.append(points[i] + share_after(i, time) * lines[i])
+            times.append(start_s + time)
+        waypoints.append(len(places))
+        places.append(points[i + 1])
+        times.append(start_s + float(duration))
+    return TimedPoints(np.array(places), np.array(times), np.array(waypoints))
+
+
+def _divisions(duration: float, after_begin: float, before_end: float) -> list[float]:
+    """Where a line of `duration` s is divided that is much longer than what comes before and after it (s)."""
+    if duration < _DIVIDED_FROM * min(after_begin, before_end):
+        return []
+    from_begin, from_end = [0.0], [duration]
+    first, last = _DIVISION_GROWTH * after_begin, _DIVISION_GROWTH * before_end
+    while from_end[-1] - from_begin[-1] > 2.0 * min(first, last):
+        if first <= last:
+            from_begin.append(from_begin[-1] + first)
+            first *= _DIVISION_GROWTH
+        else:
+            from_end.append(from_end[-1] - last)
+            last *= _DIVISION_GROWTH
+    return from_begin[1:] + from_end[:0:-1]
+
+
+def quick_times(ride: TimedPoints, speed: float, accel: float) -> tuple[TimedPoints, float]:
+    """The points of a ride with times between them at which the smoothest path is quick, and its duration
+    (s): where the path is too fast or turns too hard it gets more time, elsewhere less."""
+    best, best_s = ride, inf
+    for _ in range(_STRETCHING_ROUNDS):
+        fine, jets = MinimumSnap(ride.points, ride.times).jets()
+        use = np.maximum(
+            np.linalg.norm(jets[1], axis=1) / speed, np.sqrt(np.linalg.norm(jets[2], axis=1) / accel)
+        )
+        duration_s = float(ride.times[-1] * use.max())
+        if not duration_s < best_s:
+            break
+        best, best_s = ride, duration_s
+        segments = np.clip(np.searchsorted(ride.times, fine, side="right") - 1, 0, len(ride.times) - 2)
+        most = np.zeros(len(ride.times) - 1)
+        np.maximum.at(most, segments, use)
+        ride = ride.stretched(np.clip(most, _MIN_STRETCH, _MAX_STRETCH) ** _STRETCHING)
+    return best, best_s
+
+
+def quickest_ride(points: Array, speed: float, accel: float) -> tuple[TimedPoints, float]:
+    """The quickest of the rides through the points, and its duration (s); NoPathError if there is none."""
+    found = []
+    for turn_time in _TURN_TIMES:
+        with suppress(NoPathError):
+            found.append(quick_times(ride_through(points, speed, accel, turn_time), speed, accel))
+    if not found:
+        raise NoPathError("the distances between the points are too unequal")
+    return min(found, key=itemgetter(1))
 
 
 def _point_times(shares: Array, total_s: float) -> Array:
@@ -259,20 +376,24 @@ def plan_waypoint_path(
 ) -> tuple[MinimumSnap, Array]:
     """The path through the points and the times at them.
 
-    `speed` (m/s) and `accel` (m/s^2) are peaks; if `time_optimal`, only the bounds apply.
+    `speed` (m/s) and `accel` (m/s^2) are peaks; if `time_optimal`, only the bounds apply. NoPathError if
+    there is no path that is quicker than flying from point to point with a stop at each.
     """
-    waypoints = np.array(points)
-    length = float(sum(dist(a, b) for a, b in pairwise(points)))
-    total_s = transfer_duration(length, speed, accel)
+    places = np.array(points)
+    passed = np.arange(len(points))
     if len(points) - 1 > _MAX_OPTIMISED_SEGMENTS:
-        shares = ride_time_shares(waypoints, speed, accel)
+        quickest, total_s = quickest_ride(places, speed, accel)
+        places, passed = quickest.points, quickest.waypoints
+        shares = np.diff(quickest.times) / quickest.times[-1]
     else:
-        shares = optimal_time_shares(waypoints, total_s)
+        length = float(sum(dist(a, b) for a, b in pairwise(points)))
+        total_s = transfer_duration(length, speed, accel)
+        shares = optimal_time_shares(places, total_s)
 
     def evaluate(seconds: float) -> tuple[MinimumSnap, Array, float]:
         """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""
         times = _point_times(shares, seconds)
-        path = MinimumSnap(waypoints, times)
+        path = MinimumSnap(places, times)
         fine, jets = path.jets()
         over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
         too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / speed
@@ -302,4 +423,6 @@ def plan_waypoint_path(
             else:
                 low = middle
         path, times = best
-    return path, times
+    if times[-1] > sum(transfer_duration(dist(a, b), speed, accel) for a, b in pairwise(points)):
+        raise NoPathError("the path is slower than stops at its points")
+    return path, times[passed]
