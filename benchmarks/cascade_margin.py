@@ -222,7 +222,13 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
         position = plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8]), 1.0)
         memory, command = load_position(
-            law, PlumblineMemory(position, ZERO, others), state, reference, actuation, observed, cable
+            law,
+            PlumblineMemory(position, ZERO, 0.0, ZERO, others),
+            state,
+            reference,
+            actuation,
+            observed,
+            cable,
         )
         after = advance(actuation, command.thrust, command.moment, assumed_rotors)
         return np.array(

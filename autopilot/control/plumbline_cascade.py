@@ -168,6 +168,12 @@ def with_pace(gains: PlumblineGains, pace: float) -> PlumblineGains:
 
 
 @kernel
+def max_level_moment(vehicle: Vehicle) -> float:
+    """N m, the greatest about a level axis beside half of the greatest thrust."""
+    return 0.5 * vehicle.moment_per_force * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min)
+
+
+@kernel
 def commanded_attitude(
     F: Vec3, F_dot: Vec3, F_ddot: Vec3, heading: HeadingReference, state: State, vehicle: Vehicle
 ) -> AttitudeCommand:
@@ -195,7 +201,7 @@ def commanded_attitude(
         limit_length(attitude.Omega_c, _MAX_RATE * min(1.0, n / weight)),
         limit_length(
             attitude.Omega_c_dot,
-            0.5 * vehicle.moment_per_force * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J,
+            max_level_moment(vehicle) / J,
         ),
     )
 

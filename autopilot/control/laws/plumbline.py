@@ -38,6 +38,12 @@ from autopilot.wire.parameter_table import ParameterTable
 
 # pace at which load and cable are followed when the load leaves the ground; height (m) of the full pace
 LIFTOFF_PACE, FULL_PACE_HEIGHT = 0.5, 0.7
+# pace while the rotors cannot give the moment that is asked for; s, in which it falls to this, and in which
+# it recovers afterwards (docs/control-log.md)
+SATURATED_PACE = 0.5
+SATURATION_TIME, RECOVERY_TIME = 0.5, 10.0
+# of the greatest moment about a level axis: the rotors give as much less than is asked for
+_MISSING_SHARE = 0.02
 # rad/s^3: a commanded direction whose acceleration changes faster has jumped, and has no derivative
 MAX_DIRECTION_JERK = 300.0
 
@@ -66,6 +72,8 @@ class PlumblineMemory(NamedTuple):
     """The memory of load position and that of the other modes."""
 
     position: cascade.PlumblineMemory
+    moment: Vec3  # N m, that load position asked for at its last tick
+    saturation: float  # 0 ... 1, of the rotors in the last time
     q_c_ddot: Vec3  # 1/s^2, of load attitude at its last tick
     other_modes: ThesisMemory
 
@@ -200,7 +208,7 @@ def compensated_command(
 @kernel
 def start(law: PlumblineLaw, state: State, x_d: Vec3, v_d: Vec3) -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is assumed to be steady."""
-    return PlumblineMemory(cascade.start(), ZERO, thesis.start(law.other_modes, state, x_d, v_d))
+    return PlumblineMemory(cascade.start(), ZERO, 0.0, ZERO, thesis.start(law.other_modes, state, x_d, v_d))
 
 
 @kernel
@@ -210,6 +218,19 @@ def max_pace(state: State, reference: Reference, observed: DisturbanceEstimate) 
     height = max(0.0, state.x_load[2] - observed.load_ground_height)
     pace = LIFTOFF_PACE + (1.0 - LIFTOFF_PACE) * height / FULL_PACE_HEIGHT
     return if_above(reference.jet[1][2], 0.0, min(1.0, pace), 1.0)
+
+
+@kernel
+def later_saturation(memory: PlumblineMemory, actuation: Actuation, constants: PlumblineConstants) -> float:
+    """How much of the last time the rotors could not give the moment that load position asked for about the
+    level axes: towards 1 while they cannot, and more slowly towards 0 while they can."""
+    queue, limit = actuation.queue, _MISSING_SHARE * cascade.max_level_moment(constants.vehicle)
+    asked = memory.moment
+    missing = max(abs(asked[0]) - abs(queue[0, 1]), abs(asked[1]) - abs(queue[0, 2]))
+    change = if_above(
+        missing, limit, (1.0 - memory.saturation) / SATURATION_TIME, -memory.saturation / RECOVERY_TIME
+    )
+    return memory.saturation + constants.period * change
 
 
 @kernel
@@ -233,7 +254,9 @@ def load_position(
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
         position = cascade.PlumblineMemory(0.0, position.integral, position.pace)
         predicted = with_field(with_field(predicted, "x_load", state.x_load), "v_load", state.v_load)
-    position = with_field(position, "pace", min(position.pace, max_pace(state, reference, observed)))
+    saturation = later_saturation(memory, actuation, constants)
+    pace = min(max_pace(state, reference, observed), 1.0 - (1.0 - SATURATED_PACE) * saturation)
+    position = with_field(position, "pace", min(position.pace, pace))
     drag, push = drag_and_push(state, 1.0, observed, constants)
     position, demand = cascade.load_position(
         position,
@@ -247,9 +270,8 @@ def load_position(
         constants.period,
         with_load_mass(constants.vehicle, observed.load_mass),
     )
-    return with_field(memory, "position", position), compensated_command(
-        demand, prediction, observed, constants
-    )
+    command = compensated_command(demand, prediction, observed, constants)
+    return PlumblineMemory(position, command.moment, saturation, memory.q_c_ddot, memory.other_modes), command
 
 
 @kernel
@@ -318,9 +340,8 @@ def load_attitude(
         with_load_mass(constants.vehicle, observed.load_mass),
     )
     other = with_field(other, "direction", direction)
-    return PlumblineMemory(position, q_c.q_c_ddot, other), compensated_command(
-        demand, prediction, observed, constants
-    )
+    memory = PlumblineMemory(position, ZERO, 0.0, q_c.q_c_ddot, other)
+    return memory, compensated_command(demand, prediction, observed, constants)
 
 
 @kernel
