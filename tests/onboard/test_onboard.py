@@ -478,6 +478,14 @@ def test_items_behind_a_landing_are_reported(behind: tuple[Step, ...]) -> None:
     assert (told in found) == bool(behind)
 
 
+@pytest.mark.parametrize(("count", "items"), [(1, "item 1"), (2, "items 1, 2")])
+def test_items_that_are_kept_but_not_flown_are_named(count: int, items: str) -> None:
+    camera = WireItem(2, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0, 1, 25.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+    craft = Craft(Takeoff(2.0), *[camera] * count, Land())
+    found = [(text.severity, text.text) for text in craft.onboard.endpoint.kept_texts.texts]
+    assert (mavlink.MAV_SEVERITY_INFO, f"Kept, but not flown: {items}") in found
+
+
 def test_it_tells_in_which_run_of_the_simulated_world_it_flies() -> None:
     autopilot, writer = onboard(), FrameWriter(255, 190)
     request = mavlink.MAVLink_command_long_message(

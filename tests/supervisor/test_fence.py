@@ -182,7 +182,7 @@ def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
     # the way between two good places leads through the exclusion zone
     through = (model.Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
     verdict = sky.ask(ReplaceMission(3, tuple(LocatedStep(i, i, step) for i, step in enumerate(through))))
-    assert verdict.text == "Mission denied: item 2 leads in an exclusion zone of the fence"
+    assert verdict.text == "Mission denied: item 2 leads into an exclusion zone of the fence"
     free = fenced(*steps, action=0)
     assert free.ask(ReplaceMission(3, located)).result == ACCEPTED
 
