@@ -18,7 +18,7 @@ from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.before_flight import CHECKING_TEXT
-from gcs.workflows.flyable import check_items, load_checked
+from gcs.workflows.flyable import check_plan_items, load_checked
 from gcs.workflows.running_flight import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
@@ -63,10 +63,11 @@ def checked_upload(
 def _upload_foreign(
     session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> None:
-    items = _flyable_items(path, check_plan(plan, home := vehicle_home(session)), skip)
+    checked = check_plan(plan, home := vehicle_home(session))
+    items = _flyable_items(path, checked, skip)
     if not force:
         with notify_if_slow(CHECKING_TEXT):
-            check_items(path.name, items, home, vehicle)
+            check_plan_items(path.name, checked, home, vehicle)
     # the fence first: the vehicle checks the mission against it
     replaced = []
     for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
