@@ -226,7 +226,8 @@ def test_after_a_termination_the_vehicle_is_armed_later_and_needs_no_disarming()
     for force in (False, True):
         verdict = sky.ask(R.Arm(True, force))
         assert (sky.flight, verdict.result) == (given_up, LATER)
-        assert verdict.text == "Arming denied after termination, for 2.0 s more"
+        assert verdict.text == "Arming denied: flight terminated, wait 2.0 s"
+    assert sky.ask(R.RunPrearmChecks()).text.startswith("flight terminated, wait 2.0 s")
     assert (sky.ask(R.Arm(False, False)), sky.flight) == (YES, given_up)
     sky.run(lambda s: s.flight.phase == Phase.DISARMED, 2.1)
 

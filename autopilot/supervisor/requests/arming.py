@@ -36,6 +36,9 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
     """What keeps the vehicle from being armed, in words."""
     # `view.estimate_problems` are the estimator's: `autopilot.estimation.filter.problem_texts`
     problems = [*chain.from_iterable(flight.external_arming_problems.values()), *view.estimate_problems]
+    if flight.phase == Phase.FAILSAFE:
+        left_s = 1e-6 * (flight.phase_start_us + FAILSAFE_DISARM_US - view.now_us)
+        problems.insert(0, f"flight terminated, wait {left_s:.1f} s")
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         problems.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
@@ -61,12 +64,11 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
         if after is None:
             return flight, denied("Disarming denied")
         return after, Verdict(ACCEPTED.result, "Disarmed in the air by force", True) if in_air else ACCEPTED
-    if flight.phase == Phase.FAILSAFE:
-        left_s = 1e-6 * (flight.phase_start_us + FAILSAFE_DISARM_US - view.now_us)
-        return flight, temporarily_denied(f"Arming denied after termination, for {left_s:.1f} s more")
-    if flight.phase != Phase.DISARMED:
+    if flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
         return flight, ACCEPTED  # already armed: answered as PX4 and ArduPilot do
     problems = arming_problems(flight, view, settings)
+    if flight.phase == Phase.FAILSAFE:
+        return flight, temporarily_denied(f"Arming denied: {problems[0]}")
     if problems and not request.force:
         return flight, denied(f"Arming denied: {problems[0]}")
     after = transition(with_heading_before_flight(flight, view), Event.ARM, view, settings)
