@@ -38,7 +38,11 @@ class FileNumbers(NamedTuple):
 
 
 def _renumbered(text: str, pattern: re.Pattern[str], numbers: Sequence[int]) -> str:
-    return pattern.sub(lambda match: match[0].replace(match[1], str(numbers[int(match[1])])), text)
+    def in_file(match: re.Match[str]) -> str:
+        number = int(match[1])
+        return match[0].replace(match[1], str(numbers[number])) if number < len(numbers) else match[0]
+
+    return pattern.sub(in_file, text)
 
 
 def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:

@@ -68,6 +68,7 @@ def _upload_foreign(
     if not force:
         with notify_if_slow(CHECKING_TEXT):
             check_plan_items(path.name, checked, home, vehicle)
+    counted = _as_counted(items, home, session)
     # the fence first: the vehicle checks the mission against it
     replaced = []
     for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
@@ -77,13 +78,16 @@ def _upload_foreign(
             if points:
                 print_line(text)
     try:
-        counted = _as_counted(items, home, session)
         print_line(session.run(MissionUpload(session.target, counted), "upload").text)
     except RefusedError as error:
+        before = (0,) * (
+            len(counted) - len(items)
+        )  # the home, which the vehicle counts and the file does not
+        numbers = checked.numbers._replace(items=before + checked.numbers.items)
+        text = numbers.in_vehicle_text(str(error))
         if replaced:
-            names = " and ".join(replaced)
-            raise RefusedError(f"{error}; the vehicle has {path.name}'s {names} now") from None
-        raise
+            text += f"; the vehicle has {path.name}'s {' and '.join(replaced)} now"
+        raise RefusedError(text) from None
 
 
 def _as_counted(items: Sequence[WireItem], home: Home, session: Session) -> Sequence[WireItem]:
