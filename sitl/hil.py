@@ -315,7 +315,7 @@ class HilSimulator:
 
     @property
     def frame(self) -> Frame:
-        """The vehicle as third-party firmwares define it; ValueError if they cannot fly it."""
+        """The vehicle as third-party firmwares define it; FrameError if they cannot fly it."""
         return frame_of(self._layout, self.core.truth.rotor_min, self.core.truth.rotor_max)
 
     def restart(self) -> None:

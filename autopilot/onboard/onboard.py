@@ -821,7 +821,8 @@ class Onboard:
         self._prepare()
         unflown = unflown_items(mission.items)
         if unflown:
-            text = f"Mission items kept, not flown: {listed(unflown)}"
+            items = "item" if len(unflown) == 1 else "items"
+            text = f"Kept, but not flown: {items} {listed(unflown)}"
             self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
         early = zip(plan.steps[:-1], plan.sequence, strict=False)  # all steps but the last
         landing = next((item for step, item in early if isinstance(step, Land)), None)

@@ -102,6 +102,16 @@ def parameters_for(
     return parameter_table
 
 
+def require_delivered(belief: Vehicle, ignored: Collection[str]) -> None:
+    """VehicleFileError if one of the `ignored` parameters is none with which the vehicle is delivered."""
+    given = ", ".join(belief.parameters) or "none"
+    unknown = [name for name in ignored if name not in belief.parameters]
+    if unknown:
+        raise VehicleFileError(
+            [f"--ignore {name}: not among the vehicle's parameters; there are {given}" for name in unknown]
+        )
+
+
 def _as_delivered(parameter: table.Parameter, belief: Vehicle) -> table.Parameter:
     """A parameter of a custom class; its default is the value with which the vehicle is delivered, if any."""
     if parameter.name not in belief.parameters:

@@ -230,6 +230,8 @@ MOTION_REQUESTS = (
     | Orbit
     | ChangeAltitude
     | ChangeSpeed
+    | TurnHeading
+    | LookAt
     | Release
     | Winch
     | Grab

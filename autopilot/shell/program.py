@@ -17,7 +17,7 @@ from platformdirs import user_state_path
 from autopilot.onboard.onboard import SIMULATOR_SYSTEM, Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.own.law import law_number, own_law_reference
-from autopilot.own.own_code import OwnCode, parameters_for
+from autopilot.own.own_code import OwnCode, parameters_for, require_delivered
 from autopilot.own.source import OwnError
 from autopilot.own.trial import try_all
 from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
@@ -491,7 +491,9 @@ def main(
     worker = BackgroundWorker()
     try:
         own = OwnCode(own_law_reference(law or DEFAULT_LAW), estimator, planner)
-        table = parameters_for(load_belief(vehicle), own, ignored=ignore)
+        belief = load_belief(vehicle)
+        require_delivered(belief, ignore)
+        table = parameters_for(belief, own, ignored=ignore)
         check_names(settings, table.names)
         folder = storage or user_state_path("plumbline")
         store = Storage(folder)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,20 +15,24 @@ RELEASE_MARGIN_M = (
 )
 
 
-def attached(load: LoadTrack) -> NDArray[np.bool_]:
+def cable_length(parameters: Mapping[str, float]) -> float:
+    """Length (m) of the cable by the parameters of a log: the true one, or else the assumed one; infinite if
+    neither is known."""
+    return parameters.get("SIM_CABLE_LEN", parameters.get("VEH_CABLE_LEN", math.inf))
+
+
+def attached(load: LoadTrack, cable_m: float) -> NDArray[np.bool_]:
     """(n,) True unless the load has left the cable.
 
     The load has left the cable if the cable is not taut but its ends are farther apart than when it was last
     taut: then from the last time it was taut until it is taut again. Before the cable was taut for the first
-    time, the load counts as attached.
+    time, `cable_m` counts as that distance.
     """
-    n = len(load.time_s)
     taut = np.flatnonzero(load.taut == 1)
-    if not len(taut):
-        return np.ones(n, dtype=np.bool_)
-    last = np.searchsorted(taut, np.arange(n), side="right") - 1  # index into `taut`, -1 before the first
-    length_m = load.distance_m[taut[np.maximum(last, 0)]]
-    slack = (load.taut != 1) & (last >= 0)
+    # index into `taut`; -1 before the first, which is also the last place of the following two
+    last = np.searchsorted(taut, np.arange(len(load.time_s)), side="right") - 1
+    length_m = np.append(load.distance_m[taut], cable_m)[last]
+    slack = load.taut != 1
     too_far = slack & (load.distance_m > length_m + RELEASE_MARGIN_M)
     released = np.zeros(len(taut) + 1, dtype=np.bool_)
     released[last[too_far]] = True

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.align import as_of, hermite, linear
 from gcs.analysis.axes import Floats
-from gcs.analysis.release import attached
+from gcs.analysis.release import attached, cable_length
 from gcs.analysis.tracks import Ints, Telemetry
 
 UNKNOWN = -1
@@ -118,7 +118,7 @@ def samples_of(telemetry: Telemetry) -> Samples:
         item=_integers_as_of(telemetry, setpoint.item, time_s),
         control_mode=control_mode,
         in_mission=in_window(telemetry, time_s),
-        attached=attached(truth),
+        attached=attached(truth, cable_length(telemetry.parameters)),
         actual_m=truth.position_m,
         actual_m_s=truth.velocity_m_s,
         desired_m=np.where(

@@ -25,6 +25,7 @@ from gcs.formats.items import FormatError
 from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
+from gcs.mission_items import FileNumbers
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
@@ -34,11 +35,12 @@ WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
 
 class CheckedPlan(NamedTuple):
     """The items of a file that can be sent to the vehicle; a line for each part that must be left out, and
-    for the items that the vehicle keeps but does not execute."""
+    for the items that the vehicle keeps but does not execute; and the numbers of the items in the file."""
 
     items: tuple[WireItem, ...]
     left_out: list[str]
     kept: list[str]
+    numbers: FileNumbers
 
 
 def is_foreign(path: Path) -> bool:
@@ -130,7 +132,10 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
         kept.append(f"{places}: not flown; the mission ends with the landing of item {numbers[landing]}")
-    return CheckedPlan(tuple(items), [*(line for _, line in problems), *plan.not_converted], kept)
+    left_out = [*(line for _, line in problems), *plan.not_converted]
+    return CheckedPlan(
+        tuple(items), left_out, kept, FileNumbers(tuple(numbers), tuple(numbers[step.last] for step in steps))
+    )
 
 
 def _home_row(plan: Plan) -> WireItem | None:

@@ -22,7 +22,7 @@ from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
 from gcs.formats.missions import check_plan, is_foreign, planned_home, read_foreign
-from gcs.mission_items import in_mission_terms, items_of
+from gcs.mission_items import FileNumbers, in_mission_terms, items_of
 from gcs.workflows.before_flight import unused_planner_text
 from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import mission_of, violations
@@ -61,14 +61,20 @@ def _winch_items(
 
 
 def path_reports(
-    mission: Mission, limits: VehicleLimits, planner: Planner | None = None, shaped: bool = True
+    mission: Mission,
+    limits: VehicleLimits,
+    planner: Planner | None = None,
+    shaped: bool = True,
+    numbers: FileNumbers | None = None,
 ) -> list[PathReport]:
     """How a vehicle with these limits flies the mission, with paths `shaped` by the autopilot or as
-    requested; a `planner` makes those through waypoints. GcsError says what is wrong with a planned path."""
+    requested; a `planner` makes those through waypoints. GcsError says what is wrong with a planned path, by
+    the `numbers` of the file that the mission comes from."""
     try:
         return paths(_as_sent(mission), limits, planner, shaped)
     except PlanError as error:
-        raise GcsError(f"{mission.name}: {error}") from None
+        text = str(error) if numbers is None else numbers.in_step_text(str(error))
+        raise GcsError(f"{mission.name}: {text}") from None
 
 
 def _as_sent(mission: Mission) -> Mission:
@@ -190,26 +196,42 @@ class CheckResult:
 
 
 class _ReadFile(NamedTuple):
-    """A mission as it is read from a file, and the items to be sent; parts of the file for which there are
-    none, and notes about others."""
+    """A mission as it is read from a file of another ground station, and the items to be sent; parts of the
+    file for which there are none, and notes about others; and the numbers of the items in the file."""
 
     mission: Mission
     lists: ItemLists
-    left_out: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+    numbers: FileNumbers
 
 
 def _read_foreign(path: Path) -> _ReadFile:
     """The content of a file of another ground station; FormatError says what is wrong with it."""
     plan = read_foreign(path)
     home = planned_home(plan)
-    items, left_out, kept = check_plan(plan, home)
+    items, left_out, kept, numbers = check_plan(plan, home)
     place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
     return _ReadFile(
         mission_of(path.name, items, home),
         ItemLists(items, home, plan.fence or (), plan.rally or ()),
         tuple(left_out) if items else (*left_out, "nothing that can be flown"),
         (f"note: flown with home at {place}", *(f"note: {line}" for line in kept)),
+        numbers,
+    )
+
+
+def _in_file_terms(found: CheckResult, numbers: FileNumbers) -> CheckResult:
+    """The result, which counts steps and the items that are sent, with the numbers of the file."""
+    return replace(
+        found,
+        violations=tuple(
+            replace(one, item=numbers.of_step(one.item), text=numbers.in_step_text(one.text))
+            for one in found.violations
+        ),
+        paths=tuple(replace(one, item=numbers.of_step(one.item)) for one in found.paths),
+        warnings=tuple(map(numbers.in_step_text, found.warnings)),
+        refusals=tuple(map(numbers.in_vehicle_text, found.refusals)),
     )
 
 
@@ -222,25 +244,24 @@ def check_mission(
     GcsError if a custom `planner` fails to plan it.
     """
     path, limits = Path(name_or_path), load_limits(vehicle)
-    if foreign := is_foreign(path):
-        mission, lists, left_out, notes = _read_foreign(path)
+    if is_foreign(path):
+        mission, lists, left_out, notes, numbers = _read_foreign(path)
         if left_out:
             return CheckResult(mission.name, vehicle, (), (), notes, left_out)
     else:
-        mission, notes = load(name_or_path), ()
+        mission, notes, numbers = load(name_or_path), (), None
         lists = ItemLists(items_of(mission, Home()))
     table = autopilot_parameters(limits.vehicle)
     found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
-    reports = [] if found else path_reports(mission, limits, planner, not as_asked)
+    reports = [] if found else path_reports(mission, limits, planner, not as_asked, numbers)
     answer = Answer() if found else ask_supervisor(lists, table, not as_asked, planner)
     warnings = (
-        *notes,
         *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
         *margin_warnings(reports, vehicle, limits.vehicle),
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
     )
-    if not foreign:  # which `gcs fly` does not fly
+    if numbers is None:  # `gcs fly` flies it
         warnings += tuple(timeout_warnings(mission, reports, table))
         if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
             warnings += (
@@ -254,7 +275,8 @@ def check_mission(
     )
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
-    refusals = answer.refusals
-    if not foreign:  # whose items are numbered as they are sent
-        refusals = tuple(in_mission_terms(text, mission) for text in refusals)
-    return CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, refusals)
+    result = CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, answer.refusals)
+    if numbers is None:
+        return replace(result, refusals=tuple(in_mission_terms(text, mission) for text in result.refusals))
+    in_file_terms = _in_file_terms(result, numbers)
+    return replace(in_file_terms, warnings=(*notes, *in_file_terms.warnings))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
+from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for, require_delivered
 from autopilot.own.source import OwnError
 from autopilot.vehicle.file import load_truth_and_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
@@ -34,7 +34,7 @@ def check_flight_inputs(
 ) -> None:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot have its value, if a rate
     does not divide the rate that it must divide, or if custom code cannot fly. `ignored`: parameters in the
-    vehicle's file that have no effect."""
+    vehicle's file that have no effect, which it must have."""
     try:
         found, believed = load_truth_and_belief(vehicle)
         load_profile(sensors)
@@ -114,6 +114,7 @@ def split_settings(
 
 def _table(vehicle: Vehicle, own: OwnCode, ignored: Collection[str]) -> ParameterTable:
     try:
+        require_delivered(vehicle, ignored)
         return parameters_for(vehicle, own, ignored=ignored)
     except OwnError as error:
         raise InputError(str(error)) from None

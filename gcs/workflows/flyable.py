@@ -8,6 +8,7 @@ from autopilot.trajectory.feasibility import VehicleLimits, Violation, check
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
+from gcs.formats.missions import CheckedPlan
 from gcs.mission_items import items_of
 from gcs.workflows.flyable_marks import mark_flyable
 from gcs.workflows.mission_file import load
@@ -37,9 +38,12 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     return mission
 
 
-def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
-    """GcsError unless the vehicle can fly the mission of these items."""
-    require_flyable(mission_of(name, items, home), vehicle, True)
+def check_plan_items(name: str, checked: CheckedPlan, home: Home, vehicle: str) -> None:
+    """GcsError unless the vehicle can fly the items of this file of another ground station."""
+    try:
+        require_flyable(mission_of(name, checked.items, home), vehicle)
+    except GcsError as error:
+        raise GcsError(*map(checked.numbers.in_step_text, error.lines)) from None
 
 
 def mission_of(name: str, items: Sequence[WireItem], home: Home) -> Mission:

@@ -45,6 +45,7 @@ FIGURES = (  # of the record, that `--require` accepts
     "failed",
     "completed_fraction",
     "load_error_max_m",
+    "planned",
     "flown",
     "wall_s",
     "flights_per_s",

@@ -18,7 +18,7 @@ from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.before_flight import CHECKING_TEXT
-from gcs.workflows.flyable import check_items, load_checked
+from gcs.workflows.flyable import check_plan_items, load_checked
 from gcs.workflows.running_flight import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
@@ -63,10 +63,12 @@ def checked_upload(
 def _upload_foreign(
     session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> None:
-    items = _flyable_items(path, check_plan(plan, home := vehicle_home(session)), skip)
+    checked = check_plan(plan, home := vehicle_home(session))
+    items = _flyable_items(path, checked, skip)
     if not force:
         with notify_if_slow(CHECKING_TEXT):
-            check_items(path.name, items, home, vehicle)
+            check_plan_items(path.name, checked, home, vehicle)
+    counted = _as_counted(items, home, session)
     # the fence first: the vehicle checks the mission against it
     replaced = []
     for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
@@ -76,13 +78,16 @@ def _upload_foreign(
             if points:
                 print_line(text)
     try:
-        counted = _as_counted(items, home, session)
         print_line(session.run(MissionUpload(session.target, counted), "upload").text)
     except RefusedError as error:
+        before = (0,) * (
+            len(counted) - len(items)
+        )  # the home, which the vehicle counts and the file does not
+        numbers = checked.numbers._replace(items=before + checked.numbers.items)
+        text = numbers.in_vehicle_text(str(error))
         if replaced:
-            names = " and ".join(replaced)
-            raise RefusedError(f"{error}; the vehicle has {path.name}'s {names} now") from None
-        raise
+            text += f"; the vehicle has {path.name}'s {' and '.join(replaced)} now"
+        raise RefusedError(text) from None
 
 
 def _as_counted(items: Sequence[WireItem], home: Home, session: Session) -> Sequence[WireItem]:

@@ -25,6 +25,10 @@ _ARM_TOLERANCE = 0.1  # share of the arm by which the distances of the rotors ma
 THRUST_EXPO = 0.65
 
 
+class FrameError(ValueError):
+    """Third-party firmwares cannot fly the vehicle; the text says why."""
+
+
 class Frame(NamedTuple):
     """How a firmware's motors and flight controller are placed on a vehicle."""
 
@@ -58,9 +62,9 @@ class Frame(NamedTuple):
 
 
 def frame_of(layout: Layout, min_force_n: float, max_force_n: float) -> Frame:
-    """The frame of a vehicle whose rotors give these forces; ValueError if it is not an X."""
+    """The frame of a vehicle whose rotors give these forces; FrameError if it is not an X."""
     if not 0.0 <= min_force_n < max_force_n < inf:
-        raise ValueError(
+        raise FrameError(
             f"rotors of {min_force_n:g} to {max_force_n:g} N; a throttle needs rotors from 0 N or more to a "
             "finite force (rotor_min_n, rotor_max_n)"
         )
@@ -69,9 +73,9 @@ def frame_of(layout: Layout, min_force_n: float, max_force_n: float) -> Frame:
         if order:
             strengths = tuple(max_force_n * layout[rotor].strength for rotor in order)
             return Frame(order, strengths, min_force_n, mounting_yaw)
-    raise ValueError(
-        'rotors that make no quadrotor of the kind that firmwares fly: take frame = "x" or "plus" with four '
-        "rotors, spins in turn"
+    raise FrameError(
+        "ArduPilot, PX4 and Betaflight need four rotors with alternating spin, in an X or a plus "
+        '(frame = "x" or "plus")'
     )
 
 

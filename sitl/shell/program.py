@@ -31,6 +31,7 @@ from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator
+from sitl.interfaces.frame import FrameError
 from sitl.pacing import Pacing
 from sitl.sensors.shipped import PROFILES, ProfileError
 from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
@@ -200,6 +201,8 @@ def main(
         if not compiled:
             notify(COMPILING_TEXT)
         warm = build()  # compiles, or loads, every kernel
+        if kind.run is not None:
+            _ = warm.frame  # FrameError if no third-party firmware flies the vehicle
         warm_up(warm)
         warm.truth_datagram()
         warm.receive(b"")
@@ -238,6 +241,8 @@ def main(
                 run_lockstep(link, simulator, stop, notify, paced)
     except (VehicleFileError, ProfileError) as error:
         sys.exit(print_errors("sitl", EXIT_USAGE, *error.problems))
+    except FrameError as error:
+        sys.exit(print_errors("sitl", EXIT_USAGE, f"--vehicle {vehicle}: {error}"))
     except ParameterError as error:
         sys.exit(print_errors("sitl", EXIT_USAGE, str(error)))
     except ValueError as error:

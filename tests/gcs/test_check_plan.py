@@ -70,7 +70,7 @@ def test_a_mission_within_its_fence_passes(tmp_path: Path) -> None:
         (
             (place(OUTSIDE, 1.0, 0.0, 3.0),),
             (Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0)),
-            ["Mission denied: item 2 leads in an exclusion zone of the fence"],
+            ["Mission denied: item 2 leads into an exclusion zone of the fence"],
         ),
         (
             box(6.0, 0.0, 3.0),
@@ -112,7 +112,40 @@ def test_rally_points_beyond_the_fence_are_warned_of(tmp_path: Path) -> None:
     rally = tuple(place(mavlink.MAV_CMD_NAV_RALLY_POINT, 0.0, east, 0.0) for east in (1.0, 20.0))
     found = checked(tmp_path, box(3.0, 3.0, 6.0), CORNER, rally)
     assert found.exit_code == EXIT_DONE
-    assert "warning: Rally points outside the fence: 1; no return leads there\n" in found.stdout
+    assert "warning: Rally point 1 is outside the fence: no return leads there\n" in found.stdout
+
+
+def camera_plan(folder: Path, name: str, last: Waypoint, fence: tuple[WireItem, ...] = ()) -> Path:
+    """A file with an item that is kept before its waypoints; the last one is item 3 of the mission."""
+    first, *rest = encode_steps((Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), last, Land()), HOME)
+    path = folder / name
+    write_foreign(
+        path, (first, place(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 25.0, 0.0, 0.0), *rest), HOME, fence
+    )
+    return path
+
+
+@pytest.mark.parametrize(("name", "home_rows"), [("x.plan", 0), ("x.waypoints", 1)])
+def test_the_items_of_a_file_have_one_number_each(tmp_path: Path, name: str, home_rows: int) -> None:
+    """That of the file, in which the home is a row of its own or not, and items are no steps."""
+    takeoff, camera, first, last = (number + home_rows for number in range(4))
+    path = camera_plan(tmp_path, name, Waypoint(6.0, 0.0, 2.0))
+    found = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs")
+    labels = [line.partition(" (")[0] for line in found.stdout.splitlines() if line.startswith("items[")]
+    assert labels == [f"items[{number}]" for number in (takeoff, first, last)]
+    assert f"note: item {camera}, DO_SET_CAM_TRIGG_DIST (206): kept" in found.stdout
+    record = json.loads(CliRunner().invoke(gcs, ["check", str(path), "--json"], prog_name="gcs").stdout)
+    assert [report["item"] for report in record["paths"]] == [takeoff, first, last]
+    low = camera_plan(tmp_path, name, Waypoint(6.0, 0.0, 0.1))
+    record = json.loads(CliRunner().invoke(gcs, ["check", str(low), "--json"], prog_name="gcs").stdout)
+    assert [(one["item"], one["text"].partition(":")[0]) for one in record["violations"]] == [
+        (last, f"items[{last}] (waypoint)")
+    ]
+    vehicle = tmp_path / "near.toml"
+    vehicle.write_text('believed = "bebop"\n[parameters]\nGF_MAX_HOR_DIST = 5.0\n', encoding="utf-8")
+    path = camera_plan(tmp_path, name, Waypoint(6.0, 0.0, 2.0))
+    found = CliRunner().invoke(gcs, ["check", str(path), "--vehicle", str(vehicle)], prog_name="gcs")
+    assert found.stdout.startswith(f"Mission denied: item {last} leads beyond the fence")
 
 
 def test_what_cannot_be_sent_is_a_refusal(tmp_path: Path) -> None:

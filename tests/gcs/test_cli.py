@@ -31,7 +31,7 @@ from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows import readiness as readiness_module
 from gcs.workflows import status as status_module
 from gcs.workflows import view as view_module
-from missions.model import Land, Signals, Sine, Takeoff, Term
+from missions.model import Land, Signals, Sine, Takeoff, Term, Waypoint
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -533,6 +533,20 @@ def test_a_waypoint_in_the_first_place_is_not_taken_for_the_home(live, tmp_path,
         assert vehicle.mission[0].z == 0.0
 
 
+@pytest.mark.parametrize(
+    ("autopilot", "refused_item"), [(mavlink.MAV_AUTOPILOT_PX4, 2), (mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, 3)]
+)
+@pytest.mark.parametrize(("ending", "number"), [(".plan", 2), (".waypoints", 3)])
+def test_a_refused_item_has_its_number_in_the_file(live, tmp_path, autopilot, refused_item, ending, number):
+    vehicle, port = live
+    vehicle.autopilot, vehicle.refuse_item = autopilot, refused_item
+    file = tmp_path / f"in{ending}"
+    write_foreign(file, encode_steps([Waypoint(float(k), 0.0, 2.0) for k in range(3)], Home()), Home())
+    result = run("upload", str(file), "--force", "--connect", port)
+    assert result.exit_code == EXIT_ERROR
+    assert result.stderr.startswith(f"gcs: upload: item {number} refused: ")
+
+
 def test_a_refused_mission_of_a_plan_says_that_its_fence_was_taken(live, tmp_path):
     vehicle, port = live
     file = tmp_path / "in.plan"
@@ -558,7 +572,7 @@ def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):
     assert (refused.exit_code, refused.stdout) == (EXIT_ERROR, "")
     head, end, fall = refused.stderr.splitlines()
     assert head == "gcs: in.plan cannot be flown by vehicle bebop; --force tries:"
-    assert end.startswith("gcs: items[1] (signals): at 5.0 s, its end, the load still moves at ")
+    assert end.startswith("gcs: items[3] (signals): at 5.0 s, its end, the load still moves at ")
     assert "the load would have to fall" in fall
     assert run("upload", str(file), "--force", "--connect", port).exit_code == EXIT_DONE
 

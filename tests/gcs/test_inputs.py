@@ -119,6 +119,14 @@ def test_a_setting_that_cannot_be_is_refused_with_what_there_is(setting, part):
     assert refused("fly", "hover", "--set", setting).startswith(f"gcs: {part}")
 
 
+def test_a_parameter_to_be_ignored_is_one_of_the_vehicles(tmp_path):
+    file = tmp_path / "mine.toml"
+    plumbline.Vehicle.load("bebop").replace(name="mine", parameters={"MY_GAIN": 3, "MIS_SPEED": 1}).save(file)
+    line = refused("fly", "hover", "--vehicle", str(file), "--ignore", "my_gain", "--ignore", "NOPE")
+    assert line == "gcs: --ignore NOPE: not among the vehicle's parameters; there are MY_GAIN, MIS_SPEED"
+    check_flight_inputs(str(file), "lab", [], ignored=["MY_GAIN"])
+
+
 def test_settings_of_both_programs_are_taken():
     check_flight_inputs("thesis", "ideal", [("SIM_WIND_E", 3.0), ("SIM_LOSS_PCT", 5.0), ("NGC_KX", 5.0)])
 

@@ -166,7 +166,10 @@ def one_after_another(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("one_after_another")
 @pytest.mark.parametrize(
     ("required", "code"),
-    [(("completed_fraction >= 0.99", "load_error_max_m < 0.05"), 0), (("completed_fraction > 1",), 4)],
+    [
+        (("completed_fraction >= 0.99", "planned == 2", "load_error_max_m < 0.05"), 0),
+        (("completed_fraction > 1",), 4),
+    ],
 )
 def test_a_sweep_is_judged_as_a_whole(required: tuple[str, ...], code: int, tmp_path: Path) -> None:
     words = [word for text in required for word in ("--require", text)]

@@ -335,6 +335,26 @@ def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> Non
     assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        (mavlink.MAV_CMD_NAV_LAND,),
+        (mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, 1.0),
+        (mavlink.MAV_CMD_CONDITION_YAW, 90.0),
+        (mavlink.MAV_CMD_DO_SET_ROI_NONE,),
+    ],
+)
+def test_nothing_is_flown_and_no_nose_is_turned_while_the_simulator_is_silent(command: Any) -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.begin()
+    craft.run(at_phase(Phase.LIFT))
+    craft.onboard.set_simulator_silent(True)
+    assert craft.command(*command) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    assert craft.texts[-1] == "Not flown: the simulator is silent"
+    craft.onboard.set_simulator_silent(False)
+    assert craft.command(*command) == ACCEPTED
+
+
 @pytest.mark.parametrize(("given", "believed"), [({}, 30.0), ({"VEH_IMU_DELAY": 20.0}, 20.0)])
 def test_latency_of_the_sensors_is_believed_unless_a_belief_is_given(
     given: dict[str, float], believed: float
@@ -456,6 +476,14 @@ def test_items_behind_a_landing_are_reported(behind: tuple[Step, ...]) -> None:
     found = [(text.severity, text.text) for text in craft.onboard.endpoint.kept_texts.texts]
     told = (mavlink.MAV_SEVERITY_WARNING, "Mission ends with the landing of item 2; no later item is flown")
     assert (told in found) == bool(behind)
+
+
+@pytest.mark.parametrize(("count", "items"), [(1, "item 1"), (2, "items 1, 2")])
+def test_items_that_are_kept_but_not_flown_are_named(count: int, items: str) -> None:
+    camera = WireItem(2, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0, 1, 25.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+    craft = Craft(Takeoff(2.0), *[camera] * count, Land())
+    found = [(text.severity, text.text) for text in craft.onboard.endpoint.kept_texts.texts]
+    assert (mavlink.MAV_SEVERITY_INFO, f"Kept, but not flown: {items}") in found
 
 
 def test_it_tells_in_which_run_of_the_simulated_world_it_flies() -> None:

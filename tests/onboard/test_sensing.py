@@ -106,7 +106,11 @@ def test_rally_points_outside_the_fence_are_told_whichever_comes_first() -> None
         for kind, items in order:
             assert not [text for text in kept_texts(craft) if "Rally" in text]
             craft.onboard.set_areas(kind, items)
-        assert "Rally points outside the fence: 1; no return leads there" in kept_texts(craft)
+        assert "Rally point 1 is outside the fence: no return leads there" in kept_texts(craft)
+    craft = Craft()
+    for kind, items in (second, (rally_kind, rally + rally[1:])):
+        craft.onboard.set_areas(kind, items)
+    assert "Rally points 1, 2 are outside the fence: no return leads there" in kept_texts(craft)
     craft = Craft(GF_ACTION=0.0)
     for kind, items in (first, second):
         craft.onboard.set_areas(kind, items)

@@ -40,6 +40,11 @@ def invoke(tmp_path: Path):
         (sitl, ["--real-time", "--lockstep"], "--lockstep and --real-time exclude each other"),
         (autopilot, ["--vehicle", "nothing"], "unknown vehicle 'nothing'; shipped: "),
         (autopilot, ["--law", "nothing"], "--law 'nothing': no control law of that name; "),
+        (
+            autopilot,
+            ["--ignore", "NGC_KX"],
+            "--ignore NGC_KX: not among the vehicle's parameters; there are none",
+        ),
         (autopilot, ["--set", "NGC_KX=1e9"], "NGC_KX = 1000000000.0"),
         (autopilot, ["--gcs", "0"], "must be PORT or HOST:PORT, with a port of 1 ... 65535"),
     ],

@@ -54,3 +54,16 @@ def test_the_clock_is_that_of_the_wall_unless_another_is_asked_for(
     assert (result.exit_code, run) == (0, [(loop, speed)]), result.output
     told = "in lockstep" if speed is None else f"at {speed:g} x real time"
     assert f"250 Hz {told}" in result.stdout
+
+
+@pytest.mark.parametrize("firmware", ["ardupilot", "px4", "betaflight"])
+def test_a_vehicle_that_the_firmware_cannot_fly_is_refused_before_it_is_waited_for(
+    kept: None, firmware: str
+) -> None:
+    places = [word for name in ("--listen", "--truth") for word in (name, str(free_port()))]
+    result = CliRunner().invoke(program.main, [*places, "--for", firmware, "--vehicle", "hexarotor"])
+    assert result.exit_code == 2 and "waiting for" not in result.stdout
+    assert result.stderr == (
+        "sitl: --vehicle hexarotor: ArduPilot, PX4 and Betaflight need four rotors with alternating spin, "
+        'in an X or a plus (frame = "x" or "plus")\n'
+    )

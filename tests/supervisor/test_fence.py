@@ -123,6 +123,21 @@ def test_a_takeoff_beyond_it_is_refused(armed: bool) -> None:
     assert sky.ask(Takeoff(6.0)).result == ACCEPTED
 
 
+@pytest.mark.parametrize("force", [False, True])
+def test_a_takeoff_that_waits_for_arming_is_refused_if_the_fence_was_lowered_meanwhile(force: bool) -> None:
+    sky = fenced()
+    assert sky.ask(Takeoff(6.0)).result == ACCEPTED
+    sky.settings = replace(sky.settings, fence=replace(sky.settings.fence, height_m=4.0))
+    before = sky.flight
+    verdict = sky.ask(Arm(True, force))
+    assert (sky.flight, verdict.result) == (before, DENIED)
+    assert verdict.text == (
+        "Take-off denied: beyond the fence, GF_MAX_VER_DIST 4 m above home (vehicle at 6.70 m)"
+    )
+    assert sky.ask(Takeoff(3.0)).result == ACCEPTED
+    assert sky.ask(Arm(True, force)).result == ACCEPTED
+
+
 def test_a_fence_that_is_switched_off_stops_nobody() -> None:
     sky = fenced().airborne()
     assert sky.ask(EnableFence(False)).result == ACCEPTED
@@ -167,7 +182,7 @@ def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
     # the way between two good places leads through the exclusion zone
     through = (model.Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
     verdict = sky.ask(ReplaceMission(3, tuple(LocatedStep(i, i, step) for i, step in enumerate(through))))
-    assert verdict.text == "Mission denied: item 2 leads in an exclusion zone of the fence"
+    assert verdict.text == "Mission denied: item 2 leads into an exclusion zone of the fence"
     free = fenced(*steps, action=0)
     assert free.ask(ReplaceMission(3, located)).result == ACCEPTED
 

@@ -138,7 +138,7 @@ def test_every_step_ends_where_the_timeline_says(steps: tuple[Step, ...]) -> Non
 SQUARE = Polygon(True, ((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)))
 FENCE = Fence((SQUARE, Disc(False, (0.0, 3.0), 1.0)))
 AROUND = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 4.5, 2.0), Waypoint(0.0, 4.5, 2.0))
-ZONE, OUTSIDE = "in an exclusion zone of the fence", "outside the fence"
+ZONE, OUTSIDE = "into an exclusion zone of the fence", "outside the fence"
 
 
 def fenced(*steps: Step, home: Vec3 = ZERO, fence: Fence = FENCE, **changes: Any) -> Sky:

@@ -218,6 +218,20 @@ def test_in_the_air_rotors_stop_by_force_only(phase: Phase) -> None:
     assert verdict == Verdict(ACCEPTED, "Disarmed in the air by force", warns=True)
 
 
+def test_after_a_termination_the_vehicle_is_armed_later_and_needs_no_disarming() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(R.Terminate()).result == ACCEPTED
+    sky.wait(1.0)
+    given_up = sky.flight
+    for force in (False, True):
+        verdict = sky.ask(R.Arm(True, force))
+        assert (sky.flight, verdict.result) == (given_up, LATER)
+        assert verdict.text == "Arming denied: flight terminated, wait 2.0 s"
+    assert sky.ask(R.RunPrearmChecks()).text.startswith("flight terminated, wait 2.0 s")
+    assert (sky.ask(R.Arm(False, False)), sky.flight) == (YES, given_up)
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED, 2.1)
+
+
 def test_a_return_before_the_load_is_lifted_lands_beside_it() -> None:
     sky = Sky()
     assert sky.ask(R.Arm(True, False)).result == ACCEPTED

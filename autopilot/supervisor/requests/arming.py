@@ -12,8 +12,8 @@ from autopilot.supervisor.heading import with_heading_before_flight
 from autopilot.supervisor.machine import transition, try_transition
 from autopilot.supervisor.requests.mission import start_at_current_step
 from autopilot.supervisor.requests.modes import hold
-from autopilot.supervisor.requests.takeoff import start_takeoff
-from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied
+from autopilot.supervisor.requests.takeoff import start_takeoff, takeoff_problem
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, temporarily_denied
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     ON_GROUND,
@@ -25,6 +25,7 @@ from autopilot.supervisor.state import (
     fence_problem,
     interrupt_mission,
 )
+from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US
 from autopilot.wire.dialect import plumbline as mavlink
 
 GROUND_SPEED_M_S = 0.3  # a vehicle that moves faster is not armed
@@ -35,6 +36,9 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
     """What keeps the vehicle from being armed, in words."""
     # `view.estimate_problems` are the estimator's: `autopilot.estimation.filter.problem_texts`
     problems = [*chain.from_iterable(flight.external_arming_problems.values()), *view.estimate_problems]
+    if flight.phase == Phase.FAILSAFE:
+        left_s = 1e-6 * (flight.phase_start_us + FAILSAFE_DISARM_US - view.now_us)
+        problems.insert(0, f"flight terminated, wait {left_s:.1f} s")
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         problems.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
@@ -51,6 +55,8 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
     if not request.arm:
         if flight.phase == Phase.DISARMED:
             return hold(flight, request, view, settings)
+        if flight.phase == Phase.FAILSAFE and not request.force:
+            return flight, ACCEPTED  # the rotors stand already
         in_air = flight.phase not in ON_GROUND
         if in_air and not request.force:
             return flight, denied("Disarming denied: in the air")
@@ -58,9 +64,11 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
         if after is None:
             return flight, denied("Disarming denied")
         return after, Verdict(ACCEPTED.result, "Disarmed in the air by force", True) if in_air else ACCEPTED
-    if flight.phase != Phase.DISARMED:
+    if flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
         return flight, ACCEPTED  # already armed: answered as PX4 and ArduPilot do
     problems = arming_problems(flight, view, settings)
+    if flight.phase == Phase.FAILSAFE:
+        return flight, temporarily_denied(f"Arming denied: {problems[0]}")
     if problems and not request.force:
         return flight, denied(f"Arming denied: {problems[0]}")
     after = transition(with_heading_before_flight(flight, view), Event.ARM, view, settings)
@@ -68,6 +76,10 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
         started, verdict = start_at_current_step(after, view, settings)
         return (started if verdict.result == ACCEPTED.result else flight), verdict
     if flight.action_when_armed == ActionWhenArmed.TAKEOFF:
+        # the fence may have been changed since the take-off was requested
+        problem = takeoff_problem(after, after.mission.takeoff_altitude_m, view, settings)
+        if problem:
+            return flight, denied(f"Take-off denied: {problem}")
         return start_takeoff(after, view, settings), ACCEPTED
     return after, ACCEPTED
 

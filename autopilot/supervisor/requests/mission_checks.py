@@ -154,7 +154,7 @@ def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
     for seq, entry in ahead:
         reason = _violation_of_step(flight, entry, settings)
         if reason:
-            return f"item {seq} leads {reason}"
+            return f"item {seq} {_leading(reason)}"
     return ""
 
 
@@ -162,7 +162,15 @@ def forbidden_rally_text(flight: Flight, settings: Settings) -> str:
     """A warning that names the rally points that the fence forbids; empty if there are none."""
     places = enumerate(flight.area.rally[:MAX_CHECKED_RALLY])
     outside = [number for number, place in places if fence_problem(flight, place, settings)]
-    return f"Rally points outside the fence: {listed(outside)}; no return leads there" if outside else ""
+    if not outside:
+        return ""
+    points = "point {} is" if len(outside) == 1 else "points {} are"
+    return f"Rally {points.format(listed(outside))} outside the fence: no return leads there"
+
+
+def _leading(reason: str) -> str:
+    """What leads to a place where the load may not be, with the reason: into a zone, or beyond the fence."""
+    return f"leads {'into' + reason.removeprefix('in') if reason.startswith('in ') else reason}"
 
 
 def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
@@ -203,7 +211,7 @@ def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings
             places = _points_on_curve(path, entry)
             reason = _first_violation(flight, entry, places, settings)
             if reason and not _first_violation(flight, entry, (entry.begin,), settings):
-                return f"the curve to item {seq} leads {reason}"
+                return f"the curve to item {seq} {_leading(reason)}"
     return ""
 
 

@@ -25,13 +25,18 @@ def start_takeoff(flight: Flight, view: View, settings: Settings) -> Flight:
     return transition(at_speed, takeoff_event(flight), view, settings)
 
 
+def takeoff_problem(flight: Flight, altitude_m: float, view: View, settings: Settings) -> str:
+    """Why the fence forbids to take off to this height here; an empty string if it does not."""
+    here = view.x_quad if flight.cable.released else view.x_load
+    return fence_problem(flight, (here[0], here[1], altitude_m), settings)
+
+
 def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -> Decision:
     """Take off to a height of the load; if the vehicle is disarmed, as soon as it is armed."""
     altitude = settings.motion.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
     if not altitude >= MIN_ALTITUDE_M:
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {MIN_ALTITUDE_M} m")
-    here = view.x_quad if flight.cable.released else view.x_load
-    problem = fence_problem(flight, (here[0], here[1], altitude), settings)
+    problem = takeoff_problem(flight, altitude, view, settings)
     if problem:
         return flight, denied(f"Take-off denied: {problem}")
     requested = replace(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def test_the_load_is_off_the_cable_from_the_moment_it_is_let_go() -> None:
     flight = flights.delivery()
     telemetry = flight.telemetry()
     (released,) = [time for time, _, text in flight.texts if text == "Load released"]
-    on = attached(telemetry.load_truth)
+    on = attached(telemetry.load_truth, flights.CABLE_M)
     np.testing.assert_array_equal(on, flight.time_s < released - 1e-9)
     numbers = flight_record(telemetry, FlightMeta(), samples_of(telemetry))
     assert numbers["swing_max_deg"] == pytest.approx(0.0, abs=1e-3)
@@ -107,7 +108,24 @@ def test_a_slack_cable_is_a_cable() -> None:
     slack = np.flatnonzero(flight.mission)[100:120]
     flight.taut[slack] = 0
     flight.distance[slack] -= 0.1
-    assert attached(flight.telemetry().load_truth).all()
+    assert attached(flight.telemetry().load_truth, flights.CABLE_M).all()
+
+
+def test_a_load_that_was_let_go_before_the_log_gives_no_figures() -> None:
+    flight = flights.delivery()
+    flight.taut[:] = 0
+    flight.tension[:] = 0.0
+    told = replace(flight.telemetry(), parameters={"VEH_CABLE_LEN": flights.CABLE_M})
+    numbers = flight_record(told, FlightMeta(), samples_of(told))
+    load_figures = (
+        *("swing_max_deg", "tension_min_n", "tension_max_n", "slack_events"),
+        *("load_speed_max_m_s", "estimator_error_max_m"),
+    )
+    assert {name: numbers[name] for name in load_figures} == dict.fromkeys(load_figures)
+    true_length = replace(told, parameters={"VEH_CABLE_LEN": flights.CABLE_M, "SIM_CABLE_LEN": 10.0})
+    assert samples_of(true_length).attached.all(), "of the two lengths the true one counts"
+    unknown = replace(told, parameters={})
+    assert samples_of(unknown).attached.all()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
-from sitl.interfaces.frame import Frame, frame_of
+from sitl.interfaces.frame import Frame, FrameError, frame_of
 
 # motors 1 to 4 as ArduPilot and PX4 document their quadrotor X: forward, left, counterclockwise
 DOCUMENTED = ((1, -1, True), (-1, 1, True), (1, 1, False), (-1, -1, False))
@@ -74,10 +74,10 @@ def test_throttles_beyond_their_range_are_cut() -> None:
     ("name", "changes", "told"),
     [
         ("thesis", {}, "finite force"),
-        ("hexarotor", {}, "four rotors"),
-        ("iris", {"spin": "+-+-"}, "spins in turn"),
+        ("hexarotor", {}, "four rotors with alternating spin"),
+        ("iris", {"spin": "+-+-"}, "four rotors with alternating spin"),
     ],
 )
 def test_a_vehicle_that_no_firmware_flies_is_refused(name: str, changes: dict[str, str], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(FrameError, match=told):
         framed(load_vehicle(name).model_copy(update=changes))
