@@ -141,9 +141,14 @@ def wind_gusts() -> str:
     borne = max(levels(of("wind-gusts"), GUSTS, whole))
     beyond = [cell for cell in of("wind-gusts") if cell[GUSTS] > borne]
     flown, completed = (sum(cell[key] for cell in beyond) for key in ("flown", "completed"))
+    lost = (
+        f" With more gusts {flown - completed} of {flown} flights are lost, most of them {lost_most(beyond)}."
+        if beyond
+        else ""
+    )
     return f"""All flights complete up to {max(cell[WIND] for cell in of("wind-gusts")):g} m/s of steady wind with gusts of {borne:g} m/s; the error of {calm[0.0]:.0f} mm in still air becomes {calm[5.0]:.0f} at 5 m/s and {calm[10.0]:.0f} at 10 m/s
 without gusts, and {mm(error(of("wind-gusts", **{WIND: 10.0, GUSTS: borne})))} at 10 m/s with gusts of {borne:g} m/s: the autopilot detects a gust only by its effect, and the
-error grows with the wind because drag is quadratic. With more gusts {flown - completed} of {flown} flights are lost, most of them {lost_most(beyond)}.
+error grows with the wind because drag is quadratic.{lost}
 """
 
 
