@@ -30,8 +30,8 @@ from autopilot.control.thesis_cascade import (
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 
-# tan 35 deg: the slack phases need no greater tilt
-_TILT_TANGENT = 0.7
+# tan 45 deg
+_TILT_TANGENT = 1.0
 # least and greatest upward force, in weights
 _MIN_LIFT = 0.2
 _MAX_LIFT = 1.6
@@ -66,7 +66,7 @@ def position_force(
 
 @kernel
 def limited_force(F: Vec3, weight: float) -> Vec3:
-    """F with an upward part of 0.2 to 1.6 weights, and no more than 35 deg from the vertical."""
+    """F with an upward part of 0.2 to 1.6 weights, and no more than 45 deg from the vertical."""
     up = min(_MAX_LIFT * weight, max(_MIN_LIFT * weight, F[2]))
     sideways = norm((F[0], F[1], 0.0))
     shrink = min(1.0, _TILT_TANGENT * up / max(sideways, 1e-9))
