@@ -182,7 +182,7 @@ class RunningVehicle:
         """Fly the load to a position and hold it there; without `up_m` at its present height.
 
         The load has arrived when it is within 0.1 m of the position and slower than 0.1 m/s. A mission that
-        is being flown ends.
+        is being flown ends. After a release the position is that of the vehicle.
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
@@ -191,7 +191,16 @@ class RunningVehicle:
         self._require_armed("goto")
         self._command(lambda session: reposition(session, place, False, checked_speed_m_s).operation)
         if wait:
-            self.wait(lambda state: _has_arrived(state, place), limit_s)
+            self.wait(lambda state: self._has_arrived(state, place), limit_s)
+
+    def _has_arrived(self, state: State, place: tuple[float, float, float | None]) -> bool:
+        position, speed_m_s = self._session.view.motion_without_load or (state.load_m, state.load_speed_m_s)
+        if position is None or speed_m_s is None:
+            return False
+        offsets = [
+            actual - wanted for actual, wanted in zip(position, place, strict=True) if wanted is not None
+        ]
+        return math.hypot(*offsets) < _NEAR_M and speed_m_s < _SLOW_M_S
 
     @checked_flags
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
@@ -458,12 +467,3 @@ def _winch_stands() -> Condition:
         return now_s - still_since_s > _STILL_S
 
     return condition
-
-
-def _has_arrived(state: State, place: tuple[float, float, float | None]) -> bool:
-    if state.load_m is None or state.load_speed_m_s is None:
-        return False
-    offsets = [
-        actual - wanted for actual, wanted in zip(state.load_m, place, strict=True) if wanted is not None
-    ]
-    return math.hypot(*offsets) < _NEAR_M and state.load_speed_m_s < _SLOW_M_S

@@ -265,24 +265,31 @@ def _hover_violations(limits: VehicleLimits) -> list[Violation]:
 
 
 def _balance_violations(limits: VehicleLimits) -> list[Violation]:
-    """The violation of a vehicle that its load tips over, since the cable is attached too far from the centre
-    of mass; empty if its rotors hold it level."""
+    """The violation of a vehicle whose rotors cannot hold it level, because the cable is attached too far
+    from the centre of mass or because of their own limits; empty if they can."""
     vehicle = limits.vehicle
     forward, left, _ = vehicle.attachment_m
     load_n = vehicle.load_mass_kg * vehicle.gravity_m_s2
     total_n = load_n + vehicle.quad_mass_kg * vehicle.gravity_m_s2
     arm_m = vehicle.arm_m
     demand = np.array([total_n, load_n * left / arm_m, -load_n * forward / arm_m, 0.0])
-    forces_n = np.array(limits.body.efforts) @ demand
-    if not vehicle.limited or vehicle.rotor_min_n <= forces_n.min() <= forces_n.max() <= vehicle.rotor_max_n:
+    efforts = np.array(limits.body.efforts)
+    forces_n = efforts @ demand
+
+    def are_within_limits(forces_n: Array) -> bool:
+        return bool(vehicle.rotor_min_n <= forces_n.min() and forces_n.max() <= vehicle.rotor_max_n)
+
+    if not vehicle.limited or are_within_limits(forces_n):
         return []
     is_low = forces_n.min() < vehicle.rotor_min_n
     value, limit = (forces_n.min(), vehicle.rotor_min_n) if is_low else (forces_n.max(), vehicle.rotor_max_n)
-    beside_m, bound = np.hypot(forward, left), "least" if is_low else "most"
-    text = (
-        f"the cable is attached {beside_m:.2f} m beside the centre of mass: to hover, one rotor "
-        f"must give {value:.2f} N and gives {limit:.2f} N at {bound}; lower attachment_m"
-    )
+    bound = "least" if is_low else "most"
+    text = f"to hover, one rotor must give {value:.2f} N and gives {limit:.2f} N at {bound}"
+    if are_within_limits(efforts @ [total_n, 0.0, 0.0, 0.0]):
+        beside_m = np.hypot(forward, left)
+        text = f"the cable is attached {beside_m:.2f} m beside the centre of mass: {text}; lower attachment_m"
+    else:
+        text += "; lower rotor_min_n" if is_low else "; raise rotor_max_n"
     return [Violation(0, "rotor force", float(value), limit, 0.0, text)]
 
 

@@ -138,6 +138,8 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
         "attachment_x_m": attached_x,
         "attachment_y_m": attached_y,
         "attachment_z_m": attached_z,
+        "gear_height_m": belief.gear_height_m,
+        "load_radius_m": belief.load_radius_m,
         "battery_cells": float(belief.battery_cells),
         "battery_capacity_mah": belief.battery_capacity_mah,
         "battery_resistance_ohm": belief.battery_resistance_ohm,

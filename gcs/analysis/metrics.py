@@ -262,11 +262,11 @@ def clock_numbers(telemetry: Telemetry) -> Numbers:
 def coverage_numbers(samples: Samples) -> Numbers:
     """Completeness of the capture, which limits the accuracy of the numbers above."""
     window = samples.in_mission
-    stamps = samples.time_s[window]
+    steps_s = np.diff(samples.time_s)[window[1:] & window[:-1]]  # none across a pause
     error = samples.error_m[samples.position_tracked]
     return {
         "samples": int(window.sum()),
-        "gap_max_s": float(np.diff(stamps).max()) if len(stamps) > 1 else None,
+        "gap_max_s": float(steps_s.max()) if len(steps_s) else None,
         "matched_fraction": float(np.isfinite(error).all(axis=1).mean()) if len(error) else None,
     }
 

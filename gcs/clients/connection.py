@@ -64,6 +64,10 @@ class Connection:
         """When `poll` has something to send again."""
         return self._next_heartbeat_us or 0
 
+    def send_heartbeat_at_once(self) -> None:
+        """Have the next `poll` return our heartbeat, however recent the last one is."""
+        self._next_heartbeat_us = None
+
     def poll(self, now_us: int) -> list[bytes]:
         """Our heartbeat, once a second."""
         if self._next_heartbeat_us is not None and now_us < self._next_heartbeat_us:

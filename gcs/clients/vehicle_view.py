@@ -197,6 +197,17 @@ class VehicleView:
         return error if math.isfinite(error) else None
 
     @property
+    def motion_without_load(self) -> tuple[tuple[float, float, float], float] | None:
+        """Position (east, north, up) and speed of the vehicle while its own position is controlled, as after
+        a release: position commands then refer to the vehicle."""
+        setpoint, motion = self.latest.get("LOAD_SETPOINT"), self.latest.get("LOCAL_POSITION_NED")
+        if setpoint is None or setpoint.control_mode != mavlink.PLUMBLINE_CONTROL_QUAD_POSITION:
+            return None
+        if motion is None:
+            return None
+        return (motion.y, motion.x, -motion.z), math.hypot(motion.vx, motion.vy, motion.vz)
+
+    @property
     def rotor_use(self) -> float | None:
         """The greatest rotor force over its limit; None for a vehicle without limits."""
         rotors = self.latest.get("ROTOR_STATE")

@@ -97,7 +97,8 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Folder for table and picture.  [default: replays/NAME, after the flight's folder or file]",
+    help="Folder for table and picture; those of an earlier replay are replaced.  [default: replays/NAME, "
+    "after the flight's folder or file]",
 )
 @json_option
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:

@@ -60,7 +60,7 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
 
     Each line is one mission item as transferred; null and - stand for values that are not given. With FILE,
     which must end in .plan or .waypoints, the mission is written for other ground stations, a .plan with
-    fence and rally points.
+    fence and rally points. An existing FILE is replaced.
     """
     if file is not None and not is_foreign(file):
         raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from gcs.errors import InputError
 from gcs.recorded.motion import Motion
 from gcs.recorded.smoothing import Floats
 
+TABLE_FILE, PICTURE_FILE = "load.csv", "load.png"
 _HEADER = "time_s,load_x_m,load_y_m,load_z_m,sd_x_m,sd_y_m,measured_x_m,measured_y_m,measured_z_m"
+
+
+def check_no_other_files(folder: Path) -> None:
+    """InputError if a folder contains a file of these names that is not of an earlier replay."""
+    with suppress(OSError), (folder / TABLE_FILE).open("rb") as file:
+        if file.readline().strip() == _HEADER.encode():
+            return
+    for name in (TABLE_FILE, PICTURE_FILE):
+        if (folder / name).exists():
+            raise InputError(
+                f"{folder}: holds a {name} that is not of a replay; name another folder by --out"
+            )
 
 
 def write_table(path: Path, motion: Motion, load: Floats, sd: Floats) -> None:

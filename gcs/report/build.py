@@ -46,6 +46,7 @@ def build_report(
     progress: Progress | None = None,
     figures: Callable[[Record], None] | None = None,
     all_pictures: bool = False,
+    check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
 
@@ -53,6 +54,7 @@ def build_report(
     if given, is that of a new flight, and an earlier report in the directory is deleted; otherwise meta.json
     beside the log is read. A log that is truncated, empty or of a lost flight gives a record too, with None
     for what cannot be known. With `all_pictures`, the pictures that the page does not need are drawn too.
+    `check` is called with the record before anything is written, and may raise an error.
     """
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View
@@ -79,6 +81,8 @@ def build_report(
         telemetry = load_telemetry(tlog_path)
         samples = samples_of(telemetry)
         record = flight_record(telemetry, meta, samples)
+        if check is not None:
+            check(record)
         record["report_dir"] = str(out_dir)
         _write_json(out_dir / META_FILE, meta.to_json())
         _write_json(out_dir / SUMMARY_FILE, record)

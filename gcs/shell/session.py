@@ -176,6 +176,7 @@ class Session:
                 self.on_truth(datagram, now_us)
             for one in messages(datagram)[0]:
                 self.view.truth.put(one)
+        was_known = self._connection.target is not None
         for datagram in self._socket.drain():
             if self.on_received is not None:
                 self.on_received(datagram, now_us)
@@ -186,6 +187,9 @@ class Session:
                 self.view.update(one, now_us)
                 if operation is not None:
                     operation.receive(one.message, now_us)
+        if not was_known and self._connection.target is not None:
+            # heartbeats before had no address; a single command is over before the next one
+            self._connection.send_heartbeat_at_once()
 
     def close(self) -> None:
         self._socket.close()

@@ -18,7 +18,7 @@ from gcs.folders import PAGE_FILE, PLAN_FILE, check_no_other_results, make_folde
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
-from gcs.sweep.store import Row, Store
+from gcs.sweep.store import TABLE_FILE, Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
 
 STORE_INTERVAL_S = 5.0  # longest time between the end of a flight and its storage on disk
@@ -57,7 +57,7 @@ def sweep(
     which are otherwise compiled when they are first needed. GcsError if a flight cannot be stored.
     """
     store = Store(directory, plan)
-    check_no_other_results(directory, PLAN_FILE, (PAGE_FILE,))
+    check_no_other_results(directory, PLAN_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(directory)
     with reserved(directory, "gcs sweep"):
         if fresh:

@@ -19,6 +19,7 @@ import numpy as np
 
 from autopilot.own.law import law_name
 from autopilot.shell.atomic_file import write_atomically
+from gcs.errors import InputError
 from gcs.formats.arrow import array_of, path_for_arrow, text_array
 from gcs.sweep.flight import FlightResult
 from gcs.sweep.plan import Case, SweepPlan, from_json
@@ -95,6 +96,10 @@ def _distinct_flights(plan: SweepPlan) -> list[tuple[Any, ...]]:
     return flights
 
 
+def _damaged(path: Path) -> InputError:
+    return InputError(f"{path}: damaged, or no Parquet file; delete it, or name another folder by --out")
+
+
 class Store:
     """The flights of a sweep's directory."""
 
@@ -154,11 +159,22 @@ class Store:
 
     def _tables(self, names: list[str] | None = None) -> Iterator[pyarrow.Table]:
         """What each file holds, all columns or those of these names, numbered by the present plan."""
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
         for path in self._files():
-            file = pq.ParquetFile(path_for_arrow(path))  # `read_table` would import pandas
-            yield self._numbered(file.read(columns=names))
+            try:
+                file = pq.ParquetFile(path_for_arrow(path))  # `read_table` would import pandas
+                if METADATA_KEY not in (file.schema_arrow.metadata or {}):
+                    raise InputError(f"{path}: not the flights of a sweep; name another folder by --out")
+                table = file.read(columns=names)
+            except OSError as error:
+                if error.errno is not None:
+                    raise
+                raise _damaged(path) from None  # Arrow reports a damaged page so
+            except pa.ArrowException:
+                raise _damaged(path) from None
+            yield self._numbered(table)
 
     def _numbered(self, table: pyarrow.Table) -> pyarrow.Table:
         """The table of a file with its flights numbered by the present plan, which has all of them."""

@@ -80,9 +80,17 @@ def replay(
         length_warning,
         map_warning,
     )
-    from gcs.recorded.replay_files import write_picture, write_table
+    from gcs.recorded.replay_files import (
+        PICTURE_FILE,
+        TABLE_FILE,
+        check_no_other_files,
+        write_picture,
+        write_table,
+    )
 
     path = find_recording(path)
+    folder = out or REPLAYS_FOLDER / name_of(path)
+    check_no_other_files(folder)
     with notify_if_slow(_READING_TEXT, quiet):
         _, motion, model = _read(path, columns)
     with StepDisplay("estimating the load", quiet, long=True) as display:
@@ -103,11 +111,10 @@ def replay(
         load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
         sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
         display.update(0, 0, "writing table and picture")
-        folder = out or REPLAYS_FOLDER / name_of(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            write_table(folder / "load.csv", motion, load, sd)
-            write_picture(folder / "load.png", motion, load, sd)
+            write_table(folder / TABLE_FILE, motion, load, sd)
+            write_picture(folder / PICTURE_FILE, motion, load, sd)
         except OSError as error:
             raise write_error(error, folder) from None
     return record, folder

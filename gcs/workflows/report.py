@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,14 +32,16 @@ def make_report(
     quiet: bool,
     on_record: Callable[[Record], None] | None = None,
     all_pictures: bool = False,
+    check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Make the report in `out`; without `meta`, meta.json beside the log is used. `on_record` is called with
-    the record before anything is drawn. `all_pictures`: also those that the page does not contain."""
+    the record before anything is drawn. `all_pictures`: also those that the page does not contain.
+    `check` is called with the record before anything is written, and may raise an error."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update, on_record, all_pictures)
+            return build_report(tlog, out, meta, display.update, on_record, all_pictures, check)
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
@@ -103,10 +106,27 @@ def remake_report(
     tlog = find_log(source)
     default_folder = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else default_folder)
-    check_no_other_results(folder, TLOG_FILE)
-    if (folder / TLOG_FILE).exists() and not (folder / TLOG_FILE).samefile(tlog):
+    reported = (folder / SUMMARY_FILE).exists()
+    check_no_other_results(folder, TLOG_FILE, () if reported else (PAGE_FILE,))
+    holds_log = (folder / TLOG_FILE).exists()
+    if holds_log and not (folder / TLOG_FILE).samefile(tlog):
         raise InputError(f"{folder}: holds another flight; name another folder by --out")
-    return make_report(tlog, folder, None, quiet, all_pictures=all_pictures), folder
+    check = partial(_check_same_flight, folder) if out and reported and not holds_log else None
+    return make_report(tlog, folder, None, quiet, all_pictures=all_pictures, check=check), folder
+
+
+_MEASURED = ("recorded_s", "samples", "load_error_max_m", "rotor_force_max_n")  # distinguish flights
+
+
+def _check_same_flight(folder: Path, record: Record) -> None:
+    """InputError if the folder contains the report of another flight, whose log is elsewhere."""
+    try:
+        earlier = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
+        is_same = all(earlier[name] == record[name] for name in _MEASURED)
+    except (OSError, ValueError, TypeError, KeyError):
+        is_same = False
+    if not is_same:
+        raise InputError(f"{folder}: holds the report of another flight; name another folder by --out")
 
 
 def make_mcap(source: Path, folder: Path) -> Path:

@@ -19,7 +19,7 @@ LOAD_S = 2.0  # in which a vehicle reports the position of its load
 
 @dataclass(frozen=True)
 class Move:
-    """The command that sends the load to a position, and the distance of that position from the load."""
+    """The command that sends the load, or a vehicle that released it, to a position; how far that is."""
 
     operation: Operation
     distance_m: float  # NaN if the vehicle does not report the position of its load
@@ -46,14 +46,16 @@ def reposition(
     latitude, longitude, _ = geodetic_from_enu((east, north, up), origin)
     height_m = math.nan if offset[2] is None else up
     operation = command.reposition(session.target, latitude, longitude, height_m, speed_m_s)
-    if load is None:
+    alone = session.view.motion_without_load
+    body = load if alone is None else alone[0]
+    if body is None:
         return Move(operation, math.nan)
     destination = (
         east,
         north,
-        load[2] if offset[2] is None else up,
-    )  # without a height, the load keeps its own
-    return Move(operation, norm(sub(destination, load)))
+        body[2] if offset[2] is None else up,
+    )  # without a height, load or vehicle keeps its own
+    return Move(operation, norm(sub(destination, body)))
 
 
 def _home(session: Session, origin: Home) -> Vec3:

@@ -379,6 +379,15 @@ def test_single_commands(live):
     assert not vehicle.armed
 
 
+def test_a_single_command_is_preceded_by_a_heartbeat(live):
+    """The vehicle watches for the loss of a ground station only after it has heard its HEARTBEAT."""
+    vehicle, port = live
+    heard = []
+    vehicle.on_heartbeat = lambda message: heard.append((message.type, len(vehicle.commands)))
+    assert run("arm", "--connect", port).stdout == "arm: accepted\n"
+    assert heard == [(mavlink.MAV_TYPE_GCS, 0)]
+
+
 def test_a_vehicle_is_chosen_by_its_system_id(live, monkeypatch):
     vehicle, port = live
     assert run("arm", "--sysid", "1", "--connect", port).stdout == "arm: accepted\n"

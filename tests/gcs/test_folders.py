@@ -77,6 +77,23 @@ def test_the_report_of_a_log_does_not_take_the_place_of_another_flights(tmp_path
     assert list((tmp_path / "other").iterdir()) == [logs[1]]
 
 
+def test_the_report_of_a_log_does_not_take_the_place_of_another_logs(tmp_path: Path) -> None:
+    logs, out = [tmp_path / "one.tlog", tmp_path / "other.tlog"], tmp_path / "report"
+    for seconds, log in enumerate(logs, start=1):
+        recorded_flights.flight(float(seconds), recorded_flights.still).write(log)
+    for _ in range(2):  # the same log may be reported again
+        remake_report(logs[0], out, quiet=True)
+    before = {file.name: file.read_bytes() for file in out.iterdir()}
+    with pytest.raises(InputError, match=r"report: holds the report of another flight; name another folder"):
+        remake_report(logs[1], out, quiet=True)
+    assert {file.name: file.read_bytes() for file in out.iterdir()} == before
+    (out / SUMMARY_FILE).unlink()
+    with pytest.raises(
+        InputError, match=r"holds a report\.html that is not of a flight; name another folder"
+    ):
+        remake_report(logs[0], out, quiet=True)
+
+
 def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
     def interrupted(telemetry: bytes) -> None:
         with FlightFolder(tmp_path / "out", overwrite=False):

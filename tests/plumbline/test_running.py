@@ -10,8 +10,13 @@ from typing import Any
 import pytest
 
 import plumbline
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.datagrams import messages
 from gcs.clients.operation import Target
+from gcs.clients.vehicle_view import VehicleView
 from gcs.shell.link import UdpSocket, free_port
+from gcs.workflows.reposition import reposition
 from plumbline import RunningVehicle
 
 WRONG: dict[str, tuple[Any, str]] = {
@@ -98,7 +103,11 @@ class QuietSession:
         idle = threading.Event()
         while not done():
             idle.wait(0.001)
+            self.pass_time()
         return True
+
+    def pass_time(self) -> None:
+        """Nothing is heard."""
 
     def run(self, operation: Any) -> Any:
         """Every request is answered."""
@@ -126,3 +135,63 @@ def test_a_link_that_fails_while_it_listens_serves_the_next_request() -> None:
         for _ in range(4):
             vehicle.pause()
     assert session.failures == 0
+
+
+class ReportingSession(QuietSession):
+    """A session with a vehicle that has reported these messages, and does not move while its clock runs."""
+
+    lost = False
+
+    def __init__(self, *reported: Any) -> None:
+        super().__init__()
+        self.view = VehicleView()
+        self._time_us = 0
+        for message in reported:
+            self._hear(message)
+
+    def _hear(self, message: Any) -> None:
+        for received in messages(FrameWriter(1, 1).frame(message))[0]:
+            self.view.update(received, 0)
+
+    def pass_time(self) -> None:
+        """A second of the vehicle's clock."""
+        self._time_us += 1_000_000
+        errors = mavlink.MAVLink_cascade_errors_message(self._time_us, ZERO3, *[ZERO3] * 5, 0, 0, 0, ZERO3, 3)
+        self._hear(errors)
+
+    def request(self, message_id: int) -> Any:
+        """A message that was reported."""
+        return self.view.latest[mavlink.mavlink_map[message_id].msgname]
+
+
+ZERO3, REST, LEVEL = (0.0,) * 3, (0.0,) * 9, (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("control_mode", "here"),
+    [
+        (mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, (0.0, 0.0, 0.02)),
+        (mavlink.PLUMBLINE_CONTROL_QUAD_POSITION, (1.0, 0.5, 3.0)),
+    ],
+    ids=["with its load", "after a release"],
+)
+def test_what_position_commands_refer_to_is_awaited(
+    control_mode: int, here: tuple[float, float, float]
+) -> None:
+    """The load rests at home, and the vehicle flies at (1, 0.5, 3)."""
+    armed, estimated = mavlink.MAV_MODE_FLAG_SAFETY_ARMED, mavlink.PLUMBLINE_SOURCE_ESTIMATED
+    session = ReportingSession(
+        mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, armed, 0, 4, 3),
+        mavlink.MAVLink_gps_global_origin_message(473977420, 85455940, 0),
+        mavlink.MAVLink_home_position_message(473977420, 85455940, 0, 0, 0, 0, LEVEL, 0, 0, 0),
+        mavlink.MAVLink_load_state_message(0, 0.0, 0.0, -0.02, *REST, 0.7, 0.0, 0, 0, estimated),
+        mavlink.MAVLink_local_position_ned_message(0, 0.5, 1.0, -3.0, *ZERO3),
+        mavlink.MAVLink_load_setpoint_message(0, *REST, *ZERO3, 0.0, 0.0, 0, 0, control_mode),
+    )
+    with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
+        vehicle.goto(*here, timeout_s=2.0)
+        with pytest.raises(plumbline.Error, match="not within 2 s of the vehicle's clock"):
+            vehicle.goto(here[0], here[1], here[2] + 1.0, timeout_s=2.0)
+    for height_m in (here[2], None):  # without a height it keeps the one that it has
+        move = reposition(session, (here[0], here[1] + 2.0, height_m), False, None)  # type: ignore[arg-type]
+        assert move.distance_m == pytest.approx(2.0)

@@ -250,6 +250,14 @@ def test_a_load_that_tips_the_vehicle_over_is_found_by_the_law_of_the_lever(
     assert check(mission(), VehicleLimits(level)) == []
 
 
+def test_rotors_that_give_too_much_at_least_are_no_matter_of_the_attachment() -> None:
+    vehicle = WITHOUT_DRAG.model_copy(update={"rotor_min_n": 1.5})
+    (found,) = check(mission(), VehicleLimits(vehicle))
+    each_n = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2 / 4.0
+    told = f"to hover, one rotor must give {each_n:.2f} N and gives 1.50 N at least; lower rotor_min_n"
+    assert found.text == told
+
+
 def test_a_vehicle_that_can_hardly_lift_its_load_is_not_advised_to_change_what_a_takeoff_has_not() -> None:
     limits = replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update={"gravity_m_s2": 14.0}))
     found = check(Mission("up", "Up", "", (), (Takeoff(2.0), Delay(1.0), Land())), limits)

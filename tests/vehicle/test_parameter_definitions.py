@@ -51,6 +51,8 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert table["VEH_ROTOR_LIM"] == float(belief.limited)
     assert table["QP_KZ"] == pytest.approx(16.0 * belief.quad_mass_kg)
     truth = load_truth(name)
+    # the estimator starts at the heights at which the plant lets vehicle and load rest
+    assert (table["EST_GEAR_H"], table["EST_LOAD_H"]) == (belief.gear_height_m, belief.load_radius_m)
     world = sim_parameters(truth)
     assert world["SIM_QUAD_MASS"] == truth.quad_mass
     assert world.describe("SIM_QUAD_MASS").low == truth.quad_mass / 100.0
@@ -70,7 +72,7 @@ OF_THE_ROTORS = {
 OF_THE_WORLD_ALONE = {
     *OF_THE_ROTORS,
     *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),
-    *("gear_height_m", "gear_spread_m", "rotor_reach_m", "rotor_height_m", "load_radius_m"),
+    *("gear_spread_m", "rotor_reach_m", "rotor_height_m"),
     *("contact_frequency_rad_s", "contact_damping_ratio", "friction", "slip_rate_1_s"),
     *CHAIN_KEYS.values(),
     *("rotor_radius_m", "air_density_kg_m3", "rotor_drag_1_s", "rotor_flap_rad_s_m"),

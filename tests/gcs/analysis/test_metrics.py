@@ -150,6 +150,15 @@ def test_errors_of_a_known_error():
     assert found["gap_max_s"] == pytest.approx(flights.TICK_S, abs=tolerances.STAMP_S)
 
 
+def test_a_pause_of_the_mission_is_no_gap():
+    flight = flights.flight(4.0, flights.still)
+    mission = np.flatnonzero(flight.mission)
+    flight.phase[mission[100:300]] = mavlink.PLUMBLINE_PHASE_HOLD
+    assert record(flight)["gap_max_s"] == pytest.approx(flights.TICK_S, abs=tolerances.STAMP_S)
+    flight.drop = lambda i, kind: kind == "load_state" and mission[400] <= i < mission[410]
+    assert record(flight)["gap_max_s"] == pytest.approx(11 * flights.TICK_S, abs=tolerances.STAMP_S)
+
+
 def test_durations():
     flight = flights.flight(4.0, flights.still)
     found = record(flight, wall_s=2.0)

@@ -105,7 +105,8 @@ def test_drag_and_mass_are_identified_from_few_rows_and_any_guess(circled: Path)
 
 def test_the_load_is_known_from_the_vehicle_alone(flown: Path, tmp_path: Path) -> None:
     asked = ["replay", str(flown), "--out", str(tmp_path / "replay"), "--json"]
-    record = json.loads(CliRunner().invoke(gcs, asked, prog_name="gcs").stdout)
+    for _ in range(2):  # an earlier replay is replaced
+        record = json.loads(CliRunner().invoke(gcs, asked, prog_name="gcs").stdout)
     alone = record["pose_alone"]
     assert alone["median_m"] < 1e-3
     assert alone["inside_95"] > 0.95
@@ -115,6 +116,16 @@ def test_the_load_is_known_from_the_vehicle_alone(flown: Path, tmp_path: Path) -
     error = np.linalg.norm(table[:, 1:4] - table[:, 6:9], axis=1)
     assert np.median(error) == pytest.approx(alone["median_m"], abs=2e-6)
     assert (tmp_path / "replay" / "load.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["load.csv", "load.png"])
+def test_a_replay_does_not_take_the_place_of_files_of_others(flown: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("time,load\n", encoding="utf-8")
+    refused = CliRunner().invoke(gcs, ["replay", str(flown), "--out", str(tmp_path)], prog_name="gcs")
+    told = f"gcs: {tmp_path}: holds a {name} that is not of a replay; name another folder by --out\n"
+    assert (refused.exit_code, refused.stderr) == (EXIT_USAGE, told)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text(encoding="utf-8") == "time,load\n"
 
 
 def test_a_load_that_was_not_measured_in_every_row_is_scored_in_the_others(

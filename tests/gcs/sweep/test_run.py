@@ -6,6 +6,7 @@ import errno
 import json
 import re
 import shlex
+import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -22,7 +23,7 @@ from autopilot.own.own_code import OwnCode
 from autopilot.shell.compiling import Part
 from gcs.batch import pool
 from gcs.cli import gcs
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
 from gcs.sweep import run, work
 from gcs.sweep.plan import PlanError, SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_files, sweep_origin
@@ -99,6 +100,7 @@ def test_a_sweep_that_was_killed_goes_on(
 ) -> None:
     plan, complete, _ = whole
     rows = pq.read_table(complete / "flights.parquet").to_pylist()
+    store_plan(tmp_path, plan, "gcs sweep", sweep_origin(plan))
     store = Store(tmp_path, plan)
     store.add(rows[:2])
     store.merge()
@@ -394,6 +396,41 @@ def test_the_table_alone_is_written_where_that_is_asked_for(short: str, tmp_path
     result = CliRunner().invoke(gcs, words, prog_name="gcs")
     assert (result.exit_code, result.stdout) == (0, f"table: {tmp_path / 'flights.parquet'}\n")
     assert {path.name for path in tmp_path.iterdir() if path.suffix} == {"flights.parquet", "plan.json"}
+
+
+def test_a_table_that_is_not_of_a_sweep_is_left_alone(short: str, tmp_path: Path) -> None:
+    table = tmp_path / "flights.parquet"
+    table.write_bytes(b"mine")
+    told = refused_sweep(short, tmp_path)
+    assert "holds a flights.parquet that is not of a sweep; name another folder by --out" in told
+    assert [path.name for path in tmp_path.iterdir()] == [table.name] and table.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("damage", ["truncated", "in a column", "of another program"])
+def test_a_damaged_table_is_told_in_one_line(
+    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, damage: str
+) -> None:
+    plan, complete, _ = whole
+    shutil.copytree(complete, tmp_path, dirs_exist_ok=True)
+    table = tmp_path / "flights.parquet"
+    stored = table.read_bytes()
+    if damage == "truncated":
+        table.write_bytes(stored[:-7])
+    elif damage == "in a column":
+        table.write_bytes(stored[:4] + bytes(200) + stored[204:])
+    else:
+        pq.write_table(pq.read_table(table).replace_schema_metadata(None), table)
+    says = "not the flights of a sweep" if damage == "of another program" else "damaged, or no Parquet file"
+    with pytest.raises(InputError, match=f"^{table}: {says}; .*name another folder by --out$"):
+        swept(plan, tmp_path)
+
+
+def refused_sweep(short: str, directory: Path) -> str:
+    """The line with which a sweep into this folder is refused."""
+    words = ["sweep", short, "--jobs", "1", "--out", str(directory), "--quiet"]
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1), result.output
+    return result.stderr
 
 
 @pytest.mark.parametrize(
