@@ -7,12 +7,18 @@ order within a tick, and the times at which the ground station acts.
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+from pathlib import Path
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.own.own_code import OwnCode
+from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
@@ -122,6 +128,30 @@ def test_same_bits_with_fixes_that_float_and_are_lost(short: str) -> None:
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])
 def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> None:
     flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
+
+
+def test_figures_of_a_released_load_are_those_of_the_record(delivery: str, tmp_path: Path) -> None:
+    """The record samples what the sweep takes at every tick, in single precision."""
+    words = [
+        "fly",
+        delivery,
+        "--seed",
+        "1",
+        "--set",
+        "SIM_WIND_E=3",
+        "--out",
+        str(tmp_path),
+        "--quiet",
+        "--json",
+    ]
+    record = json.loads(CliRunner().invoke(gcs, words, prog_name="gcs").stdout)
+    conditions = Conditions(sensors="lab", seed=1, settings={"CTL_LAW": PLUMBLINE, "SIM_WIND_E": 3.0})
+    mission = load_mission(delivery)
+    found = asdict(fly(mission, conditions, start_times(mission, conditions)))
+    shared = {name: record[name] for name in found if isinstance(record.get(name), float)}
+    assert len(shared) == 13
+    sampled = {name: pytest.approx(value, rel=1e-3) for name, value in shared.items()}
+    assert {name: found[name] for name in shared} == sampled
 
 
 @pytest.mark.parametrize("rate_hz", [125.0, 625.0])  # a tick of 8 and of 1.6 ms
