@@ -111,6 +111,17 @@ def test_same_end_of_a_flight_that_is_lost(short: str) -> None:
     flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": THESIS, "SIM_ACT_DELAY_MS": 60.0}))
 
 
+def test_same_end_of_a_flight_that_empties_its_battery(short: str) -> None:
+    """30 mAh: the voltage falls to nothing, and the rotors stop."""
+    settings = {"CTL_LAW": PLUMBLINE, "SIM_BATTERY": 1.0, "SIM_BAT_CAP": 30.0}
+    found, states = flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+    assert (found.outcome, found.reason) == (
+        "diverged",
+        "Failsafe: rotors 1, 2, 3, 4 lost, the others cannot fly it",
+    )
+    assert states[-1, 10:].max() < 0.1
+
+
 def test_same_bits_with_receiver_and_camera(short: str) -> None:
     gust = {"SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0, "SIM_GUST_FOR_S": 1.0}
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
