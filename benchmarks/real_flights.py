@@ -34,7 +34,7 @@ COLUMNS = (
     "pose alone",
     "inside 95 %",
     "tracked length",
-    "of the swing",
+    "by prediction",
 )
 
 
@@ -54,7 +54,7 @@ def score_flight(path: Path, columns: ColumnMap) -> tuple[dict[str, Any], tuple[
         "rows": len(motion.time_s),
         **_figures(scores),
         "tracked_length_m": [tracked.value, tracked.half_width],
-        "swing_length_m": [swing.value + below, swing.half_width],
+        "predicted_length_m": [swing.value + below, swing.half_width],
     }, scores
 
 
@@ -81,7 +81,7 @@ def line(row: dict[str, Any]) -> list[str]:
     """A row of the table."""
     lengths = [
         f"{v:.3f} +- {h:.3f} m"
-        for v, h in (row[k] for k in ("tracked_length_m", "swing_length_m") if k in row)
+        for v, h in (row[k] for k in ("tracked_length_m", "predicted_length_m") if k in row)
     ]
     return [
         row["flight"],

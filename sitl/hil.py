@@ -16,7 +16,6 @@ from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, packed, unpack
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.vehicle.battery import open_voltage
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.wire.codec import FrameWriter, decode
@@ -46,6 +45,7 @@ from sitl.messages import (
 )
 from sitl.parameter_server import ParameterServer
 from sitl.plant.attachment import effective_mass
+from sitl.plant.drive import battery_of, voltage_until_empty
 from sitl.plant.records import Truth
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.files import load_profile
@@ -508,7 +508,10 @@ class HilSimulator:
         """BATTERY_STATUS, as a power module measures it."""
         drive, supply = self.core.truth.drive, self.core.world.supply
         left = max(0.0, drive.charge - supply.used_as / drive.capacity_as)
-        voltage = supply.voltage if self.core.tick_count else drive.cells * open_voltage(drive.charge)
+        voltage = supply.voltage
+        if not self.core.tick_count:
+            battery = battery_of(self.core.truth, len(self.core.rotor_force))
+            voltage = voltage_until_empty(drive.capacity_as * (1.0 - drive.charge), battery)
         return battery_status_message(BatteryReading(voltage, supply.current, supply.used_as / 3.6, left))
 
     def _status(self) -> object:

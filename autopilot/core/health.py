@@ -24,6 +24,7 @@ from autopilot.vehicle.battery import (
     drawn_current,
     rotor_power_coefficient,
     rotor_power_term,
+    source_voltage,
     terminal_voltage,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
@@ -38,6 +39,8 @@ _FIELDS = (
     (PRESSURE, snapshot.BARO),
 )
 _NEVER = (-1, -1, -1, -1)
+# shares of the charge from which a measured battery is told of, and how; the lowest first
+LOW_BATTERY = ((0.07, "Battery nearly empty, {} % left: land"), (0.15, "Battery low, {} % left"))
 
 
 class Condition(NamedTuple):
@@ -69,7 +72,15 @@ def remaining_charge(condition: Condition, battery: Battery) -> float:
 
 def voltage(condition: Condition, battery: Battery) -> float:
     """Voltage at the terminals, V."""
-    return terminal_voltage(condition.used_as, condition.current, battery)
+    return terminal_voltage(source_voltage(condition.used_as, battery), condition.current, battery)
+
+
+def low_battery_text(before: float, now: float) -> str | None:
+    """What to tell of a measured battery whose remaining share (NaN: unknown) was `before` and is `now`."""
+    for share, text in LOW_BATTERY:
+        if now <= share and not before <= share:
+            return text.format(round(100.0 * now))
+    return None
 
 
 @kernel
@@ -110,8 +121,8 @@ def update_condition(
             square[2] + fast * ((a[2] - mean[2]) ** 2 - square[2]),
         )
     used = before.used_as + before.current * dt
-    work = rotor_power_term(forces, forces.shape[0])
-    current = drawn_current(work, used, unpack(Battery, battery, 0))
+    work, constants = rotor_power_term(forces, forces.shape[0]), unpack(Battery, battery, 0)
+    current = drawn_current(work, source_voltage(used, constants), constants)
     pack(
         Condition(last_received_us, now_us if has_fix else before.fix_us, mean, square, used, current),
         condition,

@@ -52,6 +52,13 @@ class Hold:
 
 
 @dataclass(frozen=True, slots=True)
+class LiftWait(Hold):
+    """The load should hang at the end of its lift, but still lies at this height: the law pulls harder."""
+
+    start_height_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Transfer:
     """From rest to rest along a straight line."""
 

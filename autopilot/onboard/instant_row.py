@@ -96,7 +96,7 @@ _VEHICLE_PROBLEM, _LOAD_PROBLEM = (
     _offset(EstimateSummary, "vehicle_problem"),
     _offset(EstimateSummary, "load_problem"),
 )
-_R_C = _offset(ControlMemory, "command.R_c")
+_R_C, _LOAD_MASS = _offset(ControlMemory, "command.R_c"), _offset(ControlMemory, "observed.load_mass")
 _NOW_US, _PHASE, _SEQ = (_offset(Instant, name) for name in ("now_us", "phase", "seq"))
 _FLAGS, _DISTANCE = _offset(Instant, "estimator_flags"), _offset(Instant, "distance")
 _ELAPSED, _DURATION = _offset(Instant, "elapsed_s"), _offset(Instant, "duration_s")
@@ -130,6 +130,7 @@ def put_instant(
     seq: int,
     load_tracked: bool,
     needs_load_estimate: bool,
+    assumed_load_kg: float,
     rotor_min: float,
     rotor_max: float,
     rotors: int,
@@ -140,7 +141,8 @@ def put_instant(
     `summary`, `estimator` and `control` are those of `CoreRows`, `forces` (14) those of the rotors. The
     present leg has this control mode (NO_LEG: there is no leg); `targets[row]` is its setpoint, as
     `layout.jets` returns it, and `requested[row]` the requested path. `load_tracked`: in a phase in which the
-    load is tracked; `needs_load_estimate`: the load must be known.
+    load is tracked; `needs_load_estimate`: the load must be known. `assumed_load_kg`: mass with which the
+    estimator computes the tension; 0: the tension is that of a custom estimator.
     """
     for i in range(_FROM_SUMMARY.shape[0]):
         instant[_FROM_SUMMARY[i, 0]] = summary[_FROM_SUMMARY[i, 1]]
@@ -155,6 +157,8 @@ def put_instant(
         instant[_FORCES + i] = forces[i]
     is_uncertain = summary[_VEHICLE_PROBLEM] != 0.0 or (needs_load_estimate and summary[_LOAD_PROBLEM] != 0.0)
     instant[_FLAGS] = 0 if is_uncertain else _ESTIMATOR_FLAGS
+    if assumed_load_kg > 0.0:
+        instant[_TENSION] *= control[_LOAD_MASS] / assumed_load_kg
     load_undetected = summary[_LOAD_PROBLEM] == NO_LOAD or summary[_LOAD_PROBLEM] == NO_LOAD_DIRECTION
     if load_undetected and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
         # in the air the accelerometer detects the pull; on the ground only sight shows that it has ended

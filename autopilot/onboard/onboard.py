@@ -28,7 +28,7 @@ from autopilot.core.flight_core import (
     Setup,
     commanded_rate,
 )
-from autopilot.core.health import Condition, battery_constants
+from autopilot.core.health import Condition, battery_constants, low_battery_text
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import warm_up
 from autopilot.estimation.filter import estimator_tuning
@@ -95,7 +95,7 @@ from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
-from autopilot.wire.convert.battery import read_battery_status
+from autopilot.wire.convert.battery import BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
@@ -523,7 +523,7 @@ class Onboard:
                 self._resume_flight(message)
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
-            self._snapshot_source.measured = MeasuredBattery(self.now_us, read_battery_status(message))
+            self._receive_battery(read_battery_status(message))
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_PARAM_ERROR:
             client = self._simulator_parameters.client_of(message.param_id)
@@ -533,6 +533,13 @@ class Onboard:
         name = self._simulator_parameters.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
+
+    def _receive_battery(self, reading: BatteryReading) -> None:
+        before = self._snapshot_source.measured.reading
+        self._snapshot_source.measured = MeasuredBattery(self.now_us, reading)
+        text = low_battery_text(before.remaining, reading.remaining)
+        if text is not None:
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def _resume_flight(self, boot: Any) -> None:
         """Take over a flight under way, which the autopilot had begun before it was restarted."""

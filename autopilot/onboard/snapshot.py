@@ -363,8 +363,8 @@ class InstantConstants(NamedTuple):
     duration_s: float
     phase: int
     load_and_rotors: tuple[
-        bool, bool, float, float, int
-    ]  # `carrying`, `needs_load_estimate`, `rotor_min`, `rotor_max`, `rotors`
+        bool, bool, float, float, float, int
+    ]  # `load_tracked`, `needs_load_estimate`, `assumed_load_kg`, `rotor_min`, `rotor_max`, `rotors`
 
 
 def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstants | None) -> InstantConstants:
@@ -384,6 +384,7 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
                 before.requested if before and unchanged else jets(leg, setpoints.times_s, requested=True)
             )
     limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+    load_kg = setup.vehicle.load_mass if core.built_in is None else 0.0
     return InstantConstants(
         flight,
         setpoints,
@@ -396,7 +397,7 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
         start_us,
         float(duration_s),
         int(flight.phase),
-        (flight.phase in CARRYING, needs_load_estimate(flight), *limits, len(setup.layout)),
+        (flight.phase in CARRYING, needs_load_estimate(flight), load_kg, *limits, len(setup.layout)),
     )
 
 

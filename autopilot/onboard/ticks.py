@@ -13,6 +13,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.onboard.tick_batch import (
     ANY_FIX,
     ARMED,
+    ASSUMED_LOAD_KG,
     COMPONENT,
     CONTROL_MODE,
     DIALECT_COMPONENT,
@@ -219,6 +220,7 @@ def _put_instant(batch: TickBatch, now_us: int) -> None:
             numbers[SEQ],
             numbers[LOAD_TRACKED] != 0,
             numbers[NEEDS_LOAD_ESTIMATE] != 0,
+            batch.limits[ASSUMED_LOAD_KG],
             batch.limits[ROTOR_MIN],
             batch.limits[ROTOR_MAX],
             numbers[ROTORS],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import norm
-from autopilot.guidance.legs import Hold, Leg, PathStretch, Swing, SwingDamping
+from autopilot.guidance.legs import LOAD_POSITION, Hold, Leg, LiftWait, PathStretch, Swing, SwingDamping
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import start_phase_legs, transition, try_transition
 from autopilot.supervisor.motion import (
@@ -44,6 +44,7 @@ from missions.model import AttitudeRun, Land, Release, ReturnHome, Speed, Step, 
 
 SETTLE_S = 3.0  # hold after an attitude run
 MIN_LIFT_SHARE = 0.5
+LIFT_PATIENCE_S = 5.0  # in which the pull may still grow to the weight of a load that is heavier than assumed
 RELEASED_TEXT = "Load released"
 
 
@@ -95,6 +96,11 @@ def after_last_leg(flight: Flight, view: View, settings: Settings) -> tuple[Flig
     if isinstance(leg, SwingDamping) and not leg.ends_step:  # now the phase can begin
         return start_phase_legs(flight, view, settings), Report()
     if flight.phase == Phase.LIFT and leg is not None and _has_lift_failed(flight, leg, view):
+        if not isinstance(leg, LiftWait):
+            start, end = leg.jet(0.0)[0], leg.jet(leg.duration_s)[0]
+            return _with_legs(
+                flight, (LiftWait(end, LIFT_PATIENCE_S, LOAD_POSITION, start[2]),), view
+            ), Report()
         text = "The load was not lifted: landing"
         return transition(interrupt_mission(flight), Event.LAND, view, settings), Report(((CRITICAL, text),))
     if flight.mission.active and flight.phase in (Phase.LIFT, Phase.MISSION):
@@ -112,7 +118,8 @@ def after_last_leg(flight: Flight, view: View, settings: Settings) -> tuple[Flig
 
 def _has_lift_failed(flight: Flight, leg: Leg, view: View) -> bool:
     """Whether a lift that has ended brought the load less than the share `MIN_LIFT_SHARE` of its way up."""
-    start_height, end_height = leg.jet(0.0)[0][2], leg.jet(leg.duration_s)[0][2]
+    start_height = leg.start_height_m if isinstance(leg, LiftWait) else leg.jet(0.0)[0][2]
+    end_height = leg.jet(leg.duration_s)[0][2]
     return not flight.cable.released and view.x_load[2] - start_height < MIN_LIFT_SHARE * (
         end_height - start_height
     )

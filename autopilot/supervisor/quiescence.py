@@ -45,7 +45,7 @@ from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, T
 from autopilot.supervisor.watches.fence import NO_ACTION, has_fence
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
-from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, last_setpoint_height
+from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, give_up_us, last_setpoint_height
 from autopilot.supervisor.watches.touchdown import (
     LOAD_DEPTH,
     ON_GROUND_DEPTH,
@@ -186,7 +186,7 @@ def _active_watch(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, fl
     """What is watched for, its level in m, and when it will have been true for long enough."""
     condition_met = flight.condition_since_us >= 0
     if flight.phase == Phase.TAUTEN and len(flight.legs) == 1 and isinstance(leg, Creep):
-        end_us = flight.condition_since_us + PULL_US if condition_met else FOREVER_US
+        end_us = flight.condition_since_us + PULL_US if condition_met else give_up_us(flight, settings) + 1
         return TAUT, last_setpoint_height(leg, settings), end_us
     if flight.phase in (Phase.LOWER, Phase.SET_DOWN) and isinstance(leg, Creep):
         end_us = flight.condition_since_us + STILL_US if condition_met else FOREVER_US

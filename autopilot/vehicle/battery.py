@@ -14,6 +14,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
 from autopilot.geometry.packed import Row
 
+_TINY = 1e-30  # avoids a division by 0
 ELECTRONICS_W = 3.0  # on the ground: flight computer and radio
 # (share of the charge left, open-circuit voltage of a cell); a common lithium-polymer cell
 CELL_VOLTAGES = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4.2))
@@ -55,9 +56,15 @@ def charge_left(used_as: float, battery: Battery) -> float:
 
 
 @kernel
-def terminal_voltage(used_as: float, current: float, battery: Battery) -> float:
-    """Voltage at the terminals in V."""
-    found = battery.cells * open_voltage(charge_left(used_as, battery)) - battery.resistance * current
+def source_voltage(used_as: float, battery: Battery) -> float:
+    """Voltage in V without current, after `used_as` (A s) were used."""
+    return battery.cells * open_voltage(charge_left(used_as, battery))
+
+
+@kernel
+def terminal_voltage(open_v: float, current: float, battery: Battery) -> float:
+    """Voltage at the terminals in V, for that without current."""
+    found = open_v - battery.resistance * current
     return if_above(found, 0.0, found, 0.0)
 
 
@@ -72,12 +79,11 @@ def rotor_power_term(forces: Row, rotors: int) -> float:
 
 
 @kernel
-def drawn_current(power_term: float, used_as: float, battery: Battery) -> float:
-    """Current in A, for the result of `rotor_power_term` and the charge used before (A s)."""
+def drawn_current(power_term: float, open_v: float, battery: Battery) -> float:
+    """Current in A, for the result of `rotor_power_term` and the voltage without current (V)."""
     power = ELECTRONICS_W + battery.rotor_power_coefficient * power_term
-    open_v = battery.cells * open_voltage(charge_left(used_as, battery))
     if battery.resistance == 0.0:
-        return power / open_v
+        return if_above(open_v, 0.0, power / (open_v + _TINY), 0.0)
     # at most what the battery can give
     discriminant = open_v * open_v - 4.0 * battery.resistance * power
     return (open_v - sqrt(if_above(discriminant, 0.0, discriminant, 0.0))) / (2.0 * battery.resistance)

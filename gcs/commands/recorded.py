@@ -17,7 +17,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _MAX_DECIMALS = 6
 _QUANTITIES = {  # the identified quantities as displayed
     "tracked_length_m": "cable length, by the distance of the load (m)",
-    "length_m": "cable length, by the swing (m)",
+    "length_m": "cable length, by the predicted positions (m)",
     "drag_per_m": "quadratic drag / mass of the load (1/m)",
     "wash_per_s2": "rotor wash at the load, outwards (1/s^2)",
     "swirl_per_s2": "rotor wash at the load, around (1/s^2)",

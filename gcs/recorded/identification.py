@@ -1,9 +1,11 @@
 """Parameters of cable, load and vehicle identified from a recording, with intervals of 95 %.
 
-The length is found twice: from the distance between the tracked points, and from the swing alone. The
-parameters of the load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's
-weights) by Gauss-Newton. Those of the vehicle come from a regression: its thrust lies along its axis, so the
-horizontal acceleration of vehicle and load shows in the tilt.
+The length is found twice: from the distance between the tracked points, and with the other parameters of the
+load. These are those that predict its positions best, 2 s and 5 s ahead: robust least squares (Huber's
+weights) by Gauss-Newton. This length too is nearly that of the distance, from the attachment to the load: a
+position lies one length from the attachment, and its height alone shows the length better than the period of
+the swing does. A wrong clock therefore does not show in it. Those of the vehicle come from a regression: its
+thrust lies along its axis, so the horizontal acceleration of vehicle and load shows in the tilt.
 
 Intervals come from a jackknife: the recording is cut into blocks of ten seconds (neighbouring residuals are
 correlated, those of different blocks are not), and the parameters are estimated again without each block, by

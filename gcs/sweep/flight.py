@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import nan, sqrt
+from math import inf, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,7 @@ from sitl.world import Floats, World, new_world
 GROUND_WINDOW_US = 20_000  # between two turns of the ground station in lockstep
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
+_NO_PATH = np.zeros((1, COLUMNS))  # requested path of a mission step in which the load follows none
 _NEVER = 2**62
 _TICK, _NOW = field_offset(World, "tick"), field_offset(World, "now_us")
 _SLACK_EVENTS = field_offset(World, "plant") + field_offset(PlantState, "slack_events")
@@ -234,7 +235,10 @@ class SweepFlight:
         self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
         self.requested_path = _NO_ROWS
-        if flight.phase != Phase.MISSION or not flight.legs or flight.legs[0].control_mode != LOAD_POSITION:
+        if flight.phase != Phase.MISSION or not flight.legs:
+            return
+        if flight.legs[0].control_mode != LOAD_POSITION:
+            self.requested_path = _NO_PATH
             return
         leg, planned = flight.legs[0], self.core.planned
         assert planned is not None, "positions of the load are planned"
@@ -325,10 +329,12 @@ class SweepFlight:
             result.load_error_max_m = f.error_max
             result.tracking_error_max_m = f.tracking_max
             result.load_error_rms_m = sqrt(f.error_square / f.samples)
+        if f.tension_min < inf:
             result.estimator_error_max_m = f.estimator_error_max
+            result.tension_min_n, result.tension_max_n = f.tension_min, f.tension_max
+        if f.ticks > 0.0:
             result.saturated_fraction = f.saturated / f.ticks
             result.psi_R_max, result.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
-            result.tension_min_n, result.tension_max_n = f.tension_min, f.tension_max
             result.rotor_force_min_n, result.rotor_force_max_n = f.rotor_min, f.rotor_max
         return result
 

@@ -28,10 +28,12 @@ from autopilot.geometry.compiler import INNER_OPTIONS
 from autopilot.geometry.entry import kernel_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
-from autopilot.geometry.packed import Row, pack, unpack
+from autopilot.geometry.packed import Row, pack, unpack, with_field
+from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.wire import Wire, deliver_readings, put_forces, rounded_reel_rate
 from sitl.plant.chain.records import ChainRows
+from sitl.plant.records import PlantState
 from sitl.plant.rotors import FORCE, REQUESTED
 from sitl.world import Floats, World, WorldModel, WorldRows, world_tick
 
@@ -60,35 +62,46 @@ NO_FIGURES = Figures(
 
 
 @kernel
-def add_to_figures(
-    figures: Row, world: WorldRows, core: CoreRows, target: Vec3, requested_position: Vec3
-) -> None:
-    """Add this tick to the figures; `requested_position` is the load's position on the requested path,
-    `target` that on the shaped path, which the autopilot flies."""
-    f = unpack(Figures, figures, 0)
-    plant, control = unpack(World, world.world, 0).plant, unpack(ControlMemory, core.control, 0)
-    believed = unpack(EstimateSummary, core.summary, 0).state
-    error = norm(sub(plant.x_load, requested_position))
+def _with_path_errors(f: Figures, x_load: Vec3, target: Vec3, requested: Vec3) -> Figures:
+    """The figures after a tick at which the load should be at `requested`, and at `target` by the shaped
+    path, which the autopilot flies."""
+    error = norm(sub(x_load, requested))
+    f = with_field(f, "error_max", max(f.error_max, error))
+    f = with_field(f, "error_square", f.error_square + error * error)
+    f = with_field(f, "samples", f.samples + 1.0)
+    return with_field(f, "tracking_max", max(f.tracking_max, norm(sub(x_load, target))))
+
+
+@kernel
+def _with_load(f: Figures, plant: PlantState, believed: Vec3) -> Figures:
+    """The figures after a tick at which the load is on the cable, and by the estimate at `believed`."""
+    f = with_field(f, "tension_min", min(f.tension_min, plant.tension))
+    f = with_field(f, "tension_max", max(f.tension_max, plant.tension))
+    return with_field(f, "estimator_error_max", max(f.estimator_error_max, norm(sub(plant.x_load, believed))))
+
+
+@kernel
+def add_to_figures(figures: Row, world: WorldRows, core: CoreRows, requested_path: Any) -> None:
+    """Add this tick to the figures: always those of the vehicle, those of the load while it is on the cable,
+    and those of the path while the load is to follow it."""
+    f, now = unpack(Figures, figures, 0), unpack(World, world.world, 0)
+    control, stretch = unpack(ControlMemory, core.control, 0), unpack(Stretch, core.stretch, 0)
+    if not now.released:
+        if stretch.mode == LOAD_POSITION:
+            row = row_at(stretch, now.now_us)
+            target, requested = vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
+            f = _with_path_errors(f, now.plant.x_load, target, requested)
+        f = _with_load(f, now.plant, unpack(EstimateSummary, core.summary, 0).state.x_load)
     min_force, max_force = f.rotor_min, f.rotor_max
     for i in range(world.rotor_table.shape[0]):
         force = world.rotors[FORCE, i]
         min_force, max_force = min(min_force, force), max(max_force, force)
-    updated = Figures(
-        max(f.error_max, error),
-        f.error_square + error * error,
-        f.samples + 1.0,
-        max(f.tracking_max, norm(sub(plant.x_load, target))),
-        max(f.psi_R_max, control.command.psi_R),
-        max(f.psi_q_max, control.command.psi_q),
-        f.saturated + (1.0 if control.mixed.saturated != 0 else 0.0),
-        f.ticks + 1.0,
-        min(f.tension_min, plant.tension),
-        max(f.tension_max, plant.tension),
-        max(f.estimator_error_max, norm(sub(plant.x_load, believed.x_load))),
-        min_force,
-        max_force,
-    )
-    pack(updated, figures, 0)
+    f = with_field(f, "psi_R_max", max(f.psi_R_max, control.command.psi_R))
+    f = with_field(f, "psi_q_max", max(f.psi_q_max, control.command.psi_q))
+    f = with_field(f, "saturated", f.saturated + (1.0 if control.mixed.saturated != 0 else 0.0))
+    f = with_field(f, "ticks", f.ticks + 1.0)
+    f = with_field(f, "rotor_min", min_force)
+    pack(with_field(f, "rotor_max", max_force), figures, 0)
 
 
 class Code(NamedTuple):
@@ -188,7 +201,8 @@ def fly_stretch(
 
     `started`: the present tick has been flown; `decided`: except for the law's part, which had to wait for
     the supervisor's decision. `requested_path` (ticks, 21) is the load's requested path, from the first tick
-    of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the true state,
+    of the core's stretch on, of which only the number of rows counts where the load follows no path; without
+    rows no figures are taken. `trace` (ticks, 14) receives the true state,
     up to its length. `reeling` is the winch at the ticks of the core's stretch, as of
     `autopilot.core.reeling`; without rows its rate is to be `reel_rate` (m/s). `chain` is the memory of a
     cable of links, None for other cables.
@@ -214,9 +228,6 @@ def fly_stretch(
         if outcome == TO_DECIDE:
             return True
         if outcome == FLOWN and requested_path.shape[0] > 0:
-            row = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
-            add_to_figures(
-                figures, world, core, vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
-            )
+            add_to_figures(figures, world, core, requested_path)
         if now.tick >= stop_tick:
             return False

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, fly_tick, row_at, vector_at
+from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, fly_tick
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.lanes import as_lane_array, diverged_lanes
 from autopilot.geometry.packed import Row, unpack, with_field
-from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.kernel import add_to_figures
 from gcs.sweep.wire import Wire, deliver_readings, put_forces
 from sitl.plant.rotors import REQUESTED
@@ -95,10 +94,7 @@ def fly_lanes(
         readings = deliver_readings(world, now.now_us, link, core.inbox)
         outcome = fly_tick(core, law_rows, readings, now.now_us, now.tick, tick_us * 1e-6, False)
         if outcome == FLOWN and requested_path[0].shape[0] > 0:
-            row = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
-            add_to_figures(
-                figures, world, core, vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
-            )
+            add_to_figures(figures, world, core, requested_path)
         diverged = diverged_lanes()
         if outcome == TO_DECIDE:
             return done, (1 << LANES) - 1

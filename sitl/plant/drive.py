@@ -32,14 +32,17 @@ from autopilot.geometry.lanes import if_above
 from autopilot.geometry.packed import Row
 from autopilot.vehicle.battery import (
     Battery,
+    charge_left,
     drawn_current,
     open_voltage,
     rotor_power_coefficient,
     rotor_power_term,
+    source_voltage,
     terminal_voltage,
 )
 from sitl.plant.records import Drive, Truth
 
+EXHAUSTED_SHARE = 0.02  # of the charge, below which the voltage of the cells falls to 0
 _TINY = 1e-30  # avoids 0 / 0
 
 
@@ -99,11 +102,19 @@ def battery_of(truth: Truth, rotors: int) -> Battery:
 
 
 @kernel
+def voltage_until_empty(used_as: float, battery: Battery) -> float:
+    """Voltage in V without current, which falls to 0 with the last of the charge: no more can be drawn."""
+    last = charge_left(used_as, battery) / EXHAUSTED_SHARE
+    return source_voltage(used_as, battery) * if_above(1.0, last, last, 1.0)
+
+
+@kernel
 def discharged(supply: Supply, forces: Row, rotors: int, truth: Truth, h: float) -> Supply:
     """The battery h seconds later, when the rotors give these forces (N) at that instant."""
     battery = battery_of(truth, rotors)
     empty = truth.drive.capacity_as * (1.0 - truth.drive.charge)  # A s, used before the beginning
     used = supply.used_as + h * supply.current
-    current = drawn_current(rotor_power_term(forces, rotors), empty + used, battery)
-    voltage = terminal_voltage(empty + used, current, battery)
+    open_v = voltage_until_empty(empty + used, battery)
+    current = drawn_current(rotor_power_term(forces, rotors), open_v, battery)
+    voltage = terminal_voltage(open_v, current, battery)
     return Supply(used, current, voltage, voltage / (battery.cells * open_voltage(1.0)))

@@ -58,6 +58,17 @@ def test_a_load_too_heavy_to_be_lifted_is_told_and_set_down() -> None:
     assert craft.texts[-1] == "Landed, disarmed"
 
 
+@pytest.mark.parametrize("height_m", [1.0, 3.0])
+def test_a_load_of_three_times_the_assumed_mass_is_lifted_to_any_height(height_m: float) -> None:
+    """At the end of a short lift the pull still grows."""
+    craft = Craft(Takeoff(height_m), Delay(1.0), Land(), SIM_LOAD_MASS=0.3)
+    craft.begin()
+    craft.run(at_phase(Phase.LOWER), 120.0)
+    assert craft.truth.x_load[2] > 0.8 * height_m
+    craft.run(at_phase(Phase.DISARMED), 120.0)
+    assert "The load was not lifted: landing" not in craft.texts
+
+
 @pytest.mark.parametrize("law", range(len(LAWS)), ids=LAWS)
 def test_every_law_lifts_with_noisy_readings(law: int) -> None:
     """A law that differentiates the load's velocity is the first to suffer from its noise."""

@@ -14,7 +14,7 @@ from autopilot.geometry.packed import unpack
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, SignalRun, requested_jet
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.instant import Instant
-from autopilot.supervisor.state import leg_time_s
+from autopilot.supervisor.state import Phase, leg_time_s
 from gcs import closed_loop
 from missions.fileformat import load_mission
 from sitl.hil import HilSimulator
@@ -73,3 +73,20 @@ def test_the_setpoint_is_that_of_the_leg_at_every_tick(mission: str, least: dict
     outcome = closed_loop.fly(load_mission(mission), conditions, NoLog(), watching(seen))
     assert outcome.name == "completed"
     assert {name: seen[name] for name, count in least.items() if seen[name] < count} == {}
+
+
+@pytest.mark.parametrize("load_kg", [0.05, 0.1, 0.13])
+def test_the_tension_is_that_of_the_load_that_hangs_on_the_cable(load_kg: float) -> None:
+    """The vehicle assumes 0.1 kg, and learns the mass while the load hangs free."""
+    told_and_true: list[tuple[float, float]] = []
+
+    def watch(onboard: Onboard, simulator: HilSimulator) -> bool:
+        if onboard.phase == Phase.MISSION:
+            said = unpack(Instant, onboard.log_sample().instant, 0)
+            told_and_true.append((said.tension, simulator.core.state.tension))
+        return True
+
+    conditions = closed_loop.Conditions(settings={"SIM_LOAD_MASS": load_kg})
+    assert closed_loop.fly(load_mission("hover"), conditions, NoLog(), watch).name == "completed"
+    assert len(told_and_true) > 1000
+    assert max(abs(told / true - 1.0) for told, true in told_and_true) < 0.02

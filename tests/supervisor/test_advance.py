@@ -455,6 +455,25 @@ def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
     assert max(jet[0][2] for _, _, jet in sky.setpoints) < 0.02 + 1.35 * SETTINGS.cable_length_m
 
 
+def test_a_load_that_swings_unnoticed_ends_the_climb() -> None:
+    """The vehicle is moved over it again and again, and each move begins the climb anew."""
+    sky = Sky()
+    sky.ask(Arm(True, False))
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    ideal = sky.obey
+
+    def hanging_light() -> View:
+        seen = ideal()._replace(taut=False, pull_n=0.1 * SETTINGS.load_weight_n)
+        x, y, z = seen.x_quad
+        swing = 0.2 * math.sin(2.0 * sky.now_us * 1e-6)
+        return seen._replace(x_load=(x + swing, y, max(z - SETTINGS.cable_length_m, 0.02)))
+
+    sky.obey = hanging_light  # type: ignore[method-assign]
+    sky.run(lambda s: s.flight.phase != Phase.TAUTEN and s.now_us > 1_000_000, limit_s=60.0)
+    assert sky.flight.phase == Phase.SET_DOWN
+    assert sky.texts[-1] == "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
+
+
 def test_a_gust_may_hide_the_pull_of_a_load_without_a_tracker() -> None:
     """The pull alone shows that its cable is taut: the setpoint rises for 2 s more."""
 

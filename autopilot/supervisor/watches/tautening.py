@@ -26,6 +26,8 @@ MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is
 LIFTING_TEXT = "Cable taut, lifting the load"
 LIFTING_UNOBSERVED_TEXT = "Cable taut, lifting the load; no load sensor"
 LATE_FACTOR = 2.0  # factor of the time in which the setpoint rises from the load to its last height
+# further time, in which a plain receiver may find the heights of vehicle and load; it needs up to ten
+PATIENCE_S = 30.0
 # The vehicle's setpoint rises above the cable's length by this share of it, and at least by this share of the
 # lead at which the law pulls with the load's weight: then the cable must have come taut.
 STRETCH_SHARE, LEAD_SHARE = 0.3, 1.3
@@ -47,6 +49,8 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     assert isinstance(creep, Creep)
     at = creep.jet(leg_time_s(flight, view.now_us))[0]
     over = (view.x_load[0], view.x_load[1], at[2])
+    # each move over the load begins the climb anew: one that hangs unnoticed would be followed for ever
+    is_too_late = view.now_us > give_up_us(flight, settings)
     if (
         not norm(sub(over, at)) <= MAX_LOAD_OFFSET
     ):  # for example because the load was not seen well from the ground
@@ -54,11 +58,12 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
             return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
-        return WatchResult(_moved_over_load(flight, view, creep, at, over))
+        if not is_too_late:
+            return WatchResult(_moved_over_load(flight, view, creep, at, over))
     last_height = last_setpoint_height(creep, settings) + HEIGHT_SIGMAS * view.height_std
     if not view.load_tracked:
         last_height += HIDDEN_S * creep.velocity[2]
-    if flight.condition_since_us < 0 and at[2] > last_height:
+    if flight.condition_since_us < 0 and (at[2] > last_height or is_too_late):
         text = "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
     return WatchResult(flight)
@@ -83,9 +88,18 @@ def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:
     distance = norm(sub(view.x_quad, view.x_load))
     if not distance + HEIGHT_SIGMAS * view.height_std < settings.cable_length_m:
         return False
-    latest_s = LATE_FACTOR * max_setpoint_distance(settings) / settings.motion.taut_speed_m_s
-    late = view.now_us - flight.phase_start_us > latest_s * 1e6
+    late = view.now_us - flight.phase_start_us > _late_s(settings) * 1e6
     return late and not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
+
+
+def _late_s(settings: Settings) -> float:
+    """Time of tautening after which the cable should long have come taut."""
+    return LATE_FACTOR * max_setpoint_distance(settings) / settings.motion.taut_speed_m_s
+
+
+def give_up_us(flight: Flight, settings: Settings) -> int:
+    """The time after which a cable that is being tautened counts as never taut, wherever the vehicle is."""
+    return flight.phase_start_us + round((_late_s(settings) + PATIENCE_S) * 1e6)
 
 
 def _moved_over_load(flight: Flight, view: View, creep: Creep, at: Vec3, over: Vec3) -> Flight:

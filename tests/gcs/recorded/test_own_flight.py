@@ -79,6 +79,17 @@ def test_length_mass_and_drag_of_the_truth_are_identified(
         assert width < 0.01 * value
 
 
+def test_the_length_is_a_distance_and_shows_no_wrong_clock(flown: Path) -> None:
+    """It is the one that predicts positions best, and is named so."""
+    recording, columns = read_recording(flown, load_map("telemetry")), load_map("telemetry")
+    motion = motion_of(recording._replace(time_s=1.2 * recording.time_s), columns)
+    length = load_vehicle("bebop").cable_length_m
+    (found,) = identify_load(motion, columns.load_model(length), ["length_m"])
+    assert found.value == pytest.approx(length, rel=0.01)
+    shown = CliRunner().invoke(gcs, ["identify", str(flown)], prog_name="gcs").stdout
+    assert "by the predicted positions" in shown and "by the swing" not in shown
+
+
 def test_drag_and_mass_are_identified_from_few_rows_and_any_guess(circled: Path) -> None:
     recording = read_recording(circled, load_map("telemetry"))
     every = slice(None, None, 8)  # of 125 rows/s

@@ -27,4 +27,4 @@ def test_real_flights_are_predicted_and_seen_from_the_vehicle(tmp_path: Path) ->
     assert 0.90 < whole["pose_alone_inside"] < 0.98
     for flight in figures["flights"]:
         assert flight["tracked_length_m"][0] == pytest.approx(3.158, rel=0.01)
-        assert flight["swing_length_m"][0] == pytest.approx(3.158, rel=0.01)
+        assert flight["predicted_length_m"][0] == pytest.approx(3.158, rel=0.01)

@@ -7,12 +7,18 @@ order within a tick, and the times at which the ground station acts.
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+from pathlib import Path
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.own.own_code import OwnCode
+from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
@@ -105,6 +111,17 @@ def test_same_end_of_a_flight_that_is_lost(short: str) -> None:
     flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": THESIS, "SIM_ACT_DELAY_MS": 60.0}))
 
 
+def test_same_end_of_a_flight_that_empties_its_battery(short: str) -> None:
+    """30 mAh: the voltage falls to nothing, and the rotors stop."""
+    settings = {"CTL_LAW": PLUMBLINE, "SIM_BATTERY": 1.0, "SIM_BAT_CAP": 30.0}
+    found, states = flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+    assert (found.outcome, found.reason) == (
+        "diverged",
+        "Failsafe: rotors 1, 2, 3, 4 lost, the others cannot fly it",
+    )
+    assert states[-1, 10:].max() < 0.1
+
+
 def test_same_bits_with_receiver_and_camera(short: str) -> None:
     gust = {"SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0, "SIM_GUST_FOR_S": 1.0}
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
@@ -122,6 +139,30 @@ def test_same_bits_with_fixes_that_float_and_are_lost(short: str) -> None:
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])
 def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> None:
     flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
+
+
+def test_figures_of_a_released_load_are_those_of_the_record(delivery: str, tmp_path: Path) -> None:
+    """The record samples what the sweep takes at every tick, in single precision."""
+    words = [
+        "fly",
+        delivery,
+        "--seed",
+        "1",
+        "--set",
+        "SIM_WIND_E=3",
+        "--out",
+        str(tmp_path),
+        "--quiet",
+        "--json",
+    ]
+    record = json.loads(CliRunner().invoke(gcs, words, prog_name="gcs").stdout)
+    conditions = Conditions(sensors="lab", seed=1, settings={"CTL_LAW": PLUMBLINE, "SIM_WIND_E": 3.0})
+    mission = load_mission(delivery)
+    found = asdict(fly(mission, conditions, start_times(mission, conditions)))
+    shared = {name: record[name] for name in found if isinstance(record.get(name), float)}
+    assert len(shared) == 13
+    sampled = {name: pytest.approx(value, rel=1e-3) for name, value in shared.items()}
+    assert {name: found[name] for name in shared} == sampled
 
 
 @pytest.mark.parametrize("rate_hz", [125.0, 625.0])  # a tick of 8 and of 1.6 ms

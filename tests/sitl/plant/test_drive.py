@@ -8,9 +8,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.vehicle.battery import ELECTRONICS_W, Battery, drawn_current, open_voltage, terminal_voltage
+from autopilot.vehicle.battery import (
+    ELECTRONICS_W,
+    Battery,
+    drawn_current,
+    open_voltage,
+    source_voltage,
+    terminal_voltage,
+)
 from sitl.plant.by_value import rotors_of
-from sitl.plant.drive import FULL, discharged, driven_force, is_driven, throttle_of, thrust_share
+from sitl.plant.drive import (
+    EXHAUSTED_SHARE,
+    FULL,
+    discharged,
+    driven_force,
+    is_driven,
+    throttle_of,
+    thrust_share,
+)
 from sitl.plant.records import Drive
 from sitl.plant.rotors import TARGET, set_targets
 
@@ -73,10 +88,11 @@ def test_each_rotor_is_driven_within_its_own_limits(bebop):
 
 def test_power_is_what_is_drawn_at_the_terminals():
     battery = Battery(4320.0, 3.0, 0.06, 15.0)
-    current = drawn_current(4.0, 1000.0, battery)
-    power = current * terminal_voltage(1000.0, current, battery)
+    open_v = source_voltage(1000.0, battery)
+    current = drawn_current(4.0, open_v, battery)
+    power = current * terminal_voltage(open_v, current, battery)
     assert power == pytest.approx(ELECTRONICS_W + 15.0 * 4.0, rel=1e-12)
-    assert drawn_current(4.0, 1000.0, battery._replace(resistance=0.0)) == pytest.approx(
+    assert drawn_current(4.0, open_v, battery._replace(resistance=0.0)) == pytest.approx(
         (ELECTRONICS_W + 60.0) / (3.0 * open_voltage(1.0 - 1000.0 / 4320.0)), rel=1e-12
     )
 
@@ -95,7 +111,7 @@ def test_hover_empties_the_battery_in_the_time_that_its_power_says(bebop):
     rows = rotors_of((0.25 * truth.quad_mass * truth.gravity,) * 4, (0.0,) * 4).rows
     forces = rows[3]
     supply, energy, seconds = FULL, 0.0, 0
-    while supply.used_as < drive.capacity_as and seconds < 3600:
+    while supply.used_as < (1.0 - EXHAUSTED_SHARE) * drive.capacity_as and seconds < 3600:
         supply = discharged(supply, forces, 4, truth, 1.0)
         energy += supply.current * supply.voltage
         assert supply.share == pytest.approx(supply.voltage / 12.6, rel=1e-12)
@@ -106,9 +122,25 @@ def test_hover_empties_the_battery_in_the_time_that_its_power_says(bebop):
     assert half.voltage == pytest.approx(3.0 * 3.82 - 0.06 * half.current, rel=1e-12)
 
 
+@pytest.mark.parametrize("resistance", [0.0, 0.06])
+def test_an_empty_battery_gives_nothing(bebop, resistance):
+    """It gives no more than its charge, and its voltage falls to 0 only with the last of it."""
+    drive = Drive(battery=1.0, cells=3.0, capacity_as=180.0, resistance=resistance, hover_w=65.0)
+    truth = bebop._replace(drive=drive)
+    forces = rotors_of((0.25 * truth.quad_mass * truth.gravity,) * 4, (0.0,) * 4).rows[3]
+    supplies = [FULL]
+    for _ in range(60_000):
+        supplies.append(discharged(supplies[-1], forces, 4, truth, 1e-3))
+    end = supplies[-1]
+    assert (end.current, end.voltage, end.share) == pytest.approx((0.0, 0.0, 0.0), abs=1e-2)
+    assert end.used_as == pytest.approx(180.0, rel=1e-2)
+    above = [supply for supply in supplies[1:] if supply.used_as < (1.0 - EXHAUSTED_SHARE) * 180.0]
+    assert min(supply.voltage for supply in above) > 3.0 * 3.0 - resistance * 10.0
+
+
 def test_a_short_circuit_is_not_a_number_error():
     """More power than the battery has is not drawn."""
     battery = Battery(4320.0, 3.0, 1.0, 1000.0)
-    current = drawn_current(100.0, 0.0, battery)
+    current = drawn_current(100.0, source_voltage(0.0, battery), battery)
     assert math.isfinite(current)
     assert current == pytest.approx(12.6 / 2.0, rel=1e-12)
