@@ -56,7 +56,7 @@ _FINE_S = 0.01
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
 _MAX_FINE_SAMPLES = 20_000
 _TIME_SHARE_ITERATIONS = 6
-# most segments for which times are optimised; beyond it the shares of a ride apply
+# most segments for which the integral is minimised over the times; beyond it they follow from a ride
 _MAX_OPTIMISED_SEGMENTS = 8
 _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
@@ -355,9 +355,10 @@ def quickest_ride(points: Array, speed: float, accel: float) -> tuple[TimedPoint
     for turn_time in _TURN_TIMES:
         with suppress(NoPathError):
             found.append(quick_times(ride_through(points, speed, accel, turn_time), speed, accel))
-    if not found:
+    quickest, duration_s = min(found, key=itemgetter(1), default=(None, inf))
+    if quickest is None or duration_s == inf:
         raise NoPathError("the distances between the points are too unequal")
-    return min(found, key=itemgetter(1))
+    return quickest, duration_s
 
 
 def _point_times(shares: Array, total_s: float) -> Array:
