@@ -199,10 +199,10 @@ def _waypoint_segments(
     for first, points, speed in _waypoint_chains(entries, limits.speed_m_s):
         if len(points) == 2:  # a transfer
             continue
-        try:
-            table, times, lowest_m = _planned_path(tuple(points), speed, limits)
-        except NoPathError:
+        planned = _planned_path(tuple(points), speed, limits)
+        if planned is None:
             continue
+        table, times, lowest_m = planned
         if lowest_m + points[0][2] > 0.0:
             for i in range(len(points) - 1):
                 segments[first + i] = PathSegment(table, times[i], times[i + 1], points[0])
@@ -216,15 +216,19 @@ def _waypoint_segments(
 @lru_cache(maxsize=16)
 def _planned_path(
     points: tuple[Vec3, ...], speed: float, limits: PathLimits
-) -> tuple[PieceTable, tuple[float, ...], float]:
-    """The path through the points as a table, the times at them, and its lowest place relative to the first.
+) -> tuple[PieceTable, tuple[float, ...], float] | None:
+    """The path through the points as a table, the times at them, and its lowest place relative to the first;
+    None if stops are quicker.
 
     Cached, as `shaped_path`: planning takes a tenth of a second, and one process flies the same path often,
     in a sweep or after a restart.
     """
-    path, times = plan_waypoint_path(
-        points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
-    )
+    try:
+        path, times = plan_waypoint_path(
+            points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
+        )
+    except NoPathError:
+        return None
     return path.table(), tuple(times.tolist()), float(path.jets()[1][0, :, 2].min())
 
 

@@ -20,7 +20,7 @@ from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
 from autopilot.trajectory.splines import COLUMNS, DEGREE, PieceTable
-from autopilot.trajectory.waypoint_path import PathSegment, sample_path
+from autopilot.trajectory.waypoint_path import PathSegment, limits_used, sample_path
 
 Array = NDArray[np.float64]
 
@@ -106,8 +106,7 @@ def use(path: Path, route: Route) -> float:
     times, jets = _sample_finely(path)
     min_factor = 0.0
     if not route.time_optimal:
-        too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / route.speed_m_s
-        min_factor = max(too_fast, float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / route.accel_m_s2)))
+        min_factor = float(limits_used(jets, route.speed_m_s, route.accel_m_s2).max())
     over = float(excess(demand(jets, route.body), float(times[1] - times[0]), route.bounds).max())
     return max(min_factor, 1.0 + over if over > 0.0 else 0.0)
 

@@ -329,15 +329,21 @@ def _divisions(duration: float, after_begin: float, before_end: float) -> list[f
     return from_begin[1:] + from_end[:0:-1]
 
 
+def limits_used(jets: Array, speed: float, accel: float) -> Array:
+    """(n,) how many times as long a path of these jets (7, n, 3) should take at each sample to keep to
+    `speed` (m/s) and `accel` (m/s^2)."""
+    too_fast = np.linalg.norm(jets[1], axis=1) / speed
+    too_hard = np.sqrt(np.linalg.norm(jets[2], axis=1) / accel)
+    return np.asarray(np.maximum(too_fast, too_hard))
+
+
 def quick_times(ride: TimedPoints, speed: float, accel: float) -> tuple[TimedPoints, float]:
     """The points of a ride with times between them at which the smoothest path is quick, and its duration
     (s): where the path is too fast or turns too hard it gets more time, elsewhere less."""
     best, best_s = ride, inf
     for _ in range(_STRETCHING_ROUNDS):
         fine, jets = MinimumSnap(ride.points, ride.times).jets()
-        use = np.maximum(
-            np.linalg.norm(jets[1], axis=1) / speed, np.sqrt(np.linalg.norm(jets[2], axis=1) / accel)
-        )
+        use = limits_used(jets, speed, accel)
         duration_s = float(ride.times[-1] * use.max())
         if not duration_s < best_s:
             break
@@ -397,9 +403,7 @@ def plan_waypoint_path(
         path = MinimumSnap(places, times)
         fine, jets = path.jets()
         over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
-        too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / speed
-        too_hard = float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / accel))
-        min_factor = 0.0 if time_optimal else max(too_fast, too_hard)
+        min_factor = 0.0 if time_optimal else float(limits_used(jets, speed, accel).max())
         return path, times, max(min_factor, 1.0 + over if over > 0.0 else 0.0)
 
     path, times, factor = evaluate(total_s)
