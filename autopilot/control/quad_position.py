@@ -35,6 +35,9 @@ _TILT_TANGENT = 1.0
 # least and greatest upward force, in weights
 _MIN_LIFT = 0.2
 _MAX_LIFT = 1.6
+# the same: a vehicle that should lift less leans no more than one that lifts this. One that stands in the
+# wind would otherwise lean the more the less it lifts, until the wind turns it over
+_LEANING_LIFT = 0.8
 
 
 class QuadPositionGains(NamedTuple):
@@ -65,11 +68,17 @@ def position_force(
 
 
 @kernel
+def leaning_lift(up: float, weight: float) -> float:
+    """The upward force (N) for which the vehicle leans that should lift `up`."""
+    return max(up, _LEANING_LIFT * weight)
+
+
+@kernel
 def limited_force(F: Vec3, weight: float) -> Vec3:
-    """F with an upward part of 0.2 to 1.6 weights, and no more than 45 deg from the vertical."""
+    """F with an upward part of 0.2 to 1.6 weights, for which the vehicle leans no more than 45 deg."""
     up = min(_MAX_LIFT * weight, max(_MIN_LIFT * weight, F[2]))
     sideways = norm((F[0], F[1], 0.0))
-    shrink = min(1.0, _TILT_TANGENT * up / max(sideways, 1e-9))
+    shrink = min(1.0, _TILT_TANGENT * leaning_lift(up, weight) / max(sideways, 1e-9))
     return (shrink * F[0], shrink * F[1], up)
 
 
@@ -96,8 +105,9 @@ def quad_position(
     unlimited = position_force(
         state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity
     )
-    F = limited_force(sub(unlimited, push), mass * vehicle.gravity)
-    R_c = attitude_towards(F, reference.b1_d, state.R)
+    weight = mass * vehicle.gravity
+    F = limited_force(sub(unlimited, push), weight)
+    R_c = attitude_towards((F[0], F[1], leaning_lift(F[2], weight)), reference.b1_d, state.R)
     memory, command = quad_attitude(memory, state, R_c, thrust_along(F, state.R), gains, filters, vehicle)
     zero: Vec3 = (0.0, 0.0, 0.0)
     return memory, with_errors(

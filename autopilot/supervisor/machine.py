@@ -6,6 +6,7 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 from autopilot.guidance.legs import Creep, Leg
 from autopilot.supervisor.motion import damping_leg, tracks_attitude, with_control_modes
@@ -59,6 +60,8 @@ def _enter_phase(flight: Flight, phase: Phase, view: View, settings: Settings) -
         legs=with_control_modes(flight, legs),
         leg_start_us=view.now_us,
         condition_since_us=-1,
+        stopped_height=inf,
+        stopped_since_us=-1,
         following=(),
         is_failsafe=flight.is_failsafe and phase != Phase.ARMED,  # another flight begins
         returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),

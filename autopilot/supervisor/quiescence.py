@@ -51,6 +51,8 @@ from autopilot.supervisor.watches.touchdown import (
     ON_GROUND_DEPTH,
     STILL_SPEED,
     STILL_US,
+    STOPPED_RANGE,
+    STOPPED_US,
     VEHICLE_DEPTH,
 )
 from autopilot.trajectory.slack_cable import TOUCH_SPEED
@@ -74,6 +76,7 @@ class Stretch(NamedTuple):
     condition_met: (
         bool  # the supervisor has already noted that load or vehicle is down, or that the cable pulls
     )
+    stopped_height: float  # m, near which the vehicle is known to have stopped; infinite: it sinks
     error_limit: float  # m: of the tracked position; infinite where none is tracked
     load_suspended: bool  # the load should hang on the cable
     taut_length: float  # m, from load to vehicle; while a winch reels, that of the present tick
@@ -99,6 +102,7 @@ def uncontrolled_stretch(until_us: int, now_us: int, idle: bool) -> Stretch:
         watch=NO_WATCH,
         threshold=0.0,
         condition_met=False,
+        stopped_height=inf,
         error_limit=inf,
         load_suspended=False,
         taut_length=0.0,
@@ -144,6 +148,7 @@ def next_stretch(
         watch=watch,
         threshold=threshold,
         condition_met=flight.condition_since_us >= 0,
+        stopped_height=flight.stopped_height,
         error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
         load_suspended=load_suspended,
         taut_length=flight.cable.taut_length_m,
@@ -192,6 +197,8 @@ def _active_watch(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, fl
         end_us = flight.condition_since_us + STILL_US if condition_met else FOREVER_US
         if leg.control_mode == LOAD_POSITION:
             return LOAD_DOWN, LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED, end_us
+        if flight.stopped_since_us >= 0:
+            end_us = min(end_us, flight.stopped_since_us + STOPPED_US)
         return VEHICLE_DOWN, VEHICLE_DEPTH, end_us
     return NO_WATCH, 0.0, FOREVER_US
 
@@ -271,6 +278,8 @@ def may_need_decision(
         return (state.x_load[2] - target[2] > stretch.threshold) != stretch.condition_met
     if stretch.watch == VEHICLE_DOWN:
         depth = state.x_quad[2] - target[2]
-        down = depth > stretch.threshold and (depth > ON_GROUND_DEPTH or abs(state.v_quad[2]) < STILL_SPEED)
-        return down != stretch.condition_met
+        stopped = depth > stretch.threshold
+        down = stopped and (depth > ON_GROUND_DEPTH or abs(state.v_quad[2]) < STILL_SPEED)
+        stays = abs(state.x_quad[2] - stretch.stopped_height) <= STOPPED_RANGE
+        return down != stretch.condition_met or stopped != stays
     return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
-from math import hypot, nan, sqrt
+from math import hypot, inf, nan, sqrt
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
@@ -172,6 +172,9 @@ class Flight:
     leg_start_us: int = 0
     following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
     condition_since_us: int = -1  # since when the condition that ends the phase holds, -1: it does not
+    # m, height near which a vehicle that is set down has stopped, and since when; infinite: it still sinks
+    stopped_height: float = inf
+    stopped_since_us: int = -1
     action_when_armed: ActionWhenArmed = ActionWhenArmed.NOTHING
     # while holding, it follows any setpoint: ArduPilot's GUIDED, not its LOITER
     accepts_setpoints: bool = True

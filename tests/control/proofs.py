@@ -298,8 +298,15 @@ def vehicle_error_obeys_its_law(laws: SimpleNamespace, model: SimpleNamespace, v
         wanted = 0.4 * (a_d + 9.81 * E3) - np.array(gains.k_x) * (x - x_d) - np.array(gains.k_v) * (v - v_d)
         close(F, wanted, EXACT)
     close(laws.limited_force((0.1, -0.2, 4.0), 3.924), (0.1, -0.2, 4.0), EXACT)
-    up, tangent = 0.2 * 3.924, 1.0
-    close(laws.limited_force((3.0, -4.0, -9.0), 3.924), (0.6 * tangent * up, -0.8 * tangent * up, up), EXACT)
+    # it leans for no less than 0.8 weights, by 45 deg at most
+    up, leaning, tangent = 0.2 * 3.924, 0.8 * 3.924, 1.0
+    close(
+        laws.limited_force((3.0, -4.0, -9.0), 3.924),
+        (0.6 * tangent * leaning, -0.8 * tangent * leaning, up),
+        EXACT,
+    )
+    close(laws.leaning_lift(up, 3.924), leaning, EXACT)
+    close(laws.leaning_lift(4.5, 3.924), 4.5, EXACT)
     close(laws.limited_force((0.0, 0.0, 99.0), 3.924), (0.0, 0.0, 1.6 * 3.924), EXACT)
 
 

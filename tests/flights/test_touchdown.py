@@ -5,14 +5,16 @@ from __future__ import annotations
 import io
 from math import nan
 
+import numpy as np
 import pytest
 
+import plumbline
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.closed_loop import Conditions, fly
 from gcs.sweep.flight import fly as sweep_fly
 from gcs.sweep.flight import start_times
 from missions.fileformat import load_mission
-from missions.model import Land, Mission, Takeoff
+from missions.model import Land, Mission, Release, Takeoff
 from sitl.vehicles.truth import load_truth
 
 SIMULATOR = 27  # component of its truth telemetry in our dialect
@@ -57,3 +59,20 @@ def test_quiet_trackers_that_are_late_see_a_load_that_lies(noise: float) -> None
         mission, Conditions(settings=settings), start_times(mission, Conditions(settings=settings))
     )
     assert (flown.outcome, flown.reason) == ("completed", "")
+
+
+def test_the_wind_does_not_turn_over_a_vehicle_that_lands() -> None:
+    """It leans by 26 deg as it touches down with one leg first, and has no load that holds it."""
+    mission = Mission("alone", "Alone", "", (), (Takeoff(2.0), Release(), Land()))
+    wind = {"SIM_WIND_E": 12.0, "SIM_GUST_STD": 1.0}
+    flight = plumbline.fly(mission, vehicle="hexarotor", sensors="field", settings=wind, seed=2)
+    assert flight.outcome == "completed"
+    told = flight.telemetry()
+    told = told[told.phase == "lower"]
+    height = told.vehicle_true_z_m
+    first_touch = told.time_s[height < height.min() + 0.03].min()
+    standing = told[told.time_s >= first_touch]
+    tilt = np.arccos(np.cos(standing.vehicle_angle_roll_rad) * np.cos(standing.vehicle_angle_pitch_rad))
+    assert np.degrees(tilt.max()) < 40.0
+    assert standing.vehicle_true_z_m.max() < height.min() + 0.1, "it jumped"
+    assert standing.time_s.max() - first_touch < 3.0, "its rotors ran on the ground"

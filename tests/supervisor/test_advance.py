@@ -314,6 +314,8 @@ def test_a_landing_that_is_called_off_by_another_item_is_called_off() -> None:
 
 # ---- touchdown
 
+BOBBING_M, BOBBING_US = 0.1, 1_600_000  # amplitude and period of a vehicle in a gust
+
 
 def lowering(phase: Phase) -> Flight:
     """A flight in the last leg of its landing."""
@@ -346,8 +348,9 @@ def test_a_gust_that_holds_the_vehicle_up_is_no_landing() -> None:
     start_height = creep.jet(0.0)[0][2]
     for k in range(1, 400):
         now = k * STEP_US
-        bobbing = (creep.jet(0.0)[0][0], 0.0, start_height)
-        speed = 0.2 if k % 8 < 4 else -0.2
+        phase = 2.0 * math.pi * now / BOBBING_US
+        bobbing = (creep.jet(0.0)[0][0], 0.0, start_height + BOBBING_M * math.sin(phase))
+        speed = BOBBING_M * 2e6 * math.pi / BOBBING_US * math.cos(phase)
         flight, _ = advance(flight, view(now, x_quad=bobbing, v_quad=(0.0, 0.0, speed)), SETTINGS)
     assert flight.phase == Phase.SET_DOWN
     for k in range(400, 420):
@@ -356,6 +359,25 @@ def test_a_gust_that_holds_the_vehicle_up_is_no_landing() -> None:
             break
     assert flight.phase == Phase.DISARMED, "it stands still for 0.2 s: landed"
     assert report.texts[0][1] == "Landed, disarmed"
+
+
+def test_a_vehicle_that_trembles_on_the_ground_has_landed() -> None:
+    flight = lowering(Phase.SET_DOWN)
+    creep = flight.legs[0]
+    start_height = creep.jet(0.0)[0][2]
+    for k in range(1, 400):
+        now = k * STEP_US
+        depth = start_height - creep.jet(now * 1e-6)[0][2]
+        height, speed = start_height + (0.008 if k % 2 else -0.008), 0.3 if k % 2 else -0.3
+        trembling = view(now, x_quad=(0.0, 0.0, height), v_quad=(0.0, 0.0, speed))
+        flight, report = advance(flight, trembling, SETTINGS)
+        if flight.phase == Phase.DISARMED:
+            break
+    assert flight.phase == Phase.DISARMED
+    assert report.texts[0][1] == "Landed, disarmed"
+    assert 0.24 < depth < 0.27, (
+        "half a second, in which the setpoint sinks by 0.1 m, after it is 0.15 m below"
+    )
 
 
 # ---- what ends a flight

@@ -24,6 +24,7 @@ from autopilot.control.actuators.lag_compensation import compensate_lag, lag_gai
 from autopilot.control.actuators.predictor import Prediction, predict, predict_on_ground
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.believed import believed_actuation, believed_design, believed_drag
+from autopilot.control.command_filter import filter_constants
 from autopilot.control.design import MAX_SWING_RATIO, swing_stiffness
 from autopilot.control.drag import Drag, drag_force
 from autopilot.control.laws import thesis
@@ -44,6 +45,9 @@ SATURATED_PACE = 0.5
 SATURATION_TIME, RECOVERY_TIME = 0.5, 10.0
 # of the greatest moment about a level axis: the rotors give as much less than is asked for
 _MISSING_SHARE = 0.02
+# of omega_R: the greatest natural frequency of the filter that gives the derivatives of R_c in the modes
+# other than load position; a faster one passes noise that the attitude loop cannot follow
+ATTITUDE_FILTER_RATIO = 1.5
 # rad/s^3: a commanded direction whose acceleration changes faster has jumped, and has no derivative
 MAX_DIRECTION_JERK = 300.0
 
@@ -102,9 +106,14 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
     )
     other_modes = thesis.build(table, vehicle)
     other_modes = other_modes._replace(
+        filters=other_modes.filters._replace(
+            attitude=filter_constants(
+                min(table["NGC_WN_R"], ATTITUDE_FILTER_RATIO * found.omega_R), table["NGC_ZETA"], period
+            )
+        ),
         gains=other_modes.gains._replace(
             k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
-        )
+        ),
     )
     return PlumblineLaw(constants, other_modes, 1e-3 * table["VEH_ACT_DELAY"])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 from autopilot.guidance.legs import LOAD_POSITION, Creep
 from autopilot.supervisor.settings import Settings
@@ -15,6 +16,9 @@ LOAD_DEPTH, VEHICLE_DEPTH = 0.05, 0.15  # m by which the setpoint must be below 
 # m, ten seconds of sinking: then only the ground can hold the vehicle up, however it trembles
 ON_GROUND_DEPTH = 2.0
 STILL_SPEED, STILL_US = 0.05, 200_000
+# m and us: a vehicle that trembles stands if its height varies by no more for so long; one that leans against
+# the wind as it touches down would otherwise be turned over by it
+STOPPED_RANGE, STOPPED_US = 0.02, 500_000
 
 
 def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResult:
@@ -22,7 +26,9 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResu
     if flight.phase not in (Phase.LOWER, Phase.SET_DOWN):
         return WatchResult(flight)
     flight = _note_touchdown(flight, view, settings)
-    if flight.condition_since_us < 0 or view.now_us - flight.condition_since_us < STILL_US:
+    still = flight.condition_since_us >= 0 and view.now_us - flight.condition_since_us >= STILL_US
+    stopped = flight.stopped_since_us >= 0 and view.now_us - flight.stopped_since_us >= STOPPED_US
+    if not (still or stopped):
         return WatchResult(flight)
     if flight.phase == Phase.LOWER and not flight.cable.released:
         return WatchResult(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
@@ -44,24 +50,43 @@ def _note_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the load or vehicle that is set down no longer follows its sinking setpoint.
 
     A load that still sinks lags behind the setpoint by the distance that it sinks in the lag of the law.
-    The vehicle must stand still as well, because a gust may hold it up. But a loop with a long delay may
-    never come to rest on the ground: then a setpoint far below suffices. Once the cable is slack, the
-    velocity of the load is no evidence.
+    Once the cable is slack, the velocity of the load is no evidence.
     """
     leg = flight.legs[0]
-    if isinstance(leg, Creep):
-        target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
-        if leg.control_mode == LOAD_POSITION:
-            down = view.x_load[2] - target > LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED
-            # while readings are missing, the pull shows that the load is down
-            down = down or (
-                bool(view.estimate_problems) and cable_pull_share(view, settings) < SLACK_PULL_SHARE
-            )
-        else:
-            depth = view.x_quad[2] - target
-            down = depth > VEHICLE_DEPTH and (depth > ON_GROUND_DEPTH or abs(view.v_quad[2]) < STILL_SPEED)
-        if down:
-            return (
-                flight if flight.condition_since_us >= 0 else replace(flight, condition_since_us=view.now_us)
-            )
-    return flight if flight.condition_since_us < 0 else replace(flight, condition_since_us=-1)
+    if not isinstance(leg, Creep):
+        return _with_condition(flight, False, view)
+    target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
+    if leg.control_mode != LOAD_POSITION:
+        return _note_stopped_vehicle(flight, view.x_quad[2] - target, view)
+    down = view.x_load[2] - target > LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED
+    # while readings are missing, the pull shows that the load is down
+    down = down or (bool(view.estimate_problems) and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
+    return _with_condition(flight, down, view)
+
+
+def _note_stopped_vehicle(flight: Flight, depth: float, view: View) -> Flight:
+    """The same of the vehicle, whose setpoint is `depth` (m) below it.
+
+    It must stand still as well, because a gust may hold it up. But on the ground a loop with a long delay,
+    or that of a vehicle that leans against the wind, may not come to rest: then a height that stays about the
+    same, or a setpoint far below, suffices.
+    """
+    stopped = depth > VEHICLE_DEPTH
+    flight = _with_condition(
+        flight, stopped and (depth > ON_GROUND_DEPTH or abs(view.v_quad[2]) < STILL_SPEED), view
+    )
+    if not stopped:
+        if flight.stopped_since_us < 0:
+            return flight
+        return replace(flight, stopped_height=inf, stopped_since_us=-1)
+    height = view.x_quad[2]
+    if abs(height - flight.stopped_height) <= STOPPED_RANGE:
+        return flight
+    return replace(flight, stopped_height=height, stopped_since_us=view.now_us)
+
+
+def _with_condition(flight: Flight, holds: bool, view: View) -> Flight:
+    """The flight, with the time since when the condition that ends its phase holds."""
+    if holds == (flight.condition_since_us >= 0):
+        return flight
+    return replace(flight, condition_since_us=view.now_us if holds else -1)
