@@ -6,9 +6,9 @@ The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint 
 
 x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
 matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
-are those of the least integral for a given total time (`optimal_time_shares`); for many waypoints they follow
-from a ride along the straight lines between them that is slow in turns (`ride_through`). The total follows
-from the form that was requested:
+follow from a ride along the straight lines between them that is slow in turns (`ride_through`), or, where
+that is quicker, are those of the least integral for a given total time (`optimal_time_shares`). The total
+follows from the form that was requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -56,7 +56,7 @@ _FINE_S = 0.01
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
 _MAX_FINE_SAMPLES = 20_000
 _TIME_SHARE_ITERATIONS = 6
-# most segments for which the integral is minimised over the times; beyond it they follow from a ride
+# most segments for which the integral is also minimised over the times
 _MAX_OPTIMISED_SEGMENTS = 8
 _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
@@ -387,20 +387,45 @@ def plan_waypoint_path(
     there is no path that is quicker than flying from point to point with a stop at each.
     """
     places = np.array(points)
-    passed = np.arange(len(points))
-    if len(points) - 1 > _MAX_OPTIMISED_SEGMENTS:
-        quickest, total_s = quickest_ride(places, speed, accel)
-        places, passed = quickest.points, quickest.waypoints
-        shares = np.diff(quickest.times) / quickest.times[-1]
-    else:
-        length = float(sum(dist(a, b) for a, b in pairwise(points)))
+    distances = [dist(a, b) for a, b in pairwise(points)]
+    length = float(sum(distances))
+    stops_s = sum(transfer_duration(distance, speed, accel) for distance in distances)
+
+    def planned(begin: TimedPoints) -> tuple[MinimumSnap, Array]:
+        path, times = _scaled_path(begin, speed, accel, body, bounds, time_optimal)
+        if times[-1] > stops_s:
+            raise NoPathError("the path is slower than stops at its points")
+        return path, times[begin.waypoints]
+
+    found = []
+    with suppress(NoPathError):
+        found.append(planned(quickest_ride(places, speed, accel)[0]))
+    if len(distances) <= _MAX_OPTIMISED_SEGMENTS:
         total_s = transfer_duration(length, speed, accel)
-        shares = optimal_time_shares(places, total_s)
+        with suppress(NoPathError):
+            times = np.concatenate([[0.0], np.cumsum(optimal_time_shares(places, total_s))]) * total_s
+            found.append(planned(TimedPoints(places, times, np.arange(len(places)))))
+    if not found:
+        raise NoPathError("flights with a stop at each point are quicker")
+    return min(found, key=lambda plan: float(plan[1][-1]))
+
+
+def _scaled_path(
+    begin: TimedPoints,
+    speed: float,
+    accel: float,
+    body: Body,
+    bounds: Bounds,
+    time_optimal: bool,
+) -> tuple[MinimumSnap, Array]:
+    """The path through the points and the times at them, in the same proportion as at first."""
+    total_s = float(begin.times[-1])
+    shares = np.diff(begin.times) / total_s
 
     def evaluate(seconds: float) -> tuple[MinimumSnap, Array, float]:
         """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""
         times = _point_times(shares, seconds)
-        path = MinimumSnap(places, times)
+        path = MinimumSnap(begin.points, times)
         fine, jets = path.jets()
         over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
         min_factor = 0.0 if time_optimal else float(limits_used(jets, speed, accel).max())
@@ -428,6 +453,4 @@ def plan_waypoint_path(
             else:
                 low = middle
         path, times = best
-    if times[-1] > sum(transfer_duration(dist(a, b), speed, accel) for a, b in pairwise(points)):
-        raise NoPathError("the path is slower than stops at its points")
-    return path, times[passed]
+    return path, times

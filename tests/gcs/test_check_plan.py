@@ -66,7 +66,7 @@ def test_a_mission_within_its_fence_passes(tmp_path: Path) -> None:
     [
         (box(0.0, 0.0, 5.0), CORNER, ["Mission denied: item 1 leads outside the fence"]),
         # the waypoints are inside, the curve between them leaves the square
-        (box(0.0, 0.0, 6.3), CORNER, ["Mission denied: the curve to item 2 leads outside the fence"]),
+        (box(0.0, 0.0, 6.05), CORNER, ["Mission denied: the curve to item 2 leads outside the fence"]),
         (
             (place(OUTSIDE, 1.0, 0.0, 3.0),),
             (Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0)),

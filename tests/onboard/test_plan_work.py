@@ -210,9 +210,9 @@ def test_a_mission_that_is_deleted_while_it_waits_no_longer_does(in_air: bool) -
 
 @pytest.mark.parametrize("outside", [True, False])
 def test_a_curve_beyond_the_fence_is_told_after_the_upload(outside: bool) -> None:
-    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=4.3 if outside else 9.0)
+    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=8.6 if outside else 12.0)
     craft.wait(1.0)
-    corner = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0), Waypoint(-3.0, 3.0, 2.0))
+    corner = (Waypoint(6.0, 0.0, 2.0), Waypoint(6.0, 6.0, 2.0), Waypoint(-6.0, 6.0, 2.0))
     upload(craft, Takeoff(2.0), *corner, Land())
     craft.wait(0.1)
     told = [text for text in craft.texts if text.startswith("Mission will not start: the curve to item ")]

@@ -153,7 +153,7 @@ def test_a_load_beside_the_beginning_of_a_path_is_led_onto_it() -> None:
 def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     sky = started(Takeoff(2.0), *ROUND, model.Land())
     sky.run(lambda s: s.flight.mission.step == item and s.flight.phase == Phase.MISSION)
-    sky.wait(1.0)
+    sky.wait(0.5)
     assert isinstance(sky.flight.legs[0], PathStretch)
     assert sky.ask(Pause()).result == ACCEPTED
     sky.wait(4.0)

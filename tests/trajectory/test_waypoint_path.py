@@ -23,7 +23,9 @@ from autopilot.trajectory.waypoint_path import (
     NoPathError,
     PathSegment,
     evaluate_path,
+    optimal_time_shares,
     plan_waypoint_path,
+    quickest_ride,
     ride,
     ride_through,
     sample_path,
@@ -118,9 +120,25 @@ def test_the_path_is_that_of_a_dense_programme() -> None:
 
 def test_times_between_points_are_better_than_equal_ones() -> None:
     points = np.array([(0.0, 0.0, 2.0), (1.0, 0.0, 2.0), (9.0, 0.0, 2.0), (9.0, 3.0, 2.0)])
-    _, times = plan_waypoint_path([tuple(p) for p in points], 2.0, 2.0, BODY, BOUNDS, False)
+    times = 10.0 * np.concatenate([[0.0], np.cumsum(optimal_time_shares(points, 10.0))])
     equal = np.linspace(0.0, times[-1], 4)
     assert MinimumSnap(points, times).cost < 0.5 * MinimumSnap(points, equal).cost
+
+
+@pytest.mark.parametrize("speed", [1.5, 3.0])
+def test_few_waypoints_are_passed_in_the_quicker_of_two_ways(speed: float) -> None:
+    """A ride is quicker round corners of 20 m at 1.5 m/s; at 3 m/s, which takes long to reach and to lose,
+    the smoothest path is."""
+    points: list[Vec3] = [(x, y, 10.0) for x, y in ((0, 0), (20, 0), (20, 20), (0, 20), (0, 0))]
+    places = np.array(points)
+    _, times = plan_waypoint_path(points, speed, 1.5, BODY, BOUNDS, False)
+    shares = np.diff(times) / times[-1]
+    smoothest = optimal_time_shares(places, transfer_duration(80.0, speed, 1.5))
+    ridden = quickest_ride(places, speed, 1.5)[0]
+    ridden_shares = np.diff(ridden.times[ridden.waypoints]) / ridden.times[-1]
+    chosen, other = (ridden_shares, smoothest) if speed == 1.5 else (smoothest, ridden_shares)
+    assert shares == pytest.approx(chosen, abs=1e-6)
+    assert np.abs(shares - other).max() > 1e-3
 
 
 def test_time_optimal_is_quicker_and_at_a_bound() -> None:
@@ -215,7 +233,7 @@ def test_a_path_that_would_be_slower_than_stops_is_flown_with_stops() -> None:
     """Of one that is a thousand times as long as one of its lines, the spline has no place for this line."""
     near = [(0.1 * i, 0.1 * (i % 2), 4.0) for i in range(10)]
     far: list[Vec3] = [*near, (3000.0, 0.0, 4.0), (0.0, 0.0, 4.0)]
-    with pytest.raises(NoPathError, match="too unequal"):
+    with pytest.raises(NoPathError, match="with a stop"):
         plan_waypoint_path(far, 1.5, 1.5, BODY, BOUNDS, False)
     steps = (Takeoff(4.0), *(Waypoint(*place) for place in far[1:]), Land())
     assert not any(isinstance(path, PathSegment) for path in prepare(steps, range(len(steps)), LIMITS).paths)
