@@ -412,6 +412,7 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         mixed = equal_forces(IDLE_FORCE_N if stretch.idle else 0.0, rows.table, rows.rotors)
         reset = nominal_on_ground(vehicle)
         reset = with_field(reset, "ground_force", observed.ground_force)
+        reset = with_field(reset, "vehicle_ground_height", observed.vehicle_ground_height)
         observed = with_field(reset, "load_ground_height", observed.load_ground_height)
     else:
         if constants.yaw_free:

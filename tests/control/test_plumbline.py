@@ -859,6 +859,19 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
     agree(climbing.drag.linear + BEBOP_DRAG.linear, thrice.linear, 0.03 * thrice.linear)
     slow, _ = learned(BEBOP_DRAG, thrice, lambda k: [0.2 if k % 2 else -0.2, 0.0, 0.0])
     agree(slow.drag, BEBOP_DRAG, 0.05 * BEBOP_DRAG.linear)
+    # a wind that blows from the first tick on is no drag, long before its mean is known
+    constants = law.observer_constants(0.3, 0.02, 4.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
+    observed = law.nominal_in_flight(vehicle)
+    for k in range(100):
+        v = (0.02 * k, 0.0, 0.0)
+        force = np.add(law.drag_force(v, BEBOP_DRAG), (1.5, 0.0, 0.0))
+        pose = model.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
+        state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
+        observed = law.observe(observed, state, 1.0, lift, ZERO, constants, BEBOP_DRAG, vehicle)
+    agree(observed.drag, (0.0, 0.0), 1e-12)
+    weight = 1.0 - (1.0 - TICK / 4.0) ** 100
+    assert observed.drag_weight == pytest.approx(weight)
+    agree(observed.mean_residual, [1.5 * weight, 0.0, 0.0], 1e-9)
 
 
 def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -944,15 +957,39 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
     assert observed.torque.correlation / observed.torque.square == pytest.approx(tilt, rel=0.02)
     slow, _, swept, _ = learned(lambda k: [0.2 * math.sqrt(2.0) * math.sin(0.02 * k), 0.0, 0.0])
     agree(np.array(slow.torque.total) - slow.torque.steady, 0.5 * tilt * swept, 0.1 * tilt * 0.2)
-    # no more than the rotors could compensate, and nothing while the cable is slack
+    # one that is there from the first tick on does not follow the motion, long before its mean is known
+    young = law.nominal_in_flight(vehicle)
+    gradual = law.observer_constants(0.3, 0.1, 4.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
+    for k in range(100):
+        pose = model.pack(ZERO, [0.02 * k, 0.0, 0.0], [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
+        moving = model.state_of(pose, vehicle)
+        young = law.observe(young, moving, 1.0, lift, (-0.01, 0.02, 0.0), gradual, BEBOP_DRAG, vehicle)
+    agree(young.torque.total, young.torque.steady, 1e-12)
+    assert young.torque.weight == pytest.approx(1.0 - (1.0 - TICK / 4.0) ** 100)
+    # no more than the rotors could compensate
     for k in range(500):
         spun = state._replace(omega_body=model.vec((-1.0) ** k * np.array([3.0, 3.0, 3.0])))
         observed = law.observe(observed, spun, 1.0, lift, (9.0, -9.0, 9.0), constants, BEBOP_DRAG, vehicle)
     force = vehicle.rotor_max - vehicle.rotor_min
     level, yaw = 0.3 * vehicle.arm * force, 0.6 * vehicle.torque_ratio * force
     agree(observed.torque.total, (-level, level, -yaw), ROUNDING)
-    slack = law.observe(observed, state, 0.0, 5.0, (0.1, 0.1, 0.1), constants, BEBOP_DRAG, vehicle)
-    assert slack.torque == observed.torque._replace(total=ZERO, omega_body=state.omega_body)
+
+    # with a slack cable it is learned in the air; kept, but not learned, where others act, just
+    # above the ground and while the ground carries the load; not compensated on the ground
+    def a_tick_later(taut: float, **known: float) -> Any:
+        before = observed._replace(**known)
+        return law.observe(before, state, taut, 5.0, (0.1, 0.1, 0.1), constants, BEBOP_DRAG, vehicle)
+
+    height, kept = state.x_quad[2], observed.torque._replace(omega_body=state.omega_body)
+    hangs = a_tick_later(1.0)
+    assert hangs.torque.steady != kept.steady
+    assert a_tick_later(0.0).torque == hangs.torque
+    assert a_tick_later(0.0, vehicle_ground_height=height - 0.31).torque == hangs.torque
+    assert a_tick_later(0.0, vehicle_ground_height=height - 0.29).torque == kept
+    assert a_tick_later(1.0, load_ground_height=9.0).torque == kept
+    stands = a_tick_later(0.0, ground_force=2.0 * vehicle.quad_mass * vehicle.gravity)
+    assert stands.torque == kept._replace(total=ZERO)
+    assert stands.vehicle_ground_height == height
     # an observer that is configured not to learn does not
     deaf = law.observer_constants(0.3, 0.1, 1.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     for _ in range(100):

@@ -45,6 +45,9 @@ from autopilot.control.actuators.torque_observer import (
     NO_TORQUE,
     TorqueConstants,
     TorqueEstimate,
+    deviation_from_mean,
+    held,
+    later_weight,
     observe_torque,
     torque_constants,
     without_compensation,
@@ -56,8 +59,9 @@ from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import force_along_cable
 
-# m: a load this much higher than where it lay is in the air
-_OFF_GROUND = 0.03
+# m: a load this much higher than where it lay is in the air; a vehicle this much higher than where it stood
+# touches the ground nowhere
+_OFF_GROUND, _VEHICLE_OFF_GROUND = 0.03, 0.3
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _ON_GROUND_SHARE = 0.2
 _CONTACT_TIME = 0.02  # s, time constant of the estimate of the ground's force
@@ -110,11 +114,13 @@ class DisturbanceEstimate(NamedTuple):
     mass_square: float  # of w, m^2/s^4
     ground_force: float  # N, upward force on the vehicle besides that of its rotors while the cable is slack
     load_ground_height: float  # m, height at which the load lay
+    vehicle_ground_height: float  # m, height at which the vehicle stood
     steady_push: Vec3  # N, the part of the push that does not follow the speed
     prompt_push: Vec3  # N, the same, learned as fast as configured
     drag: Drag  # learned drag, beyond the assumed drag
-    mean_shape_drag: Vec3  # N
-    mean_residual: Vec3  # N
+    drag_weight: float  # of what the two means have learned; 1: they are complete
+    mean_shape_drag: Vec3  # N, times the weight
+    mean_residual: Vec3  # N, times the weight
     drag_correlation: float  # of s and r, N^2
     drag_square: float  # of s, N^2
     load_air_accel: Vec3  # m/s^2, world, acceleration of the load by the air besides its drag
@@ -198,9 +204,11 @@ def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
         g * g,
         vehicle.quad_mass * g,
         0.0,
+        0.0,
         ZERO,
         ZERO,
         Drag(0.0, 0.0),
+        0.0,
         ZERO,
         ZERO,
         0.0,
@@ -213,7 +221,9 @@ def nominal_on_ground(vehicle: Vehicle) -> DisturbanceEstimate:
 
 def nominal_in_flight(vehicle: Vehicle) -> DisturbanceEstimate:
     """As `nominal_on_ground`, but vehicle and load are off the ground, wherever they are."""
-    return nominal_on_ground(vehicle)._replace(ground_force=0.0, load_ground_height=-inf)
+    return nominal_on_ground(vehicle)._replace(
+        ground_force=0.0, load_ground_height=-inf, vehicle_ground_height=-inf
+    )
 
 
 @kernel
@@ -256,6 +266,7 @@ def observe(
     q, a = state.q_cable, state.a_quad
     load_mass, steady_push, learned = observed.load_mass, observed.steady_push, observed.drag
     prompt_push = observed.prompt_push
+    drag_weight = observed.drag_weight
     mean_shape_drag, mean_residual = observed.mean_shape_drag, observed.mean_residual
     drag_correlation, drag_square = observed.drag_correlation, observed.drag_square
     mass_correlation, mass_square = observed.mass_correlation, observed.mass_square
@@ -292,8 +303,10 @@ def observe(
     if suspended:
         mean_shape_drag = axpy(constants.drag, sub(shape_drag, mean_shape_drag), mean_shape_drag)
         mean_residual = axpy(constants.drag, sub(residual, mean_residual), mean_residual)
-        deviation = sub(shape_drag, mean_shape_drag)
-        drag_correlation += constants.drag * (dot(deviation, sub(residual, mean_residual)) - drag_correlation)
+        drag_weight = later_weight(drag_weight, constants.drag)
+        deviation = deviation_from_mean(shape_drag, mean_shape_drag, drag_weight)
+        residual_deviation = deviation_from_mean(residual, mean_residual, drag_weight)
+        drag_correlation += constants.drag * (dot(deviation, residual_deviation) - drag_correlation)
         drag_square += constants.drag * (dot(deviation, deviation) - drag_square)
         min_drag_force = (shape.linear + shape.quadratic * _DRAG_SPEED) * _DRAG_SPEED
         factor = min(
@@ -301,11 +314,18 @@ def observe(
             max(constants.min_factor, drag_correlation / (drag_square + min_drag_force * min_drag_force)),
         )
         learned = Drag(factor * shape.linear, factor * shape.quadratic)
-    if suspended:
+    stands = ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity
+    vehicle_ground_height = observed.vehicle_ground_height
+    if stands:
+        vehicle_ground_height = state.x_quad[2]
+    in_air = state.x_quad[2] > vehicle_ground_height + _VEHICLE_OFF_GROUND
+    if suspended or (in_air and not taut > 0.0):
         torque = observe_torque(observed.torque, state, moment, constants.torque, vehicle)
-    else:
+    elif stands:
         torque = without_compensation(observed.torque, state)
-    if not ground_force > _ON_GROUND_SHARE * vehicle.quad_mass * vehicle.gravity:
+    else:
+        torque = held(observed.torque, state)
+    if not stands:
         now = axpy(-factor, shape_drag, residual)
         steady_push = axpy(constants.push, sub(now, steady_push), steady_push)
         prompt_push = axpy(constants.prompt, sub(now, prompt_push), prompt_push)
@@ -322,9 +342,11 @@ def observe(
         mass_square,
         ground_force,
         load_ground_height,
+        vehicle_ground_height,
         steady_push,
         prompt_push,
         learned,
+        drag_weight,
         mean_shape_drag,
         mean_residual,
         drag_correlation,

@@ -13,8 +13,9 @@ that is attached elsewhere than assumed, rotors that are not alike.
 A rotor disc that tilts backward turns the vehicle through its stiff blades, and its drag through the lever
 to the centre of mass, both about the level axis across the flow. k is the least-squares fit of d to s, both
 taken as differences from their means over some seconds; this part is known without delay. The rest, p, is
-learned with a delay. Both are learned only while the load hangs free: the ground turns a vehicle that touches
-it, and the estimate would attribute this to the air.
+learned with a delay. Both are learned only in the air, while the load hangs free or the cable is slack: the
+ground turns a vehicle that touches it, and a load that the ground carries turns it by an unknown pull. The
+estimate would attribute this to the air.
 """
 
 from __future__ import annotations
@@ -46,14 +47,16 @@ class TorqueEstimate(NamedTuple):
 
     total: Vec3  # k s + p, N m
     steady: Vec3
-    mean_cross_flow: Vec3  # m/s
-    mean_torque: Vec3  # N m
+    weight: float  # of what the two means have learned; 1: they are complete
+    mean_cross_flow: Vec3  # m/s, times the weight
+    mean_torque: Vec3  # N m, times the weight
     correlation: float  # of s and d, N m^2/s
     square: float  # of s, m^2/s^2
     omega_body: Vec3  # rad/s, a period ago
 
 
-NO_TORQUE = TorqueEstimate(ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ZERO)
+NO_TORQUE = TorqueEstimate(ZERO, ZERO, 0.0, ZERO, ZERO, 0.0, 0.0, ZERO)
+_MIN_WEIGHT = 1e-9  # where nothing is learned, the means and their weight are zero
 
 
 def torque_constants(
@@ -69,8 +72,27 @@ def torque_constants(
 
 @kernel
 def without_compensation(torque: TorqueEstimate, state: State) -> TorqueEstimate:
-    """The estimate a period later, while the load does not hang free: kept, but not compensated."""
-    return with_field(with_field(torque, "total", ZERO), "omega_body", state.omega_body)
+    """The estimate a period later, while the vehicle stands on the ground: kept, but not compensated."""
+    return held(with_field(torque, "total", ZERO), state)
+
+
+@kernel
+def held(torque: TorqueEstimate, state: State) -> TorqueEstimate:
+    """The estimate a period later, while nothing can be learned."""
+    return with_field(torque, "omega_body", state.omega_body)
+
+
+@kernel
+def later_weight(weight: float, share: float) -> float:
+    """The weight of a fading average that began at zero, one value later: the share that is not the zero."""
+    return weight + share * (1.0 - weight)
+
+
+@kernel
+def deviation_from_mean(value: Vec3, weighted_mean: Vec3, weight: float) -> Vec3:
+    """What a value differs by from the mean of the values so far. A mean that begins at zero and is not
+    divided by its weight would take what is constant, such as the push of the wind, for a deviation."""
+    return axpy(-1.0 / max(weight, _MIN_WEIGHT), weighted_mean, value)
 
 
 @kernel
@@ -82,17 +104,18 @@ def _clamped(value: float, limit: float) -> float:
 def observe_torque(
     torque: TorqueEstimate, state: State, moment: Vec3, constants: TorqueConstants, vehicle: Vehicle
 ) -> TorqueEstimate:
-    """The estimate a period later, while the load hangs free; `moment`, N m: of rotors and cable now."""
+    """The estimate a period later, in the air; `moment`, N m: of rotors and cable now."""
     J, W = vehicle.inertia, state.omega_body
     turning = scale(1.0 / constants.period, times(J, sub(W, torque.omega_body)))
     external_torque = sub(add(turning, cross(W, times(J, W))), moment)
     u = apply_transposed(state.R, state.v_quad)
     cross_flow: Vec3 = (u[1], -u[0], 0.0)
+    weight = later_weight(torque.weight, constants.factor)
     mean_cross_flow = axpy(constants.factor, sub(cross_flow, torque.mean_cross_flow), torque.mean_cross_flow)
     mean_torque = axpy(constants.factor, sub(external_torque, torque.mean_torque), torque.mean_torque)
-    deviation = sub(cross_flow, mean_cross_flow)
+    deviation = deviation_from_mean(cross_flow, mean_cross_flow, weight)
     correlation = torque.correlation + constants.factor * (
-        dot(deviation, sub(external_torque, mean_torque)) - torque.correlation
+        dot(deviation, deviation_from_mean(external_torque, mean_torque, weight)) - torque.correlation
     )
     square = torque.square + constants.factor * (dot(deviation, deviation) - torque.square)
     factor = correlation / (square + _FLOW_SPEED * _FLOW_SPEED)
@@ -102,6 +125,7 @@ def observe_torque(
     return TorqueEstimate(
         (_clamped(total[0], limit[0]), _clamped(total[1], limit[1]), _clamped(total[2], limit[2])),
         (_clamped(steady[0], limit[0]), _clamped(steady[1], limit[1]), _clamped(steady[2], limit[2])),
+        weight,
         mean_cross_flow,
         mean_torque,
         correlation,
