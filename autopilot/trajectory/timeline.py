@@ -54,7 +54,7 @@ def cable_length_problem(target_m: float, min_length_m: float, max_length_m: flo
     """Why a winch refuses this cable length, given WNC_LEN_MIN and WNC_LEN_MAX; empty if it does not."""
     if min_length_m - MIN_REEL_M <= target_m <= max_length_m + MIN_REEL_M:
         return ""
-    limits = f"{min_length_m:g} ... {max_length_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
+    limits = f"{min_length_m:.4g} ... {max_length_m:.4g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
     return f"a cable of {target_m:.2f} m; must be {limits}"
 
 
