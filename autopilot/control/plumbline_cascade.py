@@ -70,6 +70,7 @@ from autopilot.geometry.linear import (
 )
 from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
 from autopilot.geometry.so3 import exp
+from autopilot.vehicle.rotors import MAX_TURN_RATE
 
 # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
 DIFFERENCE_STEP = 2e-3
@@ -85,9 +86,6 @@ _MAX_LEAN_TANGENT = 2.7
 _MIN_LIFT = 0.2
 # of the pull along the cable: the greatest force across it for errors, besides that for the reference
 MAX_ACROSS_SHARE = 0.7
-# rad/s with a force of the whole weight, less with a smaller one: noise turns the direction of a small force
-# faster than rotors can follow
-_MAX_RATE = 9.0
 _PACE_RISE_TIME = 0.3  # s, in which the pace of load and cable would rise from nothing to full
 _FULL_RANGE_TIME = 0.1  # s, shortest time in which the thrust is assumed to pass through its whole range
 
@@ -198,7 +196,7 @@ def commanded_attitude(
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     return AttitudeCommand(
         attitude.R_c,
-        limit_length(attitude.Omega_c, _MAX_RATE * min(1.0, n / weight)),
+        limit_length(attitude.Omega_c, MAX_TURN_RATE * min(1.0, n / weight)),
         limit_length(
             attitude.Omega_c_dot,
             max_level_moment(vehicle) / J,

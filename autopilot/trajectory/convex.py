@@ -27,6 +27,7 @@ from autopilot.trajectory.rotor_demand import (
     COS_TILT,
     FIRST_ROTOR,
     TENSION,
+    TURN,
     Bounds,
     demand,
     demand_derivatives,
@@ -41,7 +42,8 @@ _EXCESS_WEIGHT = 2e4  # of one newton for one second; a distance of d costs 1 pe
 _CONSTRAINT_WEIGHT = 1e5  # of one metre
 _HALVINGS = 7
 _CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
-_COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # convert an excess of cosine and tension to newtons of a rotor
+# convert an excess of cosine, tension and squared rate to newtons of a rotor
+_COS_SCALE, _TENSION_SCALE, _TURN_SCALE = 2.0, 1.0, 0.02
 _START_EXCESS_N = 0.05  # largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
 _INACTIVE_N = 0.6  # a round leaves out bounds that are at least this far from the demand
@@ -335,6 +337,8 @@ class Problem:
             bound(lag @ matrix(rotor), lag @ path_demand[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
         bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
         bound(matrix(COS_TILT), path_demand[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
+        turn, max_turn = _TURN_SCALE * path_demand[:, TURN], _TURN_SCALE * bounds.turn_rate**2
+        bound(_TURN_SCALE * matrix(TURN), turn, -np.inf, max_turn, 1.0)
         blocks.append(sparse.hstack([sparse.csr_matrix((n, 3 * size)), excess_of], format="csr"))
         limits.append(np.zeros(n))
         return sparse.vstack(blocks, format="csr"), np.concatenate(limits)
@@ -358,6 +362,7 @@ def excess(path_demand: Array, spacing: float, bounds: Bounds) -> Array:
     over = np.maximum(commands.max(axis=1) - bounds.rotor_high, bounds.rotor_low - commands.min(axis=1))
     over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - path_demand[:, TENSION]))
     over = np.maximum(over, _COS_SCALE * (bounds.cos_tilt - path_demand[:, COS_TILT]))
+    over = np.maximum(over, _TURN_SCALE * (path_demand[:, TURN] - bounds.turn_rate**2))
     return np.asarray(np.maximum(over, 0.0))
 
 

@@ -1,7 +1,8 @@
 """Demand of a path on rotors, cable and attitude, with its derivatives: the constraints of an optimisation.
 
-For each sample of a path two numbers and one more per rotor: the tension (N), the cosine of the vehicle's
-tilt, and the demand on each rotor (N), with a heading of 0.
+For each sample of a path three numbers and one more per rotor: the tension (N), the cosine of the vehicle's
+tilt, the square of the rate (rad/s) at which it turns about its level axes, and the demand on each rotor (N),
+with a heading of 0. Where the rotors' force is less than the weight, the rate counts as much more.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from autopilot.geometry.kernel import kernel
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.peaks import Body, KernelBody, rotor_effort, to_kernel_body
 from autopilot.trajectory.signals import Jet
+from autopilot.vehicle.rotors import MAX_TURN_RATE
 
 Array = NDArray[np.float64]
 
-TENSION, COS_TILT, FIRST_ROTOR = 0, 1, 2  # outputs
+TENSION, COS_TILT, TURN, FIRST_ROTOR = 0, 1, 2, 3  # outputs
+_MIN_FORCE_N = 1e-3  # a smaller force has no direction that could turn
 # steps of the central differences, m/s ... m/s^6: each changes a rotor force by about as much
 _DIFFERENCE_STEPS = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
 
@@ -35,6 +38,7 @@ class Bounds(NamedTuple):
     tension_low: float
     cos_tilt: float
     rotor_tau: float
+    turn_rate: float = MAX_TURN_RATE  # rad/s, about the level axes, with a force of at least the weight
 
 
 @kernel
@@ -52,6 +56,9 @@ def _fill_outputs(jet: Jet, body: KernelBody, efforts: Array, out: Array) -> Non
     )
     out[TENSION] = flat.tension
     out[COS_TILT] = flat.R[2][2]
+    rate = flat.omega_body
+    heaviness = max(1.0, (body.quad_mass + body.load_mass) * body.gravity / max(flat.thrust, _MIN_FORCE_N))
+    out[TURN] = (rate[0] * rate[0] + rate[1] * rate[1]) * heaviness * heaviness
     for i in range(efforts.shape[0]):
         out[FIRST_ROTOR + i] = rotor_effort(efforts, i, flat.thrust, flat.moment, body)
 
@@ -71,7 +78,7 @@ def _jet_of(jets: Array, i: int) -> Jet:
 
 @kernel
 def fill_demand(jets: Array, body: KernelBody, efforts: Array, out: Array) -> None:
-    """Fill `out` (n, 2 + rotors) with the demand of `jets` (7 or more, n, 3)."""
+    """Fill `out` (n, 3 + rotors) with the demand of `jets` (7 or more, n, 3)."""
     for i in range(jets.shape[1]):
         _fill_outputs(_jet_of(jets, i), body, efforts, out[i])
 
@@ -80,8 +87,8 @@ def fill_demand(jets: Array, body: KernelBody, efforts: Array, out: Array) -> No
 def fill_demand_derivatives(
     jets: Array, body: KernelBody, efforts: Array, steps: Array, scratch: Array, out: Array
 ) -> None:
-    """Fill `out` (n, 2 + rotors, 7, 3) with the derivative of each output by each entry of the jet except the
-    position; `jets` is unchanged at the end. `scratch` is (2, 2 + rotors)."""
+    """Fill `out` (n, 3 + rotors, 7, 3) with the derivative of each output by each entry of the jet except the
+    position; `jets` is unchanged at the end. `scratch` is (2, 3 + rotors)."""
     high, low = scratch[0], scratch[1]
     for i in range(jets.shape[1]):
         for order in range(1, 7):
@@ -98,7 +105,7 @@ def fill_demand_derivatives(
 
 
 def demand(jets: Array, body: Body) -> Array:
-    """(n, 2 + rotors) demand of the path with `jets` (7, n, 3)."""
+    """(n, 3 + rotors) demand of the path with `jets` (7, n, 3)."""
     kernel_body, efforts = to_kernel_body(body)
     out = np.empty((jets.shape[1], FIRST_ROTOR + len(efforts)))
     fill_demand(jets, kernel_body, efforts, out)
@@ -106,7 +113,7 @@ def demand(jets: Array, body: Body) -> Array:
 
 
 def demand_derivatives(jets: Array, body: Body) -> Array:
-    """(n, 2 + rotors, 7, 3) derivatives of the demand by the jets (7, n, 3)."""
+    """(n, 3 + rotors, 7, 3) derivatives of the demand by the jets (7, n, 3)."""
     kernel_body, efforts = to_kernel_body(body)
     outputs = FIRST_ROTOR + len(efforts)
     out = np.zeros((jets.shape[1], outputs, 7, 3))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from math import acos, degrees, factorial
+from math import acos, degrees, factorial, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
-from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, TURN, Bounds, demand, rotor_commands
 from autopilot.trajectory.splines import COLUMNS, DEGREE, PieceTable
 from autopilot.trajectory.waypoint_path import PathSegment, limits_used, sample_path
 
@@ -195,7 +195,11 @@ def bound_violation(path: Path, route: Route) -> str:
         return f"a rotor would have to give {low:.2f} N; it must give {bounds.rotor_low:.2f} N at least"
     if tension < bounds.tension_low:
         return f"the cable would pull with {tension:.2f} N; it must be {bounds.tension_low:.2f} N at least"
-    return f"the vehicle would lean {tilt:.0f} deg; allowed are {degrees(acos(bounds.cos_tilt)):.0f} deg"
+    if degrees(acos(bounds.cos_tilt)) < tilt:
+        return f"the vehicle would lean {tilt:.0f} deg; allowed are {degrees(acos(bounds.cos_tilt)):.0f} deg"
+    turn_rate, allowed = sqrt(path_demand[:, TURN].max()), bounds.turn_rate
+    lifting = "times weight over thrust where it lifts less than the weight"
+    return f"the vehicle would turn at {turn_rate:.1f} rad/s, {lifting}; allowed are {allowed:.1f} rad/s"
 
 
 def path_segments(path: Path, route: Route) -> list[PathSegment]:

@@ -228,7 +228,8 @@ def _solve_widening(
 def _excess_reason(excess_n: float, bounds: Bounds) -> str:
     """The excess of a path that could not be brought within the bounds, in words; in N unless it is huge."""
     is_huge = excess_n > _HUGE_EXCESS * _rotor_range(bounds)
-    return f"a rotor or the cable is asked for {'far' if is_huge else f'{excess_n:.2f} N'} too much"
+    by = "far" if is_huge else f"as much as {excess_n:.2f} N of a rotor"
+    return f"it exceeds the bounds of rotors, cable or rate of turn by {by}"
 
 
 def _refused(requested: ShapedSignals, reason: str) -> ShapedSignals:

@@ -14,6 +14,9 @@ from autopilot.vehicle.layout import Layout
 # columns of a mixer's table, one row per rotor: the effect of each rotor by (2-13), and the columns of the
 # inverse; the last row: the effect of the columns for thrust, roll and pitch on yaw
 STRENGTH, ROLL, PITCH, YAW, FROM_THRUST, FROM_ROLL, FROM_PITCH, FROM_YAW = range(8)
+# rad/s about a level axis, at which the law `plumbline` and paths turn the vehicle at most; with a force of
+# the whole weight, less with a smaller one: noise turns the direction of a small force faster than rotors can
+MAX_TURN_RATE = 9.0
 ROTOR_MARGIN = 0.15  # share of a rotor's range that paths leave to control: default of MIS_ROTOR_MARG
 _TOLERANCE = 1e-9  # a number of the table below this is a rounding error
 _THRUST_SHARES = tuple(0.1 * i for i in range(1, 10))  # shares of the greatest thrust that are tried

@@ -75,6 +75,9 @@ def test_use_tells_how_much_longer_a_path_must_take() -> None:
     assert bound_violation(straight(4.0), ROUTE) == ""
     assert use(straight(0.8), ROUTE) > 1.0
     assert bound_violation(straight(0.8), ROUTE).startswith("a rotor would have to give ")
+    sedate = ROUTE._replace(bounds=ROUTE.bounds._replace(turn_rate=0.05))
+    assert bound_violation(straight(4.0), sedate).startswith("the vehicle would turn at ")
+    assert bound_violation(straight(4.0), sedate).endswith("; allowed are 0.1 rad/s")
 
 
 def changed(change: Callable[[Path], Path]) -> Path:
