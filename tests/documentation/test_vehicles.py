@@ -32,9 +32,9 @@ file:
 * The simulator flies it. Its `SIM_` parameters change single values of it
   ([parameters.md](parameters.md)).
 * The autopilot uses it as its model: `VEH_`, `BAT_`, `PLB_DRAG`, `EST_GEAR_H` (`gear_height_m`) and
-  `EST_LOAD_H` (`load_radius_m`) start with its numbers. The autopilot ignores the drag of load and rotation,
-  the other keys of the ground, and the effects of air and voltage on the rotors
-  ([realism-plant.md](realism-plant.md)).
+  `EST_LOAD_H` (`load_radius_m`) start with its numbers, and `WNC_LEN_MAX` with about four times the
+  length of its cable. The autopilot ignores the drag of load and rotation, the other keys of the ground,
+  and the effects of air and voltage on the rotors ([realism-plant.md](realism-plant.md)).
 * `gcs check` judges missions by it: masses, cable, rotors, and the drag of the vehicle.
 * A table `[parameters]` contains parameters of the autopilot with which the vehicle is delivered, like an
   airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 35 and `MIS_INFEASIBLE` 1: its paths
