@@ -75,4 +75,4 @@ def test_the_wind_does_not_turn_over_a_vehicle_that_lands() -> None:
     tilt = np.arccos(np.cos(standing.vehicle_angle_roll_rad) * np.cos(standing.vehicle_angle_pitch_rad))
     assert np.degrees(tilt.max()) < 40.0
     assert standing.vehicle_true_z_m.max() < height.min() + 0.1, "it jumped"
-    assert standing.time_s.max() - first_touch < 3.0, "its rotors ran on the ground"
+    assert standing.time_s.max() - first_touch < 5.0, "its rotors ran on the ground"
