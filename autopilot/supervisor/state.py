@@ -288,6 +288,18 @@ def leg_time_s(flight: Flight, now_us: int) -> float:
     return (now_us - flight.leg_start_us) * 1e-6
 
 
+def with_condition(flight: Flight, holds: bool, now_us: int) -> Flight:
+    """The flight, with the time since when the condition that ends its phase holds."""
+    if holds == (flight.condition_since_us >= 0):
+        return flight
+    return replace(flight, condition_since_us=now_us if holds else -1)
+
+
+def has_lasted(since_us: int, duration_us: int, now_us: int) -> bool:
+    """Whether what holds since then (-1: it does not) has held for so long."""
+    return since_us >= 0 and now_us - since_us >= duration_us
+
+
 def setpoint(flight: Flight, now_us: int) -> Jet | None:
     """Position and derivatives to fly now, of load or vehicle depending on the leg; None without a leg."""
     return jet_ahead(flight, leg_time_s(flight, now_us)) if flight.legs else None

@@ -337,6 +337,7 @@ class Problem:
             bound(lag @ matrix(rotor), lag @ path_demand[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
         bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
         bound(matrix(COS_TILT), path_demand[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
+        # in newtons, since `_INACTIVE_N` would leave out almost all of a bound in (rad/s)^2
         turn, max_turn = _TURN_SCALE * path_demand[:, TURN], _TURN_SCALE * bounds.turn_rate**2
         bound(_TURN_SCALE * matrix(TURN), turn, -np.inf, max_turn, 1.0)
         blocks.append(sparse.hstack([sparse.csr_matrix((n, 3 * size)), excess_of], format="csr"))

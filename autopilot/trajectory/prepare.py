@@ -220,7 +220,7 @@ def _planned_path(
     """The path through the points as a table, the times at them, and its lowest place relative to the first;
     None if stops are quicker.
 
-    Cached, as `shaped_path`: planning takes a tenth of a second, and one process flies the same path often,
+    Cached, as `shaped_path`: planning takes up to a second, and one process flies the same path often,
     in a sweep or after a restart.
     """
     try:

@@ -254,8 +254,7 @@ class TimedPoints:
 
     def stretched(self, factors: Array) -> TimedPoints:
         """The same with each of the n - 1 segments so many times as long."""
-        times = np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times))])
-        return replace(self, times=times)
+        return replace(self, times=_times_after(factors * np.diff(self.times)))
 
 
 def ride_through(points: Array, speed: float, accel: float, turn_time: float) -> TimedPoints:
@@ -367,9 +366,14 @@ def quickest_ride(points: Array, speed: float, accel: float) -> tuple[TimedPoint
     return quickest, duration_s
 
 
+def _times_after(durations: Array) -> Array:
+    """(n + 1,) times at the ends of n durations that follow each other from 0 on."""
+    return np.concatenate([[0.0], np.cumsum(durations)])
+
+
 def _point_times(shares: Array, total_s: float) -> Array:
     """Times at the points, in whole microseconds, so that stretches join exactly on the vehicle's clock."""
-    times = np.concatenate([[0.0], np.cumsum(shares)]) * total_s
+    times = _times_after(shares) * total_s
     return np.asarray(np.round(times * 1e6) * 1e-6)
 
 
@@ -403,7 +407,7 @@ def plan_waypoint_path(
     if len(distances) <= _MAX_OPTIMISED_SEGMENTS:
         total_s = transfer_duration(length, speed, accel)
         with suppress(NoPathError):
-            times = np.concatenate([[0.0], np.cumsum(optimal_time_shares(places, total_s))]) * total_s
+            times = _times_after(optimal_time_shares(places, total_s)) * total_s
             found.append(planned(TimedPoints(places, times, np.arange(len(places)))))
     if not found:
         raise NoPathError("flights with a stop at each point are quicker")

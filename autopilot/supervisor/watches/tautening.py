@@ -15,8 +15,10 @@ from autopilot.supervisor.state import (
     Flight,
     Phase,
     View,
+    has_lasted,
     interrupt_mission,
     leg_time_s,
+    with_condition,
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
@@ -39,7 +41,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     if flight.phase != Phase.TAUTEN or len(flight.legs) != 1:
         return WatchResult(flight)
     flight = _note_pull(flight, view, settings)
-    if flight.condition_since_us >= 0 and view.now_us - flight.condition_since_us >= PULL_US:
+    if has_lasted(flight.condition_since_us, PULL_US, view.now_us):
         length = norm(sub(view.x_quad, view.x_load))
         flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
         return WatchResult(
@@ -76,9 +78,7 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     taut in the middle of the lift.
     """
     pulls = cable_pull_share(view, settings) > TAUT_PULL_SHARE and view.taut
-    if pulls == (flight.condition_since_us >= 0):
-        return flight
-    return replace(flight, condition_since_us=view.now_us if pulls else -1)
+    return with_condition(flight, pulls, view.now_us)
 
 
 def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:

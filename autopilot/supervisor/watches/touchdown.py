@@ -7,7 +7,16 @@ from math import inf
 
 from autopilot.guidance.legs import LOAD_POSITION, Creep
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_time_s
+from autopilot.supervisor.state import (
+    INFO,
+    Event,
+    Flight,
+    Phase,
+    View,
+    has_lasted,
+    leg_time_s,
+    with_condition,
+)
 from autopilot.supervisor.watches.cable_pull import SLACK_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.trajectory.slack_cable import TOUCH_SPEED
@@ -26,9 +35,8 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResu
     if flight.phase not in (Phase.LOWER, Phase.SET_DOWN):
         return WatchResult(flight)
     flight = _note_touchdown(flight, view, settings)
-    still = flight.condition_since_us >= 0 and view.now_us - flight.condition_since_us >= STILL_US
-    stopped = flight.stopped_since_us >= 0 and view.now_us - flight.stopped_since_us >= STOPPED_US
-    if not (still or stopped):
+    still = has_lasted(flight.condition_since_us, STILL_US, view.now_us)
+    if not still and not has_lasted(flight.stopped_since_us, STOPPED_US, view.now_us):
         return WatchResult(flight)
     if flight.phase == Phase.LOWER and not flight.cable.released:
         return WatchResult(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
@@ -54,14 +62,14 @@ def _note_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
     """
     leg = flight.legs[0]
     if not isinstance(leg, Creep):
-        return _with_condition(flight, False, view)
+        return with_condition(flight, False, view.now_us)
     target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
     if leg.control_mode != LOAD_POSITION:
         return _note_stopped_vehicle(flight, view.x_quad[2] - target, view)
     down = view.x_load[2] - target > LOAD_DEPTH + settings.ramp_lag_s * TOUCH_SPEED
     # while readings are missing, the pull shows that the load is down
     down = down or (bool(view.estimate_problems) and cable_pull_share(view, settings) < SLACK_PULL_SHARE)
-    return _with_condition(flight, down, view)
+    return with_condition(flight, down, view.now_us)
 
 
 def _note_stopped_vehicle(flight: Flight, depth: float, view: View) -> Flight:
@@ -72,9 +80,8 @@ def _note_stopped_vehicle(flight: Flight, depth: float, view: View) -> Flight:
     same, or a setpoint far below, suffices.
     """
     stopped = depth > VEHICLE_DEPTH
-    flight = _with_condition(
-        flight, stopped and (depth > ON_GROUND_DEPTH or abs(view.v_quad[2]) < STILL_SPEED), view
-    )
+    down = stopped and (depth > ON_GROUND_DEPTH or abs(view.v_quad[2]) < STILL_SPEED)
+    flight = with_condition(flight, down, view.now_us)
     if not stopped:
         if flight.stopped_since_us < 0:
             return flight
@@ -83,10 +90,3 @@ def _note_stopped_vehicle(flight: Flight, depth: float, view: View) -> Flight:
     if abs(height - flight.stopped_height) <= STOPPED_RANGE:
         return flight
     return replace(flight, stopped_height=height, stopped_since_us=view.now_us)
-
-
-def _with_condition(flight: Flight, holds: bool, view: View) -> Flight:
-    """The flight, with the time since when the condition that ends its phase holds."""
-    if holds == (flight.condition_since_us >= 0):
-        return flight
-    return replace(flight, condition_since_us=view.now_us if holds else -1)
