@@ -22,7 +22,7 @@ from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, ground_turn
 from gcs.closed_ticks import NOTHING, ClosedTicks
 from gcs.expected_flight import expected_flight_s
-from gcs.mission_items import items_of
+from gcs.mission_items import areas_of, home_of, items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
 
@@ -75,13 +75,15 @@ def fly(
     ends. Without `watch`, ticks at which nothing is to be decided are flown in machine code. `client`
     replaces the usual ground station client; `on_turn` is called after each of its turns.
     """
-    home = Home()
+    home = home_of(mission)
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
     simulator = build_simulator(conditions, home)
     if client is None:
         expected_s = expected_flight_s(mission, onboard.parameters)
-        client = FlightClient(items_of(mission, home), expected_s, conditions.limit_s)
+        client = FlightClient(
+            items_of(mission, home), expected_s, conditions.limit_s, areas=areas_of(mission)
+        )
     capture = Capture(log)
     turns = LockstepTurns()
     ticks = ClosedTicks(onboard, simulator) if watch is None else None

@@ -16,6 +16,7 @@ from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError, write_error
 from gcs.folders import PAGE_FILE, TLOG_FILE, check_no_other_results, make_folder
+from gcs.mission_files import load
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
@@ -63,7 +64,8 @@ def fly(
 ) -> Flight:
     """Fly a mission from take-off to landing, as fast as this machine can.
 
-    `mission`: the name of a shipped mission, the path of a file, or a `Mission`. `sensors` and `vehicle`: a
+    `mission`: the name of a shipped mission, the path of a file, also of a `.plan` or `.waypoints` file of
+    another ground station, or a `Mission`. `sensors` and `vehicle`: a
     shipped name, the path of a file, a `Sensors` or a `Vehicle`. `law`: the name of a shipped law,
     `FILE.py:CLASS`, `MODULE:CLASS` (docs/laws.md), or the class itself. `estimator` and `planner`: a custom
     estimator or path planner, given in the same ways (docs/estimators.md, docs/planners.md). `settings`:
@@ -83,7 +85,7 @@ def fly(
 
     given = Mission.of(mission) if isinstance(mission, model.Mission) else mission
     mission_file = name_or_path("mission", given)
-    flown = mission if isinstance(mission, model.Mission) else Mission.load(mission_file)
+    flown = mission if isinstance(mission, model.Mission) else _load(mission_file)
     options = FlightOptions(
         mission=mission_file,
         law=law_reference(law),
@@ -111,6 +113,11 @@ def fly(
     if flown is mission:  # the path of its file is of interest to the command alone
         meta = replace(meta, mission=flown.name)
     return Flight(log.getvalue(), meta, flown)
+
+
+def _load(mission: str) -> model.Mission:
+    with errors_for_python():
+        return load(mission)
 
 
 def _warn(line: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from gcs.errors import GcsError, InputError, input_error
@@ -60,9 +61,14 @@ class Mission(model.Mission):
     @classmethod
     def load(cls, name_or_path: str | PathLike[str]) -> Mission:
         """A shipped mission by its name, or the mission in a file, which is then named after the file."""
+        file = name_or_file("mission", name_or_path)
         try:
-            found = load_mission(name_or_file("mission", name_or_path))
+            found = load_mission(file)
         except MissionFileError as error:
+            from gcs.formats.missions import is_foreign  # loads much
+
+            if Path(file).is_file() and is_foreign(Path(file)):
+                raise InputError(f"{file}: holds more than steps; plumbline.fly takes it as it is") from None
             raise input_error(error) from None
         return cls.of(found)
 

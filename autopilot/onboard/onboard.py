@@ -98,7 +98,6 @@ from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
@@ -787,10 +786,7 @@ class Onboard:
         """Take over another fence or other rally points."""
         self.endpoint.set_areas(kind, items)
         flight = self.core.flight
-        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
-            area = replace(flight.area, fence=read_fence(items, self._options.home), breach="")
-        else:
-            area = replace(flight.area, rally=read_rally(items, self._options.home))
+        area = flight.area.with_items(kind, items, self._options.home)
         self.core.replace_flight(replace(flight, area=area))
         self._warn_of_rally()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from math import hypot, inf, nan, sqrt
@@ -16,8 +16,10 @@ from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.fence import NO_FENCE, Fence
+from autopilot.wire.fence import NO_FENCE, Fence, read_fence, read_rally
+from autopilot.wire.items import WireItem
 from missions.model import HeadingCommand, Step
 
 
@@ -160,6 +162,21 @@ class Area:
     last_breach: str = ""  # the same of the last breach, over or not
     breaches: int = 0
     breach_us: int = 0  # when the last one began
+
+    @classmethod
+    def of(cls, lists: Mapping[int, Sequence[WireItem]], home: Home) -> Area:
+        """These fence and rally points, by their MAV_MISSION_TYPE; `home` is the origin of the world.
+        MissionItemError if the items are none."""
+        area = cls()
+        for kind, items in lists.items():
+            area = area.with_items(kind, items, home)
+        return area
+
+    def with_items(self, kind: int, items: Sequence[WireItem], home: Home) -> Area:
+        """The same with another fence or other rally points."""
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            return replace(self, fence=read_fence(items, home), breach="")
+        return replace(self, rally=read_rally(items, home))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,9 +19,10 @@ them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from types import MappingProxyType
 from typing import Literal
 
 from autopilot.wire.codec import FieldReader, Received
@@ -118,7 +119,8 @@ class FlightClient:
     """Flies `items`, which begin with a take-off and end with a landing.
 
     `expected_s` is how long the flight should take and `limit_s` how long it may take, by the vehicle's
-    clock; `link_timeout_us` is how long the vehicle may be silent, by the ground station's clock.
+    clock; `link_timeout_us` is how long the vehicle may be silent, by the ground station's clock. `areas`:
+    fence and rally points by their MAV_MISSION_TYPE, which replace those of the vehicle.
     """
 
     def __init__(
@@ -127,6 +129,7 @@ class FlightClient:
         expected_s: float,
         limit_s: float | None = None,
         link_timeout_us: int = LINK_TIMEOUT_US,
+        areas: Mapping[int, Sequence[WireItem]] = MappingProxyType({}),
     ) -> None:
         self.outcome: Outcome | None = None
         self.fell_silent = False  # the vehicle fell silent, which ended the flight
@@ -135,6 +138,7 @@ class FlightClient:
         self.view = VehicleView()
         self.connection = Connection(link_timeout_us)
         self.items = tuple(items)
+        self.areas = areas
         self._expected_s = expected_s
         self._limit_s = time_limit_s(expected_s, limit_s)
         self._operations: list[Operation] = []
@@ -454,7 +458,11 @@ def _streams(client: FlightClient) -> list[Operation]:
 
 def _upload(client: FlightClient) -> list[Operation]:
     assert client.connection.target is not None
-    return [MissionUpload(client.connection.target, client.items)]
+    # the mission last: the vehicle checks it against the fence
+    return [
+        *(MissionUpload(client.connection.target, items, kind) for kind, items in client.areas.items()),
+        MissionUpload(client.connection.target, client.items),
+    ]
 
 
 def _arm(client: FlightClient) -> list[Operation]:

@@ -140,9 +140,10 @@ def fly_command(
 ) -> int:
     """Fly a mission from start to report.
 
-    MISSION is the name of a shipped mission (see gcs missions) or the path of a mission file. A simulator and
-    an autopilot are started for the flight and stopped after it; --connect uses running ones instead. The
-    mission is checked, uploaded and flown, all telemetry is captured, and a report is written.
+    MISSION is the name of a shipped mission (see gcs missions), the path of a mission file, or a .plan or
+    .waypoints file of another ground station. A simulator and an autopilot are started for the flight and
+    stopped after it; --connect uses running ones instead. The mission is checked, uploaded and flown, all
+    telemetry is captured, and a report is written.
 
     \b
     gcs fly case-b

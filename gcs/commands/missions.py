@@ -22,7 +22,7 @@ from gcs.shell.display import notify_if_slow
 @json_option
 def missions_command(as_json: bool) -> None:
     """List the shipped missions."""
-    from gcs.workflows.mission_file import load
+    from gcs.mission_files import load
     from missions.fileformat import shipped
 
     missions = [load(name) for name in shipped()]

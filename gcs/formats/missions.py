@@ -6,7 +6,6 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from autopilot.shell.atomic_file import write_atomically
 from autopilot.wire.command_names import numbered_name
@@ -25,22 +24,12 @@ from gcs.formats.items import FormatError
 from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
-from gcs.mission_items import FileNumbers
+from gcs.mission_items import FileNumbers, ForeignMission
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
 PLAN_ENDING = ".plan"
 WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
-
-
-class CheckedPlan(NamedTuple):
-    """The items of a file that can be sent to the vehicle; a line for each part that must be left out, and
-    for the items that the vehicle keeps but does not execute; and the numbers of the items in the file."""
-
-    items: tuple[WireItem, ...]
-    left_out: list[str]
-    kept: list[str]
-    numbers: FileNumbers
 
 
 def is_foreign(path: Path) -> bool:
@@ -84,6 +73,13 @@ def write_foreign(
         raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
 
 
+def read_mission(path: Path) -> ForeignMission:
+    """The mission in a file, flown from the home for which it is planned; FormatError says what is wrong with
+    the file."""
+    plan = read_foreign(path)
+    return mission_of(plan, planned_home(plan), path.stem)
+
+
 def planned_home(plan: Plan) -> Home:
     """The home for which a file is planned: the one it names, or else where the vehicle is by default."""
     row = _home_row(plan)
@@ -92,8 +88,8 @@ def planned_home(plan: Plan) -> Home:
     return Home(row.x * 1e-7, row.y * 1e-7, row.z)
 
 
-def check_plan(plan: Plan, home: Home) -> CheckedPlan:
-    """The parts of a plan that the vehicle would accept, and those that it would not execute.
+def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
+    """The parts of a plan that the vehicle would accept, flown from this home, and those that it would not.
 
     Commands that the vehicle keeps and skips (camera, gimbal ...) stay among the items; those that it would
     refuse are left out.
@@ -132,9 +128,19 @@ def check_plan(plan: Plan, home: Home) -> CheckedPlan:
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
         kept.append(f"{places}: not flown; the mission ends with the landing of item {numbers[landing]}")
-    left_out = [*(line for _, line in problems), *plan.not_converted]
-    return CheckedPlan(
-        tuple(items), left_out, kept, FileNumbers(tuple(numbers), tuple(numbers[step.last] for step in steps))
+    return ForeignMission(
+        name=name,
+        title=name,
+        description="",
+        assumptions=(),
+        steps=tuple(one.step for one in steps),
+        items=tuple(items),
+        fence=plan.fence,
+        rally=plan.rally,
+        home=home,
+        numbers=FileNumbers(tuple(numbers), tuple(numbers[one.last] for one in steps)),
+        left_out=(*(line for _, line in problems), *plan.not_converted),
+        notes=tuple(kept),
     )
 
 

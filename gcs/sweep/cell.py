@@ -10,16 +10,17 @@ from autopilot.geometry.packed import Row, packed
 from autopilot.onboard.onboard import build_setup, mission_plan
 from autopilot.own.own_code import OwnCode, parameters_for
 from autopilot.services.mission_store import StoredMission
-from autopilot.supervisor.state import MissionPlan
+from autopilot.supervisor.state import Area, MissionPlan
 from autopilot.trajectory.prepare import PathLimits
 from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.layout import Layout
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import control_divider
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import WireItem, encode_mission
+from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions
 from gcs.expected_flight import expected_flight_s, time_limit_s
+from gcs.mission_items import areas_of, home_of, items_of
 from gcs.sweep.plan import simulator_settings
 from gcs.sweep.wire import wire_of
 from missions.model import Mission
@@ -40,6 +41,7 @@ class Cell:
     mission: Mission
     setup: Setup
     plan: MissionPlan
+    area: Area
     item_count: int  # number of mission items
     limit_us: int  # longest time that the flight may last
     truth: Truth
@@ -76,7 +78,7 @@ def _cell(
     limit_s: float | None,
     ignored: frozenset[str],
 ) -> Cell:
-    home = Home()
+    home = home_of(mission)
     file = load_vehicle(vehicle)
     table = parameters_for(load_belief(vehicle), own, ignored=ignored)
     apply_settings(table, set_values)
@@ -88,11 +90,15 @@ def _cell(
     profile = _profile(sensors)
     divider = control_divider(1e6 / settings.tick_us, table)
     setup = build_setup(table, divider, own)
-    items = tuple(encode_mission(mission, home))
+    items = items_of(mission, home)
+    plan = (
+        _plan(items, home, setup.settings.limits) if setup.planner is None else _own_plan(items, home, setup)
+    )
     return Cell(
         mission=mission,
         setup=setup,
-        plan=_plan(items, setup.settings.limits) if setup.planner is None else _own_plan(items, setup),
+        plan=plan,
+        area=Area.of(areas_of(mission), home),
         item_count=len(items),
         limit_us=round(1e6 * time_limit_s(expected_flight_s(mission, table), limit_s)),
         truth=apply_parameters(truth, sim_table),
@@ -108,12 +114,12 @@ def _profile(name: str) -> Profile:
     return load_profile(name)
 
 
-def _own_plan(items: tuple[WireItem, ...], setup: Setup) -> MissionPlan:
+def _own_plan(items: tuple[WireItem, ...], home: Home, setup: Setup) -> MissionPlan:
     """The plan of a mission by a custom planner."""
-    return mission_plan(StoredMission(items), Home(), setup.settings.limits, planner=setup.planner)
+    return mission_plan(StoredMission(items), home, setup.settings.limits, planner=setup.planner)
 
 
 @lru_cache(maxsize=64)
-def _plan(items: tuple[WireItem, ...], limits: PathLimits) -> MissionPlan:
+def _plan(items: tuple[WireItem, ...], home: Home, limits: PathLimits) -> MissionPlan:
     """The plan of a mission; cached, as shaping its paths takes seconds and depends on nothing else."""
-    return mission_plan(StoredMission(items), Home(), limits)
+    return mission_plan(StoredMission(items), home, limits)

@@ -8,7 +8,7 @@ of the ground station are known beforehand: the two instants at which it arms an
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan, sqrt
 from typing import Any
 
@@ -119,7 +119,7 @@ class SweepFlight:
         self.tick_us = cell.settings.tick_us
         self.core = FlightCore(cell.setup, SETPOINTS_LOCKSTEP)
         self.item = 0  # mission item that was flown last
-        self.core.replace_flight(with_plan(self.core.flight, cell.plan))
+        self.core.replace_flight(replace(with_plan(self.core.flight, cell.plan), area=cell.area))
         self.world = new_world(cell.truth, cell.profile, cell.settings, seed, cell.layout)
         self.chain = new_chain(cell.truth, unpack(World, self.world.world, 0).plant)
         self.core.use_inbox(new_inbox(max_readings(self.world)))

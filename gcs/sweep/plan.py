@@ -26,8 +26,8 @@ from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
+from gcs.mission_files import load
 from gcs.sweep.drawing import drawn_index, drawn_number, draws_whole_numbers
-from missions.fileformat import load_mission
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
@@ -291,8 +291,10 @@ def make_plan(
             known = {name: value for name, value in settings.items() if name not in foreign}
             _try_own_code(vehicle, own_of_law, foreign, known)
     try:
-        load_mission(mission)
+        load(mission)
         load_profile(sensors)
+    except GcsError as error:
+        raise PlanError(*error.lines) from None
     except ValueError as error:
         raise PlanError(*_error_lines(error)) from None
     plan = SweepPlan(

@@ -12,6 +12,7 @@ from autopilot.own.law import law_name
 from autopilot.shell.compiling import Part
 from autopilot.shell.watched_calls import watched_calls
 from gcs.errors import GcsError
+from gcs.mission_files import load
 from gcs.shell.display import notify_if_slow
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
@@ -21,7 +22,6 @@ from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.plan_file import sweep_files
 from gcs.sweep.store import Row, row_of
 from gcs.sweep.warmup import lanes_part, sweep_parts
-from missions.fileformat import load_mission
 from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
@@ -59,7 +59,7 @@ def prepare(
     ready then because of a varied parameter is asked again.
     """
     warm(sweep_parts(plan.laws))
-    mission = load_mission(plan.mission)
+    mission = load(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
     without_variation = replace(plan, varied=(), sample=0)
     start_times_by_law, lane_laws = {}, set()

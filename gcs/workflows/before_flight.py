@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from autopilot.vehicle.shipped import VEHICLES
+from gcs.mission_items import ForeignMission
 from gcs.shell.display import notify_if_slow
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable_marks import is_known_flyable
@@ -30,10 +31,14 @@ def check_options(options: FlightOptions) -> list[str]:
     return warnings
 
 
-def planner_warnings(planner: str, mission: Mission) -> list[str]:
-    """A line if the mission contains nothing for a custom planner to plan."""
-    unused = unused_planner_text(mission) if planner else ""
-    return [f"--planner {planner}: {unused}"] if unused else []
+def mission_warnings(planner: str, mission: Mission) -> list[str]:
+    """A line for each part of a mission that is not flown, and if it contains nothing for a custom planner to
+    plan."""
+    notes = mission.notes if isinstance(mission, ForeignMission) else ()
+    lines = [f"{mission.name}: {note}" for note in notes]
+    if planner and (unused := unused_planner_text(mission)):
+        lines.append(f"--planner {planner}: {unused}")
+    return lines
 
 
 def unused_planner_text(mission: Mission) -> str:

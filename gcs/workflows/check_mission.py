@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -16,18 +15,24 @@ from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
-from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
-from gcs.formats.missions import check_plan, is_foreign, planned_home, read_foreign
-from gcs.mission_items import FileNumbers, in_mission_terms, items_of
+from gcs.formats.missions import is_foreign, read_mission
+from gcs.mission_files import load
+from gcs.mission_items import (
+    ForeignMission,
+    home_of,
+    in_file_terms,
+    in_mission_terms,
+    items_of,
+    step_in_file,
+)
 from gcs.workflows.before_flight import unused_planner_text
 from gcs.workflows.flight_inputs import vehicle_warnings
-from gcs.workflows.flyable import mission_of, violations
-from gcs.workflows.mission_file import load
-from gcs.workflows.refusals import Answer, ItemLists, ask_supervisor
+from gcs.workflows.flyable import violations
+from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
@@ -65,22 +70,20 @@ def path_reports(
     limits: VehicleLimits,
     planner: Planner | None = None,
     shaped: bool = True,
-    numbers: FileNumbers | None = None,
 ) -> list[PathReport]:
     """How a vehicle with these limits flies the mission, with paths `shaped` by the autopilot or as
-    requested; a `planner` makes those through waypoints. GcsError says what is wrong with a planned path, by
-    the `numbers` of the file that the mission comes from."""
+    requested; a `planner` makes those through waypoints. GcsError says what is wrong with a planned path."""
     try:
         return paths(_as_sent(mission), limits, planner, shaped)
     except PlanError as error:
-        text = str(error) if numbers is None else numbers.in_step_text(str(error))
-        raise GcsError(f"{mission.name}: {text}") from None
+        raise GcsError(f"{mission.name}: {in_file_terms(str(error), mission)}") from None
 
 
 def _as_sent(mission: Mission) -> Mission:
     """The mission with its waypoints on the grid on which mission items carry them: how fast waypoints that
     are close together can be flown depends on it."""
-    sent = decode_items(items_of(mission, Home()), Home())
+    home = home_of(mission)
+    sent = decode_items(items_of(mission, home), home)
     steps = (
         there if isinstance(here, Waypoint) else here for here, there in zip(mission.steps, sent, strict=True)
     )
@@ -195,43 +198,18 @@ class CheckResult:
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
 
 
-class _ReadFile(NamedTuple):
-    """A mission as it is read from a file of another ground station, and the items to be sent; parts of the
-    file for which there are none, and notes about others; and the numbers of the items in the file."""
-
-    mission: Mission
-    lists: ItemLists
-    left_out: tuple[str, ...]
-    notes: tuple[str, ...]
-    numbers: FileNumbers
-
-
-def _read_foreign(path: Path) -> _ReadFile:
-    """The content of a file of another ground station; FormatError says what is wrong with it."""
-    plan = read_foreign(path)
-    home = planned_home(plan)
-    items, left_out, kept, numbers = check_plan(plan, home)
-    place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
-    return _ReadFile(
-        mission_of(path.name, items, home),
-        ItemLists(items, home, plan.fence or (), plan.rally or ()),
-        tuple(left_out) if items else (*left_out, "nothing that can be flown"),
-        (f"note: flown with home at {place}", *(f"note: {line}" for line in kept)),
-        numbers,
-    )
-
-
-def _in_file_terms(found: CheckResult, numbers: FileNumbers) -> CheckResult:
-    """The result, which counts steps and the items that are sent, with the numbers of the file."""
+def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...]) -> CheckResult:
+    """The result, which counts steps and the items that are sent, with the numbers of the file and notes that
+    have them already."""
     return replace(
         found,
         violations=tuple(
-            replace(one, item=numbers.of_step(one.item), text=numbers.in_step_text(one.text))
+            replace(one, item=step_in_file(one.item, mission), text=in_file_terms(one.text, mission))
             for one in found.violations
         ),
-        paths=tuple(replace(one, item=numbers.of_step(one.item)) for one in found.paths),
-        warnings=tuple(map(numbers.in_step_text, found.warnings)),
-        refusals=tuple(map(numbers.in_vehicle_text, found.refusals)),
+        paths=tuple(replace(one, item=step_in_file(one.item, mission)) for one in found.paths),
+        warnings=(*notes, *(in_file_terms(text, mission) for text in found.warnings)),
+        refusals=tuple(in_mission_terms(text, mission) for text in found.refusals),
     )
 
 
@@ -244,30 +222,30 @@ def check_mission(
     GcsError if a custom `planner` fails to plan it.
     """
     path, limits = Path(name_or_path), load_limits(vehicle)
-    if is_foreign(path):
-        mission, lists, left_out, notes, numbers = _read_foreign(path)
-        if left_out:
+    mission = read_mission(path) if is_foreign(path) else load(name_or_path)
+    notes: tuple[str, ...] = ()
+    if isinstance(mission, ForeignMission):
+        home, empty = mission.home, () if mission.items else ("nothing that can be flown",)
+        place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
+        notes = (f"note: flown with home at {place}", *(f"note: {line}" for line in mission.notes))
+        if left_out := (*mission.left_out, *empty):
             return CheckResult(mission.name, vehicle, (), (), notes, left_out)
-    else:
-        mission, notes, numbers = load(name_or_path), (), None
-        lists = ItemLists(items_of(mission, Home()))
     table = autopilot_parameters(limits.vehicle)
     found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
-    reports = [] if found else path_reports(mission, limits, planner, not as_asked, numbers)
-    answer = Answer() if found else ask_supervisor(lists, table, not as_asked, planner)
+    reports = [] if found else path_reports(mission, limits, planner, not as_asked)
+    answer = Answer() if found else ask_supervisor(mission, table, not as_asked, planner)
     warnings = (
         *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
         *margin_warnings(reports, vehicle, limits.vehicle),
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
+        *timeout_warnings(mission, reports, table),
     )
-    if numbers is None:  # `gcs fly` flies it
-        warnings += tuple(timeout_warnings(mission, reports, table))
-        if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
-            warnings += (
-                "note: how near a law without preview keeps to this, and whether its own errors lose the "
-                f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
-            )
+    if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
+        warnings += (
+            "note: how near a law without preview keeps to this, and whether its own errors lose the "
+            f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
+        )
     warnings += (
         *winch_notes(mission, table),
         *notes_after_release(mission),
@@ -276,7 +254,4 @@ def check_mission(
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
     result = CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, answer.refusals)
-    if numbers is None:
-        return replace(result, refusals=tuple(in_mission_terms(text, mission) for text in result.refusals))
-    in_file_terms = _in_file_terms(result, numbers)
-    return replace(in_file_terms, warnings=(*notes, *in_file_terms.warnings))
+    return _in_file_terms(result, mission, notes)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from autopilot.own.law import own_law_reference
 from autopilot.own.own_code import OwnCode
+from autopilot.wire.convert.geodesy import Home
 from gcs.shell.link import Address
 
 SIMULATOR_PREFIX = "SIM_"  # beginning of the names of the simulator's parameters
@@ -92,6 +93,11 @@ def own_part_options(estimator: str, planner: str) -> list[str]:
 def ignore_options(ignored: Iterable[str]) -> list[str]:
     """The words of a command line for parameters in the vehicle's file that have no effect."""
     return [word for name in ignored for word in ("--ignore", name)]
+
+
+def home_option(home: Home) -> list[str]:
+    """The words of a command line of simulator or autopilot for a home that is not the default one."""
+    return [] if home == Home() else ["--home", ",".join(map(repr, home))]
 
 
 def time_limit_option(limit_s: float | None) -> list[str]:

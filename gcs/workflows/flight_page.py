@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.own.law import law_name
-from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError
-from gcs.mission_items import items_of
+from gcs.mission_items import home_of, items_of
 from gcs.shell.display import notify
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, feed_pipe
 from gcs.shell.processes import Processes
@@ -153,9 +152,9 @@ def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> 
 
 
 def _session_record(mission: Mission, options: FlightOptions) -> dict[str, Any]:
-    own = options.connect is None
+    own, home = options.connect is None, home_of(mission)
     record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
-    record["waypoints"] = waypoints_record(items_of(mission, Home()), Home())
+    record["waypoints"] = waypoints_record(items_of(mission, home), home)
     if own:
         record |= {"law": law_name(options.law), "sensors": options.sensors, "vehicle_name": options.vehicle}
         record |= {"seed": options.seed, "speed": options.speed}

@@ -21,13 +21,14 @@ from gcs.errors import (
     disk_problem,
 )
 from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, check_no_other_results, fresh_folder, make_folder
+from gcs.mission_files import load
+from gcs.mission_items import ForeignMission, home_of
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.before_flight import check_mission, check_options, planner_warnings
+from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
-from gcs.workflows.mission_file import load
 from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.too_slow import slowness_reason
@@ -82,8 +83,13 @@ def fly(
     if options.connect is None and options.firmware is None:
         warnings = check_options(options)
     mission = load(options.mission)
+    if options.firmware is not None and isinstance(mission, ForeignMission):
+        raise InputError(
+            f"{options.mission}: --autopilot converts mission files of Plumbline; upload a file of another "
+            f"ground station to {options.firmware.kind} with that ground station"
+        )
     if not options.quiet:
-        for warning in (*warnings, *planner_warnings(options.planner, mission)):
+        for warning in (*warnings, *mission_warnings(options.planner, mission)):
             notify(warning)
     out = options.out or fresh_folder(mission.name)
     with FlightFolder(out, options.overwrite) as folder:
@@ -148,7 +154,7 @@ def _fly_started(
     page: FlightPage | None,
     processes: Processes | None,
 ) -> FlightClient:
-    with start_vehicle(options, out, processes) as started:
+    with start_vehicle(options, home_of(mission), out, processes) as started:
         from gcs.workflows.started_flight import fly_started_vehicle  # imported while the programs load
 
         check_mission(mission, options)

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from autopilot.trajectory.feasibility import VehicleLimits, Violation, check
-from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
-from gcs.formats.missions import CheckedPlan
-from gcs.mission_items import items_of
+from gcs.mission_files import load
+from gcs.mission_items import home_of, in_file_terms, items_of
 from gcs.workflows.flyable_marks import mark_flyable
-from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Mission
 
@@ -22,7 +17,7 @@ def violations(mission: Mission, vehicle: str, limits: VehicleLimits, shaped: bo
 
     InputError if no vehicle would accept its items.
     """
-    items_of(mission, Home())
+    items_of(mission, home_of(mission))
     found = check(mission, limits, shaped)
     if not found:
         mark_flyable(mission, vehicle, shaped)
@@ -38,22 +33,10 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     return mission
 
 
-def check_plan_items(name: str, checked: CheckedPlan, home: Home, vehicle: str) -> None:
-    """GcsError unless the vehicle can fly the items of this file of another ground station."""
-    try:
-        require_flyable(mission_of(name, checked.items, home), vehicle)
-    except GcsError as error:
-        raise GcsError(*map(checked.numbers.in_step_text, error.lines)) from None
-
-
-def mission_of(name: str, items: Sequence[WireItem], home: Home) -> Mission:
-    """The mission of these items, at this home."""
-    return Mission(name, name, "", (), decode_items(items, home))
-
-
 def require_flyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
     """GcsError unless the vehicle can fly the mission."""
     found = violations(mission, vehicle, load_limits(vehicle), shaped)
     if found:
         summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
-        raise GcsError(*([f"{summary} {found[0]}"] if len(found) == 1 else [summary, *map(str, found)]))
+        texts = [in_file_terms(str(one), mission) for one in found]
+        raise GcsError(*([f"{summary} {texts[0]}"] if len(texts) == 1 else [summary, *texts]))

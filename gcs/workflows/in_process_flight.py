@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from autopilot.own.law import law_number
 from autopilot.shell.watched_calls import watched_calls
-from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
+from gcs.mission_items import home_of
 from gcs.shell.display import FlightDisplay
-from gcs.workflows.before_flight import check_mission, check_options, planner_warnings
+from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.refused_settings import with_blamed_settings
 from gcs.workflows.started_flight import flight_client
@@ -26,12 +26,12 @@ def fly_in_process(
 
     `warn` is called with a line for each option that may be unintended.
     """
-    for line in (*check_options(options), *planner_warnings(options.planner, mission)):
+    for line in (*check_options(options), *mission_warnings(options.planner, mission)):
         warn(line)
     warm_up(in_process_parts((options.law,)), options.quiet)
     check_mission(mission, options)
     settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(parse_setting, options.settings))}
-    client = flight_client(mission, options, Home())
+    client = flight_client(mission, options, home_of(mission))
     with FlightDisplay(mission.name, options.quiet) as display, watched_calls():
 
         def show() -> None:

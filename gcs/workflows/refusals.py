@@ -6,7 +6,7 @@ vehicle stands at home. Whether it can fly the mission is another question (`gcs
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO
@@ -20,20 +20,11 @@ from autopilot.supervisor.state import Area, Flight, MissionPlan, View
 from autopilot.trajectory.prepare import UNPREPARED, prepare
 from autopilot.trajectory.route import Planner
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.items import MissionItemError, WireItem, located_steps
+from autopilot.wire.items import MissionItemError, located_steps
+from gcs.mission_items import areas_of, home_of, items_of
+from missions.model import Mission
 
 _STANDS_AT_HOME = View(0, ZERO, ZERO, ZERO, ZERO, False, 0.0, ())
-
-
-class ItemLists(NamedTuple):
-    """The items of a mission, its fence and its rally points, and the home from which it is flown."""
-
-    mission: Sequence[WireItem]
-    home: Home = Home()
-    fence: Sequence[WireItem] = ()
-    rally: Sequence[WireItem] = ()
 
 
 class Answer(NamedTuple):
@@ -44,22 +35,23 @@ class Answer(NamedTuple):
 
 
 def ask_supervisor(
-    lists: ItemLists, table: AutopilotParameters, shaped: bool = True, planner: Planner | None = None
+    mission: Mission, table: AutopilotParameters, shaped: bool = True, planner: Planner | None = None
 ) -> Answer:
     """The answer of a vehicle with these parameters, whose law follows `shaped` paths or not; `planner` makes
     those through waypoints."""
-    home = lists.home
+    home = home_of(mission)
+    items = items_of(mission, home)
     try:
-        area = Area(fence=read_fence(lists.fence, home), rally=read_rally(lists.rally, home))
+        area = Area.of(areas_of(mission), home)
     except MissionItemError as error:
         return Answer((str(error),))
     settings = settings_from(table, ramp_lag_s=0.0, supports_reeling=True, follows_shaped=shaped)
-    located = tuple(located_steps(lists.mission, home))
+    located = tuple(located_steps(items, home))
     steps, sequence = tuple(one.step for one in located), tuple(one.last for one in located)
     prepared = UNPREPARED
     if area.fence.zones or settings.fence.radius_m or settings.fence.height_m:  # may forbid a curve
         prepared = prepare(steps, sequence, settings.limits, planner=planner)
-    count = len(lists.mission)
+    count = len(items)
     flight = with_plan(Flight(area=area), MissionPlan(steps, sequence, count, prepared))
 
     def refusals(*requests: object) -> Iterator[str]:

@@ -12,7 +12,7 @@ from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
 from gcs.expected_flight import expected_flight_s
-from gcs.mission_items import items_of
+from gcs.mission_items import areas_of, home_of, items_of
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import unix_us
 from gcs.shell.processes import STOPPED_LIMIT_S
@@ -38,6 +38,7 @@ def flight_client(
         _expected_s(mission, options),
         options.limit_s,
         round(link_timeout_us * time_stretch),
+        areas_of(mission),
     )
 
 
@@ -60,7 +61,7 @@ def fly_started_vehicle(
     """Fly with the simulator and the autopilot that were started for it."""
     # this long, so that a program that was stopped (SIGSTOP) is reported before the vehicle counts as lost
     link_timeout_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
-    client = flight_client(mission, options, Home(), link_timeout_us)
+    client = flight_client(mission, options, home_of(mission), link_timeout_us)
 
     def on_first_message() -> None:
         watch.start()

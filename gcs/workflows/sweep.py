@@ -15,6 +15,7 @@ from gcs.batch.pool import dask_cluster, local_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
+from gcs.mission_files import load
 from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied, varied_values
@@ -29,10 +30,9 @@ from gcs.sweep.standouts import (
     stored_standouts,
 )
 from gcs.sweep.store import TABLE_FILE
-from gcs.workflows.before_flight import planner_warnings
+from gcs.workflows.before_flight import mission_warnings
 from gcs.workflows.flight_inputs import setting_warnings, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
-from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
 
 _CONTINUED = "completed flights are stored, run the same command again to continue"
@@ -174,7 +174,7 @@ def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Exe
 def _print_warnings(plan: SweepPlan) -> None:
     """Print what can be flown but may be unintended; of several values of a parameter only the first."""
     own = [line for law in plan.laws for line in misspelling_warnings(plan.own(law))]
-    others = [*planner_warnings(plan.planner, load(plan.mission)), *vehicle_warnings(plan.vehicle)]
+    others = [*mission_warnings(plan.planner, load(plan.mission)), *vehicle_warnings(plan.vehicle)]
     for line in dict.fromkeys([*own, *others]):
         notify(line)
     for option, values in (

@@ -11,14 +11,14 @@ from autopilot.wire.items import WireItem, home_item
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.errors import GcsError, RefusedError
 from gcs.formats.jumps import redirected
-from gcs.formats.missions import PLAN_ENDING, CheckedPlan, check_plan, is_foreign, read_foreign, write_foreign
+from gcs.formats.missions import PLAN_ENDING, is_foreign, mission_of, read_foreign, write_foreign
 from gcs.formats.plan import Plan
-from gcs.mission_items import items_of
+from gcs.mission_items import ForeignMission, items_of
 from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.before_flight import CHECKING_TEXT
-from gcs.workflows.flyable import check_plan_items, load_checked
+from gcs.workflows.flyable import load_checked, require_flyable
 from gcs.workflows.running_flight import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
@@ -63,12 +63,12 @@ def checked_upload(
 def _upload_foreign(
     session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> None:
-    checked = check_plan(plan, home := vehicle_home(session))
-    items = _flyable_items(path, checked, skip)
+    mission = mission_of(plan, vehicle_home(session), path.stem)
+    items = _flyable_items(path, mission, skip)
     if not force:
         with notify_if_slow(CHECKING_TEXT):
-            check_plan_items(path.name, checked, home, vehicle)
-    counted = _as_counted(items, home, session)
+            require_flyable(mission, vehicle)
+    counted = _as_counted(items, mission.home, session)
     # the fence first: the vehicle checks the mission against it
     replaced = []
     for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
@@ -83,7 +83,7 @@ def _upload_foreign(
         before = (0,) * (
             len(counted) - len(items)
         )  # the home, which the vehicle counts and the file does not
-        numbers = checked.numbers._replace(items=before + checked.numbers.items)
+        numbers = mission.numbers._replace(items=before + mission.numbers.items)
         text = numbers.in_vehicle_text(str(error))
         if replaced:
             text += f"; the vehicle has {path.name}'s {' and '.join(replaced)} now"
@@ -100,19 +100,19 @@ def _as_counted(items: Sequence[WireItem], home: Home, session: Session) -> Sequ
     return [home_item(home), *redirected(items, lambda target: target + 1)]
 
 
-def _flyable_items(path: Path, checked: CheckedPlan, skip: bool) -> tuple[WireItem, ...]:
+def _flyable_items(path: Path, mission: ForeignMission, skip: bool) -> tuple[WireItem, ...]:
     """The items to upload. Prints what cannot be flown as in the file; GcsError if something must be left out
     without `skip`, or if nothing remains."""
-    for line in (*checked.kept, *checked.left_out):
+    for line in (*mission.notes, *mission.left_out):
         notify(f"{path}: {line}")
-    if checked.left_out and not skip:
-        count = len(checked.left_out)
+    if mission.left_out and not skip:
+        count = len(mission.left_out)
         raise GcsError(
             f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip uploads the rest"
         )
-    if not checked.items:
+    if not mission.items:
         raise GcsError(f"{path}: nothing that can be flown; gcs clear deletes the mission on the vehicle")
-    return checked.items
+    return mission.items
 
 
 def download(address: Address) -> list[WireItem]:

@@ -14,9 +14,16 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from autopilot.wire.convert.geodesy import Home
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_options import SIMULATOR_PREFIX, FlightOptions, ignore_options, own_part_options
+from gcs.workflows.flight_options import (
+    SIMULATOR_PREFIX,
+    FlightOptions,
+    home_option,
+    ignore_options,
+    own_part_options,
+)
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
@@ -35,7 +42,7 @@ class VehicleProcesses:
 
 @contextmanager
 def start_vehicle(
-    options: FlightOptions, out: Path, processes: Processes | None = None
+    options: FlightOptions, home: Home, out: Path, processes: Processes | None = None
 ) -> Iterator[VehicleProcesses]:
     """Start both programs in `processes`, which may have loaded them already, and end them afterwards.
 
@@ -48,7 +55,7 @@ def start_vehicle(
         closing(UdpSocket()) as vehicle,
         closing(UdpSocket()) as truth,
     ):
-        _start(running, options, out, Path(storage), vehicle.address, truth.address)
+        _start(running, options, home, out, Path(storage), vehicle.address, truth.address)
         yield VehicleProcesses(running, vehicle, truth)
 
 
@@ -63,12 +70,18 @@ def _keep_log(storage: Path, out: Path) -> Iterator[None]:
 
 
 def _start(
-    processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
+    processes: Processes,
+    options: FlightOptions,
+    home: Home,
+    out: Path,
+    storage: Path,
+    ground: str,
+    truth: str,
 ) -> None:
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     pace += ["--real-time"] if options.real_time else []
-    both = ["--vehicle", options.vehicle]
+    both = ["--vehicle", options.vehicle, *home_option(home)]
     given = [("--set", setting) for setting in options.settings]
     simulator_settings = [word for words in given if words[1].startswith(SIMULATOR_PREFIX) for word in words]
     autopilot_settings = ["--set", "MIS_INFEASIBLE=0"] if options.force else []
@@ -87,8 +100,8 @@ def _start(
     ]
     processes.start("sitl", [*world, *pace, *both, *simulator_settings, "--quiet"], out / SIMULATOR_LOG)
     link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_OTHER_STATIONS]
-    home = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
+    onboard = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
     own = [*own_part_options(options.estimator, options.planner), *ignore_options(options.ignored)]
     processes.start(
-        "autopilot", [*home, *own, *link, *both, *autopilot_settings, "--quiet"], out / AUTOPILOT_LOG
+        "autopilot", [*onboard, *own, *link, *both, *autopilot_settings, "--quiet"], out / AUTOPILOT_LOG
     )

@@ -19,12 +19,12 @@ from autopilot.wire.parameter_names import unknown_parameter_text
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError, input_error
+from gcs.mission_files import load
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.drawing import drawn_number, draws_whole_numbers
 from gcs.sweep.plan import simulator_settings
 from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import SIMULATOR_PREFIX
-from gcs.workflows.mission_file import load
 from missions.model import Mission
 from missions.nearest import did_you_mean
 from missions.toml_files import FileError

@@ -42,6 +42,7 @@ from gcs.cli import gcs
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions
 from gcs.formats.missions import write_foreign
+from gcs.mission_files import load
 from gcs.recorded.column_map import MAPS, ColumnMap
 from gcs.shell.link import free_port
 from gcs.sweep import plan as plans
@@ -50,7 +51,6 @@ from gcs.sweep.flight import start_times
 from gcs.workflows.before_flight import check_mission, check_options
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.fly import Flight
-from gcs.workflows.mission_file import load
 from gcs.workflows.new_file import new_file
 from missions.fileformat import parse_mission
 from plumbline import Land, Mission, Takeoff, Waypoint

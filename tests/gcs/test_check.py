@@ -19,7 +19,8 @@ from autopilot.trajectory.transfer import PEAK_SPEED
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_USAGE, InputError
+from gcs.errors import EXIT_DONE, EXIT_USAGE, GcsError, InputError
+from gcs.mission_files import load
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
@@ -32,7 +33,6 @@ from gcs.workflows.check_mission import (
     winch_violations,
 )
 from gcs.workflows.flight_inputs import check_flight_inputs
-from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
@@ -74,10 +74,10 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
 
 
-def test_a_plan_of_another_ground_station_is_told_how_it_is_flown(tmp_path: Path) -> None:
+def test_a_plan_that_cannot_be_read_is_told_by_what_is_wrong_with_it(tmp_path: Path) -> None:
     plan = tmp_path / "a.plan"
     plan.write_text("{}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"a file of another ground station; gcs check .* and gcs upload"):
+    with pytest.raises(GcsError, match=r'a\.plan: "fileType" must be "Plan"'):
         load(str(plan))
     with pytest.raises(InputError, match=r"unknown mission|No such file|no such file"):
         load(str(tmp_path / "b.plan"))

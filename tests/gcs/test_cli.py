@@ -580,7 +580,7 @@ def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):
     refused = run("upload", str(file), "--connect", port)
     assert (refused.exit_code, refused.stdout) == (EXIT_ERROR, "")
     head, end, fall = refused.stderr.splitlines()
-    assert head == "gcs: in.plan cannot be flown by vehicle bebop; --force tries:"
+    assert head == "gcs: in cannot be flown by vehicle bebop; --force tries:"
     assert end.startswith("gcs: items[3] (signals): at 5.0 s, its end, the load still moves at ")
     assert "the load would have to fall" in fall
     assert run("upload", str(file), "--force", "--connect", port).exit_code == EXIT_DONE

@@ -13,7 +13,7 @@ from gcs import closed_loop
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions
 from gcs.closed_ticks import ClosedTicks, FlownTicks
-from gcs.workflows.mission_file import load
+from gcs.mission_files import load
 from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
 from plumbline.examples.load_pid import LoadPid
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.clients.flight import Outcome
@@ -76,7 +77,7 @@ def test_the_outcome_of_a_flight_in_real_time_says_that_the_machine_was_too_slow
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, real_time: bool, name: Any, says: bool
 ) -> None:
     @contextmanager
-    def no_vehicle(options: FlightOptions, out: Path, processes: None) -> Iterator[None]:
+    def no_vehicle(options: FlightOptions, home: Home, out: Path, processes: None) -> Iterator[None]:
         yield
 
     def flown(mission: Any, options: Any, log: TlogWriter, own: Any, stop: Any, watch: Any, page: Any) -> Any:

@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 import plumbline
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.items import encode_steps
+from gcs.formats.missions import write_foreign
+from missions.model import ReturnHome, Takeoff, Waypoint
 from tests.doubles.recorded_flights import STABLE_KEYS
 
 pytestmark = pytest.mark.processes
@@ -35,6 +39,18 @@ def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs:
     assert {k: v for k, v in flight.summary.items() if k not in of_the_machine} == {
         k: v for k, v in record.items() if k not in of_the_machine
     }
+
+
+def test_a_plan_of_another_ground_station_leaves_the_log_of_the_same_flight_in_one_process(
+    gcs: Gcs, tmp_path: Path
+) -> None:
+    """Also with a home that simulator and autopilot do not have by default."""
+    path, out = tmp_path / "survey.plan", tmp_path / "out"
+    home = Home(-33.9, 18.4, 60.0)
+    write_foreign(path, encode_steps((Takeoff(0.5), Waypoint(0.4, 0.0, 0.5), ReturnHome()), home), home)
+    flown = gcs("fly", str(path), "--out", str(out), "--quiet")
+    assert (flown.returncode, flown.stderr) == (0, f"gcs: {path}: completed\n")
+    assert (out / "flight.tlog").read_bytes() == plumbline.fly(path).tlog
 
 
 def test_what_four_rotors_lose_is_reported_as_diverged(gcs: Gcs, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from autopilot.wire.items import WireItem, encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
 from gcs.formats.items import NO_COORDINATE, FormatError
-from gcs.formats.missions import check_plan, planned_home, read_foreign, write_foreign
+from gcs.formats.missions import mission_of, planned_home, read_foreign, write_foreign
 from gcs.formats.params import parameter_lines, qgc_parameters
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import read_waypoints, write_waypoints
@@ -138,13 +138,13 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     text = plan_text(
         TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(201, 2)
     )
-    judged = check_plan(read_plan(text), HOME)
+    judged = mission_of(read_plan(text), HOME, "")
     lines = judged.left_out
     assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 4"]
     assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
     assert "use NAV_TAKEOFF" in lines[0]
     assert "frame 10" in lines[1]
-    assert judged.kept == [
+    assert list(judged.notes) == [
         "item 2, DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done",
         "item 5, WAYPOINT_USER_5 (31004): kept on the vehicle but not done",
     ]
@@ -152,15 +152,15 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
 
 
 def test_what_is_refused_is_left_out_and_not_kept() -> None:
-    judged = check_plan(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(203, 2), simple(21))), HOME)
+    judged = mission_of(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(203, 2), simple(21))), HOME, "")
     (line,) = judged.left_out
     assert line.startswith("item 1 (") and "DO_PARACHUTE (208)" in line
-    assert judged.kept == ["item 2, DO_DIGICAM_CONTROL (203): kept on the vehicle but not done"]
+    assert list(judged.notes) == ["item 2, DO_DIGICAM_CONTROL (203): kept on the vehicle but not done"]
     assert [item.command for item in judged.items] == [22, 203, 21]
 
 
 def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() -> None:
-    (line,) = check_plan(read_plan(plan_text(TAKEOFF, simple(5003, 20), simple(21))), HOME).left_out
+    (line,) = mission_of(read_plan(plan_text(TAKEOFF, simple(5003, 20), simple(21))), HOME, "").left_out
     assert line.endswith(
         "NAV_FENCE_CIRCLE_INCLUSION (5003): cannot be flown; "
         "it belongs in the list of the fence (mission type 1)"
@@ -169,14 +169,14 @@ def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() ->
 
 def test_items_behind_the_first_landing_are_named() -> None:
     again = read_plan(plan_text(TAKEOFF, simple(208, 2), WAYPOINTS[0], simple(21), TAKEOFF, simple(21)))
-    assert check_plan(again, HOME).kept == [
+    assert list(mission_of(again, HOME, "").notes) == [
         "items 4 to 5: not flown; the mission ends with the landing of item 3"
     ]
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
-    judged = check_plan(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
-    assert judged.left_out == judged.kept == []
+    judged = mission_of(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME, "")
+    assert judged.left_out == judged.notes == ()
     assert [item.command for item in judged.items] == [22, 16, 16, 16, 21]
 
 
@@ -186,8 +186,8 @@ def test_shipped_missions_pass_through_files_unchanged(name: str, ending: str, t
     items = encode_mission(load_mission(name), HOME)
     path = tmp_path / f"mission{ending}"
     write_foreign(path, items, HOME)
-    judged = check_plan(read_foreign(path), HOME)
-    assert judged.left_out == judged.kept == []
+    judged = mission_of(read_foreign(path), HOME, "")
+    assert judged.left_out == judged.notes == ()
     assert judged.items == as_in_files(items)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
@@ -259,11 +259,11 @@ def test_a_home_row_of_another_place_is_not_flown() -> None:
         text = f"QGC WPL 110\n0\t{current}\t0\t16\t0\t0\t0\t0\t{latitude}\t8.545594\t0\t1\n"
         return Plan(read_waypoints(text + "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t2\t1\n"), [])
 
-    at_home = check_plan(rows(47.397742), HOME)
-    assert at_home.left_out == []
+    at_home = mission_of(rows(47.397742), HOME, "")
+    assert at_home.left_out == ()
     assert [item.command for item in at_home.items] == [22], "it is no step to fly"
     for current in (0, 1):
-        elsewhere = check_plan(rows(47.39, current), HOME)
+        elsewhere = mission_of(rows(47.39, current), HOME, "")
         assert planned_home(rows(47.39, current)) == Home(47.39, 8.545594, 0.0)
         assert len(elsewhere.left_out) == 1
         assert "home row" in elsewhere.left_out[0]
@@ -357,7 +357,7 @@ def jump_in_plan(target: int) -> dict[str, Any]:
 
 
 def flown(plan: Plan) -> list[tuple[int, float]]:
-    return [(item.command, item.param1) for item in check_plan(plan, HOME).items]
+    return [(item.command, item.param1) for item in mission_of(plan, HOME, "").items]
 
 
 def test_a_jump_in_a_plan_goes_to_the_item_with_that_id() -> None:
@@ -388,7 +388,7 @@ def test_jumps_and_home_are_written_as_ground_stations_count_them(
     """`counts_home`: the vehicle's item 0 is the home, as ArduPilot has it."""
     path = tmp_path / f"mission{ending}"
     plan = read_plan(plan_text(TAKEOFF, *PLACES, jump_in_plan(2)))
-    items = check_plan(plan, HOME).items
+    items = mission_of(plan, HOME, "").items
     home = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, 473977420, 85455940, 0.0)
     on_vehicle = (home, *items[:-1], items[-1]._replace(param1=2.0)) if counts_home else items
     write_foreign(path, on_vehicle, HOME)
@@ -401,4 +401,4 @@ def test_jumps_and_home_are_written_as_ground_stations_count_them(
         assert [row[3] for row in rows] == ["16", "22", "16", "16", "177"]
         assert (rows[0][2], rows[0][8:11]) == ("0", ["47.397742", "8.545594", "0.0"])
         assert rows[-1][4] == "2.0", "the item behind the take-off"
-    assert bits(check_plan(read_foreign(path), HOME).items) == bits(items)
+    assert bits(mission_of(read_foreign(path), HOME, "").items) == bits(items)

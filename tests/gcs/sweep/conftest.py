@@ -9,8 +9,13 @@ from typing import Any
 
 import pytest
 
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import encode_mission
 from gcs.folders import PLAN_FILE
+from gcs.formats.missions import write_foreign
 from gcs.sweep.plan import SweepPlan, VariedParameter, from_json
+from missions.fileformat import parse_mission
 
 SHORT = """
 title = "Up, aside and down"
@@ -44,6 +49,22 @@ def delivery(tmp_path_factory: pytest.TempPathFactory) -> str:
     land = '[[items]]\ntype = "land"\n'
     path.write_text(SHORT.replace(land, '[[items]]\ntype = "release"\n\n' + land), encoding="utf-8")
     return str(path)
+
+
+@pytest.fixture(scope="session")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The same as a .plan, far from where the vehicle is by default, with a heading and a wide fence; beside
+    it one with a narrow fence."""
+    home, folder = Home(-33.9, 18.4, 60.0), tmp_path_factory.mktemp("plans")
+    takeoff, waypoint, land = encode_mission(parse_mission(SHORT, "short", "short"), home)
+    yaw = takeoff._replace(command=mavlink.MAV_CMD_CONDITION_YAW, param1=45.0, x=0, y=0, z=0.0)
+    for name, radius_m in (("wide", 2.0), ("narrow", 0.3)):
+        latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
+        circle = takeoff._replace(
+            command=mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, param1=radius_m, x=latitude, y=longitude
+        )
+        write_foreign(folder / f"{name}.plan", (takeoff, yaw, waypoint, land), home, (circle,))
+    return str(folder / "wide.plan")
 
 
 WINCH = """

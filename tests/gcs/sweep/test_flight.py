@@ -21,6 +21,7 @@ from autopilot.own.own_code import OwnCode
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
+from gcs.mission_files import load
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
 from plumbline.laws import Asked, Now, force
@@ -40,7 +41,7 @@ class NoLog:
 
 def flown(name: str, conditions: Conditions) -> tuple[FlightResult, NDArray[np.float64]]:
     """Fly both ways and compare every true state; return the sweep's result and the states."""
-    mission = load_mission(name)
+    mission = load(name)
     real = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
 
     def watch(_: Onboard, simulator: HilSimulator) -> bool:
@@ -204,6 +205,14 @@ def test_same_end_at_the_fence(swung: str, action: float, outcome: str) -> None:
     assert any(told in text for text in found.texts)
     if action == LAND:
         assert np.hypot(states[:, 0], states[:, 1]).max() < FENCE_M + 0.05
+
+
+def test_same_bits_with_the_plan_of_another_ground_station_and_its_fence(planned: str) -> None:
+    found, states = flown(planned, Conditions(sensors="lab", seed=1))
+    assert found.outcome == "completed"
+    assert states[:, 0].max() == pytest.approx(0.4, abs=0.02)
+    with pytest.raises(ValueError, match="item 2 leads outside the fence"):
+        start_times(load(planned.replace("wide", "narrow")), Conditions())
 
 
 def test_a_refusal_names_the_item_of_the_mission_and_not_of_the_upload() -> None:

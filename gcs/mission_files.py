@@ -1,0 +1,56 @@
+"""Missions by name or file, with errors for the command line. Imports little: `gcs fly` begins with it."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gcs.errors import InputError, input_error
+from missions.fileformat import MissionFileError, load_mission
+from missions.model import Mission
+
+if TYPE_CHECKING:
+    from gcs.mission_items import ForeignMission
+
+
+def load(name_or_path: str | PathLike[str]) -> Mission:
+    """The mission that is flown from take-off to landing: a shipped one by its name, that of a mission file,
+    or that of a file of another ground station; GcsError states what is wrong with it."""
+    try:
+        return load_mission(name_or_path)
+    except MissionFileError as error:
+        if Path(name_or_path).is_file():
+            mission = _load_foreign(Path(name_or_path))
+            if mission is not None:
+                return mission
+        raise input_error(error) from None
+
+
+def _load_foreign(path: Path) -> Mission | None:
+    """The mission of a file of another ground station, None if it is not one; InputError if it would not be
+    flown as it stands there, or not to a landing."""
+    from gcs.formats.missions import is_foreign, read_mission  # load much, and are imported only when needed
+
+    if not is_foreign(path):
+        return None
+    mission = read_mission(path)
+    problem = _why_not_flown(path, mission)
+    if problem:
+        raise InputError(*(f"{path}: {line}" for line in (*mission.left_out, problem)))
+    return mission
+
+
+def _why_not_flown(path: Path, mission: ForeignMission) -> str:
+    """Why the mission is not flown as it stands in the file from take-off to landing; empty if it is."""
+    if not mission.steps:
+        return "nothing that can be flown"
+    if mission.left_out:
+        these = "this" if len(mission.left_out) == 1 else "these"
+        return f"not flown without {these}; gcs upload {path} --skip brings the rest to a running vehicle"
+    if not mission.ends_on_ground:
+        return (
+            "does not end on the ground; end it with NAV_LAND or NAV_RETURN_TO_LAUNCH, or bring it to a "
+            f"running vehicle: gcs upload {path}"
+        )
+    return ""
