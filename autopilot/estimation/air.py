@@ -39,10 +39,14 @@ def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: Est
 
     Gusts of the variance s^2 that last for T walk by 2 s^2 / T. A mean over the time L leaves s^2 L / (L + T)
     of this variance, so that the learned one means a walk of 2 s'^2 (1 / T + 1 / L). It is at most that of
-    strong gusts in the wind that d shows, or that may be hidden where no tracker measures the load. Without a
-    sensor of the load, gusts cannot be learned: they are not distinguishable from those on the vehicle.
+    strong gusts in the wind that d shows, or that may be hidden where no tracker measures the load.
+
+    Without a sensor of the load, its pull shows only the sum of the wind on load and vehicle: neither gusts
+    nor drag can be learned, and with a faster walk d, and with it the direction of the cable, drift away.
     """
     configured_walk, c = tuning.air_walk, tuning.load_drag
+    if is_never_observed(load):
+        return configured_walk
     wind2 = air.load_accel[0] * air.load_accel[0] + air.load_accel[1] * air.load_accel[1]
     speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
     strong_gusts = (
@@ -50,9 +54,7 @@ def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: Est
         * GUST_RANDOM_WALK
         * (wind2 if load.source == TRACKER else wind2 + HIDDEN_WIND_ACCEL * HIDDEN_WIND_ACCEL)
     )
-    gusts = 0.0
-    if not is_never_observed(load):
-        gusts = min(strong_gusts, air.gust_variance * (1.0 / GUST_TIME_S + 1.0 / LEARNING_S))
+    gusts = min(strong_gusts, air.gust_variance * (1.0 / GUST_TIME_S + 1.0 / LEARNING_S))
     return sqrt(
         configured_walk * configured_walk
         + gusts

@@ -1,7 +1,8 @@
 """Correction by a cable that comes taut: the load is on the ground, the vehicle one cable length above it.
 
 A plain receiver and a barometer know the height to decimetres; here the height is measured once, and the
-climb rate, which is zero.
+climb rate, which is zero. A load that no sensor has ever observed does not move sideways either, as long as
+it lies on the ground: else the wind on the vehicle, which pulls at the cable, would seem to carry it away.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from autopilot.estimation.records import (
     LoadEstimate,
     SensorErrors,
 )
-from autopilot.estimation.tautness import PULL_SLACK, cable_is_unloaded
+from autopilot.estimation.tautness import PULL_SLACK, cable_is_unloaded, is_never_observed
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3
 
 GROUND_LOAD_HEIGHT_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
-GROUND_LOAD_CLIMB_STD = 0.05  # m/s, of its climb
-# time in which measurements of the climb of a load on the ground count as one: samples are not independent
-CLIMB_CORRELATION_S = 0.3
+GROUND_LOAD_SPEED_STD = 0.05  # m/s, of its velocity
+# time in which measurements of the velocity of a load on the ground count as one: samples are not independent
+GROUND_LOAD_CORRELATION_S = 0.3
 
 
 @kernel
@@ -58,12 +59,14 @@ def correct_tautening(
 ) -> EstimatorState:
     """The state after a prediction over dt seconds; `before` is the load before this prediction.
 
-    A cable that comes taut measures height and climb rate; the climb rate is also measured while the cable
-    pulls and the load is still on the ground. The laws receive the correction of the height at
-    once: they are about to lift the load off this ground.
+    A cable that comes taut measures height and climb rate of a receiver's vehicle; the climb rate is also
+    measured while the cable pulls and the load is still on the ground, and so is the level velocity of a
+    load that no sensor has ever observed. The laws receive the correction of the height at once: they are
+    about to lift the load off this ground.
     """
     load = state.load
-    if state.vehicle.source != RECEIVER or load.source != CAMERA or load.taut == 0.0:
+    measures_climb, measures_level = state.vehicle.source == RECEIVER, is_never_observed(load)
+    if load.source != CAMERA or load.taut == 0.0 or not (measures_climb or measures_level):
         return state
     came_taut = before.taut == 0.0
     is_pulling = load.pull > PULL_SLACK * tuning.load_mass * tuning.gravity
@@ -73,12 +76,12 @@ def correct_tautening(
     past = past_state(state, history, tuning, 0.0)
     start_correction(history)
     count = 0
-    climb_var = (
-        GROUND_LOAD_CLIMB_STD
-        * GROUND_LOAD_CLIMB_STD
-        * (1.0 if came_taut else max(1.0, CLIMB_CORRELATION_S / dt))
+    speed_var = (
+        GROUND_LOAD_SPEED_STD
+        * GROUND_LOAD_SPEED_STD
+        * (1.0 if came_taut else max(1.0, GROUND_LOAD_CORRELATION_S / dt))
     )
-    if came_taut:
+    if came_taut and measures_climb:
         start_scalar(
             history, 0, before.x_load[2] - load.x_load[2], GROUND_LOAD_HEIGHT_STD * GROUND_LOAD_HEIGHT_STD
         )
@@ -87,11 +90,15 @@ def correct_tautening(
         if not normalised_innovation_squared(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
             return state
         count = 1
-    climb = past.v_quad[2] + load.length * past.q_cable_dot[2]
-    start_scalar(history, count, -climb, climb_var)
-    add_load_velocity_jacobian(history, count, past, load.length, 2)
-    compute_gain_rows(history, count, count + 1, n)
-    fuse_scalars(history, count + 1, n)
+    first = count
+    for axis in range(3):
+        if measures_climb if axis == 2 else measures_level:
+            speed = past.v_quad[axis] + load.length * past.q_cable_dot[axis]
+            start_scalar(history, count, -speed, speed_var)
+            add_load_velocity_jacobian(history, count, past, load.length, axis)
+            count += 1
+    compute_gain_rows(history, first, count, n)
+    fuse_scalars(history, count, n)
     state = inject_error(state, history)
     corrected = state.sensor_errors.pending_correction
     return with_sensor_errors(
