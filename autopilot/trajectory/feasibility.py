@@ -160,6 +160,25 @@ class PathReport:
     asked_m_s: float = 0.0
 
     def __str__(self) -> str:
+        return self.text()
+
+    def merged(self, other: PathReport) -> PathReport:
+        """The worst of two times that the same item is flown."""
+        return replace(
+            self,
+            duration_s=max(self.duration_s, other.duration_s),
+            distance_m=max(self.distance_m, other.distance_m),
+            slowed=max(self.slowed, other.slowed),
+            beside_m=max(self.beside_m, other.beside_m),
+            speed_m_s=max(self.speed_m_s, other.speed_m_s),
+            rotor_low_n=min(self.rotor_low_n, other.rotor_low_n),
+            rotor_high_n=max(self.rotor_high_n, other.rotor_high_n),
+            tension_low_n=min(self.tension_low_n, other.tension_low_n),
+            tilt_deg=max(self.tilt_deg, other.tilt_deg),
+        )
+
+    def text(self, times: int = 1) -> str:
+        """The report as a line; `times`: how often the item is flown, at worst like this."""
         near = ""
         if self.kind == "signals" and self.distance_m == 0.0:
             near = ", as asked"
@@ -171,7 +190,8 @@ class PathReport:
             near = f", up to {self.beside_m:.1f} m beside the straight line"
         speed = f"load to {self.speed_m_s:.2f} m/s, " if self.speed_m_s else ""
         return (
-            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; {speed}"
+            f"items[{self.item}] ({self.kind}): {f'{times} times, up to ' if times > 1 else ''}"
+            f"{self.duration_s:.1f} s{near}; {speed}"
             f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "
             f"tension from {self.tension_low_n:.2f} N, tilt to {self.tilt_deg:.0f} deg"
         )

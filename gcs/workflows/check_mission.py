@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import groupby
 from pathlib import Path
 
@@ -195,7 +196,12 @@ class CheckResult:
         """The result as text."""
         if self.problems:
             return self.problems
-        return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths), *self.warnings)
+        flown: dict[int, list[PathReport]] = {}
+        for report in self.paths:
+            flown.setdefault(report.item, []).append(report)
+        # what a jump repeats is one line
+        paths = (reduce(PathReport.merged, reports).text(len(reports)) for reports in flown.values())
+        return (f"{self.mission}: vehicle {self.vehicle} can fly it", *paths, *self.warnings)
 
 
 def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...]) -> CheckResult:

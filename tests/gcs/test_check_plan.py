@@ -164,3 +164,21 @@ def test_an_unreadable_file_is_a_wrong_input(tmp_path: Path) -> None:
     found = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs")
     assert (found.exit_code, found.stdout) == (EXIT_USAGE, "")
     assert found.stderr == f'gcs: {path}: "fileType" must be "Plan"\n'
+
+
+def test_what_a_jump_repeats_is_one_line_with_the_worst_of_all_times(tmp_path: Path) -> None:
+    path = tmp_path / "x.plan"
+    takeoff, *corners, land = encode_steps((Takeoff(2.0), *CORNER, Land()), HOME)
+    jump = land._replace(command=mavlink.MAV_CMD_DO_JUMP, param1=1.0, param2=4.0, x=0, y=0, z=0.0)
+    write_foreign(path, (takeoff, *corners, jump, land), HOME)
+    found = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs")
+    lines = [line for line in found.stdout.splitlines() if line.startswith("items[")]
+    assert [line.partition(" s")[0].rpartition(" ")[0] for line in lines] == [
+        "items[0] (takeoff):",
+        "items[1] (waypoint): 5 times, up to",
+        "items[2] (waypoint): 5 times, up to",
+    ]
+    record = json.loads(CliRunner().invoke(gcs, ["check", str(path), "--json"], prog_name="gcs").stdout)
+    second = [report for report in record["paths"] if report["item"] == 1]
+    assert len(second) == 5
+    assert f"up to {max(report['duration_s'] for report in second):.1f} s" in lines[1]
