@@ -41,7 +41,7 @@ from missions.model import AttitudeRun, Signals
 
 P = Phase
 
-TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
+TOUCH_HEIGHT = 0.12  # m over the ground at which lowering turns into creeping
 # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
 BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
@@ -120,7 +120,8 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = stopping_legs(flight, view, settings)
     if flight.cable.released:
         clear = _clear_of_load(here, view, settings)
-        low = (clear[0], clear[1], min(here[2], MIN_LOAD_HEIGHT))
+        low_height = settings.gear_height_m + TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std
+        low = (clear[0], clear[1], min(here[2], low_height))
         return (
             *legs,
             carry(here, clear, flight.mission.speed_m_s, settings),

@@ -107,6 +107,7 @@ class Settings:
     """The supervisor's parameters: those of the assumed vehicle, and the others by subject."""
 
     cable_length_m: float
+    gear_height_m: float  # of the vehicle's centre of mass above the ground on which it stands
     min_move_s: float
     gravity_m_s2: float
     load_weight_n: float
@@ -133,6 +134,7 @@ def settings_from(
     length, gravity, load_mass = table["VEH_CABLE_LEN"], table["VEH_GRAVITY"], table["VEH_LOAD_MASS"]
     return Settings(
         cable_length_m=length,
+        gear_height_m=table["EST_GEAR_H"],
         min_move_s=min_move_duration(length, gravity),
         gravity_m_s2=gravity,
         load_weight_n=load_mass * gravity,

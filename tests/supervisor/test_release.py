@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from autopilot.guidance.legs import QUAD_POSITION
+from autopilot.guidance.legs import QUAD_POSITION, Creep
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
+from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.requests.decide import decide
-from autopilot.supervisor.state import Phase
+from autopilot.supervisor.state import CableState, Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
-from tests.doubles.sky import ACCEPTED, Sky, entered, hanging
+from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered, hanging
 
 DENIED = mavlink.MAV_RESULT_DENIED
 
@@ -60,6 +63,20 @@ def test_a_release_is_never_refused(phase: Phase) -> None:
         return
     assert flight.legs[0].control_mode == QUAD_POSITION
     assert flight.legs[0].jet(0.0)[0] == pytest.approx(hanging().x_quad, abs=1e-9)
+
+
+@pytest.mark.parametrize("gear_m", [0.06, 0.5])
+@pytest.mark.parametrize("height_std_m", [0.0, 0.1])
+def test_a_vehicle_without_its_load_creeps_to_the_ground_however_high_it_stands(
+    gear_m: float, height_std_m: float
+) -> None:
+    settings = replace(SETTINGS, gear_height_m=gear_m)
+    flight = replace(Flight(), cable=CableState(released=True))
+    seen = hanging()._replace(height_std=height_std_m)
+    *_, down, creep = entered(flight, Phase.LOWER, seen, settings).legs
+    assert isinstance(creep, Creep)
+    assert down.jet(down.duration_s)[0] == creep.jet(0.0)[0]
+    assert creep.jet(0.0)[0][2] == pytest.approx(gear_m + TOUCH_HEIGHT + 3.0 * height_std_m)
 
 
 def test_a_load_out_of_reach_is_not_taken() -> None:
