@@ -17,25 +17,43 @@ if TYPE_CHECKING:
 def load(name_or_path: str | PathLike[str]) -> Mission:
     """The mission that is flown from take-off to landing: a shipped one by its name, that of a mission file,
     or that of a file of another ground station; GcsError states what is wrong with it."""
+    return _found(name_or_path, complete=True)
+
+
+def read(name_or_path: str | PathLike[str]) -> Mission:
+    """The same, but of a file of another ground station whatever the vehicle accepts of it."""
+    return _found(name_or_path, complete=False)
+
+
+def is_mission_file(path: Path) -> bool:
+    """Whether this is a mission file of ours, whatever its ending."""
+    try:
+        load_mission(path)
+    except MissionFileError:
+        return False
+    return True
+
+
+def _found(name_or_path: str | PathLike[str], complete: bool) -> Mission:
     try:
         return load_mission(name_or_path)
     except MissionFileError as error:
         if Path(name_or_path).is_file():
-            mission = _load_foreign(Path(name_or_path))
+            mission = _read_foreign(Path(name_or_path), complete)
             if mission is not None:
                 return mission
         raise input_error(error) from None
 
 
-def _load_foreign(path: Path) -> Mission | None:
-    """The mission of a file of another ground station, None if it is not one; InputError if it would not be
-    flown as it stands there, or not to a landing."""
+def _read_foreign(path: Path, complete: bool) -> Mission | None:
+    """The mission of a file of another ground station, None if it is not one; InputError if it must be
+    `complete` and would not be flown as it stands there, or not to a landing."""
     from gcs.formats.missions import is_foreign, read_mission  # load much, and are imported only when needed
 
     if not is_foreign(path):
         return None
     mission = read_mission(path)
-    problem = _why_not_flown(path, mission)
+    problem = _why_not_flown(path, mission) if complete else ""
     if problem:
         raise InputError(*(f"{path}: {line}" for line in (*mission.left_out, problem)))
     return mission

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import hypot
 from typing import NamedTuple
 
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import (
+    LocatedStep,
     MissionItemError,
     WireItem,
     encode_mission,
@@ -22,6 +24,7 @@ from missions.model import KINDS, Land, Mission, ReturnHome
 
 # not "item 2 of 3", which clearly counts the items of the upload, nor an item of the fence
 _ITEM = re.compile(r"(?<!\bfence )\bitem (\d+)\b(?! of \d)", re.IGNORECASE)
+_SAME_HOME_M = 1.0
 _STEP = re.compile(r"\bitem(?: |s\[)(\d+)\b")
 
 
@@ -71,6 +74,47 @@ class ForeignMission(Mission):
             return True
         returns = any(isinstance(step, ReturnHome) for step in self.steps[-1:])
         return returns and endless_jump_target(self.items, located_steps(self.items, self.home)) is None
+
+
+def flown_steps(steps: Sequence[LocatedStep]) -> tuple[LocatedStep, ...]:
+    """The steps up to the first landing, with which a mission ends."""
+    landing = next((i for i, one in enumerate(steps) if isinstance(one.step, Land)), len(steps))
+    return tuple(steps[: landing + 1])
+
+
+def at_home(mission: Mission, home: Home) -> Mission:
+    """The mission as it is flown from another home: items of a file of another ground station stay where they
+    are, and an absolute altitude becomes another height. InputError if one cannot be flown from there."""
+    if not isinstance(mission, ForeignMission) or mission.home == home:
+        return mission
+    try:
+        steps = flown_steps(located_steps(mission.items, home))
+    except MissionItemError as error:
+        number = mission.numbers.items[error.seq] if error.seq < len(mission.items) else error.seq
+        raise InputError(f"{mission.name}: item {number}, from the vehicle's home: {error.text}") from None
+    return replace(mission, steps=tuple(one.step for one in steps), home=home)
+
+
+def home_difference(planned: Home, home: Home) -> str:
+    """The text that a mission was planned for another home than the vehicle's; empty if it was not."""
+    east, north, up = enu_from_geodetic(
+        round(1e7 * planned.latitude_deg),
+        round(1e7 * planned.longitude_deg),
+        round(1e3 * planned.altitude_m),
+        home,
+    )
+    if max(hypot(east, north), abs(up)) <= _SAME_HOME_M:
+        return ""
+    return (
+        f"planned for a home {hypot(east, north):.0f} m from the vehicle's and {abs(up):.0f} m "
+        f"{'higher' if up > 0.0 else 'lower'}: absolute altitudes and the way to the first item are others "
+        "than planned"
+    )
+
+
+def home_text(home: Home) -> str:
+    """The text that says from which home a mission is flown."""
+    return f"flown with home at {home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
 
 
 def home_of(mission: Mission) -> Home:

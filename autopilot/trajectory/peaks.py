@@ -20,6 +20,7 @@ from missions.model import AttitudeRun, Signals
 Samples = NDArray[np.float64]
 
 _SAMPLES_PER_PERIOD = 200
+_MAX_SAMPLES, _MIN_SAMPLES_PER_PERIOD = 1_000_000, 20
 _MAX_SPACING_S = 0.01
 _TRANSFER_SAMPLES = 201
 # columns of a sample row
@@ -200,10 +201,13 @@ def _peaks(times: Samples, rows: Samples) -> Peaks:
 
 
 def signal_times(step: Signals) -> Samples:
-    """Sample times: 200 to the shortest period or edge, at most 10 ms apart, and both sides of each joint."""
+    """Sample times: 200 to the shortest period or edge, at most 10 ms apart, and both sides of each joint. Of
+    signals that last for hours fewer, but 20 to the shortest period."""
     shortest_periods = [sine.period_s for term in step.terms for sine in term.factors]
     shortest_periods += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
-    spacing = min([_MAX_SPACING_S, *(period / _SAMPLES_PER_PERIOD for period in shortest_periods)])
+    shortest_s = min(shortest_periods, default=step.duration_s)
+    spacing = min(_MAX_SPACING_S, shortest_s / _SAMPLES_PER_PERIOD)
+    spacing = max(spacing, min(step.duration_s / _MAX_SAMPLES, shortest_s / _MIN_SAMPLES_PER_PERIOD))
     regular = np.linspace(0.0, step.duration_s, int(step.duration_s / spacing) + 2)[:-1]
     edges = [t for t in joints(step.terms) if 0.0 < t < step.duration_s]
     sides = [nextafter(t, -inf) for t in (*edges, step.duration_s)] + edges

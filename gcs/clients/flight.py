@@ -386,7 +386,8 @@ class FlightClient:
         if now_us - self._flight_start_us > self._limit_s * 1e6:
             where = f"still in phase {view.phase_name or 'unknown'}, item {self._item()}"
             limit = limit_text(self._limit_s)
-            self._end(Outcome("timeout", f"not landed after {limit} of flight: {where}"))
+            outcome = Outcome("timeout", f"not landed after {limit} of flight: {where}")
+            self._end(outcome.with_reason(self._why_mission_was_left()))
             return True
         return False
 

@@ -24,7 +24,7 @@ from gcs.formats.items import FormatError
 from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
-from gcs.mission_items import FileNumbers, ForeignMission
+from gcs.mission_items import FileNumbers, ForeignMission, flown_steps
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
@@ -124,7 +124,8 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         "kept on the vehicle but not done"
         for command, found in kept_items.items()
     ]
-    landing = next((step.last for step in steps if isinstance(step.step, Land)), len(remaining))
+    flown = flown_steps(steps)
+    landing = flown[-1].last if flown and isinstance(flown[-1].step, Land) else len(remaining)
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
         kept.append(f"{places}: not flown; the mission ends with the landing of item {numbers[landing]}")
@@ -133,12 +134,12 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         title=name,
         description="",
         assumptions=(),
-        steps=tuple(one.step for one in steps),
+        steps=tuple(one.step for one in flown),
         items=tuple(items),
         fence=plan.fence,
         rally=plan.rally,
         home=home,
-        numbers=FileNumbers(tuple(numbers), tuple(numbers[one.last] for one in steps)),
+        numbers=FileNumbers(tuple(numbers), tuple(numbers[one.last] for one in flown)),
         left_out=(*(line for _, line in problems), *plan.not_converted),
         notes=tuple(kept),
     )

@@ -42,8 +42,12 @@ def read_plan(text: str) -> Plan:
     """The items of a plan; complex items are replaced by the simple ones that QGroundControl has stored."""
     try:
         document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+    except RecursionError:
+        raise FormatError("not JSON: lists or objects within each other are too many") from None
+    except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error}") from None
+    except ValueError:  # an integer of thousands of digits
+        raise FormatError("not JSON: a number has too many digits") from None
     if not isinstance(document, dict) or document.get("fileType") != "Plan":
         raise FormatError('"fileType" must be "Plan"')
     mission = _member(document, "mission", dict, "mission")
@@ -139,7 +143,7 @@ def _complex(
     """The simple items that a complex one consists of, each with its place in the file."""
     kind = str(entry.get("complexItemType", "?"))
     transect = entry.get(_TRANSECT)
-    if not isinstance(transect, dict) or not isinstance(transect.get("Items"), list):
+    if not isinstance(transect, dict) or not isinstance(transect.get("Items"), list) or not transect["Items"]:
         not_converted.append(f"{where}: {kind} holds no items; make it of waypoints in the ground station")
         return
     for number, inner in enumerate(transect["Items"]):
@@ -173,10 +177,14 @@ def _fence(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
     if "geoFence" not in record:
         return None
     fence = _member(record, "geoFence", dict, "geoFence")
+    if fence.get("polygon"):
+        raise FormatError("geoFence.polygon: a fence of an older format; open and save it in QGroundControl")
     items: list[WireItem] = []
     for number, entry in enumerate(_optional_list(fence, "polygons", "geoFence")):
         where = f"geoFence.polygons[{number}]"
         corners = _member(_object(entry, where), "polygon", list, f"{where}.polygon")
+        if not corners:
+            raise FormatError(f"{where}.polygon: has no corners")
         command = _INSIDE_POLYGON if entry.get("inclusion", True) else _OUTSIDE_POLYGON
         for corner, corner_place in enumerate(corners):
             place = f"{where}.polygon[{corner}]"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -87,7 +88,9 @@ def style() -> Iterator[None]:
     """The look, for figures that are made and saved inside."""
     import matplotlib as mpl
 
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE), warnings.catch_warnings():
+        # a title may have letters that the font lacks: they are boxes in the picture
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 

@@ -7,6 +7,7 @@ of the ground station are known beforehand: the two instants at which it arms an
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import inf, nan, sqrt
@@ -47,6 +48,7 @@ TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NO_PATH = np.zeros((1, COLUMNS))  # requested path of a mission step in which the load follows none
 _NEVER = 2**62
+_OF_A_PATH = re.compile(r"\bitem \d+[^:;]*: ")  # in the refusal of a path that the vehicle cannot follow
 _TICK, _NOW = field_offset(World, "tick"), field_offset(World, "now_us")
 _SLACK_EVENTS = field_offset(World, "plant") + field_offset(PlantState, "slack_events")
 # machine code of `fly_stretch` and of the ticks that it calls, by the type of the cable's rows
@@ -103,10 +105,11 @@ def start_times(mission: Mission, conditions: Conditions) -> StartTimes:
 
     outcome = fly_with_wire(mission, conditions, _NoLog(), watch)
     if Phase.TAUTEN not in times:
+        hint = ""
+        if _OF_A_PATH.search(outcome.reason):
+            hint = " (MIS_INFEASIBLE says what becomes of a path that cannot be flown: 0 as asked, 1 slower)"
         raise ValueError(
-            f"{mission.name} does not start under the conditions of the sweep: "
-            f"{outcome.reason} (MIS_INFEASIBLE says what becomes of a path that cannot be flown: 0 as asked, "
-            "1 slower)"
+            f"{mission.name} does not start under the conditions of the sweep: {outcome.reason}{hint}"
         )
     return StartTimes(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 
@@ -305,7 +308,9 @@ class SweepFlight:
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.cell.limit_us:
             where: str = flight.phase.name.lower()
             limit = limit_text(self.cell.limit_us * 1e-6)
-            self._end("timeout", f"not landed after {limit} of flight: still in phase {where}", where)
+            late = f"not landed after {limit} of flight: still in phase {where}"
+            warnings = dict.fromkeys(self._warnings) if flight.phase != Phase.MISSION else ()
+            self._end("timeout", "; ".join([*warnings, late]), where)
         elif self.airborne_us < 0 and now_us > self.start_us + self.cell.limit_us:
             where = flight.phase.name.lower()
             self._end("timeout", f"not started after {limit_text(now_us * 1e-6)}: still {where}", where)

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from pathlib import Path
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -16,15 +15,15 @@ from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
-from gcs.formats.missions import is_foreign, read_mission
-from gcs.mission_files import load
+from gcs.mission_files import read
 from gcs.mission_items import (
     ForeignMission,
-    home_of,
+    home_text,
     in_file_terms,
     in_mission_terms,
     items_of,
@@ -83,8 +82,9 @@ def path_reports(
 def _as_sent(mission: Mission) -> Mission:
     """The mission with its waypoints on the grid on which mission items carry them: how fast waypoints that
     are close together can be flown depends on it."""
-    home = home_of(mission)
-    sent = decode_items(items_of(mission, home), home)
+    if isinstance(mission, ForeignMission):  # its steps are made of items
+        return mission
+    sent = decode_items(items_of(mission, Home()), Home())
     steps = (
         there if isinstance(here, Waypoint) else here for here, there in zip(mission.steps, sent, strict=True)
     )
@@ -197,8 +197,10 @@ class CheckResult:
         if self.problems:
             return self.problems
         flown: dict[int, list[PathReport]] = {}
-        for report in self.paths:
-            flown.setdefault(report.item, []).append(report)
+        for item, group in groupby(self.paths, key=lambda report: report.item):
+            parts = list(group)  # the way to a circle, and the circle
+            whole = replace(reduce(PathReport.merged, parts), duration_s=sum(one.duration_s for one in parts))
+            flown.setdefault(item, []).append(whole)
         # what a jump repeats is one line
         paths = (reduce(PathReport.merged, reports).text(len(reports)) for reports in flown.values())
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *paths, *self.warnings)
@@ -227,15 +229,15 @@ def check_mission(
 
     GcsError if a custom `planner` fails to plan it.
     """
-    path, limits = Path(name_or_path), load_limits(vehicle)
-    mission = read_mission(path) if is_foreign(path) else load(name_or_path)
+    limits, mission = load_limits(vehicle), read(name_or_path)
     notes: tuple[str, ...] = ()
     if isinstance(mission, ForeignMission):
-        home, empty = mission.home, () if mission.items else ("nothing that can be flown",)
-        place = f"{home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
-        notes = (f"note: flown with home at {place}", *(f"note: {line}" for line in mission.notes))
+        empty = () if mission.items else ("nothing that can be flown",)
+        notes = tuple(f"note: {line}" for line in (home_text(mission.home), *mission.notes))
         if left_out := (*mission.left_out, *empty):
             return CheckResult(mission.name, vehicle, (), (), notes, left_out)
+        if not mission.ends_on_ground:
+            notes += ("note: does not end on the ground: for gcs upload, not for gcs fly or gcs sweep",)
     table = autopilot_parameters(limits.vehicle)
     found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
     reports = [] if found else path_reports(mission, limits, planner, not as_asked)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.tlog import TlogWriter
 from gcs.errors import (
     EXIT_DONE,
@@ -22,7 +23,7 @@ from gcs.errors import (
 )
 from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, check_no_other_results, fresh_folder, make_folder
 from gcs.mission_files import load
-from gcs.mission_items import ForeignMission, home_of
+from gcs.mission_items import ForeignMission, home_of, home_text
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
@@ -91,6 +92,8 @@ def fly(
     if not options.quiet:
         for warning in (*warnings, *mission_warnings(options.planner, mission)):
             notify(warning)
+        if options.connect is None and home_of(mission) != Home():
+            notify(f"{mission.name}: {home_text(home_of(mission))}")
     out = options.out or fresh_folder(mission.name)
     with FlightFolder(out, options.overwrite) as folder:
         if options.connect is None:

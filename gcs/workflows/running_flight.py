@@ -12,6 +12,7 @@ from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.mission_items import ForeignMission, at_home, home_difference
 from gcs.shell.display import FlightDisplay, notify
 from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session
@@ -48,7 +49,10 @@ def fly_running(
             session.find_with_truth(truth)
             if session.unanswered_reason:  # it would not answer anything else either
                 raise NoVehicleError(f"{mission.name}: not flown: {session.unanswered_reason}")
-            client = flight_client(mission, options, vehicle_home(session))
+            home = vehicle_home(session)
+            if isinstance(mission, ForeignMission) and (text := home_difference(mission.home, home)):
+                notify(f"{mission.name}: {text}")
+            client = flight_client(at_home(mission, home), options, home)
             same_vehicle = replace(address, system=session.target.system)
             world = session.view.latest.get("SIM_BOOT")
         if truth.missing:

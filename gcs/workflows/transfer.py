@@ -13,7 +13,8 @@ from gcs.errors import GcsError, RefusedError
 from gcs.formats.jumps import redirected
 from gcs.formats.missions import PLAN_ENDING, is_foreign, mission_of, read_foreign, write_foreign
 from gcs.formats.plan import Plan
-from gcs.mission_items import ForeignMission, items_of
+from gcs.mission_files import is_mission_file
+from gcs.mission_items import ForeignMission, home_difference, items_of
 from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -46,7 +47,7 @@ def checked_upload(
     session. A file of another ground station is checked only in that function, since its positions must be
     judged by the vehicle's home."""
     path = Path(mission)
-    if is_foreign(path):
+    if is_foreign(path) and not is_mission_file(path):
         plan = read_foreign(path)
         return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, print_line)
     with notify_if_slow(CHECKING_TEXT):
@@ -64,6 +65,8 @@ def _upload_foreign(
     session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, print_line: PrintLine
 ) -> None:
     mission = mission_of(plan, vehicle_home(session), path.stem)
+    if plan.home is not None and (difference := home_difference(plan.home, mission.home)):
+        notify(f"{path}: {difference}")
     items = _flyable_items(path, mission, skip)
     if not force:
         with notify_if_slow(CHECKING_TEXT):

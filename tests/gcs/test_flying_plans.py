@@ -17,14 +17,19 @@ from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.formats.missions import write_foreign
-from gcs.mission_files import load
-from gcs.mission_items import ForeignMission
+from gcs.mission_files import is_mission_file, load, read
+from gcs.mission_items import ForeignMission, at_home, home_difference
+from gcs.sweep.flight import fly as fly_without_wire
+from gcs.sweep.flight import start_times
 from missions.model import Land, ReturnHome, Step, Takeoff, Waypoint
 from sitl.hil import HilSimulator
 
 HOME = Home(-33.9, 18.4, 60.0)  # not where the vehicle is by default
 PATH = (Takeoff(0.6), Waypoint(0.5, 0.3, 0.6), ReturnHome())
 HEADING_DEG = 90.0  # clockwise from north: east
+
+
+OURS = 'title = "t"\n[[items]]\ntype = "takeoff"\naltitude_m = 1.0\n[[items]]\ntype = "land"\n'
 
 
 class NoLog:
@@ -180,3 +185,57 @@ def test_a_mission_of_python_is_not_made_of_it(tmp_path: Path) -> None:
     path = plan(tmp_path)
     with pytest.raises(plumbline.Error, match="holds more than steps; "):
         plumbline.Mission.load(path)
+
+
+def test_a_mission_ends_with_its_landing_whatever_follows(tmp_path: Path) -> None:
+    path = plan(tmp_path, (*PATH[:2], Land(), Waypoint(3.0, 0.0, 1.0), ReturnHome()))
+    mission = load(path)
+    assert fly(mission, Conditions(), NoLog()).name == "completed"
+    swept = fly_without_wire(mission, Conditions(), start_times(mission, Conditions()))
+    assert (swept.outcome, swept.reason) == ("completed", "")
+    checked = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs").stdout
+    assert "note: items 3 to 4: not flown; the mission ends with the landing of item 2" in checked
+    assert "items[3]" not in checked
+
+
+def test_from_another_home_it_has_other_heights(tmp_path: Path) -> None:
+    """An absolute altitude stays where it is; what a transfer says of the homes is checked beside it."""
+    takeoff, waypoint, back = encode_steps(PATH, HOME)
+    absolute = waypoint._replace(frame=mavlink.MAV_FRAME_GLOBAL, z=HOME.altitude_m + 2.0)
+    path = tmp_path / "survey.plan"
+    write_foreign(path, (takeoff, absolute, back), HOME)
+    mission = load(path)
+    lower = HOME._replace(altitude_m=HOME.altitude_m - 50.0)
+    assert [step.altitude_m for step in mission.steps[:2]] == pytest.approx([0.6, 2.0])
+    assert [step.altitude_m for step in at_home(mission, lower).steps[:2]] == pytest.approx([0.6, 52.0])
+    assert at_home(mission, HOME) is mission
+    assert home_difference(HOME, lower).startswith(
+        "planned for a home 0 m from the vehicle's and 50 m higher:"
+    )
+    assert home_difference(HOME, HOME) == ""
+    with pytest.raises(InputError, match=r"survey: item 1, from the vehicle's home: "):
+        at_home(mission, HOME._replace(altitude_m=HOME.altitude_m + 50.0))
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x.plan"])
+def test_a_mission_file_of_ours_is_one_by_its_content(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(OURS, encoding="utf-8")
+    assert not isinstance(load(path), ForeignMission)
+    assert not isinstance(read(path), ForeignMission)
+    assert is_mission_file(path)
+    assert not is_mission_file(plan(tmp_path))
+    assert CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs").exit_code == 0
+
+
+def test_a_flight_that_a_fence_stops_says_so_when_its_time_is_over(tmp_path: Path) -> None:
+    """The load settles inside the fence, but would stop beyond it: the vehicle holds."""
+    path = plan(tmp_path, (Takeoff(0.6), Waypoint(0.5, 0.0, 0.6), ReturnHome()), fence=circle(0.5004))
+    mission, conditions = load(path), Conditions(limit_s=40.0)
+    reason = (
+        "Fence: would stop outside the fence, holding; not landed after 40 s of flight: still in phase hold"
+    )
+    outcome = fly(mission, conditions, NoLog())
+    assert (outcome.name, outcome.reason) == ("timeout", f"{reason}, item 1")
+    swept = fly_without_wire(mission, conditions, start_times(mission, Conditions()))
+    assert (swept.outcome, swept.reason) == ("timeout", reason)

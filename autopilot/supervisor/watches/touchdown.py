@@ -44,12 +44,13 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResu
 
 
 def _landed(flight: Flight) -> WatchResult:
-    """The vehicle stands on the ground: a mission in progress has reached its landing item."""
+    """The vehicle stands on the ground: a mission in progress has reached its landing item, and ends with it,
+    whatever follows."""
     mission = flight.mission
     reached: tuple[int, ...] = ()
     if mission.active:
         reached = (mission.plan.sequence[mission.step],)
-        mission = replace(mission, done=mission.step + 1 >= len(mission.plan.steps))
+        mission = replace(mission, done=True)
     text = (INFO, "Landed, disarmed")
     return WatchResult(replace(flight, mission=mission), Event.VEHICLE_DOWN, (text,), reached)
 

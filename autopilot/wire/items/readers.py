@@ -43,6 +43,10 @@ def loiter_turns(context: ItemContext) -> Iterator[Step]:
     context.expect_load()
     speed = min(context.state.speed_m_s, math.sqrt(TURN_ACCEL_M_S2 * abs(radius)))
     period = max(2.0 * math.pi * abs(radius) / speed, SHORTEST_PERIOD_S)
+    duration_s = (count + 2.0) * period
+    if duration_s > LONGEST_S:
+        text = f"its turns would take {duration_s:.0f} s; must take at most {LONGEST_S:.0f} s"
+        raise context.refusal(text)
     quarter = 0.5 * math.pi
     # clockwise seen from above for a positive radius: east as the sine, north as the cosine
     phases: tuple[tuple[Axis, float], ...] = (("x", 0.0 if radius > 0.0 else math.pi), ("y", quarter))
@@ -50,7 +54,7 @@ def loiter_turns(context: ItemContext) -> Iterator[Step]:
         Term(axis, abs(radius), 0.0, period, count * period, period, (Sine(period, phase),))
         for axis, phase in phases
     )
-    yield Signals((count + 2.0) * period, terms)
+    yield Signals(duration_s, terms)
 
 
 def gate(context: ItemContext) -> Iterator[Step]:

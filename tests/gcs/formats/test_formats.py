@@ -402,3 +402,41 @@ def test_jumps_and_home_are_written_as_ground_stations_count_them(
         assert (rows[0][2], rows[0][8:11]) == ("0", ["47.397742", "8.545594", "0.0"])
         assert rows[-1][4] == "2.0", "the item behind the take-off"
     assert bits(mission_of(read_foreign(path), HOME, "").items) == bits(items)
+
+
+def test_a_survey_without_items_is_named() -> None:
+    plan = read_plan(plan_text(TAKEOFF, survey(), simple(20, 2)))
+    assert plan.not_converted == [
+        "mission.items[1]: survey holds no items; make it of waypoints in the ground station"
+    ]
+
+
+CORNERS = [[47.0, 8.0], [47.1, 8.0], [47.0, 8.1]]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (
+            plan_text(geoFence={"version": 1, "circles": [], "polygon": CORNERS}),
+            "geoFence.polygon: a fence of an older format; open and save it in QGroundControl",
+        ),
+        (
+            plan_text(geoFence={"version": 2, "polygons": [{"polygon": [], "inclusion": True}]}),
+            "geoFence.polygons[0].polygon: has no corners",
+        ),
+        ("[" * 100_000, "not JSON: lists or objects within each other are too many"),
+        ("9" * 5000, "not JSON: a number has too many digits"),
+    ],
+    ids=["older", "empty", "deep", "long"],
+)
+def test_what_would_be_left_out_without_a_word_is_an_error(text: str, problem: str) -> None:
+    with pytest.raises(FormatError) as refusal:
+        read_plan(text)
+    assert str(refusal.value) == problem
+
+
+def test_turns_that_take_longer_than_a_day_are_refused() -> None:
+    turns = simple(18, params=[1000, 0, 1000, 1, 47.3977, 8.5456, 3])
+    (line,) = mission_of(read_plan(plan_text(TAKEOFF, turns, simple(20, 2))), HOME, "").left_out
+    assert "NAV_LOITER_TURNS (18): its turns would take" in line

@@ -231,3 +231,6 @@ def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
     with pytest.raises(ValueError, match="does not start under the conditions of the sweep") as refusal:
         start_times(mission, fenced)
     assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST" in str(refusal.value)
+    assert "MIS_INFEASIBLE" not in str(refusal.value), "which says nothing of fences"
+    with pytest.raises(ValueError, match="MIS_INFEASIBLE says what becomes of a path"):
+        start_times(load_mission("case-a"), Conditions(settings={"CTL_LAW": PLUMBLINE, "VEH_ROTOR_MAX": 1.4}))
