@@ -428,6 +428,8 @@ class FlightClient:
         )
 
     def _item(self) -> int:
+        if self._mission_over:  # then the vehicle counts from the beginning again
+            return len(self.items) - 1
         setpoint = self.view.latest.get("LOAD_SETPOINT")
         return int(setpoint.seq) if setpoint is not None and self._flight_start_us is not None else 0
 

@@ -76,7 +76,7 @@ def replay_of(
             }
             for text in telemetry.texts
         ],
-        "steps": _steps(telemetry),
+        "steps": steps_of(telemetry),
         "worst": worst_moment(samples),
         "wind": _wind(telemetry),
         "samples": pack(*_columns(telemetry, samples, columns)),
@@ -144,15 +144,19 @@ def _rotor_limits(telemetry: Telemetry) -> list[float] | None:
     return None
 
 
-def _steps(telemetry: Telemetry) -> list[Json]:
-    """The steps of the mission; `time` is when one of the step's items was first flown, None if never."""
+def steps_of(telemetry: Telemetry) -> list[Json]:
+    """The steps of the mission; `time` is when one of the step's items was first flown, None if never; of an
+    item that a jump repeats, when it was flown after the step before."""
     setpoint = telemetry.setpoint
     flown = np.isin(setpoint.phase, list(KINDS))
     items, at = setpoint.item[flown], setpoint.time_s[flown]
-    found = []
+    found, before = [], 0
     for step in step_texts(telemetry.mission, telemetry.home):
         when = np.flatnonzero((items >= step.first) & (items <= step.last))
-        found.append({**step._asdict(), "time": float(at[when[0]]) if len(when) else None})
+        later = when[when >= before]
+        before = later[0] if len(later) else before
+        first = before if len(later) else next(iter(when), None)  # where the user has changed the order
+        found.append({**step._asdict(), "time": None if first is None else float(at[first])})
     return found
 
 

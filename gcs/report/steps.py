@@ -12,7 +12,9 @@ from autopilot.wire.items import MissionItemError, WireItem, located_steps
 from missions.model import (
     AttitudeRun,
     Delay,
+    HeadingCommand,
     Land,
+    LookAt,
     Release,
     ReturnHome,
     Signals,
@@ -20,6 +22,7 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
+    TurnHeading,
     Waypoint,
     Winch,
 )
@@ -43,7 +46,8 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
         return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
     texts, released = [], False
     for one in found:
-        texts.append(StepText(one.first, one.last, describe(one.step, released)))
+        words = "".join(f"; {_heading(command)}" for command in one.heading_commands)
+        texts.append(StepText(one.first, one.last, describe(one.step, released) + words))
         released = released or isinstance(one.step, Release)
     return texts
 
@@ -74,6 +78,20 @@ def describe(step: Step, released: bool) -> str:
             return f"Fly signals for {step.duration_s:g} s: {_terms(step.terms)}"
         case AttitudeRun():
             return _attitude_run(step)
+
+
+def _heading(command: HeadingCommand) -> str:
+    """What the nose does as a step begins; headings clockwise from north."""
+    match command:
+        case TurnHeading(relative=True):
+            turn = round(math.degrees(command.angle_rad))
+            return f"nose turned by {abs(turn)}° to the {'left' if turn > 0 else 'right'}"
+        case TurnHeading():
+            return f"nose to {round(90.0 - math.degrees(command.angle_rad)) % 360}°"
+        case LookAt(east_m, north_m) if east_m is not None and north_m is not None:
+            return f"nose towards {_m(east_m)} east, {_m(north_m)} north"
+        case _:
+            return "nose no longer towards a place"
 
 
 def _terms(terms: Sequence[Term]) -> str:

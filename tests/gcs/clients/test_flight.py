@@ -121,6 +121,18 @@ def test_a_message_that_is_not_served_does_not_stop_the_flight(world, fly):
     assert fly()[0].outcome.name == "completed"
 
 
+def test_progress_stays_at_the_last_item_when_the_vehicle_counts_from_the_beginning_again(world, fly):
+    def landing(vehicle):
+        vehicle.phase, vehicle.item = mavlink.PLUMBLINE_PHASE_LOWER, len(vehicle.mission) - 1
+
+    def rewound(vehicle):
+        vehicle.item = 0
+
+    world.vehicle.script = then(then(normal_flight, 10.0, landing), 11.0, rewound)
+    client, _ = fly(seconds=12.0)
+    assert (client.progress.item, client.progress.items) == (3, 4)
+
+
 def test_progress_tells_where_the_flight_is(world, fly):
     world.vehicle.script = then(normal_flight, 10.0, lambda vehicle: None)
     client, _ = fly(seconds=12.0)

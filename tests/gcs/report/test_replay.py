@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 
 from autopilot.wire.convert.geodesy import Home
-from autopilot.wire.items import encode_mission
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem, encode_mission, encode_steps
 from gcs.analysis.axes import Floats
 from gcs.analysis.record import FlightMeta, flight_record
 from gcs.analysis.release import attached
 from gcs.analysis.samples import samples_of
 from gcs.report.packing import Column, pack
-from gcs.report.replay import replay_of
+from gcs.report.replay import replay_of, steps_of
 from gcs.report.settings import changed_settings
 from gcs.report.steps import step_texts
 from gcs.web.page import embedded
 from missions.fileformat import load_mission
+from missions.model import Land, Takeoff, Waypoint
 from tests.doubles import recorded_flights as flights
 
 
@@ -143,6 +145,47 @@ def test_steps_in_words(mission: str, first: str, behind_release: str | None) ->
         assert found[found.index("Release the load") + 1] == behind_release
     else:
         assert any(text.startswith("Fly signals for 50 s: 1 m along y") for text in found)
+
+
+def test_the_nose_is_in_the_words_of_the_step_with_which_it_turns() -> None:
+    def item(command: int, *parameters: float) -> WireItem:
+        p1, p2, p3, p4 = parameters
+        return WireItem(mavlink.MAV_FRAME_MISSION, command, 0, 1, p1, p2, p3, p4, 0, 0, 0.0)
+
+    takeoff, first, second, land = encode_steps(
+        (Takeoff(1.0), Waypoint(3.0, 0.0, 1.0), Waypoint(3.0, 2.0, 1.0), Land()), Home()
+    )
+    to_east = item(mavlink.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0)
+    left = item(mavlink.MAV_CMD_CONDITION_YAW, 30.0, 0.0, -1.0, 1.0)
+    found = step_texts((takeoff, to_east, first, left, second, land), Home())
+    assert [step.text.partition("; ")[2] for step in found] == [
+        "",
+        "nose to 90°",
+        "nose turned by 30° to the left",
+        "",
+    ]
+
+
+def test_what_a_jump_repeats_has_the_time_of_each_pass() -> None:
+    """Also where the user has changed the order, each step has some time at which its item was flown."""
+    items = encode_steps((Takeoff(1.0), Waypoint(3.0, 0.0, 1.0), Waypoint(3.0, 2.0, 1.0), Land()), Home())
+    jump = items[3]._replace(command=mavlink.MAV_CMD_DO_JUMP, frame=mavlink.MAV_FRAME_MISSION)
+    jump = jump._replace(param1=1.0, param2=1.0, x=0, y=0, z=0.0)
+    flight = flights.flight(10.0, flights.still).telemetry()
+    phase = np.full(6, mavlink.PLUMBLINE_PHASE_MISSION)
+    order = [0, 1, 2, 1, 2, 4]
+    setpoint = replace(flight.setpoint, phase=phase, item=np.array(order), time_s=np.arange(6.0))
+    told = replace(flight, setpoint=setpoint, mission=(*items[:3], jump, items[3]))
+    assert [step["time"] for step in steps_of(told)] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    back = replace(setpoint, item=np.array([2, 2, 1, 1, 2, 4]))
+    assert [step["time"] for step in steps_of(replace(told, setpoint=back))] == [
+        None,
+        2.0,
+        4.0,
+        2.0,
+        4.0,
+        5.0,
+    ]
 
 
 def test_items_that_cannot_be_flown_have_their_names() -> None:
