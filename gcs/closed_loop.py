@@ -22,7 +22,8 @@ from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, ground_turn
 from gcs.closed_ticks import NOTHING, ClosedTicks
 from gcs.expected_flight import expected_flight_s
-from gcs.mission_items import areas_of, home_of, items_of
+from gcs.foreign_mission import home_of
+from gcs.mission_items import areas_of, items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
 

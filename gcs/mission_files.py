@@ -11,7 +11,7 @@ from missions.fileformat import MissionFileError, load_mission
 from missions.model import Mission
 
 if TYPE_CHECKING:
-    from gcs.mission_items import ForeignMission
+    from gcs.foreign_mission import ForeignMission
 
 
 def load(name_or_path: str | PathLike[str]) -> Mission:
@@ -66,7 +66,9 @@ def _why_not_flown(path: Path, mission: ForeignMission) -> str:
     if mission.left_out:
         these = "this" if len(mission.left_out) == 1 else "these"
         return f"not flown without {these}; gcs upload {path} --skip brings the rest to a running vehicle"
-    if not mission.ends_on_ground:
+    from gcs.mission_items import ends_on_ground  # loads much
+
+    if not ends_on_ground(mission):
         return (
             "does not end on the ground; end it with NAV_LAND or NAV_RETURN_TO_LAUNCH, or bring it to a "
             f"running vehicle: gcs upload {path}"

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot
-from typing import NamedTuple
 
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
@@ -20,60 +19,13 @@ from autopilot.wire.items import (
     step_index,
 )
 from gcs.errors import InputError
+from gcs.foreign_mission import ForeignMission
 from missions.model import KINDS, Land, Mission, ReturnHome
 
 # not "item 2 of 3", which clearly counts the items of the upload, nor an item of the fence
 _ITEM = re.compile(r"(?<!\bfence )\bitem (\d+)\b(?! of \d)", re.IGNORECASE)
 _SAME_HOME_M = 1.0
 _STEP = re.compile(r"\bitem(?: |s\[)(\d+)\b")
-
-
-class FileNumbers(NamedTuple):
-    """The numbers of the items in a file of another ground station, which also has items that are not sent,
-    and items that are no steps to fly."""
-
-    items: tuple[int, ...]  # of each item that is sent
-    steps: tuple[int, ...]  # of each step: of its last item
-
-    def in_vehicle_text(self, text: str) -> str:
-        """A text of the vehicle, which counts the items that are sent, with the numbers of the file."""
-        return _renumbered(text, _ITEM, self.items)
-
-
-@dataclass(frozen=True, slots=True)
-class ForeignMission(Mission):
-    """The mission in a file of another ground station: with its items as they are sent, which also say what
-    steps do not (headings, commands that are kept but not done), and its fence and rally points, None if the
-    file does not mention them. `home` is that for which it was planned.
-
-    `left_out`: a line for each part of the file that the vehicle would refuse, and that is not among the
-    items; `notes`: a line for each part that is not flown.
-    """
-
-    items: tuple[WireItem, ...]
-    fence: tuple[WireItem, ...] | None
-    rally: tuple[WireItem, ...] | None
-    home: Home
-    numbers: FileNumbers
-    left_out: tuple[str, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def areas(self) -> dict[int, tuple[WireItem, ...]]:
-        """Fence and rally points that the file mentions, by their MAV_MISSION_TYPE."""
-        lists = {
-            mavlink.MAV_MISSION_TYPE_FENCE: self.fence,
-            mavlink.MAV_MISSION_TYPE_RALLY: self.rally,
-        }
-        return {kind: items for kind, items in lists.items() if items is not None}
-
-    @property
-    def ends_on_ground(self) -> bool:
-        """Whether the mission ends with a landing, or with a return as its last step, which also lands."""
-        if any(isinstance(step, Land) for step in self.steps):
-            return True
-        returns = any(isinstance(step, ReturnHome) for step in self.steps[-1:])
-        return returns and endless_jump_target(self.items, located_steps(self.items, self.home)) is None
 
 
 def flown_steps(steps: Sequence[LocatedStep]) -> tuple[LocatedStep, ...]:
@@ -112,19 +64,22 @@ def home_difference(planned: Home, home: Home) -> str:
     )
 
 
-def home_text(home: Home) -> str:
-    """The text that says from which home a mission is flown."""
-    return f"flown with home at {home.latitude_deg:.7f}, {home.longitude_deg:.7f}, {home.altitude_m:g} m"
-
-
-def home_of(mission: Mission) -> Home:
-    """The home from which a mission is flown in simulation."""
-    return mission.home if isinstance(mission, ForeignMission) else Home()
-
-
 def areas_of(mission: Mission) -> dict[int, tuple[WireItem, ...]]:
     """Fence and rally points that come with a mission, by their MAV_MISSION_TYPE."""
-    return mission.areas if isinstance(mission, ForeignMission) else {}
+    if not isinstance(mission, ForeignMission):
+        return {}
+    lists = {mavlink.MAV_MISSION_TYPE_FENCE: mission.fence, mavlink.MAV_MISSION_TYPE_RALLY: mission.rally}
+    return {kind: items for kind, items in lists.items() if items is not None}
+
+
+def ends_on_ground(mission: ForeignMission) -> bool:
+    """Whether the last step is a landing, or a return, which then lands."""
+    match mission.steps[-1:]:
+        case (Land(),):
+            return True
+        case (ReturnHome(),):
+            return endless_jump_target(mission.items, located_steps(mission.items, mission.home)) is None
+    return False
 
 
 def _renumbered(text: str, pattern: re.Pattern[str], numbers: Sequence[int]) -> str:
@@ -165,7 +120,7 @@ def in_mission_terms(text: str, mission: Mission) -> str:
     signals are uploaded as several items, the number in the file is added. A file of another ground station
     has its own numbers."""
     if isinstance(mission, ForeignMission):
-        return mission.numbers.in_vehicle_text(text)
+        return _renumbered(text, _ITEM, mission.numbers.items)
 
     def with_file_number(match: re.Match[str]) -> str:
         step = step_index(int(match[1]), mission.steps)

@@ -13,7 +13,7 @@ RETRY_US = 300_000
 SENDS = 12  # of one message; with 20 % lost each way, all twelve fail once in two hundred thousand
 RESTARTS = 3  # of a whole upload
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
-_NAMES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence", mavlink.MAV_MISSION_TYPE_RALLY: "rally points"}
+AREA_NAMES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence", mavlink.MAV_MISSION_TYPE_RALLY: "rally points"}
 
 
 def _result_text(result: int) -> str:
@@ -40,7 +40,7 @@ class MissionUpload:
         self._target = target
         self._items = tuple(items)
         self._kind = kind  # MAV_MISSION_TYPE
-        self._name = _NAMES.get(kind, "upload")
+        self._name = AREA_NAMES.get(kind, "upload")
         self._requested: list[int] = []  # items requested and not yet sent
         self._last_requested: int | None = None
         self._next = 0  # items 0 ... next-1 were requested

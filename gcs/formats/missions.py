@@ -20,11 +20,12 @@ from autopilot.wire.items import (
     handling_of,
     located_steps,
 )
+from gcs.foreign_mission import FileNumbers, ForeignMission
 from gcs.formats.items import FormatError
 from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
-from gcs.mission_items import FileNumbers, ForeignMission, flown_steps
+from gcs.mission_items import flown_steps
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 

@@ -20,7 +20,8 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions
 from gcs.expected_flight import expected_flight_s, time_limit_s
-from gcs.mission_items import areas_of, home_of, items_of
+from gcs.foreign_mission import home_of
+from gcs.mission_items import areas_of, items_of
 from gcs.sweep.plan import simulator_settings
 from gcs.sweep.wire import wire_of
 from missions.model import Mission

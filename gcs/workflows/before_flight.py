@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autopilot.vehicle.shipped import VEHICLES
-from gcs.mission_items import ForeignMission
+from gcs.foreign_mission import ForeignMission
 from gcs.shell.display import notify_if_slow
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable_marks import is_known_flyable

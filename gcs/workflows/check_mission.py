@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
@@ -20,10 +20,10 @@ from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
 from gcs.expected_flight import expected_flight_s, time_limit_s
+from gcs.foreign_mission import ForeignMission, home_text
 from gcs.mission_files import read
 from gcs.mission_items import (
-    ForeignMission,
-    home_text,
+    ends_on_ground,
     in_file_terms,
     in_mission_terms,
     items_of,
@@ -196,14 +196,19 @@ class CheckResult:
         """The result as text."""
         if self.problems:
             return self.problems
-        flown: dict[int, list[PathReport]] = {}
-        for item, group in groupby(self.paths, key=lambda report: report.item):
-            parts = list(group)  # the way to a circle, and the circle
-            whole = replace(reduce(PathReport.merged, parts), duration_s=sum(one.duration_s for one in parts))
-            flown.setdefault(item, []).append(whole)
-        # what a jump repeats is one line
-        paths = (reduce(PathReport.merged, reports).text(len(reports)) for reports in flown.values())
-        return (f"{self.mission}: vehicle {self.vehicle} can fly it", *paths, *self.warnings)
+        can_fly = f"{self.mission}: vehicle {self.vehicle} can fly it"
+        return (can_fly, *_path_lines(self.paths), *self.warnings)
+
+
+def _path_lines(reports: Iterable[PathReport]) -> Iterator[str]:
+    """A line for each item, however often a jump repeats it."""
+    passes: dict[int, list[PathReport]] = {}
+    for item, group in groupby(reports, key=lambda report: report.item):
+        parts = list(group)  # the way to a circle, and the circle
+        duration_s = sum(part.duration_s for part in parts)
+        passes.setdefault(item, []).append(replace(reduce(PathReport.merged, parts), duration_s=duration_s))
+    for times in passes.values():
+        yield reduce(PathReport.merged, times).text(len(times))
 
 
 def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...]) -> CheckResult:
@@ -236,7 +241,7 @@ def check_mission(
         notes = tuple(f"note: {line}" for line in (home_text(mission.home), *mission.notes))
         if left_out := (*mission.left_out, *empty):
             return CheckResult(mission.name, vehicle, (), (), notes, left_out)
-        if not mission.ends_on_ground:
+        if not ends_on_ground(mission):
             notes += ("note: does not end on the ground: for gcs upload, not for gcs fly or gcs sweep",)
     table = autopilot_parameters(limits.vehicle)
     found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]

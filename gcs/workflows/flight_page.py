@@ -19,7 +19,8 @@ from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError
-from gcs.mission_items import home_of, items_of
+from gcs.foreign_mission import home_of
+from gcs.mission_items import items_of
 from gcs.shell.display import notify
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, feed_pipe
 from gcs.shell.processes import Processes

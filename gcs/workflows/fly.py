@@ -22,8 +22,8 @@ from gcs.errors import (
     disk_problem,
 )
 from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, check_no_other_results, fresh_folder, make_folder
+from gcs.foreign_mission import ForeignMission, home_of, home_text
 from gcs.mission_files import load
-from gcs.mission_items import ForeignMission, home_of, home_text
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from autopilot.trajectory.feasibility import VehicleLimits, Violation, check
 from gcs.errors import GcsError
+from gcs.foreign_mission import home_of
 from gcs.mission_files import load
-from gcs.mission_items import home_of, in_file_terms, items_of
+from gcs.mission_items import in_file_terms, items_of
 from gcs.workflows.flyable_marks import mark_flyable
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Mission

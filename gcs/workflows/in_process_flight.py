@@ -9,7 +9,7 @@ from autopilot.shell.watched_calls import watched_calls
 from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
-from gcs.mission_items import home_of
+from gcs.foreign_mission import home_of
 from gcs.shell.display import FlightDisplay
 from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting

@@ -21,7 +21,8 @@ from autopilot.trajectory.prepare import UNPREPARED, prepare
 from autopilot.trajectory.route import Planner
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.items import MissionItemError, located_steps
-from gcs.mission_items import areas_of, home_of, items_of
+from gcs.foreign_mission import home_of
+from gcs.mission_items import areas_of, items_of
 from missions.model import Mission
 
 _STANDS_AT_HOME = View(0, ZERO, ZERO, ZERO, ZERO, False, 0.0, ())

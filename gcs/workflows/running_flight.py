@@ -12,7 +12,8 @@ from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError, NoVehicleError, RefusedError
-from gcs.mission_items import ForeignMission, at_home, home_difference
+from gcs.foreign_mission import ForeignMission
+from gcs.mission_items import at_home, home_difference
 from gcs.shell.display import FlightDisplay, notify
 from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session

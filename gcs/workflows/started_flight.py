@@ -12,7 +12,8 @@ from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
 from gcs.expected_flight import expected_flight_s
-from gcs.mission_items import areas_of, home_of, items_of
+from gcs.foreign_mission import home_of
+from gcs.mission_items import areas_of, items_of
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import unix_us
 from gcs.shell.processes import STOPPED_LIMIT_S

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, home_item
-from gcs.clients.missions import MissionDownload, MissionUpload
+from gcs.clients.missions import AREA_NAMES, MissionDownload, MissionUpload
 from gcs.errors import GcsError, RefusedError
+from gcs.foreign_mission import ForeignMission
 from gcs.formats.jumps import redirected
 from gcs.formats.missions import PLAN_ENDING, is_foreign, mission_of, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_files import is_mission_file
-from gcs.mission_items import ForeignMission, home_difference, items_of
+from gcs.mission_items import areas_of, home_difference, in_mission_terms, items_of
 from gcs.shell.display import notify, notify_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -74,12 +76,11 @@ def _upload_foreign(
     counted = _as_counted(items, mission.home, session)
     # the fence first: the vehicle checks the mission against it
     replaced = []
-    for kind, name, points in ((_FENCE, "fence", plan.fence), (_RALLY, "rally points", plan.rally)):
-        if points is not None:
-            text = session.run(MissionUpload(session.target, points, kind)).text
-            replaced.append(name)
-            if points:
-                print_line(text)
+    for kind, points in areas_of(mission).items():
+        text = session.run(MissionUpload(session.target, points, kind)).text
+        replaced.append(AREA_NAMES[kind])
+        if points:
+            print_line(text)
     try:
         print_line(session.run(MissionUpload(session.target, counted), "upload").text)
     except RefusedError as error:
@@ -87,7 +88,7 @@ def _upload_foreign(
             len(counted) - len(items)
         )  # the home, which the vehicle counts and the file does not
         numbers = mission.numbers._replace(items=before + mission.numbers.items)
-        text = numbers.in_vehicle_text(str(error))
+        text = in_mission_terms(str(error), replace(mission, numbers=numbers))
         if replaced:
             text += f"; the vehicle has {path.name}'s {' and '.join(replaced)} now"
         raise RefusedError(text) from None

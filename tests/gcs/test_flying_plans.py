@@ -16,9 +16,10 @@ from autopilot.wire.items import WireItem, encode_steps
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
 from gcs.errors import EXIT_USAGE, InputError
+from gcs.foreign_mission import ForeignMission
 from gcs.formats.missions import write_foreign
 from gcs.mission_files import is_mission_file, load, read
-from gcs.mission_items import ForeignMission, at_home, home_difference
+from gcs.mission_items import at_home, home_difference
 from gcs.sweep.flight import fly as fly_without_wire
 from gcs.sweep.flight import start_times
 from missions.model import Land, ReturnHome, Step, Takeoff, Waypoint
