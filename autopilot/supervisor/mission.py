@@ -52,14 +52,14 @@ def with_plan(flight: Flight, plan: MissionPlan) -> Flight:
     """The flight with another mission, rewound; without steps there is nothing to wait for."""
     waiting = flight.mission.waiting and bool(plan.steps)
     flight = replace(flight, mission=replace(flight.mission, plan=plan, waiting=waiting))
-    return with_current_step(flight, 0, done=False)
+    return with_current_step(flight, 0)
 
 
-def with_current_step(flight: Flight, step: int, done: bool) -> Flight:
+def with_current_step(flight: Flight, step: int) -> Flight:
     """The flight with another step of the mission as the present one, not begun yet."""
     return replace(
         flight,
-        mission=replace(flight.mission, step=step, step_anchor=None, done=done),
+        mission=replace(flight.mission, step=step, step_anchor=None, final_item=None),
         cable=replace(flight.cable, reel_target_m=None),
     )
 
@@ -141,13 +141,14 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
         legs, here = stopping_legs(flight, view, settings)
         return _with_legs(flight, (*legs, Hold(here, SETTLE_S)), view), Report()
     reached = (plan.sequence[number],) if _ends_item(plan, number, after) else ()
-    flight = with_current_step(flight, number + 1 if after is None else after, done=flight.mission.done)
+    flight = with_current_step(flight, 0 if after is None else after)
     if next_step is None:
         event, text = Event.DONE, "Mission complete, holding"
         if isinstance(step, ReturnHome):  # as the last step it ends on the ground, like a return by mode
             event, text = Event.LAND, "Mission complete, landing"
-        rewound = replace(flight, mission=replace(flight.mission, active=False, done=True, step=0))
-        return transition(rewound, event, view, settings), Report(((INFO, text),), reached)
+        ended = replace(flight.mission, active=False, final_item=plan.sequence[number])
+        flight = replace(flight, mission=ended)
+        return transition(flight, event, view, settings), Report(((INFO, text),), reached)
     flight = with_step_heading_aims(flight, view, settings)
     return _next_step(flight, leg, next_step, view, settings), Report((), reached)
 

@@ -118,10 +118,15 @@ class MissionProgress:
     step: int = 0  # of the plan: the present one, or the one to begin with
     active: bool = False
     waiting: bool = False  # begins when its paths are prepared
-    done: bool = False
+    final_item: int | None = None  # of a mission that is complete: the item that it ended with
     step_anchor: Vec3 | None = None  # where the present step began
     takeoff_altitude_m: float = 0.0
     speed_m_s: float = 0.0  # of transfers
+
+    @property
+    def done(self) -> bool:
+        """Whether the mission is complete, and not begun again."""
+        return self.final_item is not None
 
 
 @dataclass(frozen=True, slots=True)

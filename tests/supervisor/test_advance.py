@@ -12,6 +12,7 @@ import pytest
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import LOAD_POSITION, Brake, Creep, Hold, SignalRun, Swing, SwingDamping
 from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
+from autopilot.onboard.snapshot import flight_status
 from autopilot.services.requests import (
     Arm,
     ChangeSpeed,
@@ -102,6 +103,23 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
     assert sky.flight.mission.done
     assert "Mission complete, holding" in sky.texts
     assert sky.reached == [0, 1]
+
+
+@pytest.mark.parametrize("end", [model.ReturnHome(), model.Land(), Delay(0.5)])
+def test_a_complete_mission_is_at_its_last_item_until_the_vehicle_stands_disarmed(end: model.Step) -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), end)
+    said: list[int] = []
+
+    def is_over(sky: Sky) -> bool:
+        said.append(flight_status(sky.flight, 3).mission_current)
+        return sky.flight.mission.done and sky.flight.phase in (Phase.HOLD, Phase.DISARMED)
+
+    sky.run(is_over)
+    on_ground = sky.flight.phase == Phase.DISARMED
+    assert said[-1] == (0 if on_ground else 2)
+    in_air = said[:-1] if on_ground else said
+    assert in_air == sorted(in_air)
+    assert in_air[-1] == 2
 
 
 def test_a_speed_is_changed_back() -> None:

@@ -281,7 +281,7 @@ def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> 
     assert verdict.result == DENIED
     assert verdict.text.startswith(f"Mission denied: the curve to item {item} leads ")
     # flown from rest to rest, as after a jump into the path, the lines are straight
-    at_last = with_current_step(sky.flight, 3, done=False)
+    at_last = with_current_step(sky.flight, 3)
     ahead = remaining_timeline(at_last, sky.view, sky.settings)
     assert mission_problem(at_last, ahead, sky.settings) == ""
 

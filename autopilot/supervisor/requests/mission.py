@@ -65,7 +65,7 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
         return _hold_until_prepared(flight, view, settings), _accepted_pending("Mission")
     flight = replace(
         flight,
-        mission=replace(flight.mission, active=True, done=False, waiting=False),
+        mission=replace(flight.mission, active=True, final_item=None, waiting=False),
         action_when_armed=ActionWhenArmed.MISSION,
     )
     if flight.phase == Phase.ARMED:
@@ -119,7 +119,7 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
     step = next((i for i, seq in enumerate(plan.sequence) if seq >= request.seq), None)
     if step is None:
         return flight, denied(f"{item} denied: nothing is flown from there")
-    at_item = with_current_step(flight, step, done=False)
+    at_item = with_current_step(flight, step)
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, item)
     flies_on = flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER)

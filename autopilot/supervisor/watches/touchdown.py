@@ -49,8 +49,8 @@ def _landed(flight: Flight) -> WatchResult:
     mission = flight.mission
     reached: tuple[int, ...] = ()
     if mission.active:
-        reached = (mission.plan.sequence[mission.step],)
-        mission = replace(mission, done=True)
+        item = mission.plan.sequence[mission.step]
+        mission, reached = replace(mission, final_item=item), (item,)
     text = (INFO, "Landed, disarmed")
     return WatchResult(replace(flight, mission=mission), Event.VEHICLE_DOWN, (text,), reached)
 
