@@ -46,6 +46,7 @@ _CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
 _COS_SCALE, _TENSION_SCALE, _TURN_SCALE = 2.0, 1.0, 0.02
 _START_EXCESS_N = 0.05  # largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
+_HOPELESS_EXCESS = 10.0  # times the range of a rotor: no round leads back from there
 _INACTIVE_N = 0.6  # a round leaves out bounds that are at least this far from the demand
 _NO_SOLUTION = (
     clarabel.SolverStatus.PrimalInfeasible,
@@ -54,6 +55,9 @@ _NO_SOLUTION = (
     clarabel.SolverStatus.AlmostDualInfeasible,
 )
 _ACCURACY = 1e-7  # of the solver; the cost is of order one
+# of the solver's matrices, far below the least curvature of the cost (1e-7 in its units): the default of 1e-8
+# needs three times as many iterations, and ends at a greater cost
+_REGULARISATION = 1e-10
 
 
 class LinearConstraints(NamedTuple):
@@ -81,6 +85,20 @@ class Objective(NamedTuple):
     smoothness_weights: tuple[tuple[int, float], ...]
 
 
+class _LimitedRows(NamedTuple):
+    rows: sparse.csr_matrix  # (m, 3 size)
+    limits: Array  # (m,)
+
+
+class _BoundRows(NamedTuple):
+    """Bounds on the demand: coefficients . row - excess_factor * excess[sample] <= margin."""
+
+    rows: sparse.csr_matrix  # (m, 3 size)
+    samples: NDArray[np.int64]  # (m,)
+    excess_factors: Array  # (m,)
+    margins: Array  # (m,)
+
+
 class Problem:
     """A spline with fixed ends, a goal and bounds."""
 
@@ -105,6 +123,17 @@ class Problem:
         self._derivative_matrices = [self._matrix(self.values[order]) for order in range(8)]
         self._hessian = self._cost_matrix()
         self._constraint_matrix, self._constraint_constant = self._constraint_rows()
+        # in units of this length the curvature of the cost is about one
+        self._unit = 1.0 / float(np.sqrt(np.median(self._hessian.diagonal())))
+        scaled = self._unit * self._hessian * self._unit
+        no_cost = sparse.csc_matrix((len(self.times), len(self.times)))  # of the second order, of an excess
+        self._scaled_hessian = sparse.triu(sparse.block_diag([scaled] * 3 + [no_cost]), format="csc")
+        # the pattern of a matrix whose rows are derivatives at the samples, by the coefficients of all axes
+        self._is_free_of_axes = np.repeat(self._is_free[:, None], 3, axis=1)
+        columns = self._columns[:, None] + self.size * np.arange(3)[:, None]
+        self._indices = columns[self._is_free_of_axes]
+        self._row_starts = np.concatenate([[0], np.cumsum(3 * self._is_free.sum(axis=1))])
+        self._lag = _lag_matrix(len(self.times), self.spacing, bounds.rotor_tau)
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
         """(n, size) matrix of one derivative by the free coefficients of one axis."""
@@ -180,9 +209,15 @@ class Problem:
     # ---- one round
 
     def solve(self) -> Array | None:
-        """The coefficients (count, 3) with the least cost; None if there are none within the constraints."""
+        """The coefficients (count, 3) with the least cost; None if there are none within the constraints.
+
+        If even the smoothest path is far beyond the bounds, it is returned.
+        """
         free = self._initial_guess()
         jets = self.jets(self._all_coefficients(free))
+        rotor_range = self.bounds.rotor_high - self.bounds.rotor_low
+        if self._excess(jets).max() > _HOPELESS_EXCESS * rotor_range:
+            return self._all_coefficients(free)
         merit = self._merit(free, jets)
         for i in range(_ROUNDS):
             step = self._solve_subproblem(free, jets)
@@ -203,7 +238,7 @@ class Problem:
                 break
             decrease = merit - candidate_merit
             free, jets, merit = candidate, candidate_jets, candidate_merit
-            if share == 1.0 and decrease < _CONVERGENCE * max(merit, 0.1):
+            if decrease < _CONVERGENCE * max(merit, 0.1):
                 break
         return self._all_coefficients(free)
 
@@ -257,92 +292,84 @@ class Problem:
         """
         n, size = len(self.times), self.size
         gradient = self._gradient(self.jets(self._all_coefficients(free)))
-        hessian = sparse.block_diag([self._hessian] * 3 + [sparse.csc_matrix((n, n))], format="csc")
-        linear = np.concatenate([gradient.T.ravel(), np.full(n, _EXCESS_WEIGHT * self.spacing)])
-        blocks: list[sparse.csr_matrix] = []
-        limits: list[Array] = []
-        equal = self.constraints.low == self.constraints.high
-        here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
-        rows = sparse.hstack([self._constraint_matrix, sparse.csr_matrix((len(equal), n))], format="csr")
-        if equal.any():
-            blocks.append(rows[equal])
-            limits.append((self.constraints.high - here)[equal])
-        for sign, bound in ((1.0, self.constraints.high), (-1.0, -self.constraints.low)):
-            keep = ~equal & np.isfinite(bound)
-            if keep.any():
-                blocks.append(sign * rows[keep])
-                limits.append((bound - sign * here)[keep])
-        matrix, limit = self._linearised_bounds(jets)
-        blocks.append(matrix)
-        limits.append(limit)
-        constraints = sparse.vstack(blocks, format="csc")
-        right = np.concatenate(limits)
-        zeros = int(equal.sum())
-        cones = [clarabel.ZeroConeT(zeros)] if zeros else []
-        cones.append(clarabel.NonnegativeConeT(len(right) - zeros))
+        equal, below = self._constraints_on_change(free)
+        bounds = self._linearised_bounds(jets)
+        rows = self._unit * sparse.vstack([equal.rows, below.rows, bounds.rows], format="csc")
+        first_bound = len(equal.limits) + len(below.limits)
+        excesses = sparse.csc_matrix(
+            (-bounds.excess_factors, (first_bound + np.arange(len(bounds.margins)), bounds.samples)),
+            shape=(rows.shape[0], n),
+        )
+        right = np.concatenate([equal.limits, below.limits, bounds.margins])
+        cones = [clarabel.ZeroConeT(len(equal.limits))] if len(equal.limits) else []
+        cones.append(clarabel.NonnegativeConeT(len(right) - len(equal.limits)))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_threads = 1
         settings.tol_gap_abs = settings.tol_gap_rel = _ACCURACY
-        # scaled to units in which the curvature of the cost is about one
-        unit = np.concatenate(
-            [np.full(3 * size, 1.0 / np.sqrt(np.median(self._hessian.diagonal()))), np.ones(n)]
-        )
-        units = sparse.diags(unit)
+        settings.static_regularization_constant = _REGULARISATION
         solver = clarabel.DefaultSolver(
-            sparse.triu(units @ hessian @ units, format="csc"),
-            unit * linear,
-            sparse.csc_matrix(constraints @ units),
+            self._scaled_hessian,
+            np.concatenate([self._unit * gradient.T.ravel(), np.full(n, _EXCESS_WEIGHT * self.spacing)]),
+            sparse.hstack([rows, excesses], format="csc"),
             right,
             cones,
             settings,
         )
         solution = solver.solve()
-        change: Array = (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
+        change: Array = (self._unit * np.asarray(solution.x)[: 3 * size]).reshape(3, size).T
         if solution.status in _NO_SOLUTION or not np.isfinite(change).all():
             return None
         return free + change
 
-    def _linearised_bounds(self, jets: Array) -> tuple[sparse.csr_matrix, Array]:
-        """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""
-        n, size, bounds = len(self.times), self.size, self.bounds
+    def _constraints_on_change(self, free: Array) -> tuple[_LimitedRows, _LimitedRows]:
+        """The linear constraints on a change from the coefficients `free`: equalities, and upper limits."""
+        constraints, matrix = self.constraints, self._constraint_matrix
+        here = self._constraint_constant + matrix @ free.T.ravel()
+        equal = constraints.low == constraints.high
+        has_high, has_low = (~equal & np.isfinite(limit) for limit in (constraints.high, constraints.low))
+        below = sparse.vstack([matrix[has_high], -matrix[has_low]], format="csr")
+        limits = np.concatenate([(constraints.high - here)[has_high], (here - constraints.low)[has_low]])
+        return _LimitedRows(matrix[equal], (constraints.high - here)[equal]), _LimitedRows(below, limits)
+
+    def _linearised_bounds(self, jets: Array) -> _BoundRows:
+        """Bounds on the demand along `jets`, and on the excesses, which are not negative."""
+        n, bounds = len(self.times), self.bounds
         path_demand, slope = demand(jets, self.body), demand_derivatives(jets, self.body)
         # (n, outputs, 3, 10): derivatives by the coefficients of the band
         by_band = np.einsum("irod,oik->irdk", slope, self.values[:7])
+        blocks: list[sparse.csr_matrix] = []
+        samples: list[NDArray[np.int64]] = []
+        factors: list[Array] = []
+        margins: list[Array] = []
 
         def matrix(output: int) -> sparse.csr_matrix:
-            keep = self._is_free
-            rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
-            parts = [
-                sparse.csr_matrix(
-                    (by_band[:, output, axis][keep], (rows[keep], self._columns[keep])), shape=(n, size)
-                )
-                for axis in range(3)
-            ]
-            return sparse.hstack(parts, format="csr")
-
-        lag = _lag_matrix(n, self.spacing, bounds.rotor_tau)
-        excess_of = -sparse.eye(n, format="csr")
-        blocks: list[sparse.csr_matrix] = []
-        limits: list[Array] = []
+            values = by_band[:, output][self._is_free_of_axes]
+            return sparse.csr_matrix((values, self._indices, self._row_starts), shape=(n, 3 * self.size))
 
         def bound(rows: sparse.csr_matrix, value: Array, low: float, high: float, scale: float) -> None:
             for sign, margin in ((1.0, high - value), (-1.0, value - low)):
-                keep = margin < _INACTIVE_N
-                if keep.any():
-                    blocks.append(sparse.hstack([sign * rows[keep], scale * excess_of[keep]], format="csr"))
-                    limits.append(margin[keep])
+                keep = np.flatnonzero(margin < _INACTIVE_N)
+                blocks.append(sign * rows[keep])
+                samples.append(keep)
+                factors.append(np.full(len(keep), scale))
+                margins.append(margin[keep])
 
         for rotor in range(FIRST_ROTOR, path_demand.shape[1]):
-            bound(lag @ matrix(rotor), lag @ path_demand[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
+            command = self._lag @ path_demand[:, rotor]
+            bound(self._lag @ matrix(rotor), command, bounds.rotor_low, bounds.rotor_high, 1.0)
         bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
         bound(matrix(COS_TILT), path_demand[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
         # in newtons, since `_INACTIVE_N` would leave out almost all of a bound in (rad/s)^2
         turn, max_turn = _TURN_SCALE * path_demand[:, TURN], _TURN_SCALE * bounds.turn_rate**2
         bound(_TURN_SCALE * matrix(TURN), turn, -np.inf, max_turn, 1.0)
-        blocks.append(sparse.hstack([sparse.csr_matrix((n, 3 * size)), excess_of], format="csr"))
-        limits.append(np.zeros(n))
-        return sparse.vstack(blocks, format="csr"), np.concatenate(limits)
+        bound(sparse.csr_matrix((n, 3 * self.size)), np.zeros(n), -np.inf, 0.0, 1.0)
+        return _BoundRows(
+            sparse.vstack(blocks, format="csr"),
+            np.concatenate(samples),
+            np.concatenate(factors),
+            np.concatenate(margins),
+        )
 
 
 def sample_times(basis: Basis) -> Array:
