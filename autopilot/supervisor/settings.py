@@ -8,7 +8,7 @@ from math import cos, inf, radians
 from autopilot.guidance.heading import HeadingLimits
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import PathLimits
-from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.rotor_demand import Bounds, rotor_bounds
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
 from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, AutopilotParameters
@@ -197,7 +197,6 @@ def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
 def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
     """The limits within which paths are shaped: the assumed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
-    margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
     limited = table["VEH_ROTOR_LIM"] != 0.0
     load_mass, gravity = table["VEH_LOAD_MASS"], table["VEH_GRAVITY"]
     body = Body(
@@ -212,9 +211,10 @@ def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
         table["PLB_DRAG_2"],
         allocation_columns(table.layout),
     )
+    low, high = rotor_bounds(low, high, 0.01 * table["MIS_ROTOR_MARG"], body.hover_force)
     bounds = Bounds(
-        low + margin if limited else -inf,
-        high - margin if limited else inf,
+        low if limited else -inf,
+        high if limited else inf,
         0.01 * table["MIS_TENSION"] * load_mass * gravity,
         cos(radians(table["MIS_TILT_DEG"])),
         1e-3 * table["VEH_ROTOR_TAU"],

@@ -38,16 +38,16 @@ from autopilot.trajectory.splines import DEGREE, Array, Basis
 SAMPLES = 4  # to an interval
 _BAND = DEGREE + 1
 _ROUNDS = 12
-_EXCESS_WEIGHT = 2e4  # of one newton for one second; a distance of d costs 1 per second
+_EXCESS_WEIGHT = 3e4  # of a rotor's range for one second; a distance of d costs 1 per second
 _CONSTRAINT_WEIGHT = 1e5  # of one metre
 _HALVINGS = 7
 _CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
-# convert an excess of cosine, tension and squared rate to newtons of a rotor
-_COS_SCALE, _TENSION_SCALE, _TURN_SCALE = 2.0, 1.0, 0.02
-_START_EXCESS_N = 0.05  # largest excess with which the rounds may begin
+# an excess of the cosine, or of the squared rate, counts as much as so many ranges of a rotor
+_COS_RANGES, _TURN_RANGES = 1.5, 0.015
+_START_EXCESS = 0.035  # ranges of a rotor: largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
 _HOPELESS_EXCESS = 10.0  # times the range of a rotor: no round leads back from there
-_INACTIVE_N = 0.6  # a round leaves out bounds that are at least this far from the demand
+_INACTIVE = 0.45  # ranges of a rotor: a round leaves out bounds that are at least this far from the demand
 _NO_SOLUTION = (
     clarabel.SolverStatus.PrimalInfeasible,
     clarabel.SolverStatus.AlmostPrimalInfeasible,
@@ -91,11 +91,10 @@ class _LimitedRows(NamedTuple):
 
 
 class _BoundRows(NamedTuple):
-    """Bounds on the demand: coefficients . row - excess_factor * excess[sample] <= margin."""
+    """Bounds on the demand: row . coefficients - excess[sample] <= margin."""
 
     rows: sparse.csr_matrix  # (m, 3 size)
     samples: NDArray[np.int64]  # (m,)
-    excess_factors: Array  # (m,)
     margins: Array  # (m,)
 
 
@@ -133,6 +132,7 @@ class Problem:
         columns = self._columns[:, None] + self.size * np.arange(3)[:, None]
         self._indices = columns[self._is_free_of_axes]
         self._row_starts = np.concatenate([[0], np.cumsum(3 * self._is_free.sum(axis=1))])
+        self._excess_cost = _EXCESS_WEIGHT / bounds.rotor_range * self.spacing  # of 1 N at a sample
         self._lag = _lag_matrix(len(self.times), self.spacing, bounds.rotor_tau)
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
@@ -199,7 +199,7 @@ class Problem:
 
     def _merit(self, free: Array, jets: Array) -> float:
         """The cost plus the price of all excess over the bounds and the linear constraints."""
-        total = self._cost(jets) + _EXCESS_WEIGHT * self.spacing * float(np.sum(self._excess(jets)))
+        total = self._cost(jets) + self._excess_cost * float(np.sum(self._excess(jets)))
         if len(self.constraints.time):
             here = self._constraint_constant + self._constraint_matrix @ free.T.ravel()
             violation = np.maximum(here - self.constraints.high, self.constraints.low - here)
@@ -215,8 +215,7 @@ class Problem:
         """
         free = self._initial_guess()
         jets = self.jets(self._all_coefficients(free))
-        rotor_range = self.bounds.rotor_high - self.bounds.rotor_low
-        if self._excess(jets).max() > _HOPELESS_EXCESS * rotor_range:
+        if self._excess(jets).max() > _HOPELESS_EXCESS * self.bounds.rotor_range:
             return self._all_coefficients(free)
         merit = self._merit(free, jets)
         for i in range(_ROUNDS):
@@ -271,8 +270,9 @@ class Problem:
         """
         smoothing = 1.0
         free = self._unbounded(smoothing)
+        max_excess_n = _START_EXCESS * self.bounds.rotor_range
         for _ in range(_SMOOTHING_TRIES):
-            if float(self._excess(self.jets(self._all_coefficients(free))).max()) <= _START_EXCESS_N:
+            if float(self._excess(self.jets(self._all_coefficients(free))).max()) <= max_excess_n:
                 break
             smoothing *= _SMOOTHING_FACTOR
             free = self._unbounded(smoothing)
@@ -297,7 +297,7 @@ class Problem:
         rows = self._unit * sparse.vstack([equal.rows, below.rows, bounds.rows], format="csc")
         first_bound = len(equal.limits) + len(below.limits)
         excesses = sparse.csc_matrix(
-            (-bounds.excess_factors, (first_bound + np.arange(len(bounds.margins)), bounds.samples)),
+            (-np.ones(len(bounds.margins)), (first_bound + np.arange(len(bounds.margins)), bounds.samples)),
             shape=(rows.shape[0], n),
         )
         right = np.concatenate([equal.limits, below.limits, bounds.margins])
@@ -310,7 +310,7 @@ class Problem:
         settings.static_regularization_constant = _REGULARISATION
         solver = clarabel.DefaultSolver(
             self._scaled_hessian,
-            np.concatenate([self._unit * gradient.T.ravel(), np.full(n, _EXCESS_WEIGHT * self.spacing)]),
+            np.concatenate([self._unit * gradient.T.ravel(), np.full(n, self._excess_cost)]),
             sparse.hstack([rows, excesses], format="csc"),
             right,
             cones,
@@ -340,34 +340,34 @@ class Problem:
         by_band = np.einsum("irod,oik->irdk", slope, self.values[:7])
         blocks: list[sparse.csr_matrix] = []
         samples: list[NDArray[np.int64]] = []
-        factors: list[Array] = []
         margins: list[Array] = []
 
         def matrix(output: int) -> sparse.csr_matrix:
             values = by_band[:, output][self._is_free_of_axes]
             return sparse.csr_matrix((values, self._indices, self._row_starts), shape=(n, 3 * self.size))
 
-        def bound(rows: sparse.csr_matrix, value: Array, low: float, high: float, scale: float) -> None:
+        inactive_n = _INACTIVE * bounds.rotor_range
+
+        def bound(rows: sparse.csr_matrix, value: Array, low: float, high: float) -> None:
             for sign, margin in ((1.0, high - value), (-1.0, value - low)):
-                keep = np.flatnonzero(margin < _INACTIVE_N)
+                keep = np.flatnonzero(margin < inactive_n)
                 blocks.append(sign * rows[keep])
                 samples.append(keep)
-                factors.append(np.full(len(keep), scale))
                 margins.append(margin[keep])
 
         for rotor in range(FIRST_ROTOR, path_demand.shape[1]):
             command = self._lag @ path_demand[:, rotor]
-            bound(self._lag @ matrix(rotor), command, bounds.rotor_low, bounds.rotor_high, 1.0)
-        bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
-        bound(matrix(COS_TILT), path_demand[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
-        # in newtons, since `_INACTIVE_N` would leave out almost all of a bound in (rad/s)^2
-        turn, max_turn = _TURN_SCALE * path_demand[:, TURN], _TURN_SCALE * bounds.turn_rate**2
-        bound(_TURN_SCALE * matrix(TURN), turn, -np.inf, max_turn, 1.0)
-        bound(sparse.csr_matrix((n, 3 * self.size)), np.zeros(n), -np.inf, 0.0, 1.0)
+            bound(self._lag @ matrix(rotor), command, bounds.rotor_low, bounds.rotor_high)
+        bound(matrix(TENSION), path_demand[:, TENSION], bounds.tension_low, np.inf)
+        # these in newtons of a rotor
+        cos_n, turn_n = _newtons(bounds)
+        cos_tilt, turn = cos_n * path_demand[:, COS_TILT], turn_n * path_demand[:, TURN]
+        bound(cos_n * matrix(COS_TILT), cos_tilt, cos_n * bounds.cos_tilt, np.inf)
+        bound(turn_n * matrix(TURN), turn, -np.inf, turn_n * bounds.turn_rate**2)
+        bound(sparse.csr_matrix((n, 3 * self.size)), np.zeros(n), -np.inf, 0.0)
         return _BoundRows(
             sparse.vstack(blocks, format="csr"),
             np.concatenate(samples),
-            np.concatenate(factors),
             np.concatenate(margins),
         )
 
@@ -388,10 +388,16 @@ def excess(path_demand: Array, spacing: float, bounds: Bounds) -> Array:
     >= 0."""
     commands = rotor_commands(path_demand, spacing, bounds.rotor_tau)
     over = np.maximum(commands.max(axis=1) - bounds.rotor_high, bounds.rotor_low - commands.min(axis=1))
-    over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - path_demand[:, TENSION]))
-    over = np.maximum(over, _COS_SCALE * (bounds.cos_tilt - path_demand[:, COS_TILT]))
-    over = np.maximum(over, _TURN_SCALE * (path_demand[:, TURN] - bounds.turn_rate**2))
+    over = np.maximum(over, bounds.tension_low - path_demand[:, TENSION])
+    cos_n, turn_n = _newtons(bounds)
+    over = np.maximum(over, cos_n * (bounds.cos_tilt - path_demand[:, COS_TILT]))
+    over = np.maximum(over, turn_n * (path_demand[:, TURN] - bounds.turn_rate**2))
     return np.asarray(np.maximum(over, 0.0))
+
+
+def _newtons(bounds: Bounds) -> tuple[float, float]:
+    """The newtons of a rotor as which an excess of the cosine counts, and of the squared rate."""
+    return _COS_RANGES * bounds.rotor_range, _TURN_RANGES * bounds.rotor_range
 
 
 def _lag_matrix(n: int, spacing: float, tau: float) -> sparse.csr_matrix:

@@ -29,7 +29,7 @@ from autopilot.trajectory.peaks import (
     survey_transfer,
 )
 from autopilot.trajectory.prepare import REFUSE, PathLimits, min_transfer_s, prepare, shaped_path
-from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.rotor_demand import Bounds, rotor_bounds
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.shaping import ShapedSignals, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
@@ -114,10 +114,12 @@ class VehicleLimits:
     def shaping(self) -> PathLimits:
         """The limits to which the autopilot shapes paths: its MIS_ parameters, by default as delivered."""
         vehicle = self.vehicle
-        margin = self.rotor_margin * (vehicle.rotor_max_n - vehicle.rotor_min_n)
+        low, high = rotor_bounds(
+            vehicle.rotor_min_n, vehicle.rotor_max_n, self.rotor_margin, self.body.hover_force
+        )
         bounds = Bounds(
-            vehicle.rotor_min_n + margin if vehicle.limited else -inf,
-            vehicle.rotor_max_n - margin if vehicle.limited else inf,
+            low if vehicle.limited else -inf,
+            high if vehicle.limited else inf,
             self.min_tension_share * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
             # by way of the milliseconds of VEH_ROTOR_TAU: the same limits to the last bit give the same paths

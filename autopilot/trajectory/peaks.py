@@ -57,6 +57,12 @@ class Body(NamedTuple):
     drag_quadratic: float = 0.0
     efforts: Efforts = PLUS_EFFORTS
 
+    @property
+    def hover_force(self) -> float:
+        """The force of the rotor that gives least in hover, N."""
+        weight = (self.quad_mass + self.load_mass) * self.gravity
+        return weight * min(share for share, *_ in self.efforts)
+
 
 class KernelBody(NamedTuple):
     """A `Body` without its rotors, for kernels: their machine code is the same for any number of rotors."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
-from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.rotor_demand import Bounds, gentler_bounds
 from autopilot.trajectory.route import PlanError, Planner, Route, bound_violation, path_segments
 from autopilot.trajectory.route import slower as slowed_path
 from autopilot.trajectory.shaping import ShapedSignals, shape, unshaped_signals
@@ -37,6 +37,7 @@ MAX_SLOWDOWN = 4.0  # times as long as requested
 _SLOWDOWN_FACTORS = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, MAX_SLOWDOWN)
 _HALVINGS = 3
 SLOW_SHARE = 0.55  # of the time of a path: one on which a ride would take less is reported as slow
+_GENTLER_DISTANCE = 1.25  # times as far from the requested path, at most, for a path with a greater reserve
 _LENGTHENING, _LENGTHENING_TRIES = 1.05, 60  # for lengthening a transfer
 
 
@@ -333,11 +334,25 @@ def shaped_path(step: Signals, limits: PathLimits) -> ShapingResult:
     """
     shaped = shape(step, limits.body, limits.bounds)
     problem = shaping_problem(shaped, limits)
+    if not problem and len(shaped.pieces):
+        return ShapingResult(_gentler(step, shaped, limits) or shaped)
     if problem and limits.when_infeasible == SLOW_DOWN:
         slowed = slow_down(step, limits)
         if slowed is not None:
             return ShapingResult(slowed, slowdown_reason=problem)
     return ShapingResult(shaped, problem)
+
+
+def _gentler(step: Signals, shaped: ShapedSignals, limits: PathLimits) -> ShapedSignals | None:
+    """The signals shaped within narrower bounds, if they stay nearly as close to the requested path as
+    `shaped`: what a path takes of the rotors without need is lacking against noise and wind."""
+    bounds = gentler_bounds(limits.body, limits.bounds)
+    if bounds is None:
+        return None
+    gentler = shape(step, limits.body, bounds)
+    if shaping_problem(gentler, limits) or gentler.distance_m > _GENTLER_DISTANCE * shaped.distance_m:
+        return None
+    return gentler
 
 
 def slow_down(step: Signals, limits: PathLimits) -> ShapedSignals | None:

@@ -7,6 +7,7 @@ with a heading of 0. Where the rotors' force is less than the weight, the rate c
 
 from __future__ import annotations
 
+from math import inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,9 @@ from autopilot.vehicle.rotors import MAX_TURN_RATE
 Array = NDArray[np.float64]
 
 TENSION, COS_TILT, TURN, FIRST_ROTOR = 0, 1, 2, 3  # outputs
+_UNBOUNDED_RANGE_N = 2.0
+_LOW_RESERVE = 0.7
+_GENTLER = 0.2
 _MIN_FORCE_N = 1e-3  # a smaller force has no direction that could turn
 # steps of the central differences, m/s ... m/s^6: each changes a rotor force by about as much
 _DIFFERENCE_STEPS = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
@@ -39,6 +43,32 @@ class Bounds(NamedTuple):
     cos_tilt: float
     rotor_tau: float
     turn_rate: float = MAX_TURN_RATE  # rad/s, about the level axes, with a force of at least the weight
+
+    @property
+    def rotor_range(self) -> float:
+        """From the lower to the upper bound of the command to a rotor, N; without bounds, a small one."""
+        width = self.rotor_high - self.rotor_low
+        return width if isfinite(width) else _UNBOUNDED_RANGE_N
+
+
+def rotor_bounds(low: float, high: float, margin: float, hover: float) -> tuple[float, float]:
+    """The least and the greatest force that a path may ask of a rotor that gives `low` to `high`, and `hover`
+    to carry the weight (N): the share `margin` of the range is kept free for control.
+
+    At the lower limit no more than the share `_LOW_RESERVE` of what the rotor gives there in hover: a strong
+    rotor hovers within the share `margin` of its range.
+    """
+    reserve = margin * (high - low)
+    return low + min(reserve, max(_LOW_RESERVE * (hover - low), 0.0)), high - reserve
+
+
+def gentler_bounds(body: Body, bounds: Bounds) -> Bounds | None:
+    """Bounds that leave the share `_GENTLER` of the rotors' range free, beside what the bounds leave; None if
+    hover is not within them."""
+    reserve, hover = _GENTLER * bounds.rotor_range, body.hover_force
+    low = bounds.rotor_low + min(reserve, max(_LOW_RESERVE * (hover - bounds.rotor_low), 0.0))
+    high = bounds.rotor_high - reserve
+    return bounds._replace(rotor_low=low, rotor_high=high) if low < hover < high < inf else None
 
 
 @kernel

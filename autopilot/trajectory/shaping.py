@@ -13,7 +13,7 @@ Times are seconds from the beginning of the requested signals; paths are relativ
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import cos, inf, nextafter, pi
 from typing import NamedTuple
@@ -41,8 +41,10 @@ _LONG_WINDOW_S = 4.0
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _EXCESS_S = 0.001  # between samples of its excess: a path may begin with a peak of a millisecond
-_TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
-_SAMPLE_MARGIN_N = 0.03  # by which its samples must stay inside them
+# ranges of a rotor by which a shaped path may exceed its bounds between the samples, ...
+_TOLERANCE = 0.035
+_SAMPLE_MARGIN = 0.022  # ... and by which its samples must stay inside them; a greater excess, but less than
+_RIPPLE = 0.1  # this, is that of waves between the samples
 # in the cost, this distance counts as much as a sixth derivative that takes a quarter of a rotor's range: the
 # share `_SMOOTHNESS_SHARE` of `reference_sixth_derivative`
 _DISTANCE_M = 1e-3
@@ -191,7 +193,7 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
     times = _sample_times(-lead, duration + tail, _FINE_S)
     deviation = path_jets(shaped, times)[0] - requested_jets(table, duration, times)[0]
     distance = float(np.sqrt(np.max(np.sum(deviation * deviation, axis=1))))
-    reason = "" if worst <= _TOLERANCE_N else _excess_reason(worst, bounds)
+    reason = "" if worst <= _TOLERANCE * bounds.rotor_range else _excess_reason(worst, bounds)
     return ShapedSignals(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
 
 
@@ -215,19 +217,36 @@ def _solve_widening(
         b, e = begin - widening, end + widening
         if e - b > MAX_WINDOW_S:
             break
-        candidate = _solve(step, table, b, e, body, bounds)
-        if candidate is not None and (best is None or candidate.excess_n < best.excess_n):
-            best = candidate
-        max_excess_n = _rotor_range(bounds) if e - b > _LONG_WINDOW_S else inf
-        if best is not None and (best.excess_n <= _TOLERANCE_N or best.excess_n > max_excess_n):
+        for candidate in _candidates(step, table, b, e, body, bounds):
+            if best is None or candidate.excess_n < best.excess_n:
+                best = candidate
+        tolerance_n = _TOLERANCE * bounds.rotor_range
+        max_excess_n = bounds.rotor_range if e - b > _LONG_WINDOW_S else inf
+        if best is not None and (best.excess_n <= tolerance_n or best.excess_n > max_excess_n):
             break
         widening = (widening + WINDOW_S) * _WIDENING - WINDOW_S
     return best
 
 
+def _candidates(
+    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+) -> Iterator[_Window]:
+    """The spline from begin to end; and if it exceeds the bounds between its samples, a second one whose
+    samples stay inside by as much more."""
+    margin_n = _SAMPLE_MARGIN * bounds.rotor_range
+    window = _solve(step, table, begin, end, body, bounds, margin_n)
+    if window is None:
+        return
+    yield window
+    if _TOLERANCE * bounds.rotor_range < window.excess_n < _RIPPLE * bounds.rotor_range:
+        stricter = _solve(step, table, begin, end, body, bounds, margin_n + window.excess_n)
+        if stricter is not None:
+            yield stricter
+
+
 def _excess_reason(excess_n: float, bounds: Bounds) -> str:
     """The excess of a path that could not be brought within the bounds, in words; in N unless it is huge."""
-    is_huge = excess_n > _HUGE_EXCESS * _rotor_range(bounds)
+    is_huge = excess_n > _HUGE_EXCESS * bounds.rotor_range
     by = "far" if is_huge else f"as much as {excess_n:.2f} N of a rotor"
     return f"it exceeds the bounds of rotors, cable or rate of turn by {by}"
 
@@ -242,14 +261,9 @@ def _sample_times(begin: float, end: float, spacing: float) -> Array:
     return np.linspace(begin, end, max(int((end - begin) / spacing), 2) + 1)
 
 
-def _rotor_range(bounds: Bounds) -> float:
-    width = bounds.rotor_high - bounds.rotor_low
-    return width if np.isfinite(width) else 2.0
-
-
 def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
     """Times at which derivatives jump by more than the rotors can follow."""
-    reference = reference_sixth_derivative(body, _rotor_range(bounds))
+    reference = reference_sixth_derivative(body, bounds.rotor_range)
     times = {t for t in (*joints(step.terms), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
     for time in sorted(times):
         sides = requested_jets(table, step.duration_s, np.array([nextafter(time, -inf), time]))
@@ -287,9 +301,10 @@ def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple
 
 
 def _solve(
-    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds, margin_n: float
 ) -> _Window | None:
-    """The spline from begin to end; None if there is none within the constraints."""
+    """The spline from begin to end, whose samples keep the bounds of the rotors by `margin_n`; None if there
+    is none within the constraints."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
     ends = requested_jets(table, step.duration_s, np.array([begin, end]))
@@ -298,12 +313,10 @@ def _solve(
     fixed = basis.end_coefficients(ends[:, 0], ends[:, 1])
     times = np.linspace(begin, end, SAMPLES * intervals + 1)
     target = requested_jets(table, step.duration_s, times)[0] - origin
-    reference = reference_sixth_derivative(body, _rotor_range(bounds))
+    reference = reference_sixth_derivative(body, bounds.rotor_range)
     smooth = 1.0 / (_SMOOTHNESS_SHARE * reference) ** 2
     objective = Objective(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTHNESS_S**2)))
-    inner = bounds._replace(
-        rotor_low=bounds.rotor_low + _SAMPLE_MARGIN_N, rotor_high=bounds.rotor_high - _SAMPLE_MARGIN_N
-    )
+    inner = bounds._replace(rotor_low=bounds.rotor_low + margin_n, rotor_high=bounds.rotor_high - margin_n)
     problem = Problem(
         basis, fixed, body, inner, objective, _path_constraints(step, table, begin, end, origin)
     )
