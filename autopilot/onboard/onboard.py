@@ -770,6 +770,7 @@ class Onboard:
         """Read and prepare the mission again if it returns to a home that has changed. A mission under way
         keeps its paths, as when a parameter is changed."""
         flight = self.core.flight
+        self.endpoint.move_home(flight.area.home)
         mission = flight.mission
         if mission.active or not any(isinstance(step, ReturnHome) for step in mission.plan.steps):
             return

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.geometry.linear import Vec3
 from autopilot.services.commands import CommandService
 from autopilot.services.components import ComponentService
 from autopilot.services.faults import FaultReporter
@@ -224,6 +225,10 @@ class VehicleEndpoint:
     def set_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Set fence or rally points as they were stored."""
         self._missions.areas[kind] = items
+
+    def move_home(self, place: Vec3) -> None:
+        """Home is at `place` from now on (m, ENU from the origin)."""
+        self._missions.move_home(place)
 
     @property
     def links(self) -> tuple[Link, ...]:

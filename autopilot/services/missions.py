@@ -26,6 +26,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission, plan_id
 from autopilot.services.records import (
     Announce,
@@ -41,10 +42,10 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.command_names import numbered_name
-from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import AREA_READERS
-from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, home_item, located_steps
+from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, home_item, is_home, located_steps
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
 MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
@@ -105,6 +106,12 @@ class _EndedUpload:
     next_ack_us: int = NEVER_US
 
 
+def _moved(item: WireItem, place: Vec3, origin: Home) -> WireItem:
+    """The item at another place (m, ENU from the origin)."""
+    x, y, _ = geodetic_from_enu(place, origin)
+    return item._replace(x=x, y=y)
+
+
 class MissionService:
     """Holds the mission and serves it to any number of links.
 
@@ -115,7 +122,8 @@ class MissionService:
 
     def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
-        self._home_items = (home_item(home),) if home_is_item else ()
+        self._home_is_item = home_is_item
+        self._home_place: Vec3 = ZERO  # m, ENU from `home`, the origin
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
@@ -123,6 +131,10 @@ class MissionService:
         # items that `_plan_ids` identify
         self._identified_items: tuple[tuple[WireItem, ...], ...] = ((), (), ())
         self._plan_ids = (0, 0, 0)
+
+    def move_home(self, place: Vec3) -> None:
+        """Home is at `place` from now on (m, ENU from the origin)."""
+        self._home_place = place
 
     @property
     def plan_ids(self) -> tuple[int, int, int]:
@@ -268,8 +280,8 @@ class MissionService:
     def _complete_upload(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items have arrived: check them as a whole, and only then replace the mission."""
         items, kind = tuple(upload.items), upload.kind
-        if self._home_items and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            items = (*self._home_items, *items[1:])
+        if kind == _MISSION:
+            items = self._with_home_at_origin(items)
         try:
             if kind in _AREAS:
                 AREA_READERS[kind](items, self.home)
@@ -288,6 +300,25 @@ class MissionService:
         self._end_upload(_ACCEPTED, now_us)
         replaced = self._replace_mission(StoredMission(items))
         return [RefusalCleared(_upload_of(kind)), *replaced, self._accepting_ack(upload.peer, kind)]
+
+    def _with_home_at_origin(self, items: tuple[WireItem, ...]) -> tuple[WireItem, ...]:
+        """Uploaded items as they are stored: an item 0 that is home lies at the origin, wherever home is."""
+        first, *others = items
+        if first.command != mavlink.MAV_CMD_NAV_WAYPOINT:
+            return items
+        if self._home_is_item:
+            return (home_item(self.home), *others)
+        if not is_home(first, self.home, self._home_place):
+            return items
+        return (_moved(first, ZERO, self.home), *others) if self._home_place != ZERO else items
+
+    def _with_home_in_place(self, items: tuple[WireItem, ...]) -> tuple[WireItem, ...]:
+        """Stored items as they are served: an item 0 that is home lies where home is now."""
+        if self._home_place == ZERO or not items or items[0].command != mavlink.MAV_CMD_NAV_WAYPOINT:
+            return items
+        if not is_home(items[0], self.home, ZERO):
+            return items
+        return (_moved(items[0], self._home_place, self.home), *items[1:])
 
     def _accepting_ack(self, peer: Peer, kind: int) -> Output:
         """The acknowledgement of a plan that is now in force."""
@@ -409,7 +440,8 @@ class MissionService:
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
         """All items of a kind; empty for an unknown kind."""
         if kind == _MISSION:
-            return self.mission.items or self._home_items
+            home_items = (home_item(self.home),) if self._home_is_item else ()
+            return self._with_home_in_place(self.mission.items or home_items)
         return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:

@@ -140,15 +140,16 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
     if isinstance(leg, SwingDamping):
         legs, here = stopping_legs(flight, view, settings)
         return _with_legs(flight, (*legs, Hold(here, SETTLE_S)), view), Report()
+    if next_step is None and isinstance(step, ReturnHome):  # ends on the ground, like a return by mode
+        landing = transition(flight, Event.LAND_STEP, view, settings)
+        return landing, Report(((INFO, "Home reached, landing"),))
     reached = (plan.sequence[number],) if _ends_item(plan, number, after) else ()
     flight = with_current_step(flight, 0 if after is None else after)
     if next_step is None:
-        event, text = Event.DONE, "Mission complete, holding"
-        if isinstance(step, ReturnHome):  # as the last step it ends on the ground, like a return by mode
-            event, text = Event.LAND, "Mission complete, landing"
         ended = replace(flight.mission, active=False, final_item=plan.sequence[number])
         flight = replace(flight, mission=ended)
-        return transition(flight, event, view, settings), Report(((INFO, text),), reached)
+        text = "Mission complete, holding"
+        return transition(flight, Event.DONE, view, settings), Report(((INFO, text),), reached)
     flight = with_step_heading_aims(flight, view, settings)
     return _next_step(flight, leg, next_step, view, settings), Report((), reached)
 

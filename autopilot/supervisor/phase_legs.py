@@ -9,7 +9,16 @@ from collections.abc import Callable
 from math import dist, hypot
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, carry_leg, transfer_leg
+from autopilot.guidance.legs import (
+    LOAD_POSITION,
+    QUAD_POSITION,
+    Creep,
+    Hold,
+    Leg,
+    SwingDamping,
+    carry_leg,
+    transfer_leg,
+)
 from autopilot.guidance.setpoint_follower import (
     AttitudeSetpoint,
     TrackAttitude,
@@ -45,6 +54,7 @@ TOUCH_HEIGHT = 0.12  # m over the ground at which lowering turns into creeping
 # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
 BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
+SAME_PLACE_M = 0.01
 HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
 MAX_RALLY_CHECKS = 8  # of the nearest rally points: large fences take a tenth of a millisecond for each
 MIN_LOAD_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first
@@ -99,6 +109,15 @@ def _return_goal(flight: Flight, here: Vec3, settings: Settings) -> Vec3:
     nearest = sorted(flight.area.rally, key=lambda place: dist(place[:2], here[:2]))[:MAX_RALLY_CHECKS]
     allowed = [place for place in nearest if not fence_problem(flight, place, settings)]
     return return_place(here, flight.area.home, allowed)
+
+
+def leads_home(flight: Flight) -> bool:
+    """Whether a return ends over home or a rally point, as these are now."""
+    last = flight.legs[-1]
+    if isinstance(last, SwingDamping):  # then the way home is determined
+        return True
+    end = last.jet(last.duration_s)[0]
+    return any(dist(place[:2], end[:2]) < SAME_PLACE_M for place in (flight.area.home, *flight.area.rally))
 
 
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.endpoint import REACHED_INTERVAL_US, REACHED_REPETITIONS
-from autopilot.services.identity import ARDUPILOT, Identity
+from autopilot.services.identity import ARDUPILOT, PX4, Identity
 from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import (
     ACK_INTERVAL_US,
@@ -20,9 +21,9 @@ from autopilot.services.missions import (
 )
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
-from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.items import WireItem, located_steps
+from autopilot.wire.items import WireItem, home_item, located_steps
 
 LAT, LON = round(Home().latitude_deg * 1e7), round(Home().longitude_deg * 1e7)
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
@@ -377,6 +378,30 @@ def test_the_home_of_a_file_is_the_vehicles_own_for_clients_of_ardupilot(
     )
     assert tuple(rest) == items(2)
     assert [step.first for step in located_steps(rig.endpoint.mission.items, Home())] == [1, 2]
+
+
+MOVED = (0.0, 5.0, 0.0)  # m, ENU from the origin
+
+
+def item_of_home(place: Vec3) -> WireItem:
+    x, y, _ = geodetic_from_enu(place, Home())
+    return home_item(Home())._replace(x=x, y=y)
+
+
+@pytest.mark.parametrize("flavour", [PX4, ARDUPILOT])
+def test_home_as_item_0_is_where_home_is(rig_with, items, as_message, as_item, flavour):
+    """A file written with the home that DO_SET_HOME gave was refused, or its home was that of the start."""
+    rig = rig_with(identity=Identity(flavour=flavour))
+    rig.endpoint.move_home(MOVED)
+    sent = (item_of_home(MOVED), *items(2))
+    assert upload(rig, sent, as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    assert [step.first for step in located_steps(rig.endpoint.mission.items, Home())] == [1, 2]
+    answers = rig.replies(*(m.MAVLink_mission_request_int_message(1, 1, seq) for seq in range(3)))
+    assert tuple(as_item(x) for x in answers) == sent
+    # home is moved once more: the mission stays, and its item 0 is home
+    rig.endpoint.move_home(ZERO)
+    (served,) = rig.replies(m.MAVLink_mission_request_int_message(1, 1, 0))
+    assert as_item(served) == item_of_home(ZERO)
 
 
 @pytest.mark.parametrize("ask", [m.MAVLink_mission_request_int_message, m.MAVLink_mission_request_message])

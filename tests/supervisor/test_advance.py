@@ -19,8 +19,10 @@ from autopilot.services.requests import (
     Continue,
     Land,
     Pause,
+    Reposition,
     ReturnHome,
     SetCurrent,
+    SetHome,
     StartMission,
 )
 from autopilot.services.requests import Takeoff as TakeoffRequest
@@ -177,9 +179,39 @@ def test_a_mission_that_ends_with_a_return_lands() -> None:
     sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert sky.flight.mission.done
-    assert "Mission complete, landing" in sky.texts
+    assert "Home reached, landing" in sky.texts
     assert sky.reached == [0, 1, 2]
     assert norm(sub(sky.view.x_load, (0.0, 0.0, 0.02))) < 0.03
+
+
+def test_a_pause_in_the_landing_after_a_return_does_not_begin_the_mission_again() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
+    sky.run(lambda s: s.flight.phase == Phase.LOWER)
+    sky.wait(1.0)
+    assert sky.ask(Pause()).result == ACCEPTED
+    sky.wait(3.0)
+    assert sky.flight.phase == Phase.HOLD
+    assert sky.ask(Continue()).result == ACCEPTED
+    highest = sky.view.x_load[2]
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED or s.view.x_load[2] > highest + 0.1)
+    assert sky.flight.phase == Phase.DISARMED
+    assert sky.reached == [0, 1, 2]
+
+
+def test_a_return_that_is_asked_for_again_flies_on_or_to_a_home_that_has_moved() -> None:
+    sky = Sky().airborne()
+    sky.ask(Reposition(8.0, 0.0, 2.0, True))
+    sky.run(lambda s: s.view.x_load[0] > 7.9)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.wait(2.0)
+    before = sky.flight
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    assert sky.flight == before
+    sky.ask(SetHome((3.0, 4.0, 0.0)))
+    assert sky.flight.legs == before.legs
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert norm(sub(sky.view.x_load, (3.0, 4.0, 0.02))) < 0.03
 
 
 def test_a_mission_that_does_not_begin_with_a_takeoff_is_lifted_all_the_same() -> None:

@@ -9,7 +9,8 @@ from typing import Any
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import EnableFence, SetHome, SetMode, Takeoff
-from autopilot.supervisor.machine import requested_transition, try_transition
+from autopilot.supervisor.machine import requested_transition, start_phase_legs, try_transition
+from autopilot.supervisor.phase_legs import leads_home
 from autopilot.supervisor.requests.guided import offboard, position_control
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.mission import continue_mission
@@ -59,7 +60,9 @@ def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
 
 
 def return_home(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """Fly to home or a nearer rally point, and land."""
+    """Fly to home or a nearer rally point, and land; on the way there, fly on, or to home if it has moved."""
+    if flight.phase == Phase.RETURN:
+        return flight if leads_home(flight) else start_phase_legs(flight, view, settings), ACCEPTED
     after = requested_transition(interrupt_mission(flight), Event.RETURN, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Return"))
 

@@ -9,7 +9,7 @@ Positions are positions of the load. Items that turn the nose are not steps: the
 step after them. DO_JUMP is flown by flying its items again.
 """
 
-from autopilot.wire.items.command import Command, Handling
+from autopilot.wire.items.command import Command, Handling, is_home
 from autopilot.wire.items.decode import decode_items, endless_jump_target, located_steps, unflown_items
 from autopilot.wire.items.encode import encode_mission, encode_steps, home_item, step_index
 from autopilot.wire.items.heading import turn_heading
@@ -31,6 +31,7 @@ __all__ = [
     "endless_jump_target",
     "handling_of",
     "home_item",
+    "is_home",
     "located_steps",
     "step_index",
     "turn_heading",

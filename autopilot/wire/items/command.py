@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.timeline import MissionState
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
@@ -23,6 +24,19 @@ from autopilot.wire.items.records import (
     wrong_frame,
 )
 from missions.model import HeadingCommand, Step
+
+
+def is_home(item: WireItem, origin: Home, home: Vec3) -> bool:
+    """Whether a waypoint as item 0 is home, which is at `home` (m, ENU from the origin) on the ground. Above
+    home its height is 0: a greater one is that of a waypoint over home."""
+    if item.frame not in GLOBAL_FRAMES:
+        return False
+    east, north, _ = enu_from_geodetic(item.x, item.y, 0, origin)
+    if item.frame in ABSOLUTE_FRAMES:
+        on_ground = abs(item.z - origin.altitude_m) < HOME_ITEM_RADIUS_M
+    else:
+        on_ground = item.z == 0.0
+    return on_ground and math.hypot(east - home[0], north - home[1]) < HOME_ITEM_RADIUS_M
 
 
 class Handling(Enum):
@@ -89,17 +103,8 @@ class ItemContext:
         return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
 
     def is_home_item(self) -> bool:
-        """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not. Above
-        home its height is 0: a greater one is that of a waypoint over home."""
-        item = self.item
-        if self.seq != 0 or item.frame not in GLOBAL_FRAMES:
-            return False
-        place = enu_from_geodetic(item.x, item.y, 0, self.home)
-        if item.frame in ABSOLUTE_FRAMES:
-            at_home = abs(item.z - self.home.altitude_m) < HOME_ITEM_RADIUS_M
-        else:
-            at_home = item.z == 0.0
-        return at_home and math.hypot(place[0], place[1]) < HOME_ITEM_RADIUS_M
+        """Whether the item is home as item 0, as MAVProxy and Mission Planner write it, current or not."""
+        return self.seq == 0 and is_home(self.item, self.home, ZERO)
 
     def refusal(self, text: str, result: int = mavlink.MAV_MISSION_INVALID) -> MissionItemError:
         """The error that refuses this item."""
