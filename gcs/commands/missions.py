@@ -7,6 +7,7 @@ from dataclasses import asdict
 import click
 
 from gcs.commands.options import (
+    SettingType,
     json_option,
     mission_argument,
     planner_option,
@@ -46,6 +47,13 @@ def missions_command(as_json: bool) -> None:
 @mission_argument
 @vehicle_option("The vehicle that is to fly it")
 @planner_option
+@click.option(
+    "--set",
+    "settings",
+    type=SettingType(),
+    multiple=True,
+    help="Set a parameter of the autopilot, such as MIS_ROTOR_MARG; repeatable.",
+)
 @click.option("--as-asked", is_flag=True, help="Check the paths as asked, not shaped.")
 @click.option("--law", hidden=True, help="Refused: paths are checked, not a law.")
 @json_option
@@ -55,6 +63,7 @@ def check_command(
     mission: str,
     vehicle: str,
     planner: str | None,
+    settings: tuple[str, ...],
     as_asked: bool,
     law: str | None,
     as_json: bool,
@@ -78,15 +87,18 @@ def check_command(
 
     from gcs.workflows.before_flight import CHECKING_TEXT
     from gcs.workflows.check_mission import check_mission
+    from gcs.workflows.flight_options import parse_setting
+
+    given = [parse_setting(one) for one in settings]
 
     if planner:
         from gcs.workflows.own_planner import own_planner
 
         with own_planner(planner, vehicle) as own:
-            found = check_mission(mission, vehicle, as_asked, own)
+            found = check_mission(mission, vehicle, as_asked, own, given)
     else:
         with notify_if_slow(CHECKING_TEXT, as_json):
-            found = check_mission(mission, vehicle, as_asked)
+            found = check_mission(mission, vehicle, as_asked, settings=given)
     if as_json:
         print_json(asdict(found))
     else:

@@ -63,8 +63,9 @@ def check_mission(mission: Mission, options: FlightOptions) -> None:
     if options.force or options.allows_infeasible:
         return
     shaped = options.law == "plumbline"
-    if not is_known_flyable(mission, options.vehicle, shaped):
+    settings = options.mission_settings
+    if not is_known_flyable(mission, options.vehicle, shaped, settings):
         from gcs.workflows.flyable import require_flyable
 
         with notify_if_slow(CHECKING_TEXT, options.quiet):
-            require_flyable(mission, options.vehicle, shaped)
+            require_flyable(mission, options.vehicle, shaped, settings)

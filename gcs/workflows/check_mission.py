@@ -33,7 +33,7 @@ from gcs.workflows.before_flight import unused_planner_text
 from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import violations
 from gcs.workflows.refusals import Answer, ask_supervisor
-from gcs.workflows.vehicle_limits import load_limits
+from gcs.workflows.vehicle_limits import load_limits, with_settings
 from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
@@ -227,14 +227,18 @@ def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...])
 
 
 def check_mission(
-    name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None
+    name_or_path: str,
+    vehicle: str,
+    as_asked: bool,
+    planner: Planner | None = None,
+    settings: Sequence[tuple[str, float]] = (),
 ) -> CheckResult:
-    """Check a mission by name or path, or the file of another ground station, against a vehicle; `as_asked`:
-    without shaping.
+    """Check a mission by name or path, or the file of another ground station, against a vehicle with these
+    parameters of its autopilot; `as_asked`: without shaping.
 
     GcsError if a custom `planner` fails to plan it.
     """
-    limits, mission = load_limits(vehicle), read(name_or_path)
+    limits, mission = load_limits(vehicle, settings), read(name_or_path)
     notes: tuple[str, ...] = ()
     if isinstance(mission, ForeignMission):
         empty = () if mission.items else ("nothing that can be flown",)
@@ -243,8 +247,8 @@ def check_mission(
             return CheckResult(mission.name, vehicle, (), (), notes, left_out)
         if not ends_on_ground(mission):
             notes += ("note: does not end on the ground: for gcs upload, not for gcs fly or gcs sweep",)
-    table = autopilot_parameters(limits.vehicle)
-    found = [*violations(mission, vehicle, limits, not as_asked), *winch_violations(mission, table)]
+    table = with_settings(autopilot_parameters(limits.vehicle), settings)
+    found = [*violations(mission, vehicle, limits, not as_asked, settings), *winch_violations(mission, table)]
     reports = [] if found else path_reports(mission, limits, planner, not as_asked)
     answer = Answer() if found else ask_supervisor(mission, table, not as_asked, planner)
     warnings = (

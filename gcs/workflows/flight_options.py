@@ -14,6 +14,7 @@ from autopilot.wire.convert.geodesy import Home
 from gcs.shell.link import Address
 
 SIMULATOR_PREFIX = "SIM_"  # beginning of the names of the simulator's parameters
+Settings = Iterable[tuple[str, float]]  # parameters by name
 _REFUSE_INFEASIBLE = 2.0  # MIS_INFEASIBLE
 
 
@@ -75,6 +76,11 @@ class FlightOptions:
             words += ["--set", setting]
         words += ["--force"] if self.force else []
         return shlex.join([*words, *time_limit_option(self.limit_s)])
+
+    @property
+    def mission_settings(self) -> tuple[tuple[str, float], ...]:
+        """The settings that determine which paths the autopilot flies (MIS_), the last of each name."""
+        return tuple(dict(map(parse_setting, (s for s in self.settings if s.startswith("MIS_")))).items())
 
     @property
     def allows_infeasible(self) -> bool:

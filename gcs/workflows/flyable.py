@@ -7,21 +7,24 @@ from gcs.errors import GcsError
 from gcs.foreign_mission import home_of
 from gcs.mission_files import load
 from gcs.mission_items import in_file_terms, items_of
+from gcs.workflows.flight_options import Settings
 from gcs.workflows.flyable_marks import mark_flyable
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Mission
 
 
-def violations(mission: Mission, vehicle: str, limits: VehicleLimits, shaped: bool = True) -> list[Violation]:
-    """What the vehicle with these limits cannot fly of the mission, with paths `shaped` by the autopilot or
-    as requested.
+def violations(
+    mission: Mission, vehicle: str, limits: VehicleLimits, shaped: bool = True, settings: Settings = ()
+) -> list[Violation]:
+    """What the vehicle with these limits, which `settings` have set, cannot fly of the mission, with paths
+    `shaped` by the autopilot or as requested.
 
     InputError if no vehicle would accept its items.
     """
     items_of(mission, home_of(mission))
     found = check(mission, limits, shaped)
     if not found:
-        mark_flyable(mission, vehicle, shaped)
+        mark_flyable(mission, vehicle, shaped, settings)
     return found
 
 
@@ -34,9 +37,9 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     return mission
 
 
-def require_flyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
-    """GcsError unless the vehicle can fly the mission."""
-    found = violations(mission, vehicle, load_limits(vehicle), shaped)
+def require_flyable(mission: Mission, vehicle: str, shaped: bool = True, settings: Settings = ()) -> None:
+    """GcsError unless the vehicle can fly the mission, with these parameters of missions (MIS_)."""
+    found = violations(mission, vehicle, load_limits(vehicle, settings), shaped, settings)
     if found:
         summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
         texts = [in_file_terms(str(one), mission) for one in found]

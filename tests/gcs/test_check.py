@@ -19,7 +19,7 @@ from autopilot.trajectory.transfer import PEAK_SPEED
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_USAGE, GcsError, InputError
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE, GcsError, InputError
 from gcs.mission_files import load
 from gcs.workflows.check_mission import (
     CheckResult,
@@ -33,6 +33,7 @@ from gcs.workflows.check_mission import (
     winch_violations,
 )
 from gcs.workflows.flight_inputs import check_flight_inputs
+from gcs.workflows.flight_options import parse_setting
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
@@ -236,3 +237,18 @@ def test_paths_that_outlast_the_time_limit_of_a_flight_are_told_with_what_to_add
     )
     assert warning.endswith("add --timeout 1456")
     assert not list(timeout_warnings(load("square"), path_reports(load("square"), BEBOP_LIMITS), BEBOP))
+
+
+@pytest.mark.parametrize(("value", "flies"), [("20", True), ("45", False)])
+def test_paths_are_checked_with_the_parameters_that_are_set(value: str, flies: bool) -> None:
+    """The reserve of the vehicle's file counted whatever was set, and was named."""
+    found = CliRunner().invoke(gcs, ["check", "case-c", "--set", f"MIS_ROTOR_MARG={value}"])
+    assert found.exit_code == (EXIT_DONE if flies else EXIT_ERROR)
+    assert (f"must leave {value} % of the rotors' range" in found.output) == (not flies)
+
+
+@pytest.mark.parametrize("setting", ["VEH_LOAD_MASS=3", "SIM_WIND_E=3", "MIS_NOTHING=1"])
+def test_what_no_check_judges_is_not_set(setting: str) -> None:
+    name = setting.partition("=")[0]
+    with pytest.raises(InputError, match=f"--set {name}: must be a parameter of the autopilot"):
+        check_mission("hover", "bebop", False, settings=[parse_setting(setting)])

@@ -50,3 +50,10 @@ def test_what_cannot_be_flown_is_never_known():
     too_low = replace(hover, steps=(hover.steps[0], Waypoint(1.0, 0.0, 0.05), hover.steps[-1]))
     assert violations(too_low, "bebop", load_limits("bebop"))
     assert not is_known_flyable(too_low, "bebop", True)
+
+
+def test_what_is_set_belongs_to_the_mark():
+    hover, reserve = load_mission("hover"), (("MIS_ROTOR_MARG", 20.0),)
+    assert violations(hover, "bebop", load_limits("bebop", reserve), settings=reserve) == []
+    assert is_known_flyable(hover, "bebop", True, reserve)
+    assert not is_known_flyable(hover, "bebop", True, (("MIS_ROTOR_MARG", 21.0),))

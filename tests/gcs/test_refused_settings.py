@@ -8,6 +8,9 @@ import pytest
 
 import plumbline
 from gcs.clients.flight import Outcome
+from gcs.errors import GcsError
+from gcs.mission_files import load
+from gcs.workflows.before_flight import check_mission
 from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.refused_settings import with_blamed_settings
 
@@ -44,6 +47,13 @@ def test_the_parameters_that_differ_from_the_vehicles_are_named() -> None:
         "0.7 and not 8, MIS_TILT_DEG is 45 and not 5: choose values nearer to those of the vehicle, or "
         "change the mission"
     )
+
+
+def test_the_check_before_a_flight_takes_what_is_set() -> None:
+    """It took the reserve of the vehicle's file, and named that."""
+    with pytest.raises(GcsError, match="must leave 45 % of the rotors' range"):
+        check_mission(load("case-c"), options("MIS_ROTOR_MARG=20", "MIS_ROTOR_MARG=45"))
+    check_mission(load("case-c"), options("MIS_ROTOR_MARG=45", "MIS_ROTOR_MARG=20"))
 
 
 @pytest.mark.parametrize(
