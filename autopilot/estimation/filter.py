@@ -2,7 +2,8 @@
 
 `control_state` is the state passed to the control laws. `vehicle_problem` and `load_problem` decide
 whether the estimate is good enough for flight, `problem_texts` states why it is not, and `estimate_loss`
-why it is not even good enough for a landing.
+why it is not even good enough for a landing. `knows_attitude` and `knows_height` tell which parts of the
+vehicle's estimate remain when the rest is not good enough for flight.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 # m and rad relative to the vehicle, of a load that no tracker measures: one of them is enough
 LOAD_STD_TO_FLY, CABLE_STD_TO_FLY = 0.1, 0.14
 STATED_STD_FACTOR = 1.2  # times the deviation that the receiver states
-MAX_FIX_AGE_S = 2.0  # for which the IMU bridges a gap between fixes
+MAX_FIX_AGE_S = 2.0  # for which the IMU bridges a gap between fixes, and between heights of the barometer
 MAX_DIRECTION_AGE_S = 1.0  # for which the pendulum bridges a gap between directions to the load
 # For which the pendulum bridges a gap between a tracker's readings, whose velocity starts it better: a load
 # hidden for 5 s is 2 mm off in calm air and 8 mm in wind of 5 m/s with gusts of 1 m/s, as its covariance
@@ -288,6 +289,29 @@ def vehicle_problem(state: EstimatorState, max_age_s: float) -> int:
 
 
 @kernel
+def knows_attitude(state: EstimatorState, problem: int) -> bool:
+    """Whether the attitude, with this problem of the vehicle or of its inertial unit, is good enough for a
+    landing. Written so that NaN is not."""
+    return bool(
+        problem != NO_INERTIAL
+        and state.vehicle.source != NO_SENSOR
+        and state.uncertainty.tilt <= TILT_STD_TO_LAND
+    )
+
+
+@kernel
+def knows_height(state: EstimatorState, problem: int) -> bool:
+    """Whether the height, with this problem of the vehicle or of its inertial unit, is good enough for a
+    landing: the barometer measures it, which is used beside a receiver only."""
+    return bool(
+        knows_attitude(state, problem)
+        and state.vehicle.source == RECEIVER
+        and state.sensor_errors.barometer_age <= MAX_FIX_AGE_S
+        and state.uncertainty.vertical <= POSITION_STD_TO_LAND
+    )
+
+
+@kernel
 def load_problem(state: EstimatorState, max_age_s: float) -> int:
     """What is wrong with the estimate of the load; 0 if nothing is."""
     load, uncertainty = state.load, state.uncertainty
@@ -325,7 +349,7 @@ def estimate_loss(state: EstimatorState, problem: int) -> str:
     uncertainty = state.uncertainty
     if problem == NO_INERTIAL:
         return _PROBLEM_TEXTS[NO_INERTIAL]
-    if state.vehicle.source == NO_SENSOR or not uncertainty.tilt <= TILT_STD_TO_LAND:
+    if not knows_attitude(state, problem):
         return _PROBLEM_TEXTS[ATTITUDE_UNSETTLED]
     slow_std = state.sensor_errors.horizontal_slow_std if state.vehicle.source == RECEIVER else 0.0
     if not (uncertainty.horizontal <= POSITION_STD_TO_LAND + STATED_STD_FACTOR * slow_std):

@@ -11,24 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.core.tick import ControlMemory, EstimateSummary
-from autopilot.estimation.filter import NO_LOAD, NO_LOAD_DIRECTION
+from autopilot.estimation.filter import NO_LOAD, NO_LOAD_DIRECTION, knows_attitude, knows_height
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
-from autopilot.geometry.packed import Row, width
+from autopilot.geometry.packed import Row, unpack, width
 from autopilot.geometry.so3 import quat_from_rotation
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.instant import Instant
 from autopilot.wire.dialect import plumbline as mavlink
 
 NO_LEG = -1  # in place of a leg's control mode
-_ESTIMATOR_FLAGS = (
-    mavlink.ESTIMATOR_ATTITUDE
-    | mavlink.ESTIMATOR_VELOCITY_HORIZ
-    | mavlink.ESTIMATOR_VELOCITY_VERT
+_ATTITUDE_FLAG = mavlink.ESTIMATOR_ATTITUDE
+_HEIGHT_FLAGS = mavlink.ESTIMATOR_VELOCITY_VERT | mavlink.ESTIMATOR_POS_VERT_ABS
+_HORIZONTAL_FLAGS = (
+    mavlink.ESTIMATOR_VELOCITY_HORIZ
     | mavlink.ESTIMATOR_POS_HORIZ_REL
     | mavlink.ESTIMATOR_POS_HORIZ_ABS
-    | mavlink.ESTIMATOR_POS_VERT_ABS
     | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
     | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
 )
@@ -114,6 +113,20 @@ _FORCES, _ROTORS = _offset(Instant, "forces"), _offset(Instant, "rotors")
 
 
 @kernel
+def estimator_flags(state: EstimatorState, problem: int) -> int:
+    """ESTIMATOR_STATUS_FLAGS of an estimate with this problem of the vehicle or of its inertial unit: the
+    parts of the vehicle's state that are known."""
+    if problem == 0:
+        return _ATTITUDE_FLAG | _HEIGHT_FLAGS | _HORIZONTAL_FLAGS
+    flags = 0
+    if knows_attitude(state, problem):
+        flags |= _ATTITUDE_FLAG
+    if knows_height(state, problem):
+        flags |= _HEIGHT_FLAGS
+    return flags
+
+
+@kernel
 def put_instant(
     summary: Row,
     estimator: Row,
@@ -129,7 +142,6 @@ def put_instant(
     phase: int,
     seq: int,
     load_tracked: bool,
-    needs_load_estimate: bool,
     assumed_load_kg: float,
     rotor_min: float,
     rotor_max: float,
@@ -141,8 +153,8 @@ def put_instant(
     `summary`, `estimator` and `control` are those of `CoreRows`, `forces` (14) those of the rotors. The
     present leg has this control mode (NO_LEG: there is no leg); `targets[row]` is its setpoint, as
     `layout.jets` returns it, and `requested[row]` the requested path. `load_tracked`: in a phase in which the
-    load is tracked; `needs_load_estimate`: the load must be known. `assumed_load_kg`: mass with which the
-    estimator computes the tension; 0: the tension is that of a custom estimator.
+    load is tracked. `assumed_load_kg`: mass with which the estimator computes the tension; 0: the tension is
+    that of a custom estimator.
     """
     for i in range(_FROM_SUMMARY.shape[0]):
         instant[_FROM_SUMMARY[i, 0]] = summary[_FROM_SUMMARY[i, 1]]
@@ -155,8 +167,7 @@ def put_instant(
     instant[_ROTOR_MIN], instant[_ROTOR_MAX], instant[_ROTORS] = rotor_min, rotor_max, rotors
     for i in range(forces.shape[0]):
         instant[_FORCES + i] = forces[i]
-    is_uncertain = summary[_VEHICLE_PROBLEM] != 0.0 or (needs_load_estimate and summary[_LOAD_PROBLEM] != 0.0)
-    instant[_FLAGS] = 0 if is_uncertain else _ESTIMATOR_FLAGS
+    instant[_FLAGS] = estimator_flags(unpack(EstimatorState, estimator, 0), int(summary[_VEHICLE_PROBLEM]))
     if assumed_load_kg > 0.0:
         instant[_TENSION] *= control[_LOAD_MASS] / assumed_load_kg
     load_undetected = summary[_LOAD_PROBLEM] == NO_LOAD or summary[_LOAD_PROBLEM] == NO_LOAD_DIRECTION

@@ -23,6 +23,7 @@ from autopilot.services.instant import Instant
 from autopilot.vehicle.layout import MAX_ROTORS
 from autopilot.wire.compiled import Bytes
 from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
 
 _PULSE_MIN_US, _PULSE_MAX_US = 1000.0, 2000.0  # actuator_outputs, us
@@ -54,6 +55,7 @@ _QUAT, _QUAT_C = _offset(Instant, "quat_wxyz"), _offset(Instant, "quat_c_wxyz")
 _FLAGS = _offset(Instant, "estimator_flags")
 _HOME, _IMU = _DERIVED_OFFSET + _offset(Derived, "latitude_deg"), _DERIVED_OFFSET + _offset(Derived, "gyro")
 _VALID = _DERIVED_OFFSET + _offset(Derived, "valid")
+_HEIGHT_VALID = _DERIVED_OFFSET + _offset(Derived, "height_valid")
 _QUAT_NED, _QUAT_C_NED = (
     _DERIVED_OFFSET + _offset(Derived, "quat_ned"),
     _DERIVED_OFFSET + _offset(Derived, "quat_c_ned"),
@@ -84,7 +86,9 @@ def put_sample(
         row[_HOME + i] = home[i]
     for i in range(6):
         row[_IMU + i] = imu[i]
-    row[_VALID] = 1.0 if instant[_FLAGS] != 0.0 else 0.0
+    flags = int(instant[_FLAGS])
+    row[_VALID] = 1.0 if flags & mavlink.ESTIMATOR_POS_HORIZ_ABS else 0.0
+    row[_HEIGHT_VALID] = 1.0 if flags & mavlink.ESTIMATOR_POS_VERT_ABS else 0.0
     row[_TIME_OFFSET] = now_us
     q = instant[_QUAT : _QUAT + 4]
     c = instant[_QUAT_C : _QUAT_C + 4]
@@ -133,7 +137,7 @@ def _column_sources(column: Column) -> list[tuple[int, int]]:
     places = range(1, 1 + len(place))
     # applying the axes to three different numbers shows the place and the sign of each
     mapped = column.axes(tuple(map(float, places))) if column.axes else places
-    return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in mapped] * column.times
+    return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in mapped]
 
 
 class SampleRecords:

@@ -57,7 +57,8 @@ class Derived(NamedTuple):
     altitude_m: float
     gyro: Vec3
     accel: Vec3
-    valid: bool  # the estimate
+    valid: bool  # the whole estimate of the vehicle
+    height_valid: bool
     quat_ned: Quat
     quat_c_ned: Quat
     shares: Forces  # rotor forces as shares of the maximum, if there is one
@@ -65,11 +66,10 @@ class Derived(NamedTuple):
 
 
 class Column(NamedTuple):
-    """A field of `Instant` or `Derived`, converted to other axes (`axes`), repeated `times` times."""
+    """A field of `Instant` or `Derived`, converted to other axes (`axes`)."""
 
     name: str
     axes: Axes | None = None
-    times: int = 1
 
 
 def _columns(*names: str) -> tuple[Column, ...]:
@@ -89,6 +89,7 @@ def _vector(name: str) -> str:
 
 
 _AXES = ("float x", "float y", "float z", "float vx", "float vy", "float vz")
+# in turn of the horizontal and of the vertical part
 _VALID = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global", "z_global")
 
 FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
@@ -104,7 +105,7 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
             *_columns("latitude_deg", "longitude_deg"),
             *_ned("x_quad", "v_quad", "accel_quad"),
             *_columns("altitude_m", "horizontal_std", "vertical_std"),
-            Column("valid", times=len(_VALID)),
+            *(_columns("valid", "height_valid") * (len(_VALID) // 2)),
         ),
     ),
     (Topic("vehicle_attitude", ("float[4] q",)), _columns("quat_ned")),

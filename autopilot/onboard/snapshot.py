@@ -54,7 +54,6 @@ from autopilot.supervisor.state import (
     Phase,
     SetpointSource,
     View,
-    needs_load_estimate,
 )
 from autopilot.supervisor.watches.fence import has_fence
 from autopilot.vehicle.parameters import AutopilotParameters
@@ -155,9 +154,8 @@ def mission_state(flight: Flight, items: int) -> int:
 
 
 def is_tracked(estimator: EstimatorState) -> bool:
-    """Whether a tracker measures the vehicle, with recent readings of vehicle and load."""
-    vehicle, load = estimator.vehicle, estimator.load
-    return vehicle.source == TRACKER and vehicle.age_s < TRACKER_TIMEOUT_S and load.age_s < TRACKER_TIMEOUT_S
+    """Whether a tracker measures the vehicle, with recent readings."""
+    return estimator.vehicle.source == TRACKER and estimator.vehicle.age_s < TRACKER_TIMEOUT_S
 
 
 def sensor_bits(
@@ -371,8 +369,8 @@ class InstantConstants(NamedTuple):
     duration_s: float
     phase: int
     load_and_rotors: tuple[
-        bool, bool, float, float, float, int
-    ]  # `load_tracked`, `needs_load_estimate`, `assumed_load_kg`, `rotor_min`, `rotor_max`, `rotors`
+        bool, float, float, float, int
+    ]  # `load_tracked`, `assumed_load_kg`, `rotor_min`, `rotor_max`, `rotors`
 
 
 def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstants | None) -> InstantConstants:
@@ -405,7 +403,7 @@ def _instant_constants(core: FlightCore, flight: Flight, before: InstantConstant
         start_us,
         float(duration_s),
         int(flight.phase),
-        (flight.phase in CARRYING, needs_load_estimate(flight), load_kg, *limits, len(setup.layout)),
+        (flight.phase in CARRYING, load_kg, *limits, len(setup.layout)),
     )
 
 

@@ -55,16 +55,15 @@ STREAM_SYSTEM, STREAM_COMPONENT, STREAM_SEQUENCE, DIALECT_COMPONENT, DIALECT_SEQ
     PHASE,
     SEQ,
     LOAD_TRACKED,
-    NEEDS_LOAD_ESTIMATE,
     ROTORS,
-) = range(23, 32)
+) = range(23, 31)
 # of the timesync requests: when the next is due, and the length of a window; `TimesyncRequests`; how many
 # windows wait to be sent, and the time of the last request; the component that sends them
-NEXT_REQUEST_US, WINDOW_US, NO_WAIT_UNTIL_US, SEND_SINGLY_US, MAX_WINDOWS = range(32, 37)
-WAITING_WINDOWS, LAST_REQUEST_US, REQUEST_COMPONENT, REQUEST_SEQUENCE = range(37, 41)
+NEXT_REQUEST_US, WINDOW_US, NO_WAIT_UNTIL_US, SEND_SINGLY_US, MAX_WINDOWS = range(31, 36)
+WAITING_WINDOWS, LAST_REQUEST_US, REQUEST_COMPONENT, REQUEST_SEQUENCE = range(36, 40)
 # of the flight log: when it is due, its period, bytes that were written, range of the inertial sample's bytes
-LOG_US, LOG_PERIOD_US, LOGGED_BYTES, IMU_BEGIN, IMU_END = range(41, 46)
-NUMBERS = 46
+LOG_US, LOG_PERIOD_US, LOGGED_BYTES, IMU_BEGIN, IMU_END = range(40, 45)
+NUMBERS = 45
 _MAX_UNSENT_BYTES = 8 * MAX_STREAMS_BYTES  # bytes of streams without Python
 _MAX_LOGGED_BYTES = 65_536
 MAX_WAITING_WINDOWS = 16  # that can wait to be sent
@@ -238,7 +237,7 @@ class BatchBuilder:
             frames.autopilot,
             frames.dialect,
         )
-        load_tracked, needs_load_estimate, load_kg, rotor_min, rotor_max, rotors = constants.load_and_rotors
+        load_tracked, load_kg, rotor_min, rotor_max, rotors = constants.load_and_rotors
         setpoints_start_us = 0 if setpoints is None else setpoints.first_us
         self._streams = streams
         self._numbers[:] = (
@@ -262,7 +261,7 @@ class BatchBuilder:
                 constants.phase,
                 seq,
             ),
-            *(load_tracked, needs_load_estimate, rotors),
+            *(load_tracked, rotors),
             *(
                 *schedule[:2],
                 requests.no_wait_until_us,

@@ -120,7 +120,7 @@ def odometry(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
                 mavlink.MAV_FRAME_LOCAL_NED,
                 0,
                 mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
-                0 if s.estimator_flags else _LOST,
+                0 if s.estimator_flags & mavlink.ESTIMATOR_POS_HORIZ_ABS else _LOST,
             ),
         ),
     )

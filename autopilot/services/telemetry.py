@@ -227,8 +227,12 @@ def _system_time(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 def _estimator_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     unknown = math.nan  # of height above the ground and of airspeed, which are not measured
     ratios = (*s.test_ratios, unknown, unknown)
-    accuracy = (s.horizontal_std, s.vertical_std)
-    return (mavlink.MAVLink_estimator_status_message(s.now_us, s.estimator_flags, *ratios, *accuracy),)
+    # a deviation that grows without readings is no accuracy of a position that counts as unknown
+    horizontal = s.horizontal_std if s.estimator_flags & mavlink.ESTIMATOR_POS_HORIZ_ABS else unknown
+    vertical = s.vertical_std if s.estimator_flags & mavlink.ESTIMATOR_POS_VERT_ABS else unknown
+    return (
+        mavlink.MAVLink_estimator_status_message(s.now_us, s.estimator_flags, *ratios, horizontal, vertical),
+    )
 
 
 def _ekf_status_report(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

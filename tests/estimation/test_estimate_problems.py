@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, nan
 
 import pytest
 
-from autopilot.estimation.filter import load_problem, vehicle_problem
+from autopilot.estimation.filter import NO_FIX as FIX_MISSING
+from autopilot.estimation.filter import (
+    NO_INERTIAL,
+    knows_attitude,
+    knows_height,
+    load_problem,
+    vehicle_problem,
+)
 from autopilot.estimation.records import (
     CAMERA,
     NO_SENSOR,
@@ -159,3 +167,36 @@ def test_a_longer_limit_of_age_holds_for_the_receiver_too() -> None:
     state = settled(RECEIVER, CAMERA, VEHICLE_AGE, 2.5)
     assert estimate_problems(state, OLDEST_S) == (NO_FIX,)
     assert estimate_problems(state, 3.0) == ()
+
+
+@pytest.mark.parametrize(
+    ("source", "part", "last", "knows"),
+    [
+        (RECEIVER, "tilt", 0.2, knows_attitude),
+        (TRACKER, "tilt", 0.2, knows_attitude),
+        (RECEIVER, "tilt", 0.2, knows_height),
+        (RECEIVER, "vertical", 10.0, knows_height),
+    ],
+)
+def test_attitude_and_height_remain_while_they_are_good_enough_for_a_landing(
+    source: float, part: str, last: float, knows: Callable[[EstimatorState, int], bool]
+) -> None:
+    for value, known in ((last, True), (last + 1e-6, False), (nan, False)):
+        state = settled(source, TRACKER, part, value)
+        state = state._replace(sensor_errors=state.sensor_errors._replace(barometer_age=0.0))
+        assert knows(state, FIX_MISSING) is known
+        assert not knows(state, NO_INERTIAL)
+        nothing = state._replace(vehicle=state.vehicle._replace(source=NO_SENSOR))
+        assert not knows(nothing, FIX_MISSING)
+
+
+@pytest.mark.parametrize(
+    ("source", "age_s", "known"),
+    [(RECEIVER, 2.0, True), (RECEIVER, 2.1, False), (RECEIVER, inf, False), (TRACKER, 0.0, False)],
+)
+def test_only_a_barometer_that_is_used_and_read_gives_the_height(
+    source: float, age_s: float, known: bool
+) -> None:
+    state = settled(source, TRACKER)
+    state = state._replace(sensor_errors=state.sensor_errors._replace(barometer_age=age_s))
+    assert knows_height(state, FIX_MISSING) is known

@@ -22,6 +22,7 @@ from autopilot.services.instant import Instant
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs import closed_loop
 from missions.fileformat import load_mission
@@ -252,7 +253,9 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     rng = np.random.default_rng(3)
     row = np.zeros(width(Instant))
     row[:] = rng.normal(size=len(row))
-    pack(unpack(Instant, row, 0)._replace(seq=9, phase=5, control_mode=2, saturated=3, rotors=6), row, 0)
+    numbers = {"seq": 9, "phase": 5, "control_mode": 2, "saturated": 3, "rotors": 6}
+    height_only = mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_POS_VERT_ABS
+    pack(unpack(Instant, row, 0)._replace(**numbers, estimator_flags=height_only), row, 0)
     said, imu = unpack(Instant, row, 0), packed(ImuReading((0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
     log = make_log()
     log.step(7, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=True))
@@ -275,9 +278,9 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     assert logged("vehicle_local_position", "vx", "vy", "vz") == float32(ned_from_enu(said.v_quad))
     assert logged("vehicle_local_position", "ax", "ay", "az") == float32(ned_from_enu(said.accel_quad))
     assert logged("vehicle_local_position", "ref_lat", "ref_lon") == Home()[:2]
-    assert logged("vehicle_local_position", "eph", "epv", "xy_valid") == float32(
-        (said.horizontal_std, said.vertical_std, 1.0 if said.estimator_flags else 0.0)
-    )
+    assert logged("vehicle_local_position", "eph", "epv") == float32((said.horizontal_std, said.vertical_std))
+    assert logged("vehicle_local_position", "xy_valid", "v_xy_valid", "xy_global") == (0.0, 0.0, 0.0)
+    assert logged("vehicle_local_position", "z_valid", "v_z_valid", "z_global") == (1.0, 1.0, 1.0)
     assert vector("vehicle_attitude", "q", 4) == float32(quat_ned_frd_from_enu_flu(said.quat_wxyz))
     assert vector("vehicle_attitude_setpoint", "q_d", 4) == float32(
         quat_ned_frd_from_enu_flu(said.quat_c_wxyz)

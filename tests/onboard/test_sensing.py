@@ -7,13 +7,18 @@ from math import isnan
 import pytest
 
 from autopilot.onboard.snapshot import CoreSnapshot
-from autopilot.services.snapshot import GEOFENCE, Sortie
+from autopilot.services.identity import Identity
+from autopilot.services.snapshot import BARO, GEOFENCE, GPS, MAG, PREARM, TRACKER, Sortie
+from autopilot.services.telemetry import STREAMS
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff
 from sitl.messages import pressure_pa
 from tests.doubles.craft import Craft
+
+POSE_TRACKER, LOAD_TRACKER, GNSS_RECEIVER, BAROMETER = (1 << bit for bit in (1, 2, 4, 5))
+_estimator_status = STREAMS[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS].build
 
 
 def moment(craft: Craft) -> CoreSnapshot:
@@ -65,6 +70,45 @@ def test_the_test_ratios_are_those_of_the_readings_that_are_used() -> None:
     velocity, horizontal, vertical, magnetic = moment(craft).test_ratios
     assert 0.0 < horizontal == vertical < 1.0
     assert isnan(velocity) and isnan(magnetic)
+
+
+def fail_sensors(craft: Craft, failed: int) -> None:
+    """Fail these sensors: bits of SIM_SENS_FAIL."""
+    real32 = mavlink.MAV_PARAM_TYPE_REAL32
+    craft.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_SENS_FAIL", failed, real32))
+
+
+def test_a_load_that_is_not_tracked_is_no_loss_of_the_vehicle() -> None:
+    craft = Craft(sensors="lab")
+    craft.wait(1.0)
+    healthy, flags = moment(craft).sensors_healthy, moment(craft).estimator_flags
+    fail_sensors(craft, LOAD_TRACKER)
+    craft.wait(2.5)
+    lost = moment(craft)
+    assert not lost.ready, "the load is missing"
+    assert lost.sensors_healthy == healthy & ~PREARM
+    assert (lost.estimator_flags, lost.gps and lost.gps.fix_type) == (flags, mavlink.GPS_FIX_TYPE_3D_FIX)
+    fail_sensors(craft, POSE_TRACKER)
+    craft.wait(1.0)
+    lost = moment(craft)
+    assert not lost.sensors_healthy & (TRACKER | GPS | MAG | BARO)
+    assert (lost.estimator_flags, lost.gps) == (mavlink.ESTIMATOR_ATTITUDE, None)
+
+
+def test_without_fixes_the_estimator_knows_height_and_attitude_and_without_a_barometer_the_attitude() -> None:
+    craft = Craft(sensors="rtk")
+    craft.run(lambda craft: moment(craft).ready, 20.0)
+    fail_sensors(craft, GNSS_RECEIVER)
+    craft.wait(2.5)
+    height = mavlink.ESTIMATOR_POS_VERT_ABS | mavlink.ESTIMATOR_VELOCITY_VERT
+    assert moment(craft).estimator_flags == mavlink.ESTIMATOR_ATTITUDE | height
+    (status,) = _estimator_status(moment(craft), Identity())
+    assert (isnan(status.pos_horiz_accuracy), 0.0 < status.pos_vert_accuracy < 0.1) == (True, True)
+    fail_sensors(craft, GNSS_RECEIVER | BAROMETER)
+    craft.wait(2.5)
+    assert moment(craft).estimator_flags == mavlink.ESTIMATOR_ATTITUDE
+    (status,) = _estimator_status(moment(craft), Identity())
+    assert isnan(status.pos_horiz_accuracy) and isnan(status.pos_vert_accuracy)
 
 
 def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:

@@ -64,7 +64,7 @@ def test_odometry_is_the_estimate_and_says_what_it_does_not_know(snap):
         quat_wxyz=(half, 0.0, 0.0, half),  # nose to the north
         horizontal_std=0.1,
         vertical_std=0.2,
-        estimator_flags=1,
+        estimator_flags=m.ESTIMATOR_POS_HORIZ_ABS,
     )
     (said,) = sent(snapshot, m.MAVLINK_MSG_ID_ODOMETRY)
     assert (said.frame_id, said.child_frame_id) == (m.MAV_FRAME_LOCAL_NED, m.MAV_FRAME_LOCAL_NED)
@@ -78,8 +78,9 @@ def test_odometry_is_the_estimate_and_says_what_it_does_not_know(snap):
     assert known == pytest.approx({0: 0.01, 6: 0.01, 11: 0.04}, rel=FLOAT32_REL)
     assert all(map(math.isnan, said.velocity_covariance))
     assert (said.estimator_type, said.quality) == (m.MAV_ESTIMATOR_TYPE_AUTOPILOT, 0)
-    (lost,) = sent(snap(NOW_US), m.MAVLINK_MSG_ID_ODOMETRY)
-    assert lost.quality == -1
+    for flags in (0, m.ESTIMATOR_ATTITUDE | m.ESTIMATOR_POS_VERT_ABS):
+        (lost,) = sent(snap(NOW_US, estimator_flags=flags), m.MAVLINK_MSG_ID_ODOMETRY)
+        assert lost.quality == -1
 
 
 def test_outputs_are_those_of_servo_output_raw(snap):
