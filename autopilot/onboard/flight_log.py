@@ -7,7 +7,6 @@ axes FRD, units SI, as in PX4. The log contains what the autopilot knows, not th
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
@@ -15,7 +14,7 @@ from typing import NamedTuple
 
 from autopilot.onboard.log_records import SampleRecords
 from autopilot.onboard.log_topics import FAST, SLOW, Numbers, Sample
-from autopilot.services.files import LOG_FOLDER, LOG_SUFFIX, Path
+from autopilot.services.files import LOG_FOLDER, LOG_NAME, LOG_SUFFIX, LOG_TIME, Path
 from autopilot.services.streams import NEVER_US
 from autopilot.wire import ulog
 from autopilot.wire.convert.geodesy import Home
@@ -27,7 +26,6 @@ TAIL_US = 1_000_000  # for which the log continues after disarming
 SLOW_PERIOD_US = 1_000_000  # between two records of the slow topics
 MAX_WAITING_BYTES = 4 * 2**20  # bytes that the shell has not taken; beyond that, records are dropped
 MAX_EARLY_TEXTS = 20  # texts sent before arming with which the log begins
-_NAME = re.compile(rf"(\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d)(?:_(\d+))?{re.escape(LOG_SUFFIX)}")
 _FLOAT32_MAX = 3.4028234663852886e38
 
 
@@ -242,7 +240,7 @@ class FlightLog:
 
 def _next_name(unix_us: int, used_names: Iterable[str]) -> str:
     """The UTC time as a file name that is sorted behind those of all earlier logs, whatever the clock was."""
-    earlier = [match.groups(default="0") for match in map(_NAME.fullmatch, used_names) if match]
+    earlier = [match.groups(default="0") for match in map(LOG_NAME.fullmatch, used_names) if match]
     following = [(stem, int(count) + 1) for stem, count in earlier]
     stem, count = max([(_utc(unix_us // 1_000_000), 0), *following])
     return f"{stem}_{count:03}{LOG_SUFFIX}" if count else f"{stem}{LOG_SUFFIX}"
@@ -250,7 +248,7 @@ def _next_name(unix_us: int, used_names: Iterable[str]) -> str:
 
 def _utc(unix_s: int) -> str:
     """2026-01-31_12-30-59."""
-    return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d_%H-%M-%S")
+    return datetime.fromtimestamp(unix_s, UTC).strftime(LOG_TIME)
 
 
 def _clipped_to_float32(value: float) -> float:

@@ -21,6 +21,7 @@ from autopilot.core.health import (
     voltage,
 )
 from autopilot.core.sensor_inbox import SensorInbox, SlowSensors
+from autopilot.estimation.filter import MAX_FIX_AGE_S
 from autopilot.estimation.records import (
     FIX,
     MAGNETIC,
@@ -64,6 +65,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 TRACKER_TIMEOUT_S = 0.5  # a tracker is healthy while its last reading is younger
 UNARMED = (Phase.DISARMED, Phase.FAILSAFE)  # the rotors stand
+_FIX_TIMEOUT_US = round(MAX_FIX_AGE_S * 1e6)  # after this time, a receiver that is silent has no fix
+_NO_VELOCITY = (nan, nan, nan)
 _UNKNOWN_COUNT = 255  # number of satellites of a fix without a receiver: unknown
 
 _PHASE_MODES = {
@@ -146,7 +149,8 @@ def mission_state(flight: Flight, items: int) -> int:
         return mavlink.MISSION_STATE_NO_MISSION
     if flight.mission.active:
         return mavlink.MISSION_STATE_ACTIVE
-    if flight.mission.done:
+    begins_when_armed = flight.phase in ON_GROUND and flight.action_when_armed == ActionWhenArmed.MISSION
+    if flight.mission.done and not (flight.mission.waiting or begins_when_armed):
         return mavlink.MISSION_STATE_COMPLETE
     if flight.phase not in ON_GROUND and (flight.mission.step > 0 or flight.mission.step_anchor is not None):
         return mavlink.MISSION_STATE_PAUSED
@@ -516,6 +520,9 @@ def _gps(m: CoreSnapshot) -> tuple[Any, ...]:
     if m.source.has_fix:
         gps = unpack(HilGps, m.source.readings.fix, 0)
         position = (gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std)
+        if m.now_us - m.condition.fix_us > _FIX_TIMEOUT_US:
+            lost = (mavlink.GPS_FIX_TYPE_NO_FIX, gps.position, _NO_VELOCITY, nan, nan, _UNKNOWN_COUNT)
+            return (GpsFix(gps.time_us, *lost),)
         return (GpsFix(gps.time_us, gps.fix_type, *position, gps.satellites),)
     if m.fake_gps and is_tracked(m.estimator):
         fix_type, accuracy = mavlink.GPS_FIX_TYPE_3D_FIX, (m.horizontal_std, m.vertical_std)

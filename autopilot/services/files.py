@@ -6,7 +6,9 @@ card without a disk, for tests and for flights inside one process.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from enum import IntEnum
 from errno import ENAMETOOLONG
 from typing import NamedTuple, Protocol
@@ -16,6 +18,9 @@ Path = tuple[str, ...]  # names from the root downwards; () is the root itself
 MAX_NAME_BYTES = 255  # bytes of one name, as on any common disk
 LOG_FOLDER: Path = ("log",)  # of the card
 LOG_SUFFIX = ".ulg"
+LOG_TIME = "%Y-%m-%d_%H-%M-%S"  # the UTC time at which a log begins, with which its name begins
+# that time, and the number of a log that has begun in the same second as another
+LOG_NAME = re.compile(rf"(\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d)(?:_(\d+))?{re.escape(LOG_SUFFIX)}")
 
 
 class ErrorCode(IntEnum):
@@ -49,6 +54,17 @@ class Entry(NamedTuple):
     size: int
     is_folder: bool
     modified_s: int = 0
+
+
+def log_begin_s(log: Entry) -> int:
+    """When a log began, by its name, s since 1970; for a file with another name, when it was modified."""
+    match = LOG_NAME.fullmatch(log.name)
+    if match is None:
+        return log.modified_s
+    try:
+        return round(datetime.strptime(match[1], LOG_TIME).replace(tzinfo=UTC).timestamp())
+    except ValueError:  # no date
+        return log.modified_s
 
 
 class Card(Protocol):

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from autopilot.services.file_tree import FileTree
-from autopilot.services.files import LOG_FOLDER, LOG_SUFFIX, Entry, FileError
+from autopilot.services.files import LOG_FOLDER, LOG_SUFFIX, Entry, FileError, log_begin_s
 from autopilot.services.records import Decide, Link, Output, Peer, Send
 from autopilot.services.streams import NEVER_US
+from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.dialect import plumbline as mavlink
 
 BLOCK = 90  # LOG_DATA.data
@@ -57,7 +58,7 @@ class LogService:
         last = len(logs) - 1
         client.entries = deque(
             mavlink.MAVLink_log_entry_message(
-                number, len(logs), last, min(log.modified_s, _UINT32), min(log.size, _UINT32)
+                number, len(logs), last, saturated(log_begin_s(log), 0, _UINT32), min(log.size, _UINT32)
             )
             for number, log in enumerate(logs)
             if message.start <= number <= message.end

@@ -85,13 +85,14 @@ def scaled_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def scaled_pressure(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    """SCALED_PRESSURE of the barometer, if one is carried."""
+    """SCALED_PRESSURE of the barometer, if one is carried, with the time of its last reading."""
     readings = s.readings
     if readings is None or readings.pressure_us < 0:
         return ()
     temperature = _within(readings.temperature_degC, 100.0)
     pressure = readings.pressure_pa * 0.01
-    return (mavlink.MAVLink_scaled_pressure_message(boot_ms(s.now_us), pressure, 0.0, temperature),)
+    read_ms = boot_ms(readings.pressure_us)
+    return (mavlink.MAVLink_scaled_pressure_message(read_ms, pressure, 0.0, temperature),)
 
 
 def _diagonal(first: Vec3) -> tuple[float, ...]:

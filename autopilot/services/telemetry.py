@@ -201,18 +201,22 @@ def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     )
 
 
+def _in_mission_mode(s: Snapshot) -> bool:
+    """Whether the mode is the one that flies the mission."""
+    return (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
+
+
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     total = _UINT16
     if s.mission_total:  # without home, where home is an item: the last item has this number
         total = uint16(s.mission_total - identity.flavour.home_is_item)
-    in_mission_mode = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
     mission, fence, rally = s.plan_ids
     return (
         mavlink.MAVLink_mission_current_message(
             uint16(s.mission_current),
             total,
             s.mission_state,
-            mission_mode=_IN_MISSION_MODE if in_mission_mode else _SUSPENDED,
+            mission_mode=_IN_MISSION_MODE if _in_mission_mode(s) else _SUSPENDED,
             mission_id=mission,
             fence_id=fence,
             rally_points_id=rally,
@@ -487,6 +491,7 @@ WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
         s.mission_current,
         s.mission_total,
         s.mission_state,
+        _in_mission_mode(s),
         s.plan_ids,
     ),
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.home_position),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isnan
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from autopilot.services.identity import Identity
 from autopilot.services.snapshot import BARO, GEOFENCE, GPS, MAG, PREARM, TRACKER, Sortie
 from autopilot.services.telemetry import STREAMS
 from autopilot.supervisor.state import Phase
+from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff
@@ -18,7 +20,16 @@ from sitl.messages import pressure_pa
 from tests.doubles.craft import Craft
 
 POSE_TRACKER, LOAD_TRACKER, GNSS_RECEIVER, BAROMETER = (1 << bit for bit in (1, 2, 4, 5))
-_estimator_status = STREAMS[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS].build
+ESTIMATOR_STATUS, GPS_RAW_INT = (
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+)
+
+
+def told(craft: Craft, message_id: int) -> Any:
+    """The message of a stream as a ground station receives it now."""
+    (message,) = STREAMS[message_id].build(moment(craft), Identity())
+    return decode(FrameWriter(1, 1).frame(message))[0][0].message
 
 
 def moment(craft: Craft) -> CoreSnapshot:
@@ -102,13 +113,34 @@ def test_without_fixes_the_estimator_knows_height_and_attitude_and_without_a_bar
     craft.wait(2.5)
     height = mavlink.ESTIMATOR_POS_VERT_ABS | mavlink.ESTIMATOR_VELOCITY_VERT
     assert moment(craft).estimator_flags == mavlink.ESTIMATOR_ATTITUDE | height
-    (status,) = _estimator_status(moment(craft), Identity())
+    status = told(craft, ESTIMATOR_STATUS)
     assert (isnan(status.pos_horiz_accuracy), 0.0 < status.pos_vert_accuracy < 0.1) == (True, True)
     fail_sensors(craft, GNSS_RECEIVER | BAROMETER)
     craft.wait(2.5)
     assert moment(craft).estimator_flags == mavlink.ESTIMATOR_ATTITUDE
-    (status,) = _estimator_status(moment(craft), Identity())
+    status = told(craft, ESTIMATOR_STATUS)
     assert isnan(status.pos_horiz_accuracy) and isnan(status.pos_vert_accuracy)
+
+
+def test_a_receiver_that_falls_silent_has_no_fix() -> None:
+    craft = Craft(sensors="rtk")
+    craft.wait(3.0)
+    before = told(craft, GPS_RAW_INT)
+    assert (before.fix_type, before.satellites_visible) == (mavlink.GPS_FIX_TYPE_RTK_FIXED, 20)
+    fail_sensors(craft, GNSS_RECEIVER)
+    craft.wait(1.8)
+    bridged = told(craft, GPS_RAW_INT)
+    assert bridged.fix_type == mavlink.GPS_FIX_TYPE_RTK_FIXED, "the inertial unit bridges 2 s"
+    craft.wait(0.7)
+    lost = told(craft, GPS_RAW_INT)
+    assert (lost.fix_type, lost.satellites_visible) == (mavlink.GPS_FIX_TYPE_NO_FIX, 255)
+    assert (lost.eph, lost.epv, lost.vel, lost.cog) == (65535,) * 4
+    assert (lost.h_acc, lost.v_acc) == (0, 0), "unknown"
+    assert (lost.time_usec, lost.lat) == (bridged.time_usec, bridged.lat), "those of the last fix"
+    fail_sensors(craft, 0)
+    craft.wait(0.5)
+    again = told(craft, GPS_RAW_INT)
+    assert again.fix_type == mavlink.GPS_FIX_TYPE_RTK_FIXED
 
 
 def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:

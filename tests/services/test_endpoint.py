@@ -162,6 +162,7 @@ def test_without_it_there_is_one_system(rig):
         ({"system_status": m.MAV_STATE_EMERGENCY}, "HEARTBEAT"),
         ({"landed_state": m.MAV_LANDED_STATE_IN_AIR}, "EXTENDED_SYS_STATE"),
         ({"mission_state": m.MISSION_STATE_ACTIVE}, "MISSION_CURRENT"),
+        ({"main_mode": AUTO, "sub_mode": AUTO_MISSION}, "MISSION_CURRENT"),
     ],
 )
 def test_a_change_is_told_within_two_ticks_of_the_fastest_stream(rig, change, message):

@@ -6,11 +6,12 @@ import os
 import random
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.services.file_tree import FileTree
-from autopilot.services.files import MemoryCard
+from autopilot.services.files import Entry, MemoryCard
 from autopilot.services.logs import BLOCK, BLOCKS_PER_TICK, LogService
 from autopilot.services.records import Peer, Send, Verdict
 from autopilot.services.streams import NEVER_US
@@ -85,6 +86,23 @@ def test_the_list_tells_every_log_or_those_asked_for() -> None:
         (2, 3, 2, 3),
     ]
     assert [e.id for e in rig.list(1, 1)] == [1]
+
+
+@pytest.mark.parametrize(
+    ("name", "begin_s"),
+    [
+        ("2026-01-31_12-30-59.ulg", 1_769_862_659),
+        ("2026-01-31_12-30-59_002.ulg", 1_769_862_659),
+        ("2026-13-31_12-30-59.ulg", 77),  # no date
+        ("1960-01-31_12-30-59.ulg", 0),  # before the first time of the field
+        ("log100.ulg", 77),
+    ],
+)
+def test_a_log_has_the_time_at_which_it_began(name: str, begin_s: int) -> None:
+    """Not that at which it was written last: that of a log that is being written advances."""
+    rig = Rig(b"")
+    rig.tree.card.entries = lambda path: [Entry(name, 10, False, 77)]  # type: ignore[method-assign,assignment,misc]
+    assert [entry.time_utc for entry in rig.list()] == [begin_s]
 
 
 def test_a_whole_log_ends_with_a_short_block() -> None:

@@ -45,6 +45,12 @@ def test_only_what_has_read_of_late_counts_as_updated(snap):
     assert sent(snap(NOW_US, readings=stale), m.MAVLINK_MSG_ID_SCALED_PRESSURE) == []
 
 
+def test_a_pressure_that_was_read_long_ago_has_the_time_of_its_reading(snap):
+    old = READ._replace(pressure_us=NOW_US - 900_000)
+    (air,) = sent(snap(NOW_US, readings=old), m.MAVLINK_MSG_ID_SCALED_PRESSURE)
+    assert air.time_boot_ms == (NOW_US - 900_000) // 1000
+
+
 def test_a_vehicle_that_has_not_sensed_yet_says_nothing_of_it(snap):
     for message_id in (
         m.MAVLINK_MSG_ID_HIGHRES_IMU,

@@ -171,6 +171,13 @@ def test_gps_is_the_receiver_not_the_estimate(snap):
     assert (gps.h_acc, gps.v_acc, gps.alt_ellipsoid) == (1500, 2500, gps.alt)
 
 
+@pytest.mark.parametrize(("std", "accuracy_mm"), [(0.00023, 1), (0.0, 1), (0.0026, 3), (math.nan, 0)])
+def test_an_accuracy_below_a_millimetre_is_not_unknown(snap, std, accuracy_mm):
+    fix = GpsFix(3000, 3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), std, std, 255)
+    (gps,) = sent(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, snap(gps=fix))
+    assert (gps.h_acc, gps.v_acc) == (accuracy_mm, accuracy_mm)
+
+
 def test_a_lost_fix_has_no_dilution(snap):
     lost = GpsFix(3000, mavlink.GPS_FIX_TYPE_NO_FIX, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), math.inf, math.nan, 2)
     (gps,) = sent(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, snap(gps=lost))

@@ -124,6 +124,18 @@ def test_a_complete_mission_is_at_its_last_item_until_the_vehicle_stands_disarme
     assert in_air[-1] == 2
 
 
+def test_a_complete_mission_that_is_to_begin_again_is_not_complete() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_COMPLETE
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_NOT_STARTED
+    waiting = replace(sky.flight, phase=Phase.ARMED, mission=replace(sky.flight.mission, waiting=True))
+    assert flight_status(waiting, 3).mission_state == mavlink.MISSION_STATE_NOT_STARTED
+    sky.ask(Arm(arm=True, force=False))
+    assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_ACTIVE
+
+
 def test_a_speed_is_changed_back() -> None:
     sky = Sky()
     for asked, flown in ((0.7, 0.7), (None, sky.settings.motion.speed_m_s)):

@@ -173,6 +173,11 @@ def global_position_int_message(
     return _GLOBAL_POSITION_INT, global_position_int_values(now_us, position, velocity, heading, home)
 
 
+def _accuracy_mm(std: float) -> int:
+    """An accuracy of GPS_RAW_INT, for a standard deviation in m; 0: unknown."""
+    return 0 if math.isnan(std) else saturated(std * 1000.0, 1, _UINT32)
+
+
 def gps_raw_int_message(
     now_us: int,
     fix_type: int,
@@ -183,22 +188,24 @@ def gps_raw_int_message(
     satellites: int,
     home: Home,
 ) -> Fields:
-    """GPS_RAW_INT, with the standard deviations in m as its accuracies; the ellipsoid lies at sea level."""
+    """GPS_RAW_INT, with the standard deviations in m as its accuracies (NaN: unknown, as in the velocity);
+    the ellipsoid lies at sea level."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, _ = ned_from_enu(velocity)
+    speed = math.hypot(north, east)
     return _GPS_RAW_INT, (
         now_us,
         latitude,
         longitude,
         altitude,
         *(_DILUTIONS if fix_type >= mavlink.GPS_FIX_TYPE_2D_FIX else _NO_DILUTIONS),
-        saturated(math.hypot(north, east) * 100.0, 0, 0xFFFE),
+        0xFFFF if math.isnan(speed) else saturated(speed * 100.0, 0, 0xFFFE),
         course_cdeg(north, east),
         fix_type,
         saturated(satellites, 0, 255),
         altitude,
-        saturated(horizontal_std * 1000.0, 0, _UINT32),
-        saturated(vertical_std * 1000.0, 0, _UINT32),
+        _accuracy_mm(horizontal_std),
+        _accuracy_mm(vertical_std),
         *_NO_ACCURACIES,
     )
 
