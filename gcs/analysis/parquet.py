@@ -83,7 +83,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         "cable_slack_events": truth.slack_events,
         **_component_columns("vehicle_true", "m", samples.vehicle_m),
         **_component_columns("vehicle_estimated", "m", linear(estimate.time_s, estimate.vehicle_m, t)),
-        **_component_columns("vehicle_velocity_true", "m_s", truth.vehicle_m_s),
+        **_component_columns("vehicle_velocity_true", "m_s", samples.vehicle_m_s),
         **_component_columns("vehicle_quaternion", "", samples.quat_wxyz, ("w", "x", "y", "z")),
         **_component_columns(
             "vehicle_angle", "rad", roll_pitch_yaw(samples.quat_wxyz), ("roll", "pitch", "yaw")

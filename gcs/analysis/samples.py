@@ -11,7 +11,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.align import as_of, hermite, linear
 from gcs.analysis.axes import Floats
 from gcs.analysis.release import attached, cable_length
-from gcs.analysis.tracks import Ints, Telemetry
+from gcs.analysis.tracks import Ints, Telemetry, VelocityTrack
 
 UNKNOWN = -1
 
@@ -60,6 +60,7 @@ class Samples:
     estimated_m: Floats  # (n, 3) load position as estimated by the autopilot
     filtered_m: Floats  # (n, 3) the same from the built-in filter, in flights with a custom estimator
     vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
+    vehicle_m_s: Floats  # (n, 3) true vehicle velocity
     quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
 
     @property
@@ -102,6 +103,14 @@ def _integers_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
     return np.where(np.isnan(found), UNKNOWN, found).astype(np.int64)
 
 
+def _vehicle_velocity(telemetry: Telemetry) -> Floats:
+    """(n, 3) true velocity of the vehicle at the stamps of the true load: that of the upper end of the cable,
+    which is not rounded, where it agrees with the rounded velocity of the vehicle; elsewhere the latter."""
+    truth, rounded = telemetry.load_truth, telemetry.velocity_truth
+    coarse, fine = linear(rounded.time_s, rounded.velocity_m_s, truth.time_s), truth.attachment_m_s
+    return np.where(np.abs(fine - coarse) <= 0.5 * VelocityTrack.STEP_M_S, fine, coarse)
+
+
 def samples_of(telemetry: Telemetry) -> Samples:
     """The samples of a flight. Setpoint and estimate are sent on the same ticks as the truth; only gaps are
     interpolated."""
@@ -136,5 +145,6 @@ def samples_of(telemetry: Telemetry) -> Samples:
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
         filtered_m=hermite(filtered.time_s, filtered.position_m, filtered.velocity_m_s, time_s),
         vehicle_m=truth.vehicle_m,
+        vehicle_m_s=_vehicle_velocity(telemetry),
         quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),
     )

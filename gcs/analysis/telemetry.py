@@ -30,6 +30,7 @@ from gcs.analysis.tracks import (
     SnapTrack,
     StatusText,
     Telemetry,
+    VelocityTrack,
     WindTrack,
 )
 from gcs.analysis.vehicle_setup import SETUP_MESSAGES, VEHICLE_SYSTEM, VehicleSetup
@@ -298,6 +299,9 @@ def _assemble(
         rotors_commanded=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
         attitude_truth=_attitude(
             hil["time_usec"] * _MICRO, hil["attitude_quaternion"], hil["rollspeed pitchspeed yawspeed"]
+        ),
+        velocity_truth=_sorted(
+            VelocityTrack(hil["time_usec"] * _MICRO, VelocityTrack.STEP_M_S * enu_from_ned(hil["vx vy vz"]))
         ),
         attitude_estimated=_attitude(
             attitude["time_boot_ms"] * 1e-3,

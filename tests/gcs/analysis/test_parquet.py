@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from autopilot.onboard.onboard import Onboard
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.parquet import flight_columns
@@ -14,6 +15,7 @@ from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.closed_loop import Conditions, fly
 from missions.fileformat import load_mission
+from sitl.hil import HilSimulator
 from tests.doubles import recorded_flights as flights
 
 
@@ -43,6 +45,28 @@ def test_velocity_estimates_command_and_wind_belong_to_the_true_motion(tmp_path:
     for angle in ("roll", "pitch", "yaw"):
         estimated = column(f"vehicle_angle_estimated_{angle}_rad")
         assert estimated == pytest.approx(column(f"vehicle_angle_{angle}_rad"), abs=5e-3)
+
+
+def test_the_vehicle_velocity_is_the_simulators_also_at_impacts(tmp_path: Path) -> None:
+    log = tmp_path / "flight.tlog"
+    velocities: dict[float, tuple[float, ...]] = {}
+    was_slack = []
+
+    def watch(_: Onboard, simulator: HilSimulator) -> bool:
+        velocities[simulator.now_us] = simulator.core.state.v_quad
+        was_slack.append(not simulator.core.state.taut)
+        return True
+
+    with log.open("wb") as file:
+        mission = load_mission("hover")
+        assert fly(mission, Conditions(), TlogWriter(file), watch).name == "completed"
+    telemetry = load_telemetry(log)
+    table = flight_columns(telemetry, samples_of(telemetry))
+    true = np.array([velocities[us] for us in np.round(table["time_s"] * 1e6).astype(int).tolist()])
+    assert np.diff(was_slack).sum() >= 2, "it came taut and went slack"
+    for i, axis in enumerate("xyz"):
+        # half a step of HIL_STATE_QUATERNION, in single precision
+        assert table[f"vehicle_velocity_true_{axis}_m_s"] == pytest.approx(true[:, i], abs=5.001e-3), axis
 
 
 @pytest.mark.parametrize(
