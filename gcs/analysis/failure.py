@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.analysis.samples import AIRBORNE, Samples, phase_at
+from gcs.analysis.samples import AIRBORNE, Samples, given_up_s, phase_at
 from gcs.analysis.tracks import Telemetry
 
 _TOLD_S = 0.5  # between a failure and the end of the mission by it, at most
@@ -21,10 +21,27 @@ def failure_s(telemetry: Telemetry, samples: Samples) -> float | None:
     """
     mission = samples.time_s[samples.in_mission]
     told = np.array([text.time_s for text in telemetry.texts if text.text.startswith(_TEXTS)])
-    given_up = telemetry.setpoint.time_s[telemetry.setpoint.phase == mavlink.PLUMBLINE_PHASE_FAILSAFE]
-    times = np.concatenate([told[np.isin(phase_at(telemetry, told), AIRBORNE)], given_up[:1]])
+    times = np.append(told[np.isin(phase_at(telemetry, told), AIRBORNE)], _failsafe_s(telemetry))
     times = times[times >= mission[-1] - _TOLD_S] if len(mission) else times
-    return float(times.min()) if len(times) else None
+    failed_s = min(times.min(initial=np.inf), given_up_s(telemetry))
+    return float(failed_s) if np.isfinite(failed_s) else None
+
+
+def lost_s(telemetry: Telemetry) -> float:
+    """Time (s) from which a flight counts as diverged: the vehicle entered FAILSAFE, or reported in the air
+    what is critical; infinite if it did neither."""
+    critical = np.array(
+        [text.time_s for text in telemetry.texts if text.severity <= mavlink.MAV_SEVERITY_CRITICAL]
+    )
+    reported = critical[np.isin(phase_at(telemetry, critical), AIRBORNE)]
+    return float(min(_failsafe_s(telemetry), reported.min(initial=np.inf)))
+
+
+def _failsafe_s(telemetry: Telemetry) -> float:
+    """Time (s) at which the vehicle entered FAILSAFE; infinite if it did not."""
+    setpoint = telemetry.setpoint
+    entered = setpoint.time_s[setpoint.phase == mavlink.PLUMBLINE_PHASE_FAILSAFE]
+    return float(entered.min(initial=np.inf))
 
 
 def after_failure(samples: Samples, failed_s: float) -> NDArray[np.bool_]:

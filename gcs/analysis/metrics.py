@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, swing, tilt
-from gcs.analysis.failure import after_failure, failure_s
+from gcs.analysis.failure import after_failure, failure_s, lost_s
 from gcs.analysis.samples import (
     AIRBORNE,
     ATTITUDE_MODES,
@@ -21,6 +21,7 @@ from gcs.analysis.samples import (
     HOLD,
     MISSION,
     Samples,
+    given_up_s,
     in_window,
     phase_at,
 )
@@ -46,11 +47,13 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values * values)))
 
 
-def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
-    """Durations on the vehicle's clock, and their ratio to wall time."""
+def time_numbers(telemetry: Telemetry, wall_s: float | None, diverged: bool) -> Numbers:
+    """Durations on the vehicle's clock, and their ratio to wall time. A flight that `diverged` is recorded
+    for a moment longer, in which nothing is flown any more."""
     setpoint = telemetry.setpoint
-    airborne = np.flatnonzero(np.isin(setpoint.phase, AIRBORNE))
-    in_mission = setpoint.phase[:-1] == MISSION
+    flown = setpoint.time_s <= (lost_s(telemetry) if diverged else np.inf)
+    airborne = np.flatnonzero(np.isin(setpoint.phase, AIRBORNE) & flown)
+    in_mission = (setpoint.phase == MISSION)[:-1] & flown[1:]
     span = telemetry.span_s
     recorded = None if span is None else span[1] - span[0]
     return {
@@ -165,6 +168,7 @@ def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
     swing_max = _statistic(swing(truth.q_cable[window]), np.max)
     went_slack = np.diff(truth.slack_events, prepend=truth.slack_events[:1]) % _COUNTER_RANGE
     carried = np.isin(samples.phase, CARRIED) & samples.attached
+    carried &= samples.time_s <= given_up_s(telemetry)
     return {
         "tilt_max_deg": None if tilt_max is None else float(np.degrees(tilt_max)),
         "swing_max_deg": None if swing_max is None else float(np.degrees(swing_max)),

@@ -52,6 +52,7 @@ class FlightMeta:
 def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | None = None) -> Record:
     """Every key of METRICS, in that order, then report_dir (None here); None for unknown values."""
     samples = samples_of(telemetry) if samples is None else samples
+    outcome = meta.outcome or metrics.outcome_of(telemetry, samples)
     found: Record = {
         "mission": meta.mission,
         "law": meta.law,
@@ -60,8 +61,8 @@ def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | Non
         "sensors": meta.sensors,
         "vehicle": meta.vehicle,
         "seed": meta.seed,
-        "outcome": meta.outcome or metrics.outcome_of(telemetry, samples),
-        **metrics.time_numbers(telemetry, meta.wall_s),
+        "outcome": outcome,
+        **metrics.time_numbers(telemetry, meta.wall_s, outcome == "diverged"),
         **metrics.tracking_numbers(samples),
         **metrics.failure_numbers(telemetry, samples),
         **metrics.step_numbers(samples),

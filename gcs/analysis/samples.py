@@ -14,6 +14,7 @@ from gcs.analysis.release import attached, cable_length
 from gcs.analysis.tracks import Ints, Telemetry, VelocityTrack
 
 UNKNOWN = -1
+_EMERGENCY = mavlink.MAV_SEVERITY_EMERGENCY
 
 HOLD = mavlink.PLUMBLINE_PHASE_HOLD
 MISSION = mavlink.PLUMBLINE_PHASE_MISSION
@@ -89,13 +90,21 @@ def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
     return _integers_as_of(telemetry, telemetry.setpoint.phase, at_s)
 
 
+def given_up_s(telemetry: Telemetry) -> float:
+    """Time (s) at which the vehicle reported, in the air, that the flight cannot continue; infinite if it did
+    not. Its phase may stay the same while it falls."""
+    texts = np.array([text.time_s for text in telemetry.texts if text.severity == _EMERGENCY])
+    return float(texts[np.isin(phase_at(telemetry, texts), AIRBORNE)].min(initial=np.inf))
+
+
 def in_window(telemetry: Telemetry, at_s: Floats) -> NDArray[np.bool_]:
-    """(n,) the mission window: the setpoint in force has phase MISSION.
+    """(n,) the mission window: the setpoint in force has phase MISSION, and the flight is not given up.
 
     In a flight without that phase (the load was only lifted and held), the window is phase HOLD.
     """
     has_mission = bool((telemetry.setpoint.phase == MISSION).any())
-    return np.asarray(phase_at(telemetry, at_s) == (MISSION if has_mission else HOLD))
+    in_phase = phase_at(telemetry, at_s) == (MISSION if has_mission else HOLD)
+    return np.asarray(in_phase & (at_s <= given_up_s(telemetry)))
 
 
 def _integers_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:

@@ -365,6 +365,27 @@ def test_the_figures_of_a_failure():
     assert found["outcome"] == "interrupted"
 
 
+def test_a_flight_that_cannot_continue_ends_with_that_report_whatever_its_phase():
+    """All rotors are needed: the vehicle falls while its phase is still MISSION."""
+    flight = flights.flight(4.0, flights.still)
+    mission = np.flatnonzero(flight.mission)
+    failed = mission[len(mission) // 2]
+    failed_s = float(flight.time_s[failed])
+    flight.actual[failed + 1 :, 2] -= 0.5
+    flight.psi_r[: failed + 1], flight.psi_r[failed + 1 :] = 0.125, 2.0
+    flight.slack_events[failed + 1 :] += 1
+    flight.texts.append((failed_s, 0, "Failsafe: rotor 1 lost, the others cannot fly it"))
+    found = record(flight, outcome="diverged")
+    begins_s = float(flight.time_s[mission[0]])
+    assert found["failure_s"] == pytest.approx(failed_s, abs=0.02)
+    assert found["load_error_max_m"] == pytest.approx(0.0, abs=1e-6)
+    assert found["psi_R_max"] == 0.125
+    assert found["slack_events"] == 0
+    assert found["mission_s"] == pytest.approx(failed_s - begins_s, abs=2.0 * flights.TICK_S)
+    airborne_s = float(flight.time_s[np.flatnonzero(flight.phase == mavlink.PLUMBLINE_PHASE_TAUTEN)[0]])
+    assert found["flight_s"] == pytest.approx(failed_s - airborne_s, abs=2.0 * flights.TICK_S)
+
+
 @pytest.mark.parametrize("change", ["no text", "before the mission ends"])
 def test_what_is_no_failure(change):
     flight = flights.landing_after_a_failure(0.03)
