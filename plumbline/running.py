@@ -17,6 +17,7 @@ from os import PathLike
 from types import TracebackType
 from typing import TypeVar
 
+from autopilot.trajectory.timeline import MIN_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import KEY_BYTES
 from gcs.clients import command
@@ -57,7 +58,7 @@ _MAX_STALL_S = 60.0  # how long the vehicle's clock may stand still while its he
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
-_STILL_S = 1.5  # twice the interval of WINCH_STATUS, and its delay
+_STILL_S = 1.5  # three times the interval of WINCH_STATUS
 _NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
     "holding": lambda state: state.phase == "hold",
@@ -252,9 +253,10 @@ class RunningVehicle:
         checked_m = number("length_m", length_m)
         checked_speed_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
         limit_s = positive("timeout_s", timeout_s)
+        reeled = _reeled(checked_m, self.state.cable_length_m)
         self._command(lambda session: command.winch(session.target, checked_m, checked_speed_m_s))
         if wait:
-            self.wait(_winch_stands(), limit_s)
+            self.wait(reeled, limit_s)
 
     def release(self) -> None:
         """Let the load go. In the air it falls, and the vehicle holds its position."""
@@ -453,16 +455,26 @@ class _Clock:
         return (monotonic_us() - self._changed_us) * 1e-6
 
 
-def _winch_stands() -> Condition:
-    """That winch and load have stood still for `_STILL_S`: longer than it takes until the vehicle, which may
-    have to stop first, reports that its winch moves."""
+def _reeled(length_m: float, before_m: float | None) -> Condition:
+    """That the winch has moved, and that winch and load have then stood still for `_STILL_S`.
+
+    The vehicle first has to stop, which can take longer than that. A short movement can lie between two
+    reports: it is seen by the length (`before_m` before the command). Below MIN_REEL_M the winch stays still.
+    """
     clock, still_since_s = _Clock(), 0.0
+    has_moved = abs(length_m) < MIN_REEL_M
 
     def condition(state: State) -> bool:
-        nonlocal still_since_s
+        nonlocal still_since_s, has_moved, before_m
         now_s = clock.elapsed_s(state)
+        if before_m is None:
+            before_m = state.cable_length_m
+        if state.cable_length_m is not None and before_m is not None:
+            has_moved = has_moved or abs(state.cable_length_m - before_m) >= 0.5 * abs(length_m)
+        has_moved = has_moved or state.winch_moving is True
         speed = state.load_speed_m_s
-        if state.winch_moving is not False or (speed is not None and speed > _SLOW_M_S):
+        is_still = state.winch_moving is False and not (speed is not None and speed > _SLOW_M_S)
+        if not (has_moved and is_still):
             still_since_s = now_s
         return now_s - still_since_s > _STILL_S
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -18,6 +19,8 @@ from gcs.clients.vehicle_view import VehicleView
 from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows.reposition import reposition
 from plumbline import RunningVehicle
+from plumbline.running import Condition, _reeled
+from plumbline.state import State
 
 WRONG: dict[str, tuple[Any, str]] = {
     "address": (lambda: plumbline.connect("14550x"), "address '14550x'; must be PORT, HOST:PORT, udpin:"),
@@ -73,6 +76,32 @@ def test_what_is_wrong_is_one_line(call: Any, says: str) -> None:
     with pytest.raises(plumbline.Error) as told:
         call()
     assert says in str(told.value) and "\n" not in str(told.value)
+
+
+def test_a_winch_is_awaited_while_the_vehicle_still_has_to_stop() -> None:
+    """From 3 s on, when the vehicle has stopped, the winch moves for 2 s."""
+    known = dict.fromkeys((one.name for one in fields(State)))
+
+    def state(time_s: float, moves: bool = True) -> State:
+        length_m = 0.7 + 0.3 * min(max(time_s - 3.0, 0.0), 2.0) / 2.0
+        moving = moves and 3.0 < time_s < 5.0
+        return State(
+            **{
+                **known,
+                "time_s": time_s,
+                "load_speed_m_s": 0.05,
+                "winch_moving": moving,
+                "cable_length_m": length_m,
+            }
+        )
+
+    def first(reeled: Condition, moves: bool = True) -> float:
+        times = (0.1 * i for i in range(1000))
+        return next(time_s for time_s in times if reeled(state(time_s, moves)))
+
+    assert 5.0 < first(_reeled(0.3, 0.7)) < 7.0
+    assert 5.0 < first(_reeled(0.3, None), False) < 7.0, "seen by the length alone"
+    assert first(_reeled(0.0, 0.7)) < 2.0, "nothing to move"
 
 
 def test_a_port_that_is_taken_and_free_again_after_a_failure() -> None:

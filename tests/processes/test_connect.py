@@ -73,8 +73,8 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
 
         vehicle.takeoff(1.0)
         assert vehicle.state.load_m == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
-        vehicle.goto(0.6, -0.4, 1.3, speed_m_s=1.0)
-        assert vehicle.state.load_m == pytest.approx((0.6, -0.4, 1.3), abs=0.15)
+        vehicle.goto(1.0, -0.5, 2.0)
+        assert vehicle.state.load_m == pytest.approx((1.0, -0.5, 2.0), abs=0.15)
         before_m = vehicle.state.cable_length_m
         with pytest.raises(plumbline.Error, match=r"Winch denied: .*; must be 0.01 \.\.\."):
             vehicle.winch(0.2, speed_m_s=9.0)
@@ -82,7 +82,7 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
         assert before_m is not None and vehicle.state.cable_length_m == pytest.approx(
             before_m + 0.2, abs=0.02
         )
-        assert vehicle.state.load_m == pytest.approx((0.6, -0.4, 1.1), abs=0.15)
+        assert vehicle.state.load_m == pytest.approx((1.0, -0.5, 1.8), abs=0.15)
         began_s = vehicle.state.time_s
         after_s = vehicle.wait(1.5).time_s
         assert began_s is not None and after_s is not None and after_s - began_s > 1.4
