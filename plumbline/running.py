@@ -17,7 +17,6 @@ from os import PathLike
 from types import TracebackType
 from typing import TypeVar
 
-from autopilot.trajectory.timeline import MIN_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import KEY_BYTES
 from gcs.clients import command
@@ -58,6 +57,7 @@ _MAX_STALL_S = 60.0  # how long the vehicle's clock may stand still while its he
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
+_LEAST_REEL_M = 1e-3  # for less the winch may stay still
 _STILL_S = 1.5  # three times the interval of WINCH_STATUS
 _NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
@@ -459,10 +459,10 @@ def _reeled(length_m: float, before_m: float | None) -> Condition:
     """That the winch has moved, and that winch and load have then stood still for `_STILL_S`.
 
     The vehicle first has to stop, which can take longer than that. A short movement can lie between two
-    reports: it is seen by the length (`before_m` before the command). Below MIN_REEL_M the winch stays still.
+    reports: it is seen by the length (`before_m` before the command).
     """
     clock, still_since_s = _Clock(), 0.0
-    has_moved = abs(length_m) < MIN_REEL_M
+    has_moved = abs(length_m) <= _LEAST_REEL_M
 
     def condition(state: State) -> bool:
         nonlocal still_since_s, has_moved, before_m

@@ -80,7 +80,7 @@ def test_what_is_wrong_is_one_line(call: Any, says: str) -> None:
 
 def test_a_winch_is_awaited_while_the_vehicle_still_has_to_stop() -> None:
     """From 3 s on, when the vehicle has stopped, the winch moves for 2 s."""
-    known = dict.fromkeys((one.name for one in fields(State)))
+    known = dict.fromkeys(one.name for one in fields(State))
 
     def state(time_s: float, moves: bool = True) -> State:
         length_m = 0.7 + 0.3 * min(max(time_s - 3.0, 0.0), 2.0) / 2.0

@@ -41,6 +41,7 @@ from autopilot.supervisor.state import (
     Setpoints,
     View,
 )
+from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, hanging, view
