@@ -16,6 +16,7 @@ from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError, write_error
 from gcs.folders import PAGE_FILE, TLOG_FILE, check_no_other_results, make_folder
+from gcs.foreign_mission import ForeignMission
 from gcs.mission_files import load
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
@@ -83,8 +84,11 @@ def fly(
     from autopilot.shell.options import MAX_SEED
     from gcs.workflows.in_process_flight import fly_in_process
 
-    given = Mission.of(mission) if isinstance(mission, model.Mission) else mission
-    mission_file = name_or_path("mission", given)
+    if isinstance(mission, ForeignMission):
+        mission_file = mission.name  # it is flown as it is
+    else:
+        given = Mission.of(mission) if isinstance(mission, model.Mission) else mission
+        mission_file = name_or_path("mission", given)
     flown = mission if isinstance(mission, model.Mission) else _load(mission_file)
     options = FlightOptions(
         mission=mission_file,

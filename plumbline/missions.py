@@ -72,6 +72,13 @@ class Mission(model.Mission):
             raise input_error(error) from None
         return cls.of(found)
 
+    def replace(self, **changes: Any) -> Mission:
+        """A copy with other values of the arguments of this class, by their names."""
+        given = ("name", "steps", "title", "description", "assumptions")
+        if unknown := sorted(set(changes) - set(given)):
+            raise GcsError(f"{unknown[0]}: a Mission has no such part; it has {', '.join(given)}")
+        return Mission(**{name: getattr(self, name) for name in given} | changes)
+
     @classmethod
     def of(cls, mission: model.Mission) -> Mission:
         """A mission as one that can be saved; it is checked like any other."""

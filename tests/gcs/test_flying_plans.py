@@ -117,6 +117,9 @@ def test_the_command_says_what_is_not_done_and_leaves_the_telemetry_of_the_same_
     assert telemetry["load_true_x_m"].max() == pytest.approx(0.5, abs=0.02)
     checked = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs")
     assert "survey: vehicle bebop can fly it" in checked.stdout
+    with pytest.warns(UserWarning, match="item 1, DO_SET_CAM_TRIGG_DIST"):
+        again = plumbline.fly(flight.mission)  # ends with a return, which no Mission does
+    assert again.telemetry().equals(telemetry)
 
 
 def test_a_sweep_flies_it(tmp_path: Path) -> None:

@@ -247,3 +247,12 @@ def test_a_mission_is_not_saved_under_the_ending_of_another_format(tmp_path: Pat
     with pytest.raises(plumbline.Error, match=r"a mission is written as TOML; name it there\.toml"):
         mission.save(tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_mission_with_other_steps_is_a_copy() -> None:
+    hover = Mission.load("hover")
+    longer = hover.replace(name="longer", steps=[*hover.steps[:-1], Delay(1.0), hover.steps[-1]])
+    assert (longer.name, longer.description, len(longer.steps)) == ("longer", hover.description, 4)
+    assert len(hover.steps) == 3
+    with pytest.raises(plumbline.Error, match="altitude: a Mission has no such part; it has name, steps"):
+        hover.replace(altitude=3.0)
