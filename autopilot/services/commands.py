@@ -125,7 +125,7 @@ def _as_integer(value: float) -> int | None:
 
 def _altitude_above_home(call: Call, context: Context) -> float | None:
     """param7 as height above home [m]; None for NaN."""
-    if not math.isfinite(call.z):
+    if math.isnan(call.z):
         return None
     above_sea = call.frame in _AMSL_FRAMES or (call.frame is None and not context.flavour.takeoff_above_home)
     return call.z - context.home.altitude_m if above_sea else call.z
@@ -159,6 +159,8 @@ def _arm(call: Call, context: Context) -> Request | Verdict:
 def _takeoff(call: Call, context: Context) -> Request | Verdict:
     if call.frame is not None and call.frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
         return _refused(f"Take-off: frame {call.frame}; must be 0, 3, 5 or 6")
+    if math.isinf(call.z):
+        return _refused(f"Take-off: altitude {call.z:g} m (param7); must be a number, or NaN: the default")
     altitude_m = _altitude_above_home(call, context)
     if altitude_m is not None and altitude_m <= 0.0:
         reference = "above home" if altitude_m == call.z else f"above sea level, {altitude_m:g} m above home"
@@ -239,6 +241,8 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
     if speed is not None and not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
         text = f"Reposition: speed (param1) = {speed:g} m/s; must be {_SPEED_LIMITS}"
         return _refused(f"{text}, or 0 or -1 (unchanged)")
+    if math.isinf(call.p[3]):
+        return _refused(f"Reposition: yaw (param4) = {call.p[3]:g} rad; must be a number, or NaN: unchanged")
     yaw = _yaw(call, context)
     if east is None and up is None and yaw is None:
         return Pause()  # ground stations send this for "hold here"
@@ -329,6 +333,9 @@ def _change_speed(call: Call, context: Context) -> Request | Verdict:
 
 
 def _set_home(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] not in (0.0, 1.0):
+        text = f"Set home: place (param1) = {call.p[0]:g}; must be 1 (here) or 0 (param5 ... param7)"
+        return _refused(text)
     if call.p[0] == 1.0:
         return SetHome(None)
     position = _position_enu(call, context)

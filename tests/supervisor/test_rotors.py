@@ -48,6 +48,7 @@ def test_of_four_none_can_be_missed() -> None:
     flight, report = advance(HOLDING, hanging(rotors_lost=1), settings_for("bebop"))
     assert flight.phase == Phase.HOLD
     assert [text for _, text in report.texts] == ["Failsafe: rotor 1 lost, the others cannot fly it"]
+    assert flight.is_failsafe, "as HEARTBEAT states"
 
 
 def test_which_rotors_the_hexarotor_can_miss_and_keep_its_heading() -> None:

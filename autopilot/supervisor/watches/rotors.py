@@ -22,7 +22,7 @@ def watch_rotors(flight: Flight, view: View, settings: Settings) -> WatchResult:
     rotor_names = f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
     if not settings.rotors.can_fly_without(lost):
         text = f"Failsafe: {rotor_names} lost, the others cannot fly it"
-        return WatchResult(flight, None, ((MAV_SEVERITY_EMERGENCY, text),))
+        return WatchResult(replace(flight, is_failsafe=True), None, ((MAV_SEVERITY_EMERGENCY, text),))
     loss_text = rotor_names + " lost"
     if not settings.rotors.can_hold_heading_without(lost):
         loss_text += ", heading given up"
