@@ -423,12 +423,16 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
     )
     vehicle = limits.vehicle
     gravity, usable = vehicle.gravity_m_s2, limits.usable_thrust_n
-    # a step that begins under the ground was already reported with the step that led there
-    if extremes.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
-        finding = f"the load would be {-extremes.height_low.value:.2f} m under the ground"
+    # a step that begins too low was already reported with the step that led there
+    lowest_m = extremes.height_low.value
+    least_m = MIN_HEIGHT_M if isinstance(entry.step, Signals) else 0.0
+    if lowest_m < min(entry.begin[2], least_m) - _GROUND_M:
+        finding = f"the load would be {-lowest_m:.2f} m under the ground"
+        if lowest_m >= 0.0:
+            finding = f"the load would be {lowest_m:.2f} m above the ground; it must be {least_m:g} m at least"
         lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
         advice = f"begin higher (altitude_m) or lower {lower}"
-        yield violation("height", extremes.height_low, 0.0, finding, advice)
+        yield violation("height", extremes.height_low, least_m, finding, advice)
     if fall.value >= gravity:
         # beyond this the cable would have to push: thrust and tilt then have no meaning
         finding = (

@@ -101,6 +101,14 @@ def test_under_the_ground() -> None:
     )
 
 
+def test_signals_carry_the_load_no_lower_than_a_waypoint_may() -> None:
+    """With its centre at the height of the ground it was 2 cm in it, and the check passed."""
+    for amplitude_m, problems in ((-1.7, 0), (-1.71, 1), (-2.0, 1)):
+        found = check(mission(Signals(12.0, (Term("z", amplitude_m, 0.0, 10.0, None, 0.0),))), LIMITS)
+        assert [one.quantity for one in found] == ["height"] * problems
+    assert "the load would be 0.00 m above the ground; it must be 0.3 m at least" in found[0].text
+
+
 def test_a_winch_that_reels_the_load_into_the_ground_is_told_of_its_length() -> None:
     (violation,) = check(mission(Winch(2.5, 1.0)), LIMITS)
     assert violation.text.endswith("0.50 m under the ground; begin higher (altitude_m) or lower length_m")
