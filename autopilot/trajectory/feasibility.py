@@ -427,9 +427,10 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
     lowest_m = extremes.height_low.value
     least_m = MIN_HEIGHT_M if isinstance(entry.step, Signals) else 0.0
     if lowest_m < min(entry.begin[2], least_m) - _GROUND_M:
-        finding = f"the load would be {-lowest_m:.2f} m under the ground"
-        if lowest_m >= 0.0:
-            finding = f"the load would be {lowest_m:.2f} m above the ground; it must be {least_m:g} m at least"
+        place = "above" if lowest_m >= 0.0 else "under"
+        finding = f"the load would be {abs(lowest_m):.2f} m {place} the ground"
+        if least_m:
+            finding += f"; it must be at least {least_m:g} m above"
         lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
         advice = f"begin higher (altitude_m) or lower {lower}"
         yield violation("height", extremes.height_low, least_m, finding, advice)

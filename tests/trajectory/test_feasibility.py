@@ -96,8 +96,8 @@ def test_under_the_ground() -> None:
     slow = Term("z", -3.0, 0.0, 10.0, None, 0.0)
     (violation,) = check(mission(Signals(12.0, (slow,))), LIMITS)
     assert violation.text == (
-        "items[1] (signals): at 10.0 s the load would be 1.00 m under the ground; begin higher (altitude_m) "
-        "or lower amplitude_m of z"
+        "items[1] (signals): at 10.0 s the load would be 1.00 m under the ground; it must be at least 0.3 m "
+        "above; begin higher (altitude_m) or lower amplitude_m of z"
     )
 
 
@@ -106,7 +106,7 @@ def test_signals_carry_the_load_no_lower_than_a_waypoint_may() -> None:
     for amplitude_m, problems in ((-1.7, 0), (-1.71, 1), (-2.0, 1)):
         found = check(mission(Signals(12.0, (Term("z", amplitude_m, 0.0, 10.0, None, 0.0),))), LIMITS)
         assert [one.quantity for one in found] == ["height"] * problems
-    assert "the load would be 0.00 m above the ground; it must be 0.3 m at least" in found[0].text
+    assert "the load would be 0.00 m above the ground; it must be at least 0.3 m above" in found[0].text
 
 
 def test_a_winch_that_reels_the_load_into_the_ground_is_told_of_its_length() -> None:
