@@ -54,7 +54,7 @@ TOUCH_HEIGHT = 0.12  # m over the ground at which lowering turns into creeping
 # while readings are missing: m, added to TOUCH_HEIGHT; factor of speed and acceleration
 BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR = 0.5, 2.0
 HEIGHT_SIGMAS = 3.0  # standard deviations by which a height may be wrong
-SAME_PLACE_M = 0.01
+SAME_PLACE_M = 0.01  # between the end of a return and the place to which it leads
 HOME_RADIUS = 1.0  # m around the place to return to, within which a return does not climb
 MAX_RALLY_CHECKS = 8  # of the nearest rally points: large fences take a tenth of a millisecond for each
 MIN_LOAD_HEIGHT = 0.3  # m over home, to which a load that was being lifted or lowered is raised first

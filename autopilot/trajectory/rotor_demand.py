@@ -64,10 +64,9 @@ def rotor_bounds(low: float, high: float, margin: float, hover: float) -> tuple[
 
 def gentler_bounds(body: Body, bounds: Bounds) -> Bounds | None:
     """Bounds that leave the share `_GENTLER` of the rotors' range free, beside what the bounds leave; None if
-    hover is not within them."""
-    reserve, hover = _GENTLER * bounds.rotor_range, body.hover_force
-    low = bounds.rotor_low + min(reserve, max(_LOW_RESERVE * (hover - bounds.rotor_low), 0.0))
-    high = bounds.rotor_high - reserve
+    hover is not within them, or nothing bounds the rotors."""
+    hover = body.hover_force
+    low, high = rotor_bounds(bounds.rotor_low, bounds.rotor_high, _GENTLER, hover)
     return bounds._replace(rotor_low=low, rotor_high=high) if low < hover < high < inf else None
 
 
