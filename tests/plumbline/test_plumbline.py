@@ -197,6 +197,10 @@ def test_an_argument_that_there_is_not_is_told_with_the_nearest(call: Callable[[
 
 
 WRONG: dict[str, tuple[Any, str]] = {
+    "a parameter of a law that does not fly": (
+        lambda: plumbline.fly(SHORT, vehicle=plumbline.Vehicle.load("bebop").replace(parameters={"G_K": 3})),
+        "or leave G_K out of the vehicle's parameters",
+    ),
     "mission": (lambda: plumbline.fly("cas-b"), "did you mean case-b?"),
     "law": (lambda: plumbline.fly("hover", law="pid"), "must be thesis, lqr, plumbline, or a file"),
     "sensors": (lambda: plumbline.fly("hover", sensors="laab"), "did you mean lab?"),
