@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -15,6 +16,7 @@ from pydantic import ValidationError
 from missions.model import Mission
 from missions.nearest import nearest
 from missions.schema import ITEMS, FileSpec, Item
+from missions.text_files import TextFileError, text_of
 from missions.toml_files import FileError, TomlFiles, format_value, problems
 
 
@@ -45,15 +47,16 @@ def load_mission(name_or_path: str | PathLike[str]) -> Mission:
 
 
 def parse_mission(text: str, name: str, where: str) -> Mission:
-    """The mission that a TOML text describes. `where` begins each line of a MissionFileError."""
+    """The mission that a TOML text describes. `where`, its file, begins each line of a MissionFileError; the
+    files of trajectories are found from its folder."""
     return mission_of(MISSIONS.table(text, where), name, where, text)
 
 
 def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") -> Mission:
     """The mission of these keys and values. `where` begins each line of a MissionFileError.
 
-    `text` is the content of the file, if there is one: errors in an item are then reported with the line of
-    its [[items]].
+    `text` is the content of the file `where`, if there is one: errors in an item are then reported with the
+    line of its [[items]].
     """
     misplaced = [f"{where}: {key}: {message}" for key, message in _MISPLACED.items() if key in table]
     if isinstance(table.get("items"), Mapping):
@@ -77,8 +80,13 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
         if not isinstance(kind, str) or kind not in ITEMS:
             errors.append(f"{locations[index]}: {at}.type {_kind_problem(item)}")
             continue
+        keys = {key: value for key, value in item.items() if key != "type"}
         try:
-            items.append(ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"}))
+            if kind == "trajectory":
+                keys = _with_rows(keys, Path(where).parent)
+            items.append(ITEMS[kind].model_validate(keys))
+        except TextFileError as error:
+            errors.append(f"{locations[index]}: {at}.file = {format_value(keys['file'])}: {error}")
         except ValidationError as error:
             errors += problems(error, ITEMS[kind], locations[index], at, item)
     errors = errors or _order_problems([item["type"] for item in head.items], locations)
@@ -86,6 +94,23 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
         raise MissionFileError(errors)
     steps = tuple(item.step() for item in items)
     return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
+
+
+def _with_rows(keys: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The keys of a trajectory with the points of its file, which is found from `folder`; TextFileError
+    with the reason if there are none."""
+    file = keys.get("file")
+    if not isinstance(file, str) or "points" in keys:
+        return dict(keys)
+    from missions.trajectory import rows_of, through_rows  # loads much
+
+    try:
+        points = through_rows(rows_of(text_of(folder / file))).points
+        return {"points": [list(point) for point in points]}
+    except TextFileError:
+        raise
+    except ValueError as error:
+        raise TextFileError(f"row{error}" if str(error).startswith("[") else str(error).lstrip()) from None
 
 
 def _is_misnamed_item(key: str, value: Any) -> bool:
@@ -125,6 +150,6 @@ def _order_problems(kinds: Sequence[str], locations: Sequence[str]) -> list[str]
             errors.append(at + 'must be "land": a mission ends on the ground')
         elif index < last and kind == "land":
             errors.append(at + "only the last item may be a landing")
-        if kind in ("signals", "attitude", "winch") and "release" in kinds[:index]:
+        if kind in ("signals", "trajectory", "attitude", "winch") and "release" in kinds[:index]:
             errors.append(at + "needs the load, which an item before it has released")
     return errors

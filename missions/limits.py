@@ -12,6 +12,7 @@ SHORTEST_RUN_S = 1e-3  # signals and delays; times travel in milliseconds
 # The vehicle evaluates its path every few milliseconds: a faster wave or a steeper edge is a typing mistake.
 SHORTEST_EDGE_S = 0.1
 SHORTEST_PERIOD_S = 0.1
+SHORTEST_POINT_S = 0.1  # from one point of a trajectory to the next
 MIN_REELED_HEIGHT_M = 0.3  # height of the load after a winch item
 
 # greatest values, the same in a file and on the wire
@@ -19,6 +20,7 @@ FASTEST_REEL_M_S = 1.0
 LONGEST_CABLE_M = 100.0
 MAX_TERMS = 32  # of signals
 MAX_FACTORS = 3  # of a term
+MAX_POINTS = 1000  # of a trajectory
 
 # of a file only: a value beyond them is probably a typing mistake
 LONGEST_S = 3600.0

@@ -6,8 +6,9 @@ autopilot and the feasibility check all use these records. A step begins when th
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Axis = Literal["x", "y", "z"]
 Controlled = Literal["vehicle", "load"]
@@ -114,6 +115,50 @@ class Signals:
     terms: tuple[Term, ...]
 
 
+class TrajectoryPoint(NamedTuple):
+    """Where the load is `t_s` after its trajectory began, relative to where it began."""
+
+    t_s: float
+    east_m: float
+    north_m: float
+    up_m: float
+
+
+ORIGIN = TrajectoryPoint(0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class Trajectory:
+    """Fly the load through timed points, from where the load's setpoint is when the step begins.
+
+    `points`: rows of t (s), east, north and up (m), as a list or an array (n, 4), 0.1 s apart or more. Their
+    times and places count from the first. The path is the spline of degree 9 that passes each point at its
+    time and is at rest at both ends. TypeError if a row has not four values.
+    """
+
+    points: tuple[TrajectoryPoint, ...]
+
+    def __init__(self, points: Iterable[Sequence[float]]) -> None:
+        rows = [tuple(row) for row in points]
+        for index, row in enumerate(rows):
+            if len(row) != len(TrajectoryPoint._fields):
+                raise TypeError(f"points[{index}] has {len(row)} values; must be t_s, east_m, north_m, up_m")
+        object.__setattr__(self, "points", tuple(TrajectoryPoint(*row) for row in rows))
+
+    @classmethod
+    def through(cls, rows: Iterable[Sequence[float]]) -> Trajectory:
+        """The trajectory that passes rows (t, east, north, up) within a millimetre, however close they are:
+        those of a computed or recorded path. ValueError if no smooth path from rest to rest does."""
+        from missions.trajectory import through_rows  # loads much
+
+        return through_rows(rows)
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last point."""
+        return self.points[-1].t_s
+
+
 @dataclass(frozen=True, slots=True)
 class AttitudeRun:
     """Swing an attitude out and back: angle(t) = tilt * sin^2(pi t / duration_s), t from 0 to `duration_s`.
@@ -149,13 +194,15 @@ class LookAt:
 
 
 HeadingCommand = TurnHeading | LookAt  # items between steps, which take effect as the next step begins
-Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
+LoadPath = Signals | Trajectory  # steps that give the load's place as a function of time
+Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | LoadPath | AttitudeRun
 KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",
     Waypoint: "waypoint",
     Speed: "speed",
     Delay: "delay",
     Signals: "signals",
+    Trajectory: "trajectory",
     AttitudeRun: "attitude",
     ReturnHome: "return",
     Release: "release",

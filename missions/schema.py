@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import radians
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
 from missions import limits, model
 
@@ -160,6 +160,31 @@ class SignalsItem(Item):
         return model.Signals(self.duration_s, tuple(term.term() for term in self.terms))
 
 
+class TrajectoryItem(Item):
+    file: str | None = Field(None, description="CSV file with the columns t_s, east_m, north_m, altitude_m")
+    points: list[Annotated[list[float], Field(min_length=4, max_length=4)]] | None = Field(
+        None, description="[t_s, east_m, north_m, altitude_m] of each, instead of a file"
+    )
+    _trajectory: model.Trajectory = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _is_a_path(self) -> TrajectoryItem:
+        from missions.trajectory import through_points  # loads much
+
+        if (self.file is None) == (self.points is None):
+            found = "no file and no points" if self.points is None else "both a file and points"
+            raise ValueError(f"has {found}; must have one of them")
+        if self.points is not None:
+            try:
+                self._trajectory = through_points(self.points)
+            except ValueError as error:
+                raise ValueError(f"points{error}") from None
+        return self
+
+    def step(self) -> model.Step:
+        return self._trajectory
+
+
 class AttitudeItem(Item):
     controlled: Literal["vehicle", "load"] = Field(description="whose attitude is tracked")
     tilt_north_deg: Degrees = Field(0.0, description="largest tilt towards north")
@@ -177,6 +202,7 @@ ITEMS: dict[str, type[Item]] = {
     "speed": SpeedItem,
     "delay": DelayItem,
     "signals": SignalsItem,
+    "trajectory": TrajectoryItem,
     "attitude": AttitudeItem,
     "return": ReturnItem,
     "release": ReleaseItem,

@@ -49,6 +49,8 @@ def _keys(record: Any) -> dict[str, Any]:
             found = _plain(value)
             key = field.name.removesuffix("_rad") + "_deg"
             table[key] = _degrees(found) if isinstance(found, float) else found
+        elif field.name == "points":
+            table["points"] = [[_plain(number) for number in row] for row in value]
         elif isinstance(value, Sequence) and not isinstance(value, str):
             table |= {field.name: [_keys(part) for part in value]} if value else {}
         elif value is not None:

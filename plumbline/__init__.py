@@ -31,6 +31,7 @@ from missions.model import (
     Speed,
     Takeoff,
     Term,
+    Trajectory,
     Waypoint,
     Winch,
 )
@@ -61,6 +62,7 @@ __all__ = [
     "State",
     "Takeoff",
     "Term",
+    "Trajectory",
     "Vehicle",
     "Waypoint",
     "Winch",

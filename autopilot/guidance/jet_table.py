@@ -19,9 +19,10 @@ from autopilot.guidance.legs import (
     Transfer,
     requested_jet,
 )
+from autopilot.trajectory.load_path import PathTables
 from autopilot.trajectory.reeling import reel
 from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
-from autopilot.trajectory.signals import Jet, SignalTable
+from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.transfer import transfer
 from autopilot.trajectory.waypoint_path import evaluate_path
@@ -46,7 +47,7 @@ def _transfers(times: Floats, begin: Vec3, end: Vec3, duration: float, out: Floa
 @kernel
 def _runs(
     times: Floats,
-    table: SignalTable,
+    tables: PathTables,
     pieces: PieceTable,
     duration: float,
     lead: float,
@@ -56,9 +57,9 @@ def _runs(
 ) -> None:
     for k in range(times.shape[0]):
         if requested:
-            _put(out[k], evaluate_requested(table, duration, times[k] - lead))
+            _put(out[k], evaluate_requested(tables, duration, times[k] - lead))
         else:
-            _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
+            _put(out[k], evaluate_shaped(tables, pieces, duration, times[k] - lead))
         for j in range(3):
             out[k, j] = anchor[j] + out[k, j]
 
@@ -90,7 +91,9 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
     if type(leg) is SignalRun:
         path = leg.path
         as_requested = requested or flies_requested_path(leg)
-        _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, leg.anchor, as_requested, found)
+        _runs(
+            times_s, path.tables, path.pieces, path.duration_s, path.lead_s, leg.anchor, as_requested, found
+        )
     elif type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
     elif type(leg) is PathStretch:

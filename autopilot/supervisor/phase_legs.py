@@ -46,7 +46,7 @@ from autopilot.trajectory.slack_cable import (
     TOUCH_SPEED,
 )
 from autopilot.trajectory.timeline import return_place
-from missions.model import AttitudeRun, Signals
+from missions.model import AttitudeRun, LoadPath
 
 P = Phase
 
@@ -185,7 +185,7 @@ def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     step = flight.mission.plan.steps[flight.mission.step]
     legs, here = stopping_legs(flight, view, settings)
     anchor = flight.mission.step_anchor
-    if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
+    if anchor is not None and isinstance(step, LoadPath | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
         # a step that is resumed after a pause is flown again from where it began
         back = carry(here, anchor, flight.mission.speed_m_s, settings)
         return (*legs, back, *step_legs(step, anchor, flight, settings))

@@ -27,12 +27,14 @@ from missions.model import (
     AttitudeRun,
     Delay,
     Land,
+    LoadPath,
     Release,
     ReturnHome,
     Signals,
     Speed,
     Step,
     Takeoff,
+    Trajectory,
     Waypoint,
     Winch,
 )
@@ -72,7 +74,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         case ReturnHome():
             there = destination(step, here, flight)
             return (carry(here, there, flight.mission.speed_m_s, settings, _min_duration_s(flight)),)
-        case Signals():
+        case Signals() | Trajectory():
             return (SignalRun(here, _signals_of(flight, flight.mission.step) or unshaped_signals(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
@@ -114,7 +116,7 @@ def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
         return ()
     end = last.jet(last.duration_s)
     next_step = flight.mission.plan.steps[step]
-    if norm(end[1]) > AT_REST or not isinstance(next_step, Waypoint | Delay | ReturnHome | Signals):
+    if norm(end[1]) > AT_REST or not isinstance(next_step, Waypoint | Delay | ReturnHome | LoadPath):
         return ()
     return step_legs(next_step, end[0], replace(flight, mission=replace(flight.mission, step=step)), settings)
 

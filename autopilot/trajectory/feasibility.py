@@ -24,8 +24,8 @@ from autopilot.trajectory.peaks import (
     Extreme,
     Peaks,
     survey_attitude,
+    survey_load_path,
     survey_path,
-    survey_signals,
     survey_transfer,
 )
 from autopilot.trajectory.prepare import REFUSE, PathLimits, min_transfer_s, prepare, shaped_path
@@ -38,7 +38,20 @@ from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.rotors import ROTOR_MARGIN, allocation_columns
-from missions.model import KINDS, AttitudeRun, Land, Mission, Signals, Takeoff, Term, Waypoint, Winch
+from missions.model import (
+    KINDS,
+    AttitudeRun,
+    Land,
+    LoadPath,
+    Mission,
+    Signals,
+    Step,
+    Takeoff,
+    Term,
+    Trajectory,
+    Waypoint,
+    Winch,
+)
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
@@ -55,6 +68,7 @@ _SHORTER_CABLE, _SMALLER_FORCE = 0.25, 0.5
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
 _MULTIPLE_FROM = 3.0  # from here on an excess is reported as a multiple
+LOAD_PATH_KINDS = (KINDS[Signals], KINDS[Trajectory])
 _NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
@@ -182,9 +196,9 @@ class PathReport:
     def text(self, times: int = 1) -> str:
         """The report as a line; `times`: how often the item is flown, at worst like this."""
         near = ""
-        if self.kind == "signals" and self.distance_m == 0.0:
+        if self.kind in LOAD_PATH_KINDS and self.distance_m == 0.0:
             near = ", as asked"
-        elif self.kind == "signals":
+        elif self.kind in LOAD_PATH_KINDS:
             near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
         if self.slowed != 1.0:
             near = f", {self.slowed:.2f} times as long as asked{near.removesuffix(' asked')}"
@@ -232,8 +246,8 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                 f"the ground; it must be at least {MIN_HEIGHT_M:g} m: raise altitude_m"
             )
             found.append(Violation(entry.item, "height", entry.end[2], MIN_HEIGHT_M, entry.transfer_s, text))
-        if isinstance(entry.step, Signals):
-            jumps = list(_jumps(entry.item, entry.step))
+        if isinstance(entry.step, LoadPath):
+            jumps = list(_jumps(entry.item, entry.step)) if isinstance(entry.step, Signals) else []
             found += jumps
             if shaped and not jumps:
                 extremes = _survey(entry, limits)
@@ -245,7 +259,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                 elif path_violations:
                     found += path_violations
                 else:
-                    text = f"{_item_label(entry)}: {problem}; {_bounds_text(limits)}"
+                    text = f"{_item_label(entry)}: {problem}; {_bounds_text(entry.step, limits)}"
                     found.append(Violation(entry.item, "shaping", inf, limits.max_shaping_m, 0.0, text))
                 continue
         extremes = _survey(entry, limits, shaped or entry.item in flown_through)
@@ -261,13 +275,15 @@ def _flown_through(mission: Mission, limits: VehicleLimits) -> frozenset[int]:
     return frozenset(item for item, path in enumerate(prepared.paths) if isinstance(path, PathSegment))
 
 
-def _bounds_text(limits: VehicleLimits) -> str:
+def _bounds_text(step: LoadPath, limits: VehicleLimits) -> str:
     """The bounds of a shaped path in words, and what to change if it cannot keep them."""
+    advice = "lower amplitude_m, lengthen rise_s or period_s"
+    if isinstance(step, Trajectory):
+        advice = "give its points later times"
     reserve = f"{100.0 * limits.rotor_margin:.0f} % of the rotors' range free at either limit"
     return (
         f"a path must leave {reserve} (MIS_ROTOR_MARG), the cable taut and the tilt below "
-        f"{degrees(limits.tilt_max_rad):.0f} deg; lower amplitude_m, lengthen rise_s or period_s, or let it "
-        "be flown slower (MIS_INFEASIBLE 1)"
+        f"{degrees(limits.tilt_max_rad):.0f} deg; {advice}, or let it be flown slower (MIS_INFEASIBLE 1)"
     )
 
 
@@ -397,8 +413,8 @@ def _transfer_s(entry: TimelineEntry, limits: VehicleLimits, shaped: bool) -> fl
 
 
 def _survey(entry: TimelineEntry, limits: VehicleLimits, shaped: bool = False) -> Peaks | None:
-    if isinstance(entry.step, Signals):
-        return survey_signals(entry.step, entry.begin, limits.body)
+    if isinstance(entry.step, LoadPath):
+        return survey_load_path(entry.step, entry.begin, limits.body)
     if isinstance(entry.step, AttitudeRun):
         return survey_attitude(entry.step, entry.begin[2], limits.body)
     if entry.transfer_s > 0.0:
@@ -425,14 +441,13 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
     gravity, usable = vehicle.gravity_m_s2, limits.usable_thrust_n
     # a step that begins too low was already reported with the step that led there
     lowest_m = extremes.height_low.value
-    least_m = MIN_HEIGHT_M if isinstance(entry.step, Signals) else 0.0
+    least_m = MIN_HEIGHT_M if isinstance(entry.step, LoadPath) else 0.0
     if lowest_m < min(entry.begin[2], least_m) - _GROUND_M:
         place = "above" if lowest_m >= 0.0 else "under"
         finding = f"the load would be {abs(lowest_m):.2f} m {place} the ground"
         if least_m:
             finding += f"; it must be at least {least_m:g} m above"
-        lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
-        advice = f"begin higher (altitude_m) or lower {lower}"
+        advice = f"begin higher (altitude_m) or {_height_advice(entry.step)}"
         yield violation("height", extremes.height_low, least_m, finding, advice)
     if fall.value >= gravity:
         # beyond this the cable would have to push: thrust and tilt then have no meaning
@@ -468,15 +483,22 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
         yield violation("tilt", tilt, limits.tilt_max_rad, finding)
 
 
+def _height_advice(step: Step) -> str:
+    """What to change in a step that leads too low, besides the height at which it begins."""
+    if isinstance(step, Trajectory):
+        return "raise its points"
+    return f"lower {'length_m' if isinstance(step, Winch) else 'amplitude_m of z'}"
+
+
 def _length_advice(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> str:
     """The advice to shorten the cable if the forces are a multiple of the limits because of its length: the
     vehicle has to swing about the load. Else an empty string."""
     worst = extremes.rotor_high.value
-    if not (isinstance(entry.step, Signals) and worst > _MULTIPLE_FROM * limits.vehicle.rotor_max_n):
+    if not (isinstance(entry.step, LoadPath) and worst > _MULTIPLE_FROM * limits.vehicle.rotor_max_n):
         return ""
     length_m = limits.body.cable_length
     shorter = limits.body._replace(cable_length=_SHORTER_CABLE * length_m)
-    if survey_signals(entry.step, entry.begin, shorter).rotor_high.value > _SMALLER_FORCE * worst:
+    if survey_load_path(entry.step, entry.begin, shorter).rotor_high.value > _SMALLER_FORCE * worst:
         return ""
     return f"shorten cable_length_m, {length_m:g} m, on which the load swings too slowly for this path; or "
 
@@ -538,6 +560,8 @@ def _advice(entry: TimelineEntry, time: float) -> str:
         return "lower the tilt or lengthen duration_s"
     if isinstance(step, Takeoff | Land):
         return "lower load_mass_kg or raise rotor_max_n, or lower MIS_ACCEL in [parameters] of the vehicle"
+    if isinstance(step, Trajectory):
+        return "give its points later times, or let it be flown slower (MIS_INFEASIBLE 1)"
     if not isinstance(step, Signals):
         return "lower speed_m_s or the acceleration of transfers"
     accel = evaluate(signal_table(step.terms), time)[2]

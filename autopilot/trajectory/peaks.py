@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf, nextafter
 from typing import NamedTuple
 
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.trajectory.flatness import flat_outputs
-from autopilot.trajectory.signals import Jet, SignalTable, evaluate, joints, signal_table
+from autopilot.trajectory.load_path import PathTables, evaluate_load_path, path_joints, path_tables
+from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import transfer
-from missions.model import AttitudeRun, Signals
+from missions.model import AttitudeRun, LoadPath, Signals
 
 Samples = NDArray[np.float64]
 
@@ -152,11 +154,11 @@ def _fill_sample(row: Samples, jet: Jet, body: KernelBody, efforts: Samples) -> 
 
 
 @kernel
-def _fill_signals(
-    table: SignalTable, times: Samples, body: KernelBody, efforts: Samples, rows: Samples
+def _fill_load_path(
+    tables: PathTables, times: Samples, body: KernelBody, efforts: Samples, rows: Samples
 ) -> None:
     for i in range(times.shape[0]):
-        _fill_sample(rows[i], evaluate(table, times[i]), body, efforts)
+        _fill_sample(rows[i], evaluate_load_path(tables, times[i]), body, efforts)
 
 
 @kernel
@@ -206,25 +208,31 @@ def _peaks(times: Samples, rows: Samples) -> Peaks:
     )
 
 
-def signal_times(step: Signals) -> Samples:
+def sample_times(step: LoadPath) -> Samples:
     """Sample times: 200 to the shortest period or edge, at most 10 ms apart, and both sides of each joint. Of
     signals that last for hours fewer, but 20 to the shortest period."""
-    shortest_periods = [sine.period_s for term in step.terms for sine in term.factors]
-    shortest_periods += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
-    shortest_s = min(shortest_periods, default=step.duration_s)
+    shortest_s = min(_periods(step), default=step.duration_s)
     spacing = min(_MAX_SPACING_S, shortest_s / _SAMPLES_PER_PERIOD)
     spacing = max(spacing, min(step.duration_s / _MAX_SAMPLES, shortest_s / _MIN_SAMPLES_PER_PERIOD))
     regular = np.linspace(0.0, step.duration_s, int(step.duration_s / spacing) + 2)[:-1]
-    edges = [t for t in joints(step.terms) if 0.0 < t < step.duration_s]
+    edges = [t for t in path_joints(step) if 0.0 < t < step.duration_s]
     sides = [nextafter(t, -inf) for t in (*edges, step.duration_s)] + edges
     return np.union1d(regular, np.array(sides))
 
 
-def survey_signals(step: Signals, anchor: Vec3, body: Body) -> Peaks:
-    """Extremes along load signals that begin at `anchor`; the jumps at joints are not included."""
-    times = signal_times(step)
+def _periods(step: LoadPath) -> list[float]:
+    """Times (s) in which the path may swing: periods and edges of signals, two intervals of a trajectory."""
+    if not isinstance(step, Signals):
+        return [2.0 * (after.t_s - before.t_s) for before, after in pairwise(step.points)]
+    periods = [sine.period_s for term in step.terms for sine in term.factors]
+    return periods + [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
+
+
+def survey_load_path(step: LoadPath, anchor: Vec3, body: Body) -> Peaks:
+    """Extremes along a path that begins at `anchor`; the jumps at joints are not included."""
+    times = sample_times(step)
     rows = np.empty((times.size, _COLUMNS))
-    _fill_signals(signal_table(step.terms), times, *to_kernel_body(body), rows)
+    _fill_load_path(path_tables(step), times, *to_kernel_body(body), rows)
     rows[:, HEIGHT] += anchor[2]
     return _peaks(times, rows)
 

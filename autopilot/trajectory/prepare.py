@@ -15,6 +15,7 @@ from math import cos, dist
 from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.trajectory.load_path import slower_step
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
 from autopilot.trajectory.rotor_demand import Bounds, gentler_bounds
 from autopilot.trajectory.route import PlanError, Planner, Route, bound_violation, path_segments
@@ -30,7 +31,7 @@ from autopilot.trajectory.waypoint_path import (
     plan_waypoint_path,
     ride,
 )
-from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
+from missions.model import LoadPath, ReturnHome, Step, Waypoint
 
 AS_REQUESTED, SLOW_DOWN, REFUSE = 0, 1, 2
 MAX_SLOWDOWN = 4.0  # times as long as requested
@@ -118,7 +119,7 @@ def prepare(
         segments, planner_notes, refusal = _custom_segments(entries, sequence, limits, planner)
         notes += planner_notes
     for index, (step, item) in enumerate(zip(steps, sequence, strict=True)):
-        if not isinstance(step, Signals):
+        if not isinstance(step, LoadPath):
             paths.append(segments.get(index))
             continue
         if not limits.shape_paths:
@@ -327,7 +328,7 @@ class ShapingResult(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def shaped_path(step: Signals, limits: PathLimits) -> ShapingResult:
+def shaped_path(step: LoadPath, limits: PathLimits) -> ShapingResult:
     """Signals shaped to the vehicle, slowed down if that is allowed and necessary.
 
     Cached: hard signals take seconds, and a mission is checked in the same process before it is flown.
@@ -343,7 +344,7 @@ def shaped_path(step: Signals, limits: PathLimits) -> ShapingResult:
     return ShapingResult(shaped, problem)
 
 
-def _gentler(step: Signals, shaped: ShapedSignals, limits: PathLimits) -> ShapedSignals | None:
+def _gentler(step: LoadPath, shaped: ShapedSignals, limits: PathLimits) -> ShapedSignals | None:
     """The signals shaped within narrower bounds, if they stay nearly as close to the requested path as
     `shaped`: what a path takes of the rotors without need is lacking against noise and wind."""
     bounds = gentler_bounds(limits.body, limits.bounds)
@@ -355,11 +356,11 @@ def _gentler(step: Signals, shaped: ShapedSignals, limits: PathLimits) -> Shaped
     return gentler
 
 
-def slow_down(step: Signals, limits: PathLimits) -> ShapedSignals | None:
+def slow_down(step: LoadPath, limits: PathLimits) -> ShapedSignals | None:
     """The signals slowed down no more than necessary, to a few percent; None if that does not help either."""
 
     def shape_slowed(factor: float) -> ShapedSignals | None:
-        shaped = shape(slowed_signals(step, factor), limits.body, limits.bounds)
+        shaped = shape(slower_step(step, factor), limits.body, limits.bounds)
         return None if shaping_problem(shaped, limits) else replace(shaped, duration_factor=factor)
 
     # shaping takes longest for an impossible path, so the search tries few of them
@@ -382,24 +383,3 @@ def slow_down(step: Signals, limits: PathLimits) -> ShapedSignals | None:
         else:
             best = shaped
     return best
-
-
-def slowed_signals(step: Signals, factor: float) -> Signals:
-    """The same path at 1 / factor of the speed."""
-
-    def sine(s: Sine) -> Sine:
-        return Sine(factor * s.period_s, s.phase_rad, factor * s.start_s)
-
-    def term(t: Term) -> Term:
-        return Term(
-            t.axis,
-            t.amplitude_m,
-            factor * t.start_s,
-            factor * t.rise_s,
-            None if t.hold_s is None else factor * t.hold_s,
-            factor * t.fall_s,
-            tuple(sine(s) for s in t.factors),
-            None if t.rise_90_by_s is None else factor * t.rise_90_by_s,
-        )
-
-    return Signals(factor * step.duration_s, tuple(term(t) for t in step.terms))

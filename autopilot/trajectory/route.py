@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from math import acos, degrees, factorial, sqrt
+from math import acos, degrees, sqrt
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, TURN, Bounds, demand, rotor_commands
-from autopilot.trajectory.splines import COLUMNS, DEGREE, PieceTable
+from autopilot.trajectory.splines import DEGREE, PieceTable, interpolating_spline, power_table
 from autopilot.trajectory.waypoint_path import PathSegment, limits_used, sample_path
 
 Array = NDArray[np.float64]
@@ -69,11 +68,7 @@ def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLik
         )
     if breaks.shape != (len(powers) + 1,):
         raise ValueError(f"breaks_s are of shape {breaks.shape}; must be ({len(powers) + 1},)")
-    table = np.zeros((len(powers), COLUMNS))
-    table[:, 0], table[:, 1] = breaks[:-1], breaks[1:]
-    by_power = table[:, 2:].reshape(len(powers), 3, DEGREE + 1)
-    by_power[:, :, : powers.shape[1]] = powers.transpose(0, 2, 1)
-    return Path(table, tuple(np.asarray(passes_s, np.float64).ravel().tolist()))
+    return Path(power_table(breaks, powers), _times(passes_s))
 
 
 def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Path:
@@ -84,11 +79,11 @@ def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Pa
         raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
     if not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         raise ValueError("times_s must increase")
-    rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
-    spline = scipy.interpolate.make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
-    breaks = np.unique(spline.t)
-    orders = [spline(breaks[:-1], nu=n) / factorial(n) for n in range(DEGREE + 1)]
-    return polynomials(breaks, np.stack(orders, axis=1), passes_s)
+    return Path(interpolating_spline(times, places), _times(passes_s))
+
+
+def _times(passes_s: ArrayLike) -> tuple[float, ...]:
+    return tuple(np.asarray(passes_s, np.float64).ravel().tolist())
 
 
 def slower(path: Path, factor: float) -> Path:

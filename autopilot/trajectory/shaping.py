@@ -23,11 +23,19 @@ import numpy as np
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
 from autopilot.trajectory.convex import NO_CONSTRAINTS, SAMPLES, LinearConstraints, Objective, Problem, excess
+from autopilot.trajectory.load_path import (
+    NO_PATH,
+    NO_PIECES,
+    PathTables,
+    evaluate_load_path,
+    path_joints,
+    path_tables,
+)
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
-from autopilot.trajectory.signals import REST, Jet, SignalTable, evaluate, joints, signal_table
-from autopilot.trajectory.splines import COLUMNS, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
-from missions.model import Signals
+from autopilot.trajectory.signals import REST, Jet
+from autopilot.trajectory.splines import ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
+from missions.model import LoadPath, Signals
 
 LEAD_TOLERANCE_M = 0.005  # how far the load may leave its position before the signals begin
 INTERVAL_S = 0.04  # of the splines
@@ -65,7 +73,7 @@ class ShapedSignals:
     The path begins `lead_s` before the requested signals and ends `tail_s` after them.
     """
 
-    table: SignalTable
+    tables: PathTables
     pieces: PieceTable
     duration_s: float  # of the requested signals
     lead_s: float
@@ -77,65 +85,61 @@ class ShapedSignals:
 
     def jet(self, t: float) -> Jet:
         """The path to fly at t (s from the beginning of the requested signals) with derivatives 1 ... 6."""
-        return evaluate_shaped(self.table, self.pieces, self.duration_s, t)
+        return evaluate_shaped(self.tables, self.pieces, self.duration_s, t)
 
     def requested(self, t: float) -> Jet:
         """The requested path at t."""
-        return evaluate_requested(self.table, self.duration_s, t)
+        return evaluate_requested(self.tables, self.duration_s, t)
 
 
 @kernel
-def evaluate_requested(table: SignalTable, duration: float, t: float) -> Jet:
+def evaluate_requested(tables: PathTables, duration: float, t: float) -> Jet:
     """The requested path: at rest before the signals begin, and after they end if they end at rest."""
     if t < 0.0:
         return REST
     if t < duration:
-        return evaluate(table, t)
-    last = evaluate(table, duration)
+        return evaluate_load_path(tables, t)
+    last = evaluate_load_path(tables, duration)
     v = last[1]
     if v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > 1e-4:
-        return evaluate(table, t)
+        return evaluate_load_path(tables, t)
     return last[0], ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
 
 
 @kernel
-def evaluate_shaped(table: SignalTable, pieces: PieceTable, duration: float, t: float) -> Jet:
+def evaluate_shaped(tables: PathTables, pieces: PieceTable, duration: float, t: float) -> Jet:
     """The path to fly: the piece that contains t, or else the requested signals."""
     row = find_piece(pieces, t)
     if row >= 0:
         return evaluate_piece(pieces, row, t)
-    return evaluate_requested(table, duration, t)
+    return evaluate_requested(tables, duration, t)
 
 
 @kernel
-def _fill(table: SignalTable, pieces: PieceTable, duration: float, times: Array, out: Array) -> None:
+def _fill(tables: PathTables, pieces: PieceTable, duration: float, times: Array, out: Array) -> None:
     for i in range(times.shape[0]):
-        jet = evaluate_shaped(table, pieces, duration, times[i])
+        jet = evaluate_shaped(tables, pieces, duration, times[i])
         for order in range(7):
             for axis in range(3):
                 out[order, i, axis] = jet[order][axis]
 
 
-_NO_PIECES: PieceTable = np.zeros((0, COLUMNS))
-
-
-def unshaped_signals(step: Signals) -> ShapedSignals:
+def unshaped_signals(step: LoadPath) -> ShapedSignals:
     """The signals exactly as requested."""
-    table = signal_table(step.terms)
-    return ShapedSignals(table, _NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
+    return ShapedSignals(path_tables(step), NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
 
 
 def path_jets(shaped: ShapedSignals, times: Array) -> Array:
     """(7, n, 3) jets of the path to fly."""
     out = np.empty((7, times.size, 3))
-    _fill(shaped.table, shaped.pieces, shaped.duration_s, times, out)
+    _fill(shaped.tables, shaped.pieces, shaped.duration_s, times, out)
     return out
 
 
-def requested_jets(table: SignalTable, duration: float, times: Array) -> Array:
+def requested_jets(tables: PathTables, duration: float, times: Array) -> Array:
     """(7, n, 3) jets of the requested path."""
     out = np.empty((7, times.size, 3))
-    _fill(table, _NO_PIECES, duration, times, out)
+    _fill(tables, NO_PIECES, duration, times, out)
     return out
 
 
@@ -159,21 +163,21 @@ def reference_sixth_derivative(body: Body, rotor_range: float) -> float:
     )
 
 
-def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
+def shape(step: LoadPath, body: Body, bounds: Bounds) -> ShapedSignals:
     """The signals shaped so that the vehicle can fly them within the bounds; `reason` is set if it cannot."""
     requested = unshaped_signals(step)
-    table, duration = requested.table, step.duration_s
+    tables, duration = requested.tables, step.duration_s
     end_speed = float(
-        np.linalg.norm(requested_jets(table, duration, np.array([nextafter(duration, -inf)]))[1])
+        np.linalg.norm(requested_jets(tables, duration, np.array([nextafter(duration, -inf)]))[1])
     )
     if end_speed > _REST_M_S:
         return _refused(requested, f"the signals end at {end_speed:.2f} m/s; they must end at rest")
-    places = sorted([*_jumps(step, table, body, bounds), *_violations(table, duration, body, bounds)])
+    places = sorted([*_jumps(step, tables, body, bounds), *_violations(tables, duration, body, bounds)])
     spans = _windows(places, WINDOW_S)
     windows: list[_Window] = []
     while len(windows) < len(spans):
         begin, end = spans[len(windows)]
-        window = _solve_widening(step, table, begin, end, body, bounds)
+        window = _solve_widening(step, tables, begin, end, body, bounds)
         if window is None:
             text = f"from {max(begin, 0.0):.1f} s to {min(end, duration):.1f} s it exceeds what can be flown"
             return _refused(requested, text)
@@ -189,12 +193,12 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
     rows = np.vstack([window.pieces for window in windows])
     lead, tail = max(-windows[0].begin, 0.0), max(windows[-1].end - duration, 0.0)
     worst = max(window.excess_n for window in windows)
-    shaped = ShapedSignals(table, rows, duration, lead, tail, 0.0, worst, 1.0, "")
+    shaped = ShapedSignals(tables, rows, duration, lead, tail, 0.0, worst, 1.0, "")
     times = _sample_times(-lead, duration + tail, _FINE_S)
-    deviation = path_jets(shaped, times)[0] - requested_jets(table, duration, times)[0]
+    deviation = path_jets(shaped, times)[0] - requested_jets(tables, duration, times)[0]
     distance = float(np.sqrt(np.max(np.sum(deviation * deviation, axis=1))))
     reason = "" if worst <= _TOLERANCE * bounds.rotor_range else _excess_reason(worst, bounds)
-    return ShapedSignals(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
+    return ShapedSignals(tables, rows, duration, lead, tail, distance, worst, 1.0, reason)
 
 
 class _Window(NamedTuple):
@@ -207,7 +211,7 @@ class _Window(NamedTuple):
 
 
 def _solve_widening(
-    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+    step: LoadPath, tables: PathTables, begin: float, end: float, body: Body, bounds: Bounds
 ) -> _Window | None:
     """The first of increasingly wide windows that keeps the bounds, or else the one that exceeds them least;
     None if there is none."""
@@ -217,7 +221,7 @@ def _solve_widening(
         b, e = begin - widening, end + widening
         if e - b > MAX_WINDOW_S:
             break
-        for candidate in _candidates(step, table, b, e, body, bounds):
+        for candidate in _candidates(step, tables, b, e, body, bounds):
             if best is None or candidate.excess_n < best.excess_n:
                 best = candidate
         tolerance_n = _TOLERANCE * bounds.rotor_range
@@ -229,17 +233,17 @@ def _solve_widening(
 
 
 def _candidates(
-    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+    step: LoadPath, tables: PathTables, begin: float, end: float, body: Body, bounds: Bounds
 ) -> Iterator[_Window]:
     """The spline from begin to end; and if it exceeds the bounds between its samples, a second one whose
     samples stay inside by as much more."""
     margin_n = _SAMPLE_MARGIN * bounds.rotor_range
-    window = _solve(step, table, begin, end, body, bounds, margin_n)
+    window = _solve(step, tables, begin, end, body, bounds, margin_n)
     if window is None:
         return
     yield window
     if _TOLERANCE * bounds.rotor_range < window.excess_n < _RIPPLE * bounds.rotor_range:
-        stricter = _solve(step, table, begin, end, body, bounds, margin_n + window.excess_n)
+        stricter = _solve(step, tables, begin, end, body, bounds, margin_n + window.excess_n)
         if stricter is not None:
             yield stricter
 
@@ -253,7 +257,7 @@ def _excess_reason(excess_n: float, bounds: Bounds) -> str:
 
 def _refused(requested: ShapedSignals, reason: str) -> ShapedSignals:
     return ShapedSignals(
-        requested.table, requested.pieces, requested.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason
+        requested.tables, requested.pieces, requested.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason
     )
 
 
@@ -261,12 +265,12 @@ def _sample_times(begin: float, end: float, spacing: float) -> Array:
     return np.linspace(begin, end, max(int((end - begin) / spacing), 2) + 1)
 
 
-def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
+def _jumps(step: LoadPath, tables: PathTables, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
     """Times at which derivatives jump by more than the rotors can follow."""
     reference = reference_sixth_derivative(body, bounds.rotor_range)
-    times = {t for t in (*joints(step.terms), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
+    times = {t for t in (*path_joints(step), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
     for time in sorted(times):
-        sides = requested_jets(table, step.duration_s, np.array([nextafter(time, -inf), time]))
+        sides = requested_jets(tables, step.duration_s, np.array([nextafter(time, -inf), time]))
         jump = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
         sixth_derivative = sum(jump[n] * _JUMP_S ** (n - 6) for n in range(1, 7))
         if sixth_derivative > _JUMP_SHARE * reference:
@@ -274,13 +278,13 @@ def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Ite
 
 
 def _violations(
-    table: SignalTable, duration: float, body: Body, bounds: Bounds
+    tables: PathTables, duration: float, body: Body, bounds: Bounds
 ) -> Iterable[tuple[float, float]]:
     """Stretches of the requested path that exceed the bounds."""
     times = _sample_times(0.0, duration, _COARSE_S)
     # samples on both sides of a joint have no common slope: the lag is considered only in the optimisation
     over = (
-        excess(demand(requested_jets(table, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0))
+        excess(demand(requested_jets(tables, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0))
         > 0.0
     )
     edges = np.flatnonzero(np.diff(np.concatenate([[False], over, [False]]).astype(np.int8)))
@@ -301,24 +305,24 @@ def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple
 
 
 def _solve(
-    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds, margin_n: float
+    step: LoadPath, tables: PathTables, begin: float, end: float, body: Body, bounds: Bounds, margin_n: float
 ) -> _Window | None:
     """The spline from begin to end, whose samples keep the bounds of the rotors by `margin_n`; None if there
     is none within the constraints."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
-    ends = requested_jets(table, step.duration_s, np.array([begin, end]))
+    ends = requested_jets(tables, step.duration_s, np.array([begin, end]))
     origin = ends[0, 0].copy()
     ends[0] -= origin
     fixed = basis.end_coefficients(ends[:, 0], ends[:, 1])
     times = np.linspace(begin, end, SAMPLES * intervals + 1)
-    target = requested_jets(table, step.duration_s, times)[0] - origin
+    target = requested_jets(tables, step.duration_s, times)[0] - origin
     reference = reference_sixth_derivative(body, bounds.rotor_range)
     smooth = 1.0 / (_SMOOTHNESS_SHARE * reference) ** 2
     objective = Objective(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTHNESS_S**2)))
     inner = bounds._replace(rotor_low=bounds.rotor_low + margin_n, rotor_high=bounds.rotor_high - margin_n)
     problem = Problem(
-        basis, fixed, body, inner, objective, _path_constraints(step, table, begin, end, origin)
+        basis, fixed, body, inner, objective, _path_constraints(step, tables, begin, end, origin)
     )
     coefficients = problem.solve()
     if coefficients is None:
@@ -328,7 +332,7 @@ def _solve(
 
 
 def _path_constraints(
-    step: Signals, table: SignalTable, begin: float, end: float, origin: Array
+    step: LoadPath, tables: PathTables, begin: float, end: float, origin: Array
 ) -> LinearConstraints:
     """Constraints: the load stays within LEAD_TOLERANCE_M of its position until the signals begin, and each
     rise with `rise_90_by_s` is nine tenths done by then."""
@@ -343,13 +347,13 @@ def _path_constraints(
             axes += [axis] * lead_times.size
             low += [-LEAD_TOLERANCE_M] * lead_times.size
             high += [LEAD_TOLERANCE_M] * lead_times.size
-    for term in step.terms:
+    for term in step.terms if isinstance(step, Signals) else ():
         if term.rise_90_by_s is None or not begin < term.start_s + term.rise_90_by_s < end:
             continue
         axis = "xyz".index(term.axis)
         time = term.start_s + term.rise_90_by_s
         share_done = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
-        requested_position = float(requested_jets(table, step.duration_s, np.array([time]))[0, 0, axis])
+        requested_position = float(requested_jets(tables, step.duration_s, np.array([time]))[0, 0, axis])
         bound = requested_position + (0.9 - share_done) * term.amplitude_m - origin[axis]
         times.append(time)
         axes.append(axis)
@@ -364,5 +368,5 @@ def _path_constraints(
 def _fine_excess(pieces: PieceTable, begin: float, end: float, body: Body, bounds: Bounds) -> float:
     times = _sample_times(begin, nextafter(end, -inf), _EXCESS_S)
     jets = np.empty((7, times.size, 3))
-    _fill(np.zeros((0, 7)), pieces, 0.0, times, jets)
+    _fill(NO_PATH, pieces, 0.0, times, jets)
     return float(excess(demand(jets, body), float(times[1] - times[0]), bounds).max())

@@ -92,6 +92,26 @@ class Basis:
         return table
 
 
+def power_table(breaks: Array, powers: Array) -> PieceTable:
+    """The table of n polynomials between n + 1 breaks (s): `powers` (n, m, 3) with m up to 10 are their
+    coefficients of (t - begin)^i."""
+    table = np.zeros((len(powers), COLUMNS))
+    table[:, 0], table[:, 1] = breaks[:-1], breaks[1:]
+    by_power = table[:, 2:].reshape(len(powers), 3, DEGREE + 1)
+    by_power[:, :, : powers.shape[1]] = powers.transpose(0, 2, 1)
+    return table
+
+
+def interpolating_spline(times: Array, places: Array) -> PieceTable:
+    """The spline of degree 9 through places (n, 3) at increasing times (n,), n >= 2, from rest to rest:
+    derivatives 1 ... 4 are zero at both ends."""
+    rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
+    spline = scipy.interpolate.make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
+    breaks = np.unique(spline.t)
+    orders = [spline(breaks[:-1], nu=n) / factorial(n) for n in range(DEGREE + 1)]
+    return power_table(breaks, np.stack(orders, axis=1))
+
+
 @kernel
 def find_piece(table: PieceTable, t: float) -> int:
     """The row whose interval contains t, -1 if there is none; rows are in order and may leave gaps."""

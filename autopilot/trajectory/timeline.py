@@ -14,13 +14,14 @@ from functools import lru_cache
 from math import dist, pi, sqrt
 
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
-from autopilot.trajectory.signals import evaluate, signal_table
+from autopilot.trajectory.load_path import evaluate_load_path, path_tables
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
 from autopilot.trajectory.transfer import transfer_duration
 from missions.model import (
     AttitudeRun,
     Delay,
     Land,
+    LoadPath,
     Mission,
     Release,
     ReturnHome,
@@ -28,7 +29,7 @@ from missions.model import (
     Speed,
     Step,
     Takeoff,
-    Term,
+    Trajectory,
     Waypoint,
     Winch,
 )
@@ -180,8 +181,8 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
                 return before
             above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
             return replace(before, expected=above, unknown_after="a release", released=True)
-        case Signals(duration_s=duration, terms=terms):
-            x, v = _signals_end(terms, duration)
+        case Signals() | Trajectory():
+            x, v = _path_end(step)
             moving = dot(v, v) > AT_REST_M2_S2
             unknown_after = "signals that end in motion" if moving else before.unknown_after
             return replace(
@@ -195,10 +196,10 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
 
 
 @lru_cache(maxsize=64)
-def _signals_end(terms: tuple[Term, ...], duration_s: float) -> tuple[Vec3, Vec3]:
-    """Displacement and velocity at the end of signals. Each start of a mission needs those of all its
-    signals several times."""
-    x, v, *_ = evaluate(signal_table(terms), duration_s)
+def _path_end(step: LoadPath) -> tuple[Vec3, Vec3]:
+    """Displacement and velocity at the end of signals or a trajectory. Each start of a mission needs those of
+    all its paths several times."""
+    x, v, *_ = evaluate_load_path(path_tables(step), step.duration_s)
     return x, v
 
 
@@ -232,8 +233,8 @@ def _travel_and_wait_s(
             speed = min(speed, rate or REEL_M_S)
         case Release():
             return 0.0, RELEASE_S
-        case Delay(duration_s=duration) | AttitudeRun(duration_s=duration) | Signals(duration_s=duration):
-            return 0.0, duration
+        case Delay() | AttitudeRun() | Signals() | Trajectory():
+            return 0.0, step.duration_s
     if before.expected is None or after.expected is None:
         return 0.0, waiting
     distance = dist(before.expected, after.expected)

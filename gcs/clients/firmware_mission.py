@@ -22,6 +22,7 @@ _UNCHANGED = -1.0  # throttle
 _NAMES = {
     "Winch": "the winch",
     "Signals": "signals (paths given by formulas)",
+    "Trajectory": "a trajectory (a path given by timed points)",
     "AttitudeRun": "an attitude of vehicle or load",
 }
 

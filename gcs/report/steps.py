@@ -22,6 +22,7 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
+    Trajectory,
     TurnHeading,
     Waypoint,
     Winch,
@@ -76,6 +77,8 @@ def describe(step: Step, released: bool) -> str:
             return f"Make the cable {_m(abs(step.length_m))} {_longer(step.length_m)}{speed}"
         case Signals():
             return f"Fly signals for {step.duration_s:g} s: {_terms(step.terms)}"
+        case Trajectory():
+            return f"Fly a trajectory of {len(step.points)} points for {step.duration_s:g} s"
         case AttitudeRun():
             return _attitude_run(step)
 

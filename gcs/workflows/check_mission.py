@@ -34,7 +34,7 @@ from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import violations
 from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits, with_settings
-from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
+from missions.model import AttitudeRun, LoadPath, Mission, Release, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
 # one: slower rotors, a sagging battery and a cable off the centre take a part of it, wind another.
@@ -98,7 +98,7 @@ def slowness_notes(reports: Sequence[PathReport]) -> Iterator[str]:
         if asked_m_s:
             yield (
                 f"note: items[{items[0]}] to items[{items[-1]}]: too close together, or turns too sharp, for "
-                f"{asked_m_s:g} m/s; leave out waypoints, or fly signals (docs/missions.md)"
+                f"{asked_m_s:g} m/s; leave out waypoints, or fly a trajectory (docs/missions.md)"
             )
 
 
@@ -137,7 +137,7 @@ def timeout_warnings(
 
 def _move_s(entry: TimelineEntry) -> float:
     """The part of a step's duration (s) that a path report gives as it is flown."""
-    return entry.duration_s if isinstance(entry.step, Signals | AttitudeRun) else entry.transfer_s
+    return entry.duration_s if isinstance(entry.step, LoadPath | AttitudeRun) else entry.transfer_s
 
 
 def _start(table: AutopilotParameters) -> MissionState:
@@ -258,7 +258,7 @@ def check_mission(
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
         *timeout_warnings(mission, reports, table),
     )
-    if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
+    if as_asked and any(isinstance(step, LoadPath | AttitudeRun) for step in mission.steps):
         warnings += (
             "note: how near a law without preview keeps to this, and whether its own errors lose the "
             f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",

@@ -232,6 +232,9 @@ class Shell:
     def _command(self, words: list[str], block: Block) -> None:
         if words[:1] == ["."]:  # activates the environment
             return
+        if words[0] == "python":
+            assert Path(words[1]).is_file(), f"{block.place}: no block of the page is {words[1]}"
+            return  # it ran as a block
         assert words[0] == "gcs", f"{block.place}: {words[0]} is not run here: mark the block"
         if ">" in words:
             words = words[: words.index(">")]
@@ -277,7 +280,8 @@ def run_toml(block: Block) -> None:
     """Check that the block can be read as the kind of file that it is."""
     table = tomllib.loads(block.text)
     if "items" in table:
-        parse_mission(block.text, "block", block.place)
+        # its other files are found from the folder of its own
+        parse_mission(block.text, "block", block.said if block.mark == "file" else block.place)
     elif "quad_mass_kg" in table:
         Vehicle.model_validate({"name": "block", **table})
     elif "model" in table:

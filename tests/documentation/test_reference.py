@@ -39,7 +39,12 @@ The messages, commands and enumerations that Plumbline's dialect adds to MAVLink
 `autopilot/wire/dialect/plumbline.xml`. What is spoken of `common`, and how, is in [mavlink.md](mavlink.md).
 
 """
-TABLES = {"items": "1 ... 1000 tables", "terms": "1 ... 32 tables", "factors": "0 ... 3 tables"}
+TABLES = {
+    "items": "1 ... 1000 tables",
+    "terms": "1 ... 32 tables",
+    "factors": "0 ... 3 tables",
+    "points": "2 ... 1000 rows of four numbers",
+}
 # meanings of keys whose schema has no description
 MEANINGS = {
     "terms": "added to each other",

@@ -26,17 +26,19 @@ from autopilot.trajectory.shaping import ShapedSignals, unshaped_signals
 from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from missions.model import Signals, Sine, Takeoff, Term, Waypoint
+from missions.model import Signals, Sine, Takeoff, Term, Trajectory, Waypoint
 
 # a half-cosine too steep for the vehicle, and a sine that dies away
 TERMS = (Term("y", 0.25, 1.0, 0.79, None, 0.0, ()), Term("x", 0.1, 0.0, 1.0, 2.0, 1.0, (Sine(2.0),)))
 SIGNALS = Signals(5.0, TERMS)
+CURVE = Trajectory([(0.0,) * 4, (1.5, 0.5, 0.2, 0.1), (3.0, 0.2, 0.6, 0.0), (5.0, 0.3, 0.1, 0.2)])
 LEGS = (
     Hold((1.0, 2.0, 3.0)),
     Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0),
     Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
+    SignalRun((0.1, 0.2, 0.3), unshaped_signals(CURVE)),
     Reel((0.1, 0.2, 1.3), 2.0, 0.3, 0.7, 2.1),
     Reel((0.1, 0.2, 1.3), 2.0, -0.3, 0.5, 0.0),
     PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),

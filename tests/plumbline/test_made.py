@@ -30,11 +30,13 @@ from plumbline import (
     Speed,
     Takeoff,
     Term,
+    Trajectory,
     Vehicle,
     Waypoint,
     Winch,
 )
 from sitl.sensors.shipped import PROFILES
+from tests.doubles.trajectories import trajectories
 
 SHORT = Mission("short", [Takeoff(0.5), Waypoint(0.2, 0.0, 0.5, hold_s=0.5), Land()])
 
@@ -71,6 +73,7 @@ WITH_LOAD = st.one_of(
         numbers(0.001, 3600),
         st.lists(STAYING | RETURNING | TIMED, min_size=1, max_size=3).map(tuple),
     ),
+    trajectories(100.0),
     st.builds(
         AttitudeRun,
         st.sampled_from(["vehicle", "load"]),
@@ -152,6 +155,12 @@ WRONG: dict[str, tuple[Any, str]] = {
     "fall alone": (
         lambda: Mission("m", [Takeoff(1.0), Signals(5.0, (Term("y", 1.0, rise_s=1.0, fall_s=1.0),)), Land()]),
         "m: items[1].terms[0] has fall_s without hold_s; give both, or neither to stay at the top",
+    ),
+    "close points": (
+        lambda: Mission(
+            "m", [Takeoff(1.0), Trajectory([(0.05 * k, 0.0, 0.0, 0.0) for k in range(9)]), Land()]
+        ),
+        "m: items[1] points[1] is 0.05 s after the point before; must be 0.1 s at least; closer",
     ),
     "nothing": (lambda: Mission("m", []), "items = []; must be a list of at least 1"),
     "after release": (lambda: Mission("m", [Takeoff(1.0), Release(), Winch(0.1), Land()]), "needs the load"),

@@ -20,6 +20,7 @@ from autopilot.wire.fence import Disc, Fence, Polygon
 from autopilot.wire.items import LocatedStep
 from missions.model import (
     AttitudeRun,
+    Axis,
     Delay,
     Land,
     Release,
@@ -29,6 +30,7 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
+    Trajectory,
     Waypoint,
     Winch,
 )
@@ -216,12 +218,28 @@ def test_the_way_begins_where_the_load_stands() -> None:
     assert not uploaded(sky, *steps)
 
 
-def test_the_end_of_signals_is_a_place_and_the_next_way_begins_there() -> None:
-    north = Signals(5.0, (Term("y", 6.0, 0.0, 4.0, None, 0.0),))
-    assert uploaded(fenced(), Takeoff(2.0), north, Land()) == f"Mission denied: item 1 leads {OUTSIDE}"
-    short = Signals(5.0, (Term("y", 4.5, 0.0, 4.0, None, 0.0),))
-    assert not uploaded(fenced(), Takeoff(2.0), short, Land())
-    text = uploaded(fenced(), Takeoff(2.0), short, Waypoint(0.0, 1.0, 2.0), Land())
+def test_the_paths_of_signals_and_trajectories_are_checked_and_the_next_way_begins_at_their_end() -> None:
+    """North of home are a zone of radius 1 m at 3 m and the end of the square at 5 m."""
+
+    def signals(*terms: tuple[Axis, float, float | None]) -> Signals:
+        return Signals(20.0, tuple(Term(axis, m, 0.0, 4.0, hold_s, 4.0) for axis, m, hold_s in terms))
+
+    def through(*places: tuple[float, float]) -> Trajectory:
+        return Trajectory([(3.0 * k, *place, 0.0) for k, place in enumerate(((0.0, 0.0), *places))])
+
+    for path, why in (
+        (signals(("y", 4.5, None)), ZONE),  # ends behind the zone
+        (signals(("y", 4.5, 2.0)), ZONE),  # ends at home
+        (signals(("x", 6.0, 2.0)), OUTSIDE),
+        (signals(("x", 4.0, 2.0), ("y", 1.5, None)), ""),
+        (through((0.0, 4.5), (0.0, 0.0)), ZONE),
+        (through((0.0, -6.0), (0.0, 0.0)), OUTSIDE),
+        (through((2.0, 3.0), (0.0, 4.5)), ""),
+    ):
+        text = uploaded(fenced(), Takeoff(2.0), path, Land())
+        assert text == (f"Mission denied: item 1 leads {why}" if why else None)
+    beside = through((2.0, 3.0), (0.0, 4.5))
+    text = uploaded(fenced(), Takeoff(2.0), beside, Waypoint(0.0, 1.0, 2.0), Land())
     assert text == f"Mission denied: item 2 leads {ZONE}"
 
 

@@ -75,7 +75,7 @@ def edge(height: float, rise: float, axis: str = "y", by: float | None = None) -
 def along(shaped: ShapedSignals, spacing: float = 1e-3) -> tuple[Array, Array, Array]:
     """Times, jets of the flown path, positions of the asked one."""
     times = np.arange(-shaped.lead_s, shaped.duration_s + shaped.tail_s, spacing)
-    return times, path_jets(shaped, times), requested_jets(shaped.table, shaped.duration_s, times)[0]
+    return times, path_jets(shaped, times), requested_jets(shaped.tables, shaped.duration_s, times)[0]
 
 
 def assert_within(shaped: ShapedSignals, bounds: Bounds = BOUNDS) -> None:
@@ -227,7 +227,7 @@ def test_without_shaping_the_asked_path_is_flown() -> None:
     step = signals_of("case-a")
     (made,) = prepare((step,), (0,), LIMITS._replace(shape_paths=False)).paths
     asked = unshaped_signals(step)
-    plain = [one.name for one in fields(asked) if one.name not in ("table", "pieces")]
+    plain = [one.name for one in fields(asked) if one.name not in ("tables", "pieces")]
     assert [getattr(made, name) for name in plain] == [getattr(asked, name) for name in plain]
 
 

@@ -27,7 +27,7 @@ from autopilot.wire.items import (
     located_steps,
     unflown_items,
 )
-from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MAX_FACTORS, MAX_TERMS
+from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MAX_FACTORS, MAX_POINTS, MAX_TERMS
 from missions.fileformat import load_mission, shipped
 from missions.model import (
     AttitudeRun,
@@ -41,10 +41,12 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
+    Trajectory,
     TurnHeading,
     Waypoint,
     Winch,
 )
+from tests.doubles.trajectories import trajectories
 
 HOME = Home(47.397742, 8.545594, 488.0)
 FLOAT32 = 2.0**-24  # half a step of float32, relative
@@ -79,6 +81,7 @@ steps: st.SearchStrategy[Step] = st.one_of(
     st.just(ReturnHome()),
     st.just(Land()),
     st.builds(Signals, real(0.1, 3600.0), st.lists(terms, min_size=1, max_size=4).map(tuple)),
+    trajectories(1000.0),
     st.builds(AttitudeRun, st.sampled_from(["vehicle", "load"]), real(-1.5, 1.5), real(-1.5, 1.5), edges),
 )
 missions = st.lists(steps, max_size=8)
@@ -97,6 +100,8 @@ TERM = item(31010, 0.0, 1.0, 0.5, 0.5, y=-1)
 FACTOR = item(31011, x=3_000_000)
 RUN = item(31012, x=10_000)
 UP = item(22, frame=6, z=5.0)
+START = item(31014)
+POINT = item(31014, 1.0, 2.0, -0.5, x=1000)
 
 
 def numbers(value: Any) -> list[Any]:
@@ -294,6 +299,23 @@ REFUSALS = [
     ([item(31013, 1.0, 1.6, x=1000)], 0, "INVALID_PARAM2", "tilt north = 1.6 rad"),
     ([item(31013, 1.0, 0.0, math.nan, x=1000)], 0, "INVALID_PARAM3", "tilt east = nan rad"),
     ([item(31013, 1.0, 0.1, x=0)], 0, "INVALID_PARAM5_X", "duration = 0 s"),
+    ([POINT], 0, "INVALID", "the first point of a trajectory (31014) must be at 0 s"),
+    ([START._replace(param2=1.0), POINT], 0, "INVALID", "must be at 0 s and 0, 0, 0 m"),
+    ([START], 0, "INVALID", "a trajectory (31014) needs two points at least"),
+    ([START, START, POINT], 0, "INVALID", "a trajectory (31014) needs two points at least"),
+    ([START, item(115, 90.0), POINT], 0, "INVALID", "a trajectory (31014) needs two points at least"),
+    ([START, POINT, POINT._replace(x=1099)], 2, "INVALID_PARAM5_X", "time = 1.099 s; must be 0.1 s"),
+    ([START, POINT, POINT._replace(x=900)], 2, "INVALID_PARAM5_X", "time = 0.9 s; must be 0.1 s"),
+    ([START, POINT._replace(param3=math.inf)], 1, "INVALID_PARAM3", "down = inf m"),
+    ([START, POINT._replace(frame=3)], 1, "UNSUPPORTED_FRAME", "frame"),
+    ([TERM, START, POINT, RUN], 0, "INVALID", "has no run (31012) behind it"),
+    (
+        [START] + [POINT._replace(x=100 * k) for k in range(1, MAX_POINTS + 1)],
+        MAX_POINTS,
+        "NO_SPACE",
+        "more than 1000 points",
+    ),
+    ([UP, item(211, 1.0, 0.0), START, POINT], 2, "INVALID", "needs the load"),
     ([item(115, math.nan)], 0, "INVALID_PARAM1", "angle = nan deg"),
     ([item(115, 400.0)], 0, "INVALID_PARAM1", "angle = 400 deg"),
     ([item(115, 90.0, 0.0, 2.0)], 0, "INVALID_PARAM3", "sense = 2"),
@@ -424,11 +446,21 @@ def test_after_what_leaves_no_known_place_a_height_alone_is_refused(unknown: Wir
 
 def test_commands_for_other_things_are_kept_and_not_flown() -> None:
     assert (
-        decode_items(
-            [item(command) for command in (1000, 203, 196, 198, 206, 189, 31000, 31014, 43000)], HOME
-        )
-        == ()
+        decode_items([item(command) for command in (1000, 203, 196, 198, 206, 189, 31000, 43000)], HOME) == ()
     )
+
+
+def test_points_in_a_row_are_one_trajectory_and_a_point_at_time_zero_begins_another() -> None:
+    kept, heading = item(203), item(115, 90.0, 0.0, 1.0)
+    items = [UP, START, kept, POINT, START, POINT, heading, item(93, 1.0), START, POINT, item(177, 7.0, 1.0)]
+    located = located_steps(items, HOME)
+    through = Trajectory([(0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 1.0, 0.5)])
+    assert [(one.first, one.last) for one in located] == [
+        *((0, 0), (1, 3), (4, 5), (7, 7), (8, 9)),
+        *((7, 7), (8, 9)),  # once more
+    ]
+    assert [one.step for one in located if isinstance(one.step, Trajectory)] == [through] * 4
+    assert [bool(one.heading_commands) for one in located] == [False] * 3 + [True] + [False] * 3
 
 
 def test_what_is_not_flown_is_known() -> None:

@@ -35,7 +35,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
 # steps for which a vehicle on the ground takes off
-_STEPS_IN_THE_AIR = model.Takeoff | model.Waypoint | model.Signals | model.AttitudeRun
+_STEPS_IN_THE_AIR = model.Takeoff | model.Waypoint | model.LoadPath | model.AttitudeRun
 
 
 def _accepted_pending(what: str) -> Verdict:

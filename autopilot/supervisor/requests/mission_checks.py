@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from autopilot.geometry.linear import Vec3, axpy, norm, sub
+from autopilot.geometry.linear import Vec3, add, axpy, norm, sub
 from autopilot.supervisor.motion import cable_length_at, stopping_legs
 from autopilot.supervisor.requests.limits import MIN_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
@@ -25,6 +25,7 @@ from autopilot.supervisor.state import (
     load_position_below,
 )
 from autopilot.supervisor.step_legs import NEAR_START
+from autopilot.trajectory.load_path import evaluate_load_path, path_tables
 from autopilot.trajectory.prepare import MissionBegin, waypoint_path_starts
 from autopilot.trajectory.timeline import (
     ANYWHERE,
@@ -36,10 +37,11 @@ from autopilot.trajectory.timeline import (
 )
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from autopilot.wire.statustext import listed
-from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
+from missions.model import AttitudeRun, LoadPath, ReturnHome, Step, Takeoff, Waypoint, Winch
 
 # spacing of the places at which a line is checked, and their greatest number
 CHECK_SPACING_M, MAX_CHECK_POINTS = 0.25, 4000
+CHECK_SPACING_S = 0.1  # the same for a path in time
 MIN_CURVE_POINTS = 16  # between two waypoints, however close
 MAX_CHECKED_RALLY = 50  # rally points that are compared with the fence
 
@@ -87,7 +89,7 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
     else:
         here = stopping_legs(flight, view, settings)[1]
         length = cable_length_at(flight, here, settings)
-        if mission.step_anchor is not None and isinstance(steps[0], Signals | AttitudeRun):
+        if mission.step_anchor is not None and isinstance(steps[0], LoadPath | AttitudeRun):
             here = mission.step_anchor  # flown again from where it began
         if cable.reel_target_m is not None and isinstance(steps[0], Winch):  # resumed
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
@@ -175,13 +177,24 @@ def _leading(reason: str) -> str:
 
 def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
     begin, end = entry.before.expected, entry.after.expected
-    if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | Signals | Winch):
+    if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | LoadPath | Winch):
         return ""
-    straight = not isinstance(entry.step, Signals | Winch)
     # a way that begins beyond the fence leads back: only its end counts
-    if begin is None or not straight or _first_violation(flight, entry, (begin,), settings):
+    if begin is None or _first_violation(flight, entry, (begin,), settings):
         return _first_violation(flight, entry, (end,), settings)
-    return _first_violation(flight, entry, _points_along(begin, end), settings)
+    return _first_violation(flight, entry, _places_on_way(entry.step, begin, end), settings)
+
+
+def _places_on_way(step: Step, begin: Vec3, end: Vec3) -> Iterable[Vec3]:
+    """Places on the way of a step, up to its end."""
+    if isinstance(step, Winch):
+        return (end,)
+    if not isinstance(step, LoadPath):
+        return _points_along(begin, end)
+    tables = path_tables(step)
+    pieces = min(math.ceil(step.duration_s / CHECK_SPACING_S), MAX_CHECK_POINTS)
+    times = ((k + 1) / pieces * step.duration_s for k in range(pieces))
+    return (add(begin, evaluate_load_path(tables, t)[0]) for t in times)
 
 
 def _first_violation(flight: Flight, entry: TimelineEntry, places: Iterable[Vec3], settings: Settings) -> str:
@@ -244,7 +257,7 @@ def height_problem(ahead: RemainingSteps) -> str:
 def missing_load_problem(ahead: RemainingSteps) -> str:
     """Which item requires a load that is released by then, and why; an empty string if none does."""
     for seq, entry in ahead:
-        if entry.before.released and isinstance(entry.step, Signals | AttitudeRun):
+        if entry.before.released and isinstance(entry.step, LoadPath | AttitudeRun):
             return f"item {seq} needs the load, which is released"
     return ""
 

@@ -493,8 +493,21 @@ enums["PLUMBLINE_COMMAND"][31013].param[5] = """Duration of the swing (MISSION_I
 enums["PLUMBLINE_COMMAND"][31013].label[5] = """Duration"""
 enums["PLUMBLINE_COMMAND"][31013].param[6] = """Reserved (0)."""
 enums["PLUMBLINE_COMMAND"][31013].param[7] = """Reserved (0)."""
-PLUMBLINE_COMMAND_ENUM_END = 31014
-enums["PLUMBLINE_COMMAND"][31014] = EnumEntry("PLUMBLINE_COMMAND_ENUM_END", """""")
+PLUMBLINE_LOAD_TRAJECTORY_POINT = 31014
+enums["PLUMBLINE_COMMAND"][31014] = EnumEntry("PLUMBLINE_LOAD_TRAJECTORY_POINT", """A point of a load trajectory, which is the smooth path through the points in a row, at their times, from where the load hangs at the first one.""")
+enums["PLUMBLINE_COMMAND"][31014].param[1] = """Place north of the first point."""
+enums["PLUMBLINE_COMMAND"][31014].label[1] = """North"""
+enums["PLUMBLINE_COMMAND"][31014].param[2] = """Place east of the first point."""
+enums["PLUMBLINE_COMMAND"][31014].label[2] = """East"""
+enums["PLUMBLINE_COMMAND"][31014].param[3] = """Place below the first point."""
+enums["PLUMBLINE_COMMAND"][31014].label[3] = """Down"""
+enums["PLUMBLINE_COMMAND"][31014].param[4] = """Reserved (0)."""
+enums["PLUMBLINE_COMMAND"][31014].param[5] = """Time after the first point, 0 for that one (MISSION_ITEM_INT.x)."""
+enums["PLUMBLINE_COMMAND"][31014].label[5] = """Time"""
+enums["PLUMBLINE_COMMAND"][31014].param[6] = """Reserved (0)."""
+enums["PLUMBLINE_COMMAND"][31014].param[7] = """Reserved (0)."""
+PLUMBLINE_COMMAND_ENUM_END = 31015
+enums["PLUMBLINE_COMMAND"][31015] = EnumEntry("PLUMBLINE_COMMAND_ENUM_END", """""")
 
 # HL_FAILURE_FLAG
 enums["HL_FAILURE_FLAG"] = Enum()

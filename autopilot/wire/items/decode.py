@@ -12,15 +12,35 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Command, Handling, ItemContext
 from autopilot.wire.items.fields import choice
-from autopilot.wire.items.limits import MAX_FACTORS, MAX_FLOWN_ITEMS, MAX_JUMPS, MAX_TERMS
+from autopilot.wire.items.limits import (
+    MAX_FACTORS,
+    MAX_FLOWN_ITEMS,
+    MAX_JUMPS,
+    MAX_POINTS,
+    MAX_TERMS,
+    SHORTEST_POINT_S,
+)
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, handling_of
-from missions.model import Delay, HeadingCommand, Land, ReturnHome, Signals, Step, Takeoff, Term
+from missions.model import (
+    ORIGIN,
+    Delay,
+    HeadingCommand,
+    Land,
+    ReturnHome,
+    Signals,
+    Step,
+    Takeoff,
+    Term,
+    Trajectory,
+    TrajectoryPoint,
+)
 
-_TERM, _FACTOR, _RUN = (
+_TERM, _FACTOR, _RUN, _POINT = (
     mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
     mavlink.PLUMBLINE_LOAD_SIGNAL_FACTOR,
     mavlink.PLUMBLINE_LOAD_SIGNAL_RUN,
+    mavlink.PLUMBLINE_LOAD_TRAJECTORY_POINT,
 )
 
 
@@ -33,6 +53,7 @@ _SUGGESTED = (
     mavlink.MAV_CMD_NAV_LAND,
 )
 ENDLESS = -1  # repetitions of a jump
+_ROUNDING_S = 1e-9  # of times that are whole milliseconds
 _MIN_LAP_S = 0.5  # that an endless jump must take from one time to the next
 
 
@@ -52,7 +73,7 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
     while seq < len(items):
         item = items[seq]
         if item.command == mavlink.MAV_CMD_DO_JUMP:
-            reader.expect_no_terms(seq - 1)
+            reader.end_step(seq - 1)
             last = len(items) - 1
             target = choice(seq, 1, "item to jump to", item.param1, range(last + 1), f"0 ... {last}")
             allowed = f"0 ... {MAX_JUMPS}, or -1: without end"
@@ -75,7 +96,7 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
         if flown_count > MAX_FLOWN_ITEMS:
             text = f"with its jumps the mission has more than {MAX_FLOWN_ITEMS} items"
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
-    reader.expect_no_terms(len(items) - 1)
+    reader.end_step(len(items) - 1)
     reader.add_hold_to_turn(len(items) - 1)
     return tuple(reader.steps)
 
@@ -101,7 +122,8 @@ class _Reader:
         self._home = home
         self._return_to = return_to
         self._terms: list[Term] = []
-        self._first_term = 0
+        self._points: list[TrajectoryPoint] = []
+        self._first = self._last = 0  # items of the terms or points so far
         self._heading_commands: list[HeadingCommand] = []  # of the next step
         self._state = ANYWHERE  # after the steps so far
 
@@ -112,12 +134,14 @@ class _Reader:
         if handling is Handling.KEPT:
             return
         row = COMMAND[item.command]
+        if item.command != _POINT or item.x == 0:  # a point at time 0 begins another trajectory
+            self._end_trajectory()
         context = ItemContext(seq, item, self._home, self._state, row)
         if row.heading_command is not None:
             self._heading_commands.append(row.heading_command(context))
             return
         if item.command not in (_TERM, _FACTOR, _RUN):
-            self.expect_no_terms(seq - 1)
+            self._expect_no_terms(seq - 1)
         context.expect_frame()
         if item.command == _TERM:
             self._term(context)
@@ -125,14 +149,21 @@ class _Reader:
             self._factor(context)
         elif item.command == _RUN:
             self._run(context)
+        elif item.command == _POINT:
+            self._point(context)
         else:
             for step in _steps(context, row):
                 self._add(LocatedStep(seq, seq, step))
 
-    def expect_no_terms(self, seq: int) -> None:
+    def end_step(self, seq: int) -> None:
+        """End the step of the terms or points up to item `seq`."""
+        self._end_trajectory()
+        self._expect_no_terms(seq)
+
+    def _expect_no_terms(self, seq: int) -> None:
         """MissionItemError if there are terms without a run, which would be lost silently."""
         if self._terms:
-            text = f"the load signal begun at item {self._first_term} has no run (31012) behind it"
+            text = f"the load signal begun at item {self._first} has no run (31012) behind it"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
     def add_hold_to_turn(self, seq: int) -> None:
@@ -163,7 +194,7 @@ class _Reader:
             raise context.refusal(f"more than {MAX_TERMS} terms", mavlink.MAV_MISSION_NO_SPACE)
         term = context.record()
         if not self._terms:
-            self._first_term = context.seq
+            self._first = context.seq
         self._terms.append(term)
 
     def _factor(self, context: ItemContext) -> None:
@@ -182,8 +213,33 @@ class _Reader:
             raise context.refusal("a run (31012) must follow a term (31010)")
         context.expect_load()
         signals = Signals(context["duration_s"], tuple(self._terms))
-        self._add(LocatedStep(self._first_term, context.seq, signals))
+        self._add(LocatedStep(self._first, context.seq, signals))
         self._terms = []
+
+    def _point(self, context: ItemContext) -> None:
+        context.expect_load()
+        point = context.record()
+        if not self._points:
+            self._first = context.seq
+            if point != ORIGIN:
+                raise context.refusal("the first point of a trajectory (31014) must be at 0 s and 0, 0, 0 m")
+        elif point.t_s - self._points[-1].t_s < SHORTEST_POINT_S - _ROUNDING_S:
+            text = f"time = {point.t_s:g} s; must be {SHORTEST_POINT_S:g} s at least after the point before"
+            raise context.refusal(text, mavlink.MAV_MISSION_INVALID_PARAM5_X)
+        if len(self._points) == MAX_POINTS:
+            raise context.refusal(f"more than {MAX_POINTS} points", mavlink.MAV_MISSION_NO_SPACE)
+        self._points.append(point)
+        self._last = context.seq
+
+    def _end_trajectory(self) -> None:
+        """End the trajectory of the points so far, if there are any."""
+        if len(self._points) == 1:
+            text = "a trajectory (31014) needs two points at least"
+            raise MissionItemError(self._first, text, mavlink.MAV_MISSION_INVALID)
+        if self._points:
+            trajectory = Trajectory(tuple(self._points))
+            self._points = []
+            self._add(LocatedStep(self._first, self._last, trajectory))
 
 
 def _steps(context: ItemContext, row: Command) -> Iterable[Step]:

@@ -14,7 +14,7 @@ from autopilot.wire.items.fields import WIRE_FIELD, Height, Place
 from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE, WireItem
 from autopilot.wire.items.table import COMMANDS
 from autopilot.wire.parameter_table import float32
-from missions.model import Mission, Signals, Step
+from missions.model import Mission, Signals, Step, Trajectory
 
 _DEFAULT_COMMAND: dict[type[Any], Command] = {
     row.record_type: row for row in COMMANDS if row.record_type and row.is_default
@@ -49,12 +49,16 @@ def step_index(seq: int, steps: Sequence[Step]) -> int:
 
 
 def _records(step: Step) -> Iterator[Any]:
-    """The records that have separate items: the step, for signals after their terms and factors."""
+    """The records that have separate items: the step, for signals after their terms and factors; of a
+    trajectory its points."""
     if isinstance(step, Signals):
         for term in step.terms:
             yield term
             yield from term.factors
-    yield step
+    if isinstance(step, Trajectory):
+        yield from step.points
+    else:
+        yield step
 
 
 def _item(record: Any, home: Home, seq: int) -> WireItem:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any, ClassVar, Protocol
 
-from autopilot.geometry.frames import enu_from_ned
+from autopilot.geometry.frames import enu_from_ned, ned_from_enu
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.limits import FARTHEST_M, LOWEST_M
@@ -171,6 +171,28 @@ class Amplitude:
 
     def describe(self) -> str:
         return f"p1 axis: 0 north, 1 east, 2 down; p2 amplitude {-FARTHEST_M:g} ... {FARTHEST_M:g} m"
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """A place in m from the first point of a trajectory: NED on the wire, ENU in the record."""
+
+    attributes: ClassVar[tuple[str, ...]] = ("east_m", "north_m", "up_m")
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[float, float, float]:
+        ned = (item.param1, item.param2, item.param3)
+        north, east, down = (
+            check(seq, param, name, value, "m", -FARTHEST_M, FARTHEST_M)
+            for param, (name, value) in enumerate(zip(("north", "east", "down"), ned, strict=True), 1)
+        )
+        return enu_from_ned((north, east, down))
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        north, east, down = ned_from_enu((values[0], values[1], values[2]))
+        return {"param1": north, "param2": east, "param3": down}
+
+    def describe(self) -> str:
+        return f"p1, p2, p3 north, east and down of the first point {-FARTHEST_M:g} ... {FARTHEST_M:g} m"
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,16 @@ from autopilot.trajectory.timeline import SPEED_M_S
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import heading, readers
 from autopilot.wire.items.command import Command, Handling
-from autopilot.wire.items.fields import Amplitude, Choice, Fall, Height, HomePlace, Number, Place
+from autopilot.wire.items.fields import (
+    Amplitude,
+    Choice,
+    Displacement,
+    Fall,
+    Height,
+    HomePlace,
+    Number,
+    Place,
+)
 from autopilot.wire.items.limits import (
     FASTEST_M_S,
     FASTEST_REEL_M_S,
@@ -42,6 +51,7 @@ from missions.model import (
     Speed,
     Takeoff,
     Term,
+    TrajectoryPoint,
     Waypoint,
     Winch,
 )
@@ -274,6 +284,15 @@ COMMANDS: tuple[Command, ...] = (
             Number(5, "duration_s", "duration", "s", SHORTEST_EDGE_S, LONGEST_S, _MS),
         ),
         AttitudeRun,
+        is_default=True,
+        mission_frame=True,
+        needs_load=True,
+    ),
+    Command(
+        m.PLUMBLINE_LOAD_TRAJECTORY_POINT,
+        "the load passes the points in a row at their times",
+        (Number(5, "t_s", "time", "s", 0.0, LONGEST_S, _MS), Displacement()),
+        TrajectoryPoint,
         is_default=True,
         mission_frame=True,
         needs_load=True,
