@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from autopilot.shell.atomic_file import write_atomically
@@ -195,10 +196,14 @@ class Flight:
             hint = did_you_mean(name, pictures)
             raise GcsError(f"plot {name!r}: there is none; {hint}must be one of {', '.join(pictures)}")
         view = View(self._tracks, self._samples, self.summary, self._meta)
-        png = io.BytesIO()
-        with style():
-            pictures[name].draw(view, png)
-        return Picture(png.getvalue())
+
+        def draw(picture_format: str) -> bytes:
+            with TemporaryDirectory() as folder, style():
+                file = Path(folder) / f"{name}.{picture_format}"
+                pictures[name].draw(view, file)
+                return file.read_bytes()
+
+        return Picture(draw)
 
     @checked_flags
     def report(
@@ -224,7 +229,7 @@ class Flight:
             for name in LOGS:  # of another flight
                 (folder / name).unlink(missing_ok=True)
             write_atomically(folder / TLOG_FILE, self.tlog)
-            make_report(folder / TLOG_FILE, folder, self._meta, quiet, all_pictures=pictures)
+            make_report(folder / TLOG_FILE, folder, self._meta, quiet, pictures="png" if pictures else None)
         return folder / PAGE_FILE
 
     @cached_property
@@ -258,18 +263,22 @@ def _holds_another(file: Path, tlog: bytes) -> bool:
 
 
 class Picture:
-    """A picture as the bytes of a PNG, which a notebook shows."""
+    """A picture, which a notebook shows. `png` has the bytes of a PNG."""
 
-    def __init__(self, png: bytes) -> None:
-        self.png = png
+    def __init__(self, draw: Callable[[str], bytes]) -> None:
+        self._draw = draw  # in a format
+        self.png = draw("png")
 
     def save(self, path: str | Path) -> None:
-        """Write it to a PNG file; an existing file is replaced."""
+        """Write it to a file, as PNG, PDF or SVG by the ending of its name; an existing file is replaced."""
+        from gcs.report.plots import PICTURE_FORMATS
+
         file = file_path("path", path)
-        if file.suffix.lower() not in ("", ".png"):
-            raise GcsError(f"{file}: a picture is written as PNG alone; name it {file.stem}.png")
+        ending = file.suffix.lower().removeprefix(".") or "png"
+        if ending not in PICTURE_FORMATS:
+            raise GcsError(f"{file}: a picture is written as PNG, PDF or SVG; name it {file.stem}.pdf")
         try:
-            write_atomically(file, self.png)
+            write_atomically(file, self.png if ending == "png" else self._draw(ending))
         except OSError as error:
             message = (
                 f"{file}: cannot be written: {error.strerror}; name a file in a folder that can be written"

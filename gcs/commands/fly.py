@@ -132,7 +132,7 @@ def fly_command(
     view: bool,
     port: int | None,
     bind: str,
-    pictures: bool,
+    pictures: str | None,
     required: tuple[str, ...],
     junit: Path | None,
     as_json: bool,

@@ -45,7 +45,7 @@ def build_report(
     meta: FlightMeta | None = None,
     progress: Progress | None = None,
     figures: Callable[[Record], None] | None = None,
-    all_pictures: bool = False,
+    picture_format: str | None = None,
     check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
@@ -53,7 +53,8 @@ def build_report(
     `figures` is called with the record as soon as it is complete, before the steps that take longer. `meta`,
     if given, is that of a new flight, and an earlier report in the directory is deleted; otherwise meta.json
     beside the log is read. A log that is truncated, empty or of a lost flight gives a record too, with None
-    for what cannot be known. With `all_pictures`, the pictures that the page does not need are drawn too.
+    for what cannot be known. All pictures are drawn in `picture_format` (png, pdf, svg); None: only
+    that of the page.
     `check` is called with the record before anything is written, and may raise an error.
     """
     from gcs.report.draw import Drawing
@@ -68,7 +69,11 @@ def build_report(
     else:
         delete_report(out_dir)
 
-    pictures = PICTURES if all_pictures else PICTURES[:1]
+    pictures = PICTURES[:1]  # the page contains it
+    if picture_format is not None:
+        drawn = {picture.file for picture in pictures}
+        wanted = [picture.as_format(picture_format) for picture in PICTURES]
+        pictures += tuple(picture for picture in wanted if picture.file not in drawn)
     remaining = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
     total = len(remaining)
 
@@ -110,10 +115,11 @@ def build_report(
 
 def delete_report(directory: Path) -> None:
     """Delete the report of an earlier flight, including files that were made on demand."""
-    from gcs.report.plots import PICTURES
+    from gcs.report.plots import PICTURE_FORMATS, PICTURES
 
     files = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)
-    for name in (*files, *(picture.file for picture in PICTURES)):
+    pictures = (picture.as_format(one).file for picture in PICTURES for one in PICTURE_FORMATS)
+    for name in (*files, *pictures):
         (directory / name).unlink(missing_ok=True)
 
 

@@ -429,14 +429,23 @@ def _set_min_range(ax: Any, min_range: float) -> None:
         ax.set_ylim(middle - 0.5 * min_range, middle + 0.5 * min_range)
 
 
-class Picture:
-    """A picture's name, file name and caption, and the function that draws it."""
+PICTURE_FORMATS = ("png", "pdf", "svg")
 
-    def __init__(self, name: str, caption: str, draw_it: Callable[[View, Target], None]) -> None:
+
+class Picture:
+    """A picture's name, file name and caption, and the function that draws it in the format of its file."""
+
+    def __init__(
+        self, name: str, caption: str, draw_it: Callable[[View, Target], None], picture_format: str = "png"
+    ) -> None:
         self.name = name
-        self.file = f"{name}.png"
+        self.file = f"{name}.{picture_format}"
         self.caption = caption
         self.draw = draw_it
+
+    def as_format(self, picture_format: str) -> Picture:
+        """The same picture as a file of one of `PICTURE_FORMATS`."""
+        return Picture(self.name, self.caption, self.draw, picture_format)
 
 
 PICTURES: tuple[Picture, ...] = (

@@ -62,6 +62,8 @@ _STYLE: Any = {
     "font.size": 10,
     "grid.color": "#dfe3e7",
     "grid.linewidth": 0.6,
+    "pdf.fonttype": 42,  # letters that other programs can edit and search
+    "svg.hashsalt": "plumbline",  # else its identifiers are random
     "legend.borderpad": 0.0,
     "legend.columnspacing": 1.2,
     "legend.fontsize": 9,
@@ -105,11 +107,16 @@ def new_figure(width_in: float, height_in: float) -> Any:
 
 
 Target = Path | BinaryIO  # of a picture
+# what matplotlib would write about itself and the time
+_DATED = {".png": ("Software",), ".pdf": ("CreationDate", "Creator", "Producer"), ".svg": ("Date", "Creator")}
 
 
 def save(figure: Any, path: Target) -> None:
-    """Write a PNG without date or version in it, so that the same flight gives the same bytes."""
-    figure.savefig(path, dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
+    """Write a PNG, or to a path what its ending says, without date or version in it, so that the same flight
+    gives the same bytes."""
+    ending = path.suffix if isinstance(path, Path) else ".png"
+    pixels: Any = {"pil_kwargs": {"compress_level": 6}} if ending == ".png" else {}
+    figure.savefig(path, dpi=DPI, metadata=dict.fromkeys(_DATED[ending]), **pixels)
 
 
 def new_axes_grid(

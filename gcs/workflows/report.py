@@ -31,17 +31,18 @@ def make_report(
     meta: FlightMeta | None,
     quiet: bool,
     on_record: Callable[[Record], None] | None = None,
-    all_pictures: bool = False,
+    pictures: str | None = None,
     check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Make the report in `out`; without `meta`, meta.json beside the log is used. `on_record` is called with
-    the record before anything is drawn. `all_pictures`: also those that the page does not contain.
+    the record before anything is drawn. `pictures`: the format of all pictures; None: only
+    that of the page.
     `check` is called with the record before anything is written, and may raise an error."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update, on_record, all_pictures, check)
+            return build_report(tlog, out, meta, display.update, on_record, pictures, check)
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
@@ -99,7 +100,7 @@ def meta_beside(tlog: Path) -> FlightMeta:
 
 
 def remake_report(
-    source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
+    source: Path, out: Path | None, quiet: bool, pictures: str | None = None
 ) -> tuple[Record, Path]:
     """Make the report of a log, or of the directory that contains it, again; return the record and the
     report's directory."""
@@ -112,7 +113,7 @@ def remake_report(
     if holds_log and not (folder / TLOG_FILE).samefile(tlog):
         raise InputError(f"{folder}: holds another flight; name another folder by --out")
     check = partial(_check_same_flight, folder) if out and reported and not holds_log else None
-    return make_report(tlog, folder, None, quiet, all_pictures=all_pictures, check=check), folder
+    return make_report(tlog, folder, None, quiet, pictures=pictures, check=check), folder
 
 
 _MEASURED = ("recorded_s", "samples", "load_error_max_m", "rotor_force_max_n")  # distinguish flights

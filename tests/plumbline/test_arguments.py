@@ -93,7 +93,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "vehicle key": (lambda v: Vehicle.load("bebop").replace(load_mass_kg=v), ("x", 50e9, [1])),
     "sensors load": (Sensors.load, (None, "", *NO_TEXT)),
     "sensors save": (Sensors.load("lab").save, (None, *NO_PATH)),
-    "picture": (Picture(b"").save, (None, "/proc/x.png", "x.svg", "x.pdf", *NO_PATH)),
+    "picture": (Picture(lambda _: b"").save, (None, "/proc/x.png", "x.jpg", "x.eps", *NO_PATH)),
     "env settings": (lambda v: options_of({"settings": v}), (TWICE, *NO_MAPPING)),
     "env reward": (
         lambda v: options_of({"reward": v}),
@@ -149,8 +149,11 @@ def test_what_cannot_be_taken_is_an_error_of_one_line(
         (lambda: plumbline.sweep("hover", vary=[1]), "vary = [1]; must be a dict, as {'SIM_WIND_E': [0, 3]}"),  # type: ignore[arg-type]
         (lambda: plumbline.connect(15999), "address = 15999; must be a text, as 'udpin:127.0.0.1:14550'"),  # type: ignore[arg-type]
         (lambda: Mission("a", None), "steps = None; must be a list of steps, as [Takeoff(1.0), Land()]"),  # type: ignore[arg-type]
-        (lambda: Picture(b"").save("x.svg"), "x.svg: a picture is written as PNG alone; name it x.png"),
-        (lambda: Picture(b"").save("/proc/x.png"), "/proc/x.png: cannot be written: No such file"),
+        (
+            lambda: Picture(lambda _: b"").save("x.jpg"),
+            "x.jpg: a picture is written as PNG, PDF or SVG; name it x.pdf",
+        ),
+        (lambda: Picture(lambda _: b"").save("/proc/x.png"), "/proc/x.png: cannot be written: No such file"),
         (
             lambda: plumbline.fly("hover", vehicle=Mission("a", STEPS)),  # type: ignore[arg-type]
             "; must be a name, the path of a file, or a plumbline.Vehicle",

@@ -70,6 +70,8 @@ def test_telemetry_comes_as_what_is_asked_for(flight: plumbline.Flight) -> None:
 def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
     flight.plot("error").save(tmp_path / "error.png")
     assert (tmp_path / "error.png").read_bytes().startswith(b"\x89PNG")
+    flight.plot("error").save(tmp_path / "error.PDF")
+    assert (tmp_path / "error.PDF").read_bytes().startswith(b"%PDF")
     page = flight.report(tmp_path / "out")
     assert page == tmp_path / "out" / "report.html" and "short" in page.read_text(encoding="utf-8")
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == flight.tlog
