@@ -7,7 +7,7 @@ distance and a height of home. Zones are horizontal areas that apply at any heig
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot
 
@@ -51,6 +51,10 @@ class Polygon:
             x1, y1 = x2, y2
         return inside
 
+    def moved(self, east_m: float, north_m: float) -> Polygon:
+        """The same area elsewhere."""
+        return replace(self, corners=tuple((x + east_m, y + north_m) for x, y in self.corners))
+
 
 @dataclass(frozen=True, slots=True)
 class Disc:
@@ -63,6 +67,10 @@ class Disc:
     def contains(self, x: float, y: float) -> bool:
         """Whether the point is inside."""
         return hypot(x - self.centre[0], y - self.centre[1]) <= self.radius
+
+    def moved(self, east_m: float, north_m: float) -> Disc:
+        """The same area elsewhere."""
+        return replace(self, centre=(self.centre[0] + east_m, self.centre[1] + north_m))
 
 
 Zone = Polygon | Disc
@@ -82,6 +90,10 @@ class Fence:
         if any(zone.contains(x, y) for zone in self.zones if not zone.inclusion):
             return "in an exclusion zone of the fence"
         return ""
+
+    def moved(self, east_m: float, north_m: float) -> Fence:
+        """The same fence elsewhere."""
+        return Fence(tuple(zone.moved(east_m, north_m) for zone in self.zones))
 
 
 NO_FENCE = Fence()

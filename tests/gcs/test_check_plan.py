@@ -108,6 +108,30 @@ def test_limits_among_the_parameters_of_the_vehicle_count_for_every_mission(tmp_
     assert check_square("GF_MAX_HOR_DIST = 3.0\nGF_ACTION = 0").exit_code == EXIT_DONE
 
 
+@pytest.mark.parametrize(
+    ("fence", "steps", "near"),
+    [
+        (box(0.0, 0.0, 6.1), (Waypoint(6.0, 0.0, 2.0),), "item 1"),
+        (box(0.0, 0.0, 7.0), (Waypoint(6.0, 0.0, 2.0),), ""),
+        # through the gap between the box and a zone
+        ((*box(0.0, 0.0, 6.0), place(OUTSIDE, 1.0, 2.0, 1.1)), (Waypoint(4.0, 0.0, 2.0),), "item 1"),
+        ((*box(0.0, 0.0, 6.0), place(OUTSIDE, 1.0, 2.0, 2.0)), (Waypoint(4.0, 0.0, 2.0),), ""),
+        # the curve between the waypoints comes near
+        (box(0.0, 0.0, 6.3), CORNER, "the curve to item 2"),
+    ],
+)
+def test_a_path_near_the_fence_is_warned_of(
+    tmp_path: Path, fence: tuple[WireItem, ...], steps: tuple[Step, ...], near: str
+) -> None:
+    found = checked(tmp_path, fence, steps)
+    assert found.exit_code == EXIT_DONE
+    warnings = [line for line in found.stdout.splitlines() if line.startswith("warning: ")]
+    expected = (
+        f"warning: {near} leads within 0.2 m of the fence: wind, or the vehicle that swings the load, "
+    )
+    assert [line.startswith(expected) for line in warnings] == ([True] if near else [])
+
+
 def test_rally_points_beyond_the_fence_are_warned_of(tmp_path: Path) -> None:
     rally = tuple(place(mavlink.MAV_CMD_NAV_RALLY_POINT, 0.0, east, 0.0) for east in (1.0, 20.0))
     found = checked(tmp_path, box(3.0, 3.0, 6.0), CORNER, rally)
