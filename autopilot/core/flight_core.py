@@ -59,7 +59,7 @@ from autopilot.estimation.records import (
     new_history,
 )
 from autopilot.geometry.entry import entry_point_of, kernel_address_of
-from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+from autopilot.geometry.linear import IDENTITY, ZERO, Vec3, norm
 from autopilot.geometry.packed import field_offset, pack, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, jets_ahead
 from autopilot.guidance.legs import Brake, CatchLoad, Leg, PathStop, Reel, winch_hold_height
@@ -267,6 +267,12 @@ class FlightCore:
             bool(self.rows.estimator[_LOAD_AGE] == inf),
             summary.load_tracked,
         )
+
+    @property
+    def known_speed(self) -> float:
+        """Estimated speed of the vehicle, m/s; NaN if the estimate is not good enough for flight."""
+        summary = unpack(EstimateSummary, self.rows.summary, 0)
+        return nan if summary.vehicle_problem else norm(summary.state.v_quad)
 
     # ---- from tick to tick
 

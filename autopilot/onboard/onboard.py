@@ -29,12 +29,14 @@ from autopilot.core.flight_core import (
     commanded_rate,
 )
 from autopilot.core.health import Condition, battery_constants, low_battery_text
-from autopilot.core.sensor_inbox import SensorInbox, Tick
+from autopilot.core.sensor_inbox import INERTIAL, SensorInbox, Tick
 from autopilot.core.warmup import warm_up
 from autopilot.estimation.filter import estimator_tuning
+from autopilot.estimation.records import ImuReading
 from autopilot.geometry.entry import entry_point_of
 from autopilot.geometry.linear import ZERO, Vec3, norm
-from autopilot.geometry.packed import pack, packed
+from autopilot.geometry.packed import pack, packed, unpack
+from autopilot.onboard.fall_watch import FallWatch
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
 from autopilot.onboard.log_topics import Sample
@@ -43,7 +45,6 @@ from autopilot.onboard.path_work import PathWork, begin_now, path_work, use_path
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
 from autopilot.onboard.snapshot import (
-    UNARMED,
     CoreSnapshot,
     MeasuredBattery,
     Options,
@@ -89,7 +90,7 @@ from autopilot.supervisor.requests.mission_checks import (
     remaining_timeline,
 )
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import MissionPlan, Phase, Report, interrupt_mission
+from autopilot.supervisor.state import UNARMED, Fall, MissionPlan, Phase, Report, interrupt_mission
 from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
@@ -251,6 +252,7 @@ class Onboard:
         self._punctuality = Punctuality()
         self._ground = GroundWatch()
         self._ground_missing = False
+        self._fall: FallWatch | None = None  # while the vehicle falls with its rotors stopped
         self._simulator_parameters_known = False  # the simulator has reported its parameters
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is requested to restart
@@ -396,6 +398,8 @@ class Onboard:
         """What follows a tick of the flight software: texts, completed items, the log; returns the answer."""
         now_us = tick.now_us
         answer = self._put_answer(tick, dt)
+        if self._fall is not None or self.core.flight.fall != Fall.NONE:
+            self._follow_fall(tick)
         for severity, text in report.texts:
             self.endpoint.send_text(severity, text)
         for seq in report.reached:
@@ -407,6 +411,22 @@ class Onboard:
             self.has_log_data = True
             self.endpoint.files.protected = log.path
         return answer
+
+    def _follow_fall(self, tick: Tick) -> None:
+        """Follow a vehicle whose rotors have stopped in the air until it rests."""
+        core, flight, now_us = self.core, self.core.flight, tick.now_us
+        if flight.fall == Fall.NONE:  # armed again
+            self._fall = None
+            return
+        self._fall = self._fall or FallWatch(now_us)
+        measured = self._imu_sane and tick.fields_updated & INERTIAL == INERTIAL
+        sample = unpack(ImuReading, self._sensors.imu, 0) if measured else None
+        fall = self._fall.advance(sample, core.known_speed, core.settings.gravity_m_s2, now_us)
+        if fall != flight.fall:
+            core.replace_flight(replace(flight, fall=fall))
+        if fall == Fall.NONE:
+            self._fall = None
+            self._snapshot_source.note_rest(now_us)
 
     # ---- ticks without Python
 
@@ -424,6 +444,7 @@ class Onboard:
             or (self._simulator_parameters.has_messages or self._reboot or self.fault or self.restarted)
             or (self.parameters.version != self._version or self.parameters[LOSS_PARAMETER] > 0.0)
             or self._sensors.rows is not core.rows.inbox
+            or core.flight.fall != Fall.NONE
             or self._ground.has_changed(now_us + period_us, heartbeat_us)
         ):
             return None
@@ -546,6 +567,7 @@ class Onboard:
             return
         vehicle, thrust_n = self.core.setup.vehicle, float(sum((*boot.force, *boot.more_force)))
         if boot.rotors == mavlink.PLUMBLINE_ROTORS_UNHEARD:
+            self.core.replace_flight(replace(self.core.flight, fall=Fall.FALLING))
             text = "Restarted in flight after the rotors had stopped: disarmed"
             self.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, text)
         elif thrust_n < MIN_THRUST_SHARE * vehicle.quad_mass * vehicle.gravity:

@@ -50,7 +50,9 @@ from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
     ON_GROUND,
+    UNARMED,
     ActionWhenArmed,
+    Fall,
     Flight,
     Phase,
     SetpointSource,
@@ -64,7 +66,6 @@ from autopilot.wire.convert.simulator import HilGps
 from autopilot.wire.dialect import plumbline as mavlink
 
 TRACKER_TIMEOUT_S = 0.5  # a tracker is healthy while its last reading is younger
-UNARMED = (Phase.DISARMED, Phase.FAILSAFE)  # the rotors stand
 _FIX_TIMEOUT_US = round(MAX_FIX_AGE_S * 1e6)  # after this time, a receiver that is silent has no fix
 _NO_VELOCITY = (nan, nan, nan)
 _UNKNOWN_COUNT = 255  # number of satellites of a fix without a receiver: unknown
@@ -88,12 +89,16 @@ _ACTION_MODES = {
 }
 _SOURCE_MODES = {SetpointSource.OFFBOARD: identity.OFFBOARD, SetpointSource.MANUAL: identity.POSCTL}
 _LANDED_STATES = {
-    Phase.DISARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
     Phase.ARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
     Phase.TAUTEN: mavlink.MAV_LANDED_STATE_TAKEOFF,
     Phase.LIFT: mavlink.MAV_LANDED_STATE_TAKEOFF,
     Phase.LOWER: mavlink.MAV_LANDED_STATE_LANDING,
     Phase.SET_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
+}
+_FALL_STATES = {
+    Fall.NONE: mavlink.MAV_LANDED_STATE_ON_GROUND,
+    Fall.FALLING: mavlink.MAV_LANDED_STATE_IN_AIR,
+    Fall.UNKNOWN: mavlink.MAV_LANDED_STATE_UNDEFINED,
 }
 _ALWAYS_PRESENT = snapshot.MOTORS | snapshot.AHRS | snapshot.BATTERY
 _REPLACED_BY_TRACKER = snapshot.GPS | snapshot.MAG | snapshot.BARO
@@ -134,9 +139,16 @@ def reported_mode(flight: Flight) -> tuple[int, int]:
     return identity.AUTO, sub_mode(flight)
 
 
+def landed_state(flight: Flight) -> int:
+    """MAV_LANDED_STATE of the flight."""
+    if flight.phase in UNARMED:
+        return _FALL_STATES[flight.fall]
+    return _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR)
+
+
 def system_status(flight: Flight, ready: bool) -> int:
     """MAV_STATE of the flight."""
-    if flight.phase == Phase.FAILSAFE:
+    if flight.phase == Phase.FAILSAFE or flight.fall == Fall.FALLING:
         return mavlink.MAV_STATE_FLIGHT_TERMINATION
     if flight.phase == Phase.DISARMED:
         return mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_CALIBRATING
@@ -232,7 +244,7 @@ def flight_status(flight: Flight, items: int) -> FlightStatus:
         flight.phase not in UNARMED,
         int(flight.phase),
         *reported_mode(flight),
-        _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
+        landed_state(flight),
         seq,
         seq,
         items,
@@ -247,7 +259,7 @@ def sortie_after(sortie: Sortie, previous: Flight, now: Flight) -> Sortie:
         sortie = Sortie(armed_us=now.phase_start_us)
     if now.phase in IN_AIR and not sortie.takeoff_us:
         return sortie._replace(takeoff_us=now.phase_start_us)
-    if previous.phase in IN_AIR and now.phase in ON_GROUND:
+    if previous.phase in IN_AIR and now.phase in ON_GROUND and now.fall == Fall.NONE:
         return sortie._replace(landed_us=now.phase_start_us)
     return sortie
 
@@ -301,6 +313,10 @@ class SnapshotSource:
             ):  # else it stays the same object: a change is noticed by its identity
                 self._flight_status = status
         return self._flight_status
+
+    def note_rest(self, now_us: int) -> None:
+        """The vehicle rests on the ground, after its rotors had stopped in the air."""
+        self.sortie = self.sortie._replace(landed_us=now_us)
 
     def instant_constants(self, flight: Flight) -> InstantConstants:
         """What stays the same in the next instants, as long as this flight record is in force."""

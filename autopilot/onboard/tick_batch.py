@@ -23,12 +23,13 @@ from autopilot.geometry.packed import Row, width
 from autopilot.onboard.flight_log import CompiledLogging
 from autopilot.onboard.log_records import SampleRecords
 from autopilot.onboard.log_topics import FAST
-from autopilot.onboard.snapshot import UNARMED, InstantConstants, SnapshotSource, address_of_instant
+from autopilot.onboard.snapshot import InstantConstants, SnapshotSource, address_of_instant
 from autopilot.onboard.tick_answer import address_of_answer
 from autopilot.services.endpoint import CompiledStreams
 from autopilot.services.instant import Instant
 from autopilot.services.stream_frames import MAX_STREAMS_BYTES, StreamFrames, address_of_streams
 from autopilot.services.streams import NEVER_US
+from autopilot.supervisor.state import UNARMED
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, Bytes, wire_record
 from autopilot.wire.dialect import plumbline as mavlink

@@ -12,7 +12,17 @@ from autopilot.guidance.legs import Creep, Leg
 from autopilot.supervisor.motion import damping_leg, tracks_attitude, with_control_modes
 from autopilot.supervisor.phase_legs import ENTRY_LEGS
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, ActionWhenArmed, Event, Flight, Phase, View
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    UNARMED,
+    ActionWhenArmed,
+    Event,
+    Fall,
+    Flight,
+    Phase,
+    View,
+)
 from autopilot.supervisor.step_legs import following_legs
 from autopilot.supervisor.table import TRANSITIONS
 
@@ -22,7 +32,7 @@ STOPPING_HEIGHT_M = 0.12  # of the load: measured, with 0.02 m of margin
 def try_transition(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
     """The flight after an event; None if no transition exists."""
     phase = TRANSITIONS.get((flight.phase, event))
-    return None if phase is None else _enter_phase(flight, phase, view, settings)
+    return None if phase is None else _enter_phase(flight, phase, event, view, settings)
 
 
 def requested_transition(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
@@ -46,8 +56,8 @@ def start_phase_legs(flight: Flight, view: View, settings: Settings) -> Flight:
     return replace(flight, legs=legs, leg_start_us=view.now_us)
 
 
-def _enter_phase(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flight:
-    """The flight in `phase`, with the legs with which the phase begins."""
+def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, settings: Settings) -> Flight:
+    """The flight in `phase`, to which the event has led, with the legs with which the phase begins."""
     legs: tuple[Leg, ...]
     if phase in CARRYING and flight.phase in CARRYING and flight.legs and tracks_attitude(flight.legs[0]):
         legs = (damping_leg(flight.legs[0], view, settings, ends_step=False),)
@@ -63,12 +73,20 @@ def _enter_phase(flight: Flight, phase: Phase, view: View, settings: Settings) -
         stopped_height=inf,
         stopped_since_us=-1,
         following=(),
+        fall=_fall_after(flight, phase, event),
         is_failsafe=flight.is_failsafe and phase != Phase.ARMED,  # another flight begins
         returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),
     )
     if phase == Phase.DISARMED:
         return _reset_on_disarm(entered)
     return replace(entered, following=following_legs(entered, settings))
+
+
+def _fall_after(flight: Flight, phase: Phase, event: Event) -> Fall:
+    """Whether the vehicle falls from now on: its rotors have stopped in the air, not because it stands."""
+    if phase not in UNARMED:
+        return Fall.NONE
+    return Fall.FALLING if flight.phase in IN_AIR and event != Event.VEHICLE_DOWN else flight.fall
 
 
 def _reset_on_disarm(flight: Flight) -> Flight:

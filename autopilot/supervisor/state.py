@@ -46,6 +46,7 @@ INFO, WARNING, CRITICAL = (
     mavlink.MAV_SEVERITY_CRITICAL,
 )
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
+UNARMED = frozenset({Phase.DISARMED, Phase.FAILSAFE})  # the rotors stand
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
 LANDING = frozenset({Phase.LOWER, Phase.SET_DOWN})
@@ -84,6 +85,14 @@ class ActionWhenArmed(Enum):
     TAKEOFF = "take-off"
     MISSION = "mission"
     OFFBOARD = "offboard"
+
+
+class Fall(Enum):
+    """What the vehicle does after its rotors have stopped in the air."""
+
+    NONE = "they have not, or it rests on the ground"
+    FALLING = "it falls"
+    UNKNOWN = "its inertial unit is silent"
 
 
 class SetpointSource(Enum):
@@ -205,6 +214,7 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
+    fall: Fall = Fall.NONE
     heading: Heading = HEADING_EAST
     returning: bool = False  # home, or landing there
     is_failsafe: bool = False  # it was not commanded to do what it does, but reacts to a failure

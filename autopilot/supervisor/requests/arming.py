@@ -17,8 +17,10 @@ from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, t
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     ON_GROUND,
+    UNARMED,
     ActionWhenArmed,
     Event,
+    Fall,
     Flight,
     Phase,
     View,
@@ -36,6 +38,8 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
     """What keeps the vehicle from being armed, in words."""
     # `view.estimate_problems` are the estimator's: `autopilot.estimation.filter.problem_texts`
     problems = [*chain.from_iterable(flight.external_arming_problems.values()), *view.estimate_problems]
+    if flight.fall == Fall.FALLING:
+        problems.insert(0, "falling, not at rest yet")
     if flight.phase == Phase.FAILSAFE:
         left_s = 1e-6 * (flight.phase_start_us + FAILSAFE_DISARM_US - view.now_us)
         problems.insert(0, f"flight terminated, wait {left_s:.1f} s")
@@ -64,7 +68,7 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
         if after is None:
             return flight, denied("Disarming denied")
         return after, Verdict(ACCEPTED.result, "Disarmed in the air by force", True) if in_air else ACCEPTED
-    if flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
+    if flight.phase not in UNARMED:
         return flight, ACCEPTED  # already armed: answered as PX4 and ArduPilot do
     problems = arming_problems(flight, view, settings)
     if flight.phase == Phase.FAILSAFE:
