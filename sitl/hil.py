@@ -45,7 +45,7 @@ from sitl.messages import (
 )
 from sitl.parameter_server import ParameterServer
 from sitl.plant.attachment import effective_mass
-from sitl.plant.drive import battery_of, voltage_until_empty
+from sitl.plant.drive import battery_of, share_left, voltage_until_empty
 from sitl.plant.records import Truth
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.files import load_profile
@@ -507,12 +507,13 @@ class HilSimulator:
     def _battery(self) -> Any:
         """BATTERY_STATUS, as a power module measures it."""
         drive, supply = self.core.truth.drive, self.core.world.supply
-        left = max(0.0, drive.charge - supply.used_as / drive.capacity_as)
         voltage = supply.voltage
         if not self.core.tick_count:
             battery = battery_of(self.core.truth, len(self.core.rotor_force))
             voltage = voltage_until_empty(drive.capacity_as * (1.0 - drive.charge), battery)
-        return battery_status_message(BatteryReading(voltage, supply.current, supply.used_as / 3.6, left))
+        return battery_status_message(
+            BatteryReading(voltage, supply.current, supply.used_as / 3.6, share_left(supply, drive))
+        )
 
     def _status(self) -> object:
         pacing, state = self.pacing, self.core.state

@@ -28,6 +28,7 @@ from autopilot.vehicle.battery import (
     terminal_voltage,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
+from autopilot.wire.convert.battery import CRITICAL_CHARGE, LOW_CHARGE
 from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
 
 _FRESH_US = 500_000  # a sensor is healthy while its last reading is no older
@@ -40,7 +41,10 @@ _FIELDS = (
 )
 _NEVER = (-1, -1, -1, -1)
 # shares of the charge from which a measured battery is told of, and how; the lowest first
-LOW_BATTERY = ((0.07, "Battery nearly empty, {} % left: land"), (0.15, "Battery low, {} % left"))
+LOW_BATTERY = (
+    (CRITICAL_CHARGE, "Battery nearly empty, {} % left: land"),
+    (LOW_CHARGE, "Battery low, {} % left"),
+)
 
 
 class Condition(NamedTuple):

@@ -45,6 +45,7 @@ from autopilot.onboard.path_work import PathWork, begin_now, path_work, use_path
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
 from autopilot.onboard.snapshot import (
+    BATTERY_TIMEOUT_US,
     CoreSnapshot,
     MeasuredBattery,
     Options,
@@ -90,13 +91,21 @@ from autopilot.supervisor.requests.mission_checks import (
     remaining_timeline,
 )
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import UNARMED, Fall, MissionPlan, Phase, Report, interrupt_mission
+from autopilot.supervisor.state import (
+    UNARMED,
+    Fall,
+    MissionPlan,
+    Phase,
+    Report,
+    interrupt_mission,
+    with_battery,
+)
 from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
-from autopilot.wire.convert.battery import BatteryReading, read_battery_status
+from autopilot.wire.convert.battery import NO_READING, BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, endless_jump_target, located_steps, unflown_items
@@ -400,6 +409,8 @@ class Onboard:
         answer = self._put_answer(tick, dt)
         if self._fall is not None or self.core.flight.fall != Fall.NONE:
             self._follow_fall(tick)
+        if self.core.flight.empty_battery_percent is not None:
+            self._forget_silent_battery(now_us)
         for severity, text in report.texts:
             self.endpoint.send_text(severity, text)
         for seq in report.reached:
@@ -557,9 +568,21 @@ class Onboard:
     def _receive_battery(self, reading: BatteryReading) -> None:
         before = self._snapshot_source.measured.reading
         self._snapshot_source.measured = MeasuredBattery(self.now_us, reading)
+        self._note_battery(reading)
         text = low_battery_text(before.remaining, reading.remaining)
         if text is not None:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
+
+    def _forget_silent_battery(self, now_us: int) -> None:
+        """A battery that is not measured any more is not known to be empty."""
+        if now_us - self._snapshot_source.measured.time_us > BATTERY_TIMEOUT_US:
+            self._note_battery(NO_READING)
+
+    def _note_battery(self, reading: BatteryReading) -> None:
+        """Note whether the measured battery is too empty to fly."""
+        flight = with_battery(self.core.flight, reading)
+        if flight is not self.core.flight:
+            self.core.replace_flight(flight)
 
     def _resume_flight(self, boot: Any) -> None:
         """Take over a flight under way, which the autopilot had begun before it was restarted."""

@@ -60,7 +60,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.fence import has_fence
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert.battery import BatteryReading
+from autopilot.wire.convert.battery import NO_READING, BatteryReading
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import HilGps
 from autopilot.wire.dialect import plumbline as mavlink
@@ -175,16 +175,23 @@ def is_tracked(estimator: EstimatorState) -> bool:
 
 
 def sensor_bits(
-    condition: Condition, estimator: EstimatorState, ready: bool, fake_gps: bool, now_us: int
+    condition: Condition,
+    estimator: EstimatorState,
+    ready: bool,
+    fake_gps: bool,
+    now_us: int,
+    battery_empty: bool = False,
 ) -> tuple[int, int]:
     """Sensors present and healthy, as bits of SYS_STATUS; with `fake_gps`, a tracker counts as the sensors
-    that it replaces."""
+    that it replaces. A battery that is too empty to fly is not healthy."""
     present, healthy = (bits | _ALWAYS_PRESENT for bits in present_and_healthy(condition, now_us))
     if estimator.vehicle.source == TRACKER:
         tracker_bits = snapshot.TRACKER | (_REPLACED_BY_TRACKER & ~present if fake_gps else 0)
         present |= tracker_bits
         if is_tracked(estimator):
             healthy |= tracker_bits
+    if battery_empty:
+        healthy &= ~snapshot.BATTERY
     if ready:
         healthy |= snapshot.PREARM
     return present, healthy
@@ -271,8 +278,8 @@ class MeasuredBattery(NamedTuple):
     reading: BatteryReading
 
 
-NOT_MEASURED = MeasuredBattery(-(2**62), BatteryReading())
-_BATTERY_TIMEOUT_US = 2_000_000  # after this time without a reading, the battery's model is reported
+NOT_MEASURED = MeasuredBattery(-(2**62), NO_READING)
+BATTERY_TIMEOUT_US = 2_000_000  # after this time without a reading, the battery's model is reported
 
 
 class SnapshotSource:
@@ -527,7 +534,8 @@ def _system_status(m: CoreSnapshot) -> tuple[Any, ...]:
 
 @_provides("sensors_present", "sensors_healthy")
 def _sensors(m: CoreSnapshot) -> tuple[Any, ...]:
-    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+    battery_empty = m.flight.empty_battery_percent is not None
+    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us, battery_empty)
     return present | (snapshot.GEOFENCE if has_fence(m.flight, m.core.settings) else 0), healthy
 
 
@@ -607,7 +615,7 @@ def _wind(m: CoreSnapshot) -> tuple[Any, ...]:
 @_provides("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
 def _battery(m: CoreSnapshot) -> tuple[Any, ...]:
     measured = m.source.measured
-    if m.now_us - measured.time_us <= _BATTERY_TIMEOUT_US:
+    if m.now_us - measured.time_us <= BATTERY_TIMEOUT_US:
         return measured.reading
     condition, battery = m.condition, m.source.battery
     used_mah = condition.used_as / 3.6

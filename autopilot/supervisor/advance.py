@@ -12,7 +12,7 @@ from autopilot.supervisor.heading import advance_heading
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
+from autopilot.supervisor.state import CRITICAL, IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
 from autopilot.supervisor.watches.failsafe import watch_failsafe, watch_missing_readings
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
@@ -45,7 +45,20 @@ _MAX_LEG_ENDS = 20  # in one tick
 
 
 def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
-    """The flight at `view.now_us`: the first watch that finds something decides, else the legs continue."""
+    """The flight at `view.now_us`, and what is reported of it; of a failure also that the battery is empty,
+    from which it may follow."""
+    flight, report = _advance(flight, view, settings)
+    if flight.empty_battery_percent is None or not report.texts:
+        return flight, report
+    texts = (
+        (severity, f"{text} (battery nearly empty)" if severity <= CRITICAL else text)
+        for severity, text in report.texts
+    )
+    return flight, report._replace(texts=tuple(texts))
+
+
+def _advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    """The first watch that finds something decides, else the legs continue."""
     flight = advance_heading(flight, view, settings)
     for watch in WATCHES:
         result = watch(flight, view, settings)

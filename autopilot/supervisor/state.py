@@ -16,6 +16,7 @@ from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
+from autopilot.wire.convert.battery import BatteryReading, battery_percent, charge_state
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence, read_fence, read_rally
@@ -215,6 +216,8 @@ class Flight:
     area: Area = Area()
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     fall: Fall = Fall.NONE
+    # per cent of the charge that a measured battery has left if it is too empty to fly; None: it is not
+    empty_battery_percent: int | None = None
     heading: Heading = HEADING_EAST
     returning: bool = False  # home, or landing there
     is_failsafe: bool = False  # it was not commanded to do what it does, but reacts to a failure
@@ -259,6 +262,15 @@ class Report(NamedTuple):
 def interrupt_mission(flight: Flight) -> Flight:
     """The flight with its mission interrupted, or no longer waiting to begin; the step is kept."""
     return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
+
+
+def with_battery(flight: Flight, reading: BatteryReading) -> Flight:
+    """The flight with a battery that measures this, NaN: nothing."""
+    empty = charge_state(reading) == mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
+    percent = battery_percent(reading) if empty else None
+    return (
+        flight if percent == flight.empty_battery_percent else replace(flight, empty_battery_percent=percent)
+    )
 
 
 def takeoff_event(flight: Flight) -> Event:

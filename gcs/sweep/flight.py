@@ -27,7 +27,8 @@ from autopilot.onboard.path_work import path_work, use_paths
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.arming import arming_problems
-from autopilot.supervisor.state import IN_AIR, Phase
+from autopilot.supervisor.state import IN_AIR, Phase, with_battery
+from autopilot.wire.convert.battery import BatteryReading
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
@@ -40,6 +41,7 @@ from gcs.sweep.wire import max_readings, rounded_reel_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
 from sitl.plant.chain.records import new_chain
+from sitl.plant.drive import share_left
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
@@ -234,6 +236,7 @@ class SweepFlight:
         """The supervisor's part of a tick; in the mission also the requested path of the next stretch."""
         if self.core.is_reeling:  # the loop has moved the cable since the last decision
             self.core.move_cable(now_us)
+        self._measure_battery()
         phase = self.core.flight.phase
         self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
@@ -251,6 +254,14 @@ class SweepFlight:
             else jets(leg, planned.times_s, requested=True)
         )
 
+    def _measure_battery(self) -> None:
+        """What the autopilot learns of the battery, which the simulator sends it over the wire."""
+        drive = self.cell.truth.drive
+        if drive.battery > 0.0:
+            supply = unpack(World, self.world.world, 0).supply
+            reading = BatteryReading(remaining=share_left(supply, drive))
+            self.core.replace_flight(with_battery(self.core.flight, reading))
+
     # ---- what the ground station does
 
     def _tick_from(self, time_us: int) -> int:
@@ -261,6 +272,7 @@ class SweepFlight:
         """Arm and start at their instants; as long as the vehicle is not ready to be armed, postpone both."""
         if now_us not in (self.arm_us, self.start_us):
             return
+        self._measure_battery()
         phase = self.core.flight.phase
         if now_us == self.arm_us and phase == Phase.DISARMED:
             problems = arming_problems(self.core.flight, self.core.view(now_us), self.core.settings)

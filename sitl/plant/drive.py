@@ -93,6 +93,11 @@ class Supply(NamedTuple):
 FULL = Supply(0.0, 0.0, 0.0, 1.0)  # also used without a battery
 
 
+def share_left(supply: Supply, drive: Drive) -> float:
+    """Share of the charge that is left in the battery."""
+    return max(0.0, drive.charge - supply.used_as / drive.capacity_as)
+
+
 @kernel
 def battery_of(truth: Truth, rotors: int) -> Battery:
     """The battery of a vehicle with this number of rotors."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from autopilot.supervisor.state import Phase
 from autopilot.wire.codec import decode
 from autopilot.wire.convert.battery import read_battery_status
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
+from tests.doubles.craft import ACCEPTED, Craft
 
 
 def told(seconds, ends_at=None, texts=None, **settings):
@@ -63,3 +65,60 @@ def test_a_low_battery_is_told_once_if_it_is_measured(settings, said):
     texts = []
     told(3, texts=texts, **settings)
     assert [text for text in texts if "attery" in text] == said
+
+
+# ---- a battery that is too empty to fly
+
+ARM, FORCE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 21196.0
+SENSOR = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+
+
+def with_charge(percent, **settings):
+    """A craft whose measured battery has this charge, ready to fly otherwise."""
+    craft = Craft(SIM_BATTERY=1.0, SIM_BAT_CHARGE=percent, **settings)
+    craft.wait(1.5)
+    return craft
+
+
+@pytest.mark.parametrize("percent", [0.0, 5.0])
+def test_a_vehicle_whose_battery_is_empty_is_not_armed_but_by_force(percent):
+    craft = with_charge(percent)
+    moment = craft.onboard.log_sample().snapshot
+    assert moment.sensors_present & SENSOR
+    assert not moment.sensors_healthy & SENSOR
+    assert not moment.sensors_healthy & mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert craft.texts[-1] == f"Arming denied: battery nearly empty, {percent:.0f} % left"
+    assert craft.command(ARM, 1.0, FORCE) == ACCEPTED
+
+
+def test_one_that_is_low_is_armed():
+    craft = with_charge(6.0)
+    assert craft.onboard.log_sample().snapshot.sensors_healthy & SENSOR
+    assert craft.command(ARM, 1.0) == ACCEPTED
+
+
+def test_a_battery_of_the_model_that_is_empty_prevents_nothing():
+    """It is full when the program starts; nothing measures what is left of it."""
+    craft = Craft(BAT_CAPACITY=10.0, BAT_HOVER_W=1e5)
+    craft.wait(1.5)
+    assert craft.command(ARM, 1.0) == ACCEPTED
+
+
+def test_one_that_is_not_measured_any_more_is_not_known_to_be_empty():
+    craft = with_charge(3.0)
+    drive = craft.world.truth.drive._replace(battery=0.0)
+    craft.world.retune(craft.world.truth._replace(drive=drive), craft.world.settings)
+    assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    craft.wait(2.5)
+    assert craft.command(ARM, 1.0) == ACCEPTED
+
+
+def test_a_flight_that_its_battery_ends_names_it():
+    craft = with_charge(100.0, SIM_BAT_CAP=30.0)
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, float("nan"), 0, 0, 1.5) == ACCEPTED
+    assert craft.command(ARM, 1.0) == ACCEPTED
+    craft.heard.clear()
+    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED or craft.flight.is_failsafe)
+    told = "".join(craft.texts)
+    assert "rotors 1, 2, 3, 4 lost, the others cannot fly it (battery nearly empty)" in told

@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.wire.convert.battery import BatteryReading, battery_status_message, read_battery_status
+from autopilot.wire.convert.battery import (
+    BatteryReading,
+    battery_status_message,
+    charge_state,
+    read_battery_status,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 
 
@@ -24,6 +29,26 @@ def test_read_as_written(voltage, current, used_mah, remaining):
 
 def test_what_is_not_known_is_not_told():
     assert all(map(isnan, read_battery_status(battery_status_message(BatteryReading(nan, nan, nan, nan)))))
+
+
+@pytest.mark.parametrize(
+    ("remaining", "state"),
+    [
+        (1.0, mavlink.MAV_BATTERY_CHARGE_STATE_OK),
+        (0.16, mavlink.MAV_BATTERY_CHARGE_STATE_OK),
+        (0.15, mavlink.MAV_BATTERY_CHARGE_STATE_LOW),
+        (0.08, mavlink.MAV_BATTERY_CHARGE_STATE_LOW),
+        (0.07, mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL),
+        (0.06, mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL),
+        (0.05, mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
+        (0.0, mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
+        (nan, mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED),
+    ],
+)
+def test_the_charge_state_is_that_of_the_stated_charge(remaining, state):
+    message = battery_status_message(BatteryReading(remaining=remaining))
+    assert message.charge_state == state
+    assert charge_state(read_battery_status(message)) == state
 
 
 def test_cells_that_are_measured_one_by_one_are_added_up():

@@ -47,6 +47,8 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
         problems.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         problems.append(f"moving at {norm(view.v_quad):.1f} m/s")
+    if flight.empty_battery_percent is not None:
+        problems.append(f"battery nearly empty, {flight.empty_battery_percent} % left")
     here = view.x_quad if flight.cable.released else view.x_load
     fence_reason = fence_problem(flight, here, settings)
     if fence_reason:

@@ -10,6 +10,13 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 _INT16, _UINT16 = 2**15 - 1, 2**16 - 1
 _CELLS = 10  # entries of BATTERY_STATUS.voltages
+# shares of the charge, PX4's defaults of BAT_LOW_THR, BAT_CRIT_THR and BAT_EMERGEN_THR
+LOW_CHARGE, CRITICAL_CHARGE, EMERGENCY_CHARGE = 0.15, 0.07, 0.05
+_CHARGE_STATES = (  # the lowest first
+    (EMERGENCY_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
+    (CRITICAL_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL),
+    (LOW_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_LOW),
+)
 
 
 class BatteryReading(NamedTuple):
@@ -19,6 +26,9 @@ class BatteryReading(NamedTuple):
     current: float = nan  # A
     used_mah: float = nan
     remaining: float = nan  # 0 ... 1
+
+
+NO_READING = BatteryReading()
 
 
 def battery_mv(reading: BatteryReading) -> int:
@@ -34,6 +44,16 @@ def battery_ca(reading: BatteryReading) -> int:
 def battery_percent(reading: BatteryReading) -> int:
     """The remaining charge in per cent; -1: unknown."""
     return -1 if isnan(reading.remaining) else saturated(reading.remaining * 100.0, 0, 100)
+
+
+def charge_state(reading: BatteryReading) -> int:
+    """MAV_BATTERY_CHARGE_STATE of the remaining charge in per cent; UNDEFINED if that is unknown."""
+    if isnan(reading.remaining):
+        return mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
+    stated = battery_percent(reading) * 0.01
+    return next(
+        (state for share, state in _CHARGE_STATES if stated <= share), mavlink.MAV_BATTERY_CHARGE_STATE_OK
+    )
 
 
 def battery_status_message(reading: BatteryReading) -> Any:
@@ -53,6 +73,7 @@ def battery_status_message(reading: BatteryReading) -> Any:
         current_consumed=-1 if isnan(reading.used_mah) else saturated(reading.used_mah, 0, 2**31 - 1),
         energy_consumed=-1,
         battery_remaining=battery_percent(reading),
+        charge_state=charge_state(reading),
     )
 
 

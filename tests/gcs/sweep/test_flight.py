@@ -118,7 +118,7 @@ def test_same_end_of_a_flight_that_empties_its_battery(short: str) -> None:
     found, states = flown(short, Conditions(sensors="lab", seed=1, settings=settings))
     assert (found.outcome, found.reason) == (
         "diverged",
-        "Failsafe: rotors 1, 2, 3, 4 lost, the others cannot fly it",
+        "Failsafe: rotors 1, 2, 3, 4 lost, the others cannot fly it (battery nearly empty)",
     )
     assert states[-1, 10:].max() < 0.1
 
