@@ -45,6 +45,7 @@ from autopilot.services import identity, snapshot
 from autopilot.services.instant import Instant
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import NO_TEST_RATIOS, GpsFix, SensorReadings, Snapshot, Sortie, TestRatios
+from autopilot.supervisor.mission import present_item
 from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.state import (
     CARRYING,
@@ -229,18 +230,9 @@ class FlightStatus(NamedTuple):
     reel_rate: float
 
 
-def _present_item(flight: Flight) -> int:
-    """The mission item that is flown; of a complete mission the one that it ended with, until the vehicle
-    stands disarmed on the ground, from where the next flight begins with the first."""
-    mission, sequence = flight.mission, flight.mission.plan.sequence
-    if mission.final_item is not None and flight.phase not in UNARMED:
-        return mission.final_item
-    return sequence[min(mission.step, len(sequence) - 1)] if sequence else 0
-
-
 def flight_status(flight: Flight, items: int) -> FlightStatus:
     """What telemetry takes from a flight record with a mission of `items` items."""
-    area, seq = flight.area, _present_item(flight)
+    area, seq = flight.area, present_item(flight)
     return FlightStatus(
         area.home,
         area.fence_enabled,

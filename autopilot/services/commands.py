@@ -71,6 +71,7 @@ _SPEED_UNCHANGED = (0.0, -1.0)  # of DO_REPOSITION
 _SPEED_LIMITS = f"{MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g} m/s"
 _WINCH_ACTIONS = "1 (by a length), 2 (at a rate), 5 (hold) and 6 (retract) are"
 _NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0  # of a speed
+_PRESENT_ITEM = -1  # of DO_SET_MISSION_CURRENT
 # ORBIT_YAW_BEHAVIOUR: the nose points to the centre (True), keeps its heading (False), or does as before
 _ORBIT_YAWS: dict[float, bool | None] = {
     mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER: True,
@@ -226,10 +227,13 @@ def _pause_continue(call: Call, context: Context) -> Request | Verdict:
 
 
 def _set_current(call: Call, context: Context) -> Request | Verdict:
-    seq = _as_integer(call.p[0])
-    if seq is None or seq < 0:
-        return _refused(f"Set current item: item (param1) = {call.p[0]:g}; must be an item number")
-    return SetCurrent(seq)
+    seq, reset = _as_integer(call.p[0]), call.p[1]
+    if seq is None or seq < _PRESENT_ITEM:
+        text = f"Set current item: item (param1) = {call.p[0]:g}; must be an item number"
+        return _refused(f"{text}, or -1 (the present one)")
+    if reset not in (0.0, 1.0) and not math.isnan(reset):
+        return _refused(f"Set current item: reset (param2) = {reset:g}; must be 0 (no) or 1 (yes)")
+    return SetCurrent(None if seq == _PRESENT_ITEM else seq, reset == 1.0)
 
 
 def _reposition(call: Call, context: Context) -> Request | Verdict:

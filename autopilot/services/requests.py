@@ -90,9 +90,10 @@ class Continue:
 
 @dataclass(frozen=True, slots=True)
 class SetCurrent:
-    """Make this item the current one."""
+    """Make this item (None: the present one) the current one; `reset`: its jumps begin anew."""
 
-    seq: int
+    seq: int | None
+    reset: bool = False
 
 
 @dataclass(frozen=True, slots=True)

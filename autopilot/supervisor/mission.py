@@ -21,6 +21,7 @@ from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CRITICAL,
     INFO,
+    UNARMED,
     ActionWhenArmed,
     Event,
     Flight,
@@ -62,6 +63,15 @@ def with_current_step(flight: Flight, step: int) -> Flight:
         mission=replace(flight.mission, step=step, step_anchor=None, final_item=None),
         cable=replace(flight.cable, reel_target_m=None),
     )
+
+
+def present_item(flight: Flight) -> int:
+    """The mission item that is flown; of a complete mission the one that it ended with, until the vehicle
+    stands disarmed on the ground, from where the next flight begins with the first."""
+    mission, sequence = flight.mission, flight.mission.plan.sequence
+    if mission.final_item is not None and flight.phase not in UNARMED:
+        return mission.final_item
+    return sequence[min(mission.step, len(sequence) - 1)] if sequence else 0
 
 
 def step_event(flight: Flight) -> Event:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
+from itertools import chain
 from math import hypot, inf, nan, sqrt
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from autopilot.wire.convert.battery import BatteryReading, battery_percent, char
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence, read_fence, read_rally
-from autopilot.wire.items import WireItem
+from autopilot.wire.items import Visit, WireItem
 from missions.model import HeadingCommand, Step
 
 
@@ -114,10 +115,25 @@ class MissionPlan:
     prepared: PreparedPaths = UNPREPARED
     aims: tuple[tuple[HeadingCommand, ...], ...] = ()  # of each step: the heading aims that it sets
     repeat_from: int | None = None  # the step that follows the last one, if the mission has no end
+    visits: tuple[Visit, ...] = ()  # to the items, in the order in which they are flown
 
     def next_step(self, step: int) -> int | None:
         """The step that follows; None after the last one."""
         return step + 1 if step + 1 < len(self.steps) else self.repeat_from
+
+    def step_of_item(self, item: int, step: int, reset: bool) -> int | None:
+        """The step that is flown if an item becomes the present one at this step, with its jumps taken as
+        often as until then, or anew (`reset`): that of the item, of where it jumps to, or else the first one
+        behind it; None if there is none."""
+        lap = next((visit.lap for visit in reversed(self.visits) if visit.step <= step), 0)
+        found = [visit for visit in self.visits if visit.item == item and visit.step < len(self.steps)]
+        if not found:
+            return next((i for i, last in enumerate(self.sequence) if last >= item), None)
+        if reset:
+            return found[0].step
+        same_lap = (visit.step for visit in found if visit.lap == lap)
+        later = (visit.step for visit in found if visit.step > step)
+        return next(chain(same_lap, later), found[-1].step)
 
 
 @dataclass(frozen=True, slots=True)

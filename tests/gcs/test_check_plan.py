@@ -126,9 +126,7 @@ def test_a_path_near_the_fence_is_warned_of(
     found = checked(tmp_path, fence, steps)
     assert found.exit_code == EXIT_DONE
     warnings = [line for line in found.stdout.splitlines() if line.startswith("warning: ")]
-    expected = (
-        f"warning: {near} leads within 0.2 m of the fence: wind, or the vehicle that swings the load, "
-    )
+    expected = f"warning: {near} leads within 0.2 m of the fence: wind, or the vehicle that swings the load, "
     assert [line.startswith(expected) for line in warnings] == ([True] if near else [])
 
 

@@ -87,6 +87,11 @@ LONG = [
     (193, (1,), Continue(), OK),
     (193, (NAN,), None, DENIED),
     (224, (7,), SetCurrent(7), OK),
+    (224, (7, NAN), SetCurrent(7), OK),
+    (224, (7, 1), SetCurrent(7, reset=True), OK),
+    (224, (-1, 1), SetCurrent(None, reset=True), OK),
+    (224, (-2,), None, DENIED),
+    (224, (7, 2), None, DENIED),
     (224, (NAN,), None, DENIED),
     (192, (-1, 1, 0, NAN, NAN, NAN, NAN), Pause(), OK),  # QGroundControl's pause
     (192, (-1, 1, 0, 0, NAN, NAN, NAN), Reposition(None, None, None, True, heading_rad=0.5 * math.pi), OK),

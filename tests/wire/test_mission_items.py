@@ -25,6 +25,7 @@ from autopilot.wire.items import (
     encode_steps,
     endless_jump_target,
     located_steps,
+    read_items,
     unflown_items,
 )
 from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MAX_FACTORS, MAX_POINTS, MAX_TERMS
@@ -303,6 +304,7 @@ REFUSALS = [
     ([START._replace(param2=1.0), POINT], 0, "INVALID", "must be at 0 s and 0, 0, 0 m"),
     ([START], 0, "INVALID", "a trajectory (31014) needs two points at least"),
     ([START, START, POINT], 0, "INVALID", "a trajectory (31014) needs two points at least"),
+    ([START, item(203), POINT], 0, "INVALID", "a trajectory (31014) needs two points at least"),
     ([START, item(115, 90.0), POINT], 0, "INVALID", "a trajectory (31014) needs two points at least"),
     ([START, POINT, POINT._replace(x=1099)], 2, "INVALID_PARAM5_X", "time = 1.099 s; must be 0.1 s"),
     ([START, POINT, POINT._replace(x=900)], 2, "INVALID_PARAM5_X", "time = 0.9 s; must be 0.1 s"),
@@ -452,11 +454,11 @@ def test_commands_for_other_things_are_kept_and_not_flown() -> None:
 
 def test_points_in_a_row_are_one_trajectory_and_a_point_at_time_zero_begins_another() -> None:
     kept, heading = item(203), item(115, 90.0, 0.0, 1.0)
-    items = [UP, START, kept, POINT, START, POINT, heading, item(93, 1.0), START, POINT, item(177, 7.0, 1.0)]
+    items = [UP, kept, START, POINT, START, POINT, heading, item(93, 1.0), START, POINT, item(177, 7.0, 1.0)]
     located = located_steps(items, HOME)
     through = Trajectory([(0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 1.0, 0.5)])
     assert [(one.first, one.last) for one in located] == [
-        *((0, 0), (1, 3), (4, 5), (7, 7), (8, 9)),
+        *((0, 0), (2, 3), (4, 5), (7, 7), (8, 9)),
         *((7, 7), (8, 9)),  # once more
     ]
     assert [one.step for one in located if isinstance(one.step, Trajectory)] == [through] * 4
@@ -538,6 +540,18 @@ def test_jumps_fly_their_items_again() -> None:
     located = located_steps(items, HOME)
     assert [one.step.duration_s for one in located] == [1.0, 2.0] * 3 + [3.0]  # type: ignore[union-attr]
     assert [one.first for one in located] == [0, 1] * 3 + [3]
+
+
+def test_each_visit_to_an_item_states_what_is_flown_then() -> None:
+    items = [item(93, 1.0), item(93, 2.0), item(177, 1.0, 1.0), item(203), item(93, 3.0), item(203)]
+    steps, visits = read_items(items, HOME)
+    assert [one.last for one in steps] == [0, 1, 1, 4]
+    assert visits == ((0, 0, 0), (1, 1, 0), (2, 2, 0), (1, 2, 1), (2, 3, 1), (3, 3, 1), (4, 3, 1), (5, 4, 1))
+    endless = [item(93, 1.0), item(93, 2.0), item(177, 1.0, -1.0)]
+    assert read_items(endless, HOME)[1] == ((0, 0, 0), (1, 1, 0), (2, 1, 0))
+    jump_first = [item(177, 2.0, 1.0), item(93, 1.0), item(93, 2.0)]
+    assert read_items(jump_first, HOME)[1] == ((0, 0, 0), (2, 0, 1))
+    assert read_items([TERM, RUN], HOME)[1] == ((0, 0, 0), (1, 0, 0))
 
 
 def test_a_mission_of_jumps_in_jumps_is_refused_before_it_is_long() -> None:

@@ -9,7 +9,7 @@ from autopilot.services.records import Verdict
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import transition
-from autopilot.supervisor.mission import start_step, step_event, with_current_step
+from autopilot.supervisor.mission import present_item, start_step, step_event, with_current_step
 from autopilot.supervisor.requests.mission_checks import (
     is_prepared_from_here,
     is_taking_off,
@@ -94,7 +94,7 @@ def start_mission(flight: Flight, request: StartMission, view: View, settings: S
     """Fly the mission, from an item on or from the present one."""
     before = flight
     if request.first is not None and flight.mission.plan.item_count:  # else the refusal is about the mission
-        flight, verdict = set_current(flight, SetCurrent(request.first), view, settings)
+        flight, verdict = set_current(flight, SetCurrent(request.first, reset=True), view, settings)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             return before, verdict
     if flight.mission.active and flight.phase not in ON_GROUND and flight.phase != Phase.HOLD:
@@ -111,12 +111,14 @@ def continue_mission(flight: Flight, request: Any, view: View, settings: Setting
 def set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
     """Make another item the present one; while the mission is flown, fly there immediately, or as soon as the
     path from there is prepared."""
-    plan, item = flight.mission.plan, f"Mission item {request.seq}"
+    plan = flight.mission.plan
+    seq = present_item(flight) if request.seq is None else request.seq
+    item = f"Mission item {seq}"
     if not plan.item_count:
         return flight, denied(f"{item} denied: no mission is stored")
-    if not 0 <= request.seq < plan.item_count:
+    if not 0 <= seq < plan.item_count:
         return flight, denied(f"{item} denied: the last is {plan.item_count - 1}")
-    step = next((i for i, seq in enumerate(plan.sequence) if seq >= request.seq), None)
+    step = plan.step_of_item(seq, flight.mission.step, request.reset)
     if step is None:
         return flight, denied(f"{item} denied: nothing is flown from there")
     at_item = with_current_step(flight, step)

@@ -10,10 +10,16 @@ step after them. DO_JUMP is flown by flying its items again.
 """
 
 from autopilot.wire.items.command import Command, Handling, is_home
-from autopilot.wire.items.decode import decode_items, endless_jump_target, located_steps, unflown_items
+from autopilot.wire.items.decode import (
+    decode_items,
+    endless_jump_target,
+    located_steps,
+    read_items,
+    unflown_items,
+)
 from autopilot.wire.items.encode import encode_mission, encode_steps, home_item, step_index
 from autopilot.wire.items.heading import turn_heading
-from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
+from autopilot.wire.items.records import LocatedStep, MissionItemError, Visit, WireItem
 from autopilot.wire.items.table import AREA_COMMANDS, COMMAND, COMMANDS, handling_of
 
 __all__ = [
@@ -24,6 +30,7 @@ __all__ = [
     "Handling",
     "LocatedStep",
     "MissionItemError",
+    "Visit",
     "WireItem",
     "decode_items",
     "encode_mission",
@@ -33,6 +40,7 @@ __all__ = [
     "home_item",
     "is_home",
     "located_steps",
+    "read_items",
     "step_index",
     "turn_heading",
     "unflown_items",

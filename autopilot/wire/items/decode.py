@@ -20,7 +20,7 @@ from autopilot.wire.items.limits import (
     MAX_TERMS,
     SHORTEST_POINT_S,
 )
-from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
+from autopilot.wire.items.records import LocatedStep, MissionItemError, Visit, WireItem
 from autopilot.wire.items.table import COMMAND, handling_of
 from missions.model import (
     ORIGIN,
@@ -67,11 +67,26 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
 
     Places are relative to `home`; a return leads to `return_to` (m, ENU), which DO_SET_HOME moves.
     """
+    return read_items(items, home, return_to)[0]
+
+
+def read_items(
+    items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO
+) -> tuple[tuple[LocatedStep, ...], tuple[Visit, ...]]:
+    """`located_steps`, and the visits to the items in their order. An endless jump leads to a step that was
+    flown before."""
     reader = _Reader(home, return_to)
-    jumps: dict[int, int] = {}
+    jumps: dict[int, int] = {}  # by the item of a jump: how often it was reached
+    taken: dict[int, int] = {}  # how often it was taken
+    laps: dict[tuple[tuple[int, int], ...], int] = {}
+    visits: list[Visit] = []
     flown_count = seq = 0
     while seq < len(items):
         item = items[seq]
+        if item.command != _POINT or item.x == 0:  # a point at time 0 begins another trajectory
+            reader.end_trajectory()  # of points in a row
+        lap = laps.setdefault(tuple(taken.items()), len(laps))
+        visits.append(Visit(seq, len(reader.steps), lap))
         if item.command == mavlink.MAV_CMD_DO_JUMP:
             reader.end_step(seq - 1)
             last = len(items) - 1
@@ -86,9 +101,15 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
                     text = f"what a jump without end repeats must take at least {_MIN_LAP_S:g} s"
                     raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
                 reader.add_hold_to_turn(seq - 1)
-                return tuple(reader.steps)
+                steps = tuple(reader.steps)
+                visits[-1] = Visit(seq, next(i for i, step in enumerate(steps) if step.last >= target), lap)
+                return steps, tuple(visits)
             jumps[seq] = jumps.get(seq, 0) + 1
-            seq = target if jumps[seq] <= times else seq + 1
+            if jumps[seq] <= times:
+                taken[seq] = jumps[seq]
+                seq = target
+            else:
+                seq += 1
         else:
             reader.read(seq, item)
             seq += 1
@@ -98,7 +119,7 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
     reader.end_step(len(items) - 1)
     reader.add_hold_to_turn(len(items) - 1)
-    return tuple(reader.steps)
+    return tuple(reader.steps), tuple(visits)
 
 
 def endless_jump_target(items: Sequence[WireItem], steps: Sequence[LocatedStep]) -> int | None:
@@ -134,8 +155,6 @@ class _Reader:
         if handling is Handling.KEPT:
             return
         row = COMMAND[item.command]
-        if item.command != _POINT or item.x == 0:  # a point at time 0 begins another trajectory
-            self._end_trajectory()
         context = ItemContext(seq, item, self._home, self._state, row)
         if row.heading_command is not None:
             self._heading_commands.append(row.heading_command(context))
@@ -157,7 +176,7 @@ class _Reader:
 
     def end_step(self, seq: int) -> None:
         """End the step of the terms or points up to item `seq`."""
-        self._end_trajectory()
+        self.end_trajectory()
         self._expect_no_terms(seq)
 
     def _expect_no_terms(self, seq: int) -> None:
@@ -231,7 +250,7 @@ class _Reader:
         self._points.append(point)
         self._last = context.seq
 
-    def _end_trajectory(self) -> None:
+    def end_trajectory(self) -> None:
         """End the trajectory of the points so far, if there are any."""
         if len(self._points) == 1:
             text = "a trajectory (31014) needs two points at least"

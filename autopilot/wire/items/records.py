@@ -40,6 +40,14 @@ class LocatedStep(NamedTuple):
     heading_commands: tuple[HeadingCommand, ...] = ()  # given one after the other as the step begins
 
 
+class Visit(NamedTuple):
+    """A time at which the mission comes to an item."""
+
+    item: int
+    step: int  # the step that is flown then: of the item, of where it jumps to, or of one behind it
+    lap: int  # the same number for all visits between which no jump is taken or counted
+
+
 class MissionItemError(ValueError):
     """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with, `noun` names the item."""
 
