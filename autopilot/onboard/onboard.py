@@ -784,7 +784,7 @@ class Onboard:
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
-        if isinstance(request, Reboot) and not request.shutdown:
+        if isinstance(request, Reboot):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")
             # the simulator restarts, and when its clock does, the shell builds a new autopilot

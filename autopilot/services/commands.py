@@ -83,7 +83,8 @@ _ORBIT_YAWS_NOT_OFFERED = (
     mavlink.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TANGENT_TO_CIRCLE,
     mavlink.ORBIT_YAW_BEHAVIOUR_RC_CONTROLLED,
 )
-_NO_COORDINATE = 2**31 - 1  # "not a number" in an integer coordinate
+# "not a number" in an integer coordinate; the second is the one to which MAVSDK converts NaN
+_NO_COORDINATES = (2**31 - 1, -(2**31))
 MAX_INTERVAL_US = 2**31 - 1  # that MESSAGE_INTERVAL can state; longer ones count as this one
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -358,10 +359,9 @@ def _terminate(call: Call, context: Context) -> Request | Verdict:
 
 
 def _reboot(call: Call, context: Context) -> Request | Verdict:
-    choice: dict[float, Request] = {1.0: Reboot(shutdown=False), 2.0: Reboot(shutdown=True)}
-    return choice.get(call.p[0]) or Verdict(
-        UNSUPPORTED, f"Reboot: action (param1) {call.p[0]:g} is not offered; 1 (reboot) is"
-    )
+    if call.p[0] == 1.0:
+        return Reboot()
+    return Verdict(UNSUPPORTED, f"Reboot: action (param1) {call.p[0]:g} is not offered; 1 (reboot) is")
 
 
 def _store_parameters(call: Call, context: Context) -> Request | Verdict:
@@ -579,7 +579,7 @@ def _call_of_long(m: Any) -> Call:
 
 def _call_of_int(m: Any) -> Call:
     p = (m.param1, m.param2, m.param3, m.param4)
-    x, y = (math.nan if value == _NO_COORDINATE else float(value) for value in (m.x, m.y))
+    x, y = (math.nan if value in _NO_COORDINATES else float(value) for value in (m.x, m.y))
     return Call(m.command, p, x, y, m.z, m.frame)
 
 

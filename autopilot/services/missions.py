@@ -163,7 +163,7 @@ class MissionService:
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         if self._upload and self._upload.peer != peer:
-            return [_ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+            return _refused_as_busy(self._upload, peer, kind)
         self._upload = None
         if count > MAX_ITEMS:
             why = f"Mission of {count} items; at most {MAX_ITEMS} are kept"
@@ -383,7 +383,7 @@ class MissionService:
         if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         if self._upload and self._upload.peer != peer:
-            return [_ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+            return _refused_as_busy(self._upload, peer, kind)
         refused = [] if kind in _AREAS else self._refusal((), 0, peer, decide, kind)
         if refused:
             return refused
@@ -496,6 +496,14 @@ def _upload_of(kind: int) -> tuple[str, int]:
 def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Output:
     answer = mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind, opaque_id=number)
     return Send(peer.link, answer)
+
+
+def _refused_as_busy(upload: _Upload, peer: Peer, kind: int) -> list[Output]:
+    """The answer to a client that would upload or clear while another one uploads."""
+    other = upload.peer
+    text = f"Upload denied: system {other.system}, component {other.component} uploads; try again"
+    refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind))
+    return [refusal, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
 
 def _refused_item(peer: Peer, text: str | None, result: int, kind: int = _MISSION) -> list[Output]:

@@ -251,9 +251,7 @@ class RunPrearmChecks:
 
 @dataclass(frozen=True, slots=True)
 class Reboot:
-    """Restart the autopilot (`shutdown`: stop it)."""
-
-    shutdown: bool
+    """Restart the autopilot."""
 
 
 @dataclass(frozen=True, slots=True)

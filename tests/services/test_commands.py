@@ -192,8 +192,8 @@ LONG = [
     (183, (), None, UNSUPPORTED),
     (181, (), None, UNSUPPORTED),
     (410, (), None, OK),
-    (246, (1,), Reboot(False), OK),
-    (246, (2,), Reboot(True), OK),
+    (246, (1,), Reboot(), OK),
+    (246, (2,), None, UNSUPPORTED),
     (246, (NAN,), None, UNSUPPORTED),
     (245, (0,), None, OK),
     (245, (1,), None, OK),
@@ -386,6 +386,13 @@ def test_a_place_to_look_at_is_metres_from_home(rig, snap, command, first):
     rig.replies(as_int(command, 6, (first, 0, 0, 0), latitude, longitude, NAN))
     (request,) = rig.asked
     assert (request.east_m, request.north_m) == pytest.approx((30.0, -20.0), abs=0.01)  # 1e-7 degrees
+
+
+def test_a_circle_whose_centre_is_left_open_is_one_around_here(rig):
+    """MAVSDK converts NaN to the least integer."""
+    for nowhere in (2**31 - 1, -(2**31)):
+        assert acks(rig.replies(as_int(34, 3, (NAN, NAN, 0, NAN), nowhere, nowhere, NAN))) == [(34, OK)]
+    assert rig.asked == [Orbit(None, None, None, None, None, faces_centre=True)] * 2
 
 
 def test_the_yaw_of_a_place_is_heeded_as_the_identity_does(rig_with):

@@ -106,7 +106,7 @@ REQUESTS: list[Any] = [
     R.Grab(),
     R.Terminate(),
     R.RunPrearmChecks(),
-    R.Reboot(False),
+    R.Reboot(),
     R.ChangeVehicle("VEH_CABLE_LEN"),
     R.ChangeSigningKey(),
     R.StoreParameters(True),
