@@ -85,8 +85,8 @@ def ask_supervisor(
         if leads:
             way = near.removeprefix("Mission denied: ")
             warnings.append(
-                f"{way} leads within {margin_m:.1f} m of the fence: wind, or the vehicle that swings the load, "
-                "may breach it, which interrupts the flight (GF_ACTION)"
+                f"{way} leads within {margin_m:.1f} m of the fence: wind, or the vehicle that swings the "
+                "load, may breach it, which interrupts the flight (GF_ACTION)"
             )
     return Answer(found, tuple(filter(None, warnings)))
 
