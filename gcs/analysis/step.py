@@ -41,8 +41,9 @@ def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | 
     """The step of a desired path (n,), (n, 3), (n, 3), or None.
 
     A step begins at rest, moves once along one straight line, never back, and holds at least half a second
-    at its end. It starts when it leaves rest. Between samples, this time is computed from position and speed
-    as for a path that leaves rest with constant acceleration (as a half-sine step does).
+    at its end. It starts when it leaves rest, however slowly: a path through waypoints has a hundredth of its
+    peak speed only after a tenth of its duration. Between samples, this time is computed from position and
+    speed as for a path that leaves rest with constant acceleration (as a half-sine step does).
     """
     if len(time_s) < 3 or not (np.isfinite(desired_m).all() and np.isfinite(desired_m_s).all()):
         return None
@@ -70,9 +71,11 @@ def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | 
         or time_s[-1] - time_s[arrived] < _MIN_HOLD_S
     ):
         return None
-    start = time_s[started]
-    if speed[started] > 0.0:
-        start = max(time_s[started - 1], start - 2.0 * along[started] / speed[started])
+    gains = (speed[:started] > 0.0) & (speed[:started] < speed[1 : started + 1])
+    first = started - int(np.argmin(np.append(gains[::-1], False)))  # of the samples in motion
+    start = time_s[first]
+    if first > 0 and speed[first] > 0.0:
+        start = max(time_s[first - 1], start - 2.0 * max(along[first], 0.0) / speed[first])
     return Step(float(start), height, desired_m[0], direction)
 
 

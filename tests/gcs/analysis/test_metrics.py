@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from autopilot.trajectory.transfer import transfer
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.metrics import clock_numbers
@@ -80,6 +81,39 @@ def test_the_first_sample_of_the_mission_need_not_be_the_first_of_the_step():
     assert found["rise_time_90_s"] == pytest.approx(
         0.78 * np.arccos(1.0 - 2.0 * 0.9) / np.pi, abs=tolerances.CROSSING_S
     )
+
+
+def waypoint(duration_s, rest_s=0.0):
+    """A move of 3 m along x from rest to rest, as between waypoints: it leaves rest with u^7."""
+
+    def path(t):
+        go = [transfer((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), duration_s, s)[0] for s in (t - rest_s).tolist()]
+        return np.array(go)
+
+    return path
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 1.5])
+def test_a_move_to_a_waypoint_counts_from_where_it_leaves_rest(rest_s):
+    """It has a hundredth of its peak speed only after 13 % of its time, from which rise and settling were
+    counted."""
+    duration = 4.0
+    u = np.linspace(0.0, 1.0, 1_000_001)
+    # transfer: from its definition, the integral of u^6 (1 - u)^6
+    share = np.cumsum(u**6 * (1.0 - u) ** 6)
+    share /= share[-1]
+    found = record(flights.flight(6.5, waypoint(duration, rest_s)))
+    assert found["step_height_m"] == pytest.approx(3.0, rel=tolerances.WIRE_RELATIVE)
+    for key, level in (("rise_time_90_s", 0.9), ("settling_time_5pct_s", 0.95)):
+        expected = duration * u[np.searchsorted(share, level)]
+        assert found[key] == pytest.approx(expected, abs=flights.TICK_S + tolerances.CROSSING_S), key
+
+
+def test_a_path_that_returns_has_no_step_response():
+    out = waypoint(2.0)
+    found = record(flights.flight(6.0, lambda t: out(t) - out(t - 3.0)))
+    keys = ("step_height_m", "rise_time_90_s", "overshoot_pct", "settling_time_5pct_s")
+    assert {key: found[key] for key in keys} == dict.fromkeys(keys)
 
 
 def _ramp(t, begin, end):
