@@ -19,7 +19,7 @@ from autopilot.core.flight_core import SETPOINTS_LOCKSTEP, FlightCore, commanded
 from autopilot.core.tick import placeholder_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_point_of
-from autopilot.geometry.packed import field_offset, packed, unpack
+from autopilot.geometry.packed import field_offset, pack, packed, unpack
 from autopilot.guidance.jet_table import COLUMNS, flies_requested_path, jets
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard
@@ -37,6 +37,7 @@ from gcs.expected_flight import limit_text
 from gcs.mission_items import in_mission_terms
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
+from gcs.sweep.step import RequestedMotions, figures_of, response_to
 from gcs.sweep.wire import max_readings, rounded_reel_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -52,6 +53,7 @@ _NO_PATH = np.zeros((1, COLUMNS))  # requested path of a mission step in which t
 _NEVER = 2**62
 _OF_A_PATH = re.compile(r"\bitem \d+[^:;]*: ")  # in the refusal of a path that the vehicle cannot follow
 _TICK, _NOW = field_offset(World, "tick"), field_offset(World, "now_us")
+_RESPONSE = field_offset(Figures, "response")
 _SLACK_EVENTS = field_offset(World, "plant") + field_offset(PlantState, "slack_events")
 # machine code of `fly_stretch` and of the ticks that it calls, by the type of the cable's rows
 _ENTRIES: dict[type, tuple[Callable[..., bool], Code]] = {}
@@ -78,6 +80,9 @@ class FlightResult:
     load_error_max_m: float = nan
     load_error_rms_m: float = nan
     tracking_error_max_m: float = nan
+    rise_time_90_s: float = nan
+    overshoot_pct: float = nan
+    settling_time_5pct_s: float = nan
     estimator_error_max_m: float = nan
     saturated_fraction: float = nan
     psi_R_max: float = nan
@@ -136,6 +141,8 @@ class SweepFlight:
         self._warnings: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
         self.airborne_us = -1
         self.mission_us = 0
+        self.mission_until_us = 0
+        self.motions = RequestedMotions()
         self.started = False  # the first tick has been flown
 
     # ---- the loop
@@ -229,6 +236,7 @@ class SweepFlight:
             self.result.slack_events += slack_events
         if phase == Phase.MISSION:
             self.mission_us += elapsed_us
+            self.mission_until_us = self.now_us
             mission = self.core.flight.mission
             self.item = mission.plan.sequence[mission.step]
 
@@ -253,6 +261,9 @@ class SweepFlight:
             if flies_requested_path(leg)
             else jets(leg, planned.times_s, requested=True)
         )
+        step = self.motions.add(leg, flight.leg_start_us, planned.period_us)
+        if step is not None:
+            pack(response_to(step), self.figures, _RESPONSE)
 
     def _measure_battery(self) -> None:
         """What the autopilot learns of the battery, which the simulator sends it over the wire."""
@@ -346,6 +357,8 @@ class SweepFlight:
             result.load_error_max_m = f.error_max
             result.tracking_error_max_m = f.tracking_max
             result.load_error_rms_m = sqrt(f.error_square / f.samples)
+        if self.motions.are_one_step(self.mission_until_us * 1e-6):
+            result.rise_time_90_s, result.overshoot_pct, result.settling_time_5pct_s = figures_of(f.response)
         if f.tension_min < inf:
             result.estimator_error_max_m = f.estimator_error_max
             result.tension_min_n, result.tension_max_n = f.tension_min, f.tension_max

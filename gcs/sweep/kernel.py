@@ -31,6 +31,7 @@ from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack, with_field
 from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.supervisor.quiescence import Stretch
+from gcs.sweep.step import NO_RESPONSE, Response, followed
 from gcs.sweep.wire import Wire, deliver_readings, put_forces, rounded_reel_rate
 from sitl.plant.chain.records import ChainRows
 from sitl.plant.records import PlantState
@@ -54,10 +55,11 @@ class Figures(NamedTuple):
     estimator_error_max: float  # m
     rotor_min: float  # N
     rotor_max: float
+    response: Response  # to the step of the requested path, if it is one
 
 
 NO_FIGURES = Figures(
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float("inf"), 0.0, 0.0, float("inf"), -float("inf")
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float("inf"), 0.0, 0.0, float("inf"), -float("inf"), NO_RESPONSE
 )
 
 
@@ -91,6 +93,7 @@ def add_to_figures(figures: Row, world: WorldRows, core: CoreRows, requested_pat
             row = row_at(stretch, now.now_us)
             target, requested = vector_at(core.targets, row, 0), vector_at(requested_path, row, 0)
             f = _with_path_errors(f, now.plant.x_load, target, requested)
+            f = with_field(f, "response", followed(f.response, now.plant.x_load, now.now_us))
         f = _with_load(f, now.plant, unpack(EstimateSummary, core.summary, 0).state.x_load)
     min_force, max_force = f.rotor_min, f.rotor_max
     for i in range(world.rotor_table.shape[0]):

@@ -44,6 +44,15 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="session")
+def stepped(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The same with a second at the waypoint: a step of 0.4 m."""
+    path: Path = tmp_path_factory.mktemp("missions") / "stepped.toml"
+    land = '\n[[items]]\ntype = "land"\n'
+    path.write_text(SHORT.replace(land, "hold_s = 1.0\n" + land), encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture(scope="session")
 def delivery(tmp_path_factory: pytest.TempPathFactory) -> str:
     path: Path = tmp_path_factory.mktemp("missions") / "delivery.toml"
     land = '[[items]]\ntype = "land"\n'

@@ -7,6 +7,7 @@ order within a tick, and the times at which the ground station acts.
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +19,9 @@ from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.own.own_code import OwnCode
+from autopilot.wire.tlog import TlogWriter, read_tlog
+from gcs.analysis.record import FlightMeta, flight_record
+from gcs.analysis.telemetry import telemetry_of
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
@@ -26,10 +30,12 @@ from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
 from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
+from tests.gcs import tolerances
 
 MOST_TICKS = 20_000
 THESIS, LQR, PLUMBLINE, OWN = 0.0, 1.0, 2.0, 3.0
 ROUGH = {"SIM_ACT_DELAY_MS": 9.0, "SIM_DROP_PCT": 10.0, "SIM_GUST_STD": 0.5, "SIM_LOAD_MASS": 0.12}
+TELEMETRY_S = 0.008  # between two samples of the record
 FENCE_M = 0.3
 STOP_ROTORS, LAND = 4.0, 5.0  # GF_ACTION
 
@@ -164,6 +170,32 @@ def test_figures_of_a_released_load_are_those_of_the_record(delivery: str, tmp_p
     assert len(shared) == 13
     sampled = {name: pytest.approx(value, rel=1e-3) for name, value in shared.items()}
     assert {name: found[name] for name in shared} == sampled
+
+
+@pytest.mark.parametrize("name", ["stepped", "case-a"])
+def test_the_step_response_is_that_of_the_record(request: pytest.FixtureRequest, name: str) -> None:
+    """The record has a sample every 8 ms, so it may find the start of the step that much later; in between,
+    both interpolate."""
+    mission = load(request.getfixturevalue(name) if name == "stepped" else name)
+    conditions = Conditions(sensors="lab", seed=3, settings={"CTL_LAW": PLUMBLINE})
+    log = io.BytesIO()
+    fly_with_wire(mission, conditions, TlogWriter(log))
+    log.seek(0)
+    record = flight_record(telemetry_of(read_tlog(log)), FlightMeta())
+    found = fly(mission, conditions, start_times(mission, conditions))
+    for key in ("rise_time_90_s", "settling_time_5pct_s"):
+        assert getattr(found, key) == pytest.approx(record[key], abs=TELEMETRY_S + tolerances.CROSSING_S), key
+    assert found.overshoot_pct == pytest.approx(record["overshoot_pct"], rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["short", "swung", "winched"])
+def test_a_path_that_is_no_step_has_no_step_response(request: pytest.FixtureRequest, name: str) -> None:
+    """Without a hold, there and back, and with a second motion."""
+    mission = load(request.getfixturevalue(name))
+    conditions = Conditions(settings={"CTL_LAW": PLUMBLINE})
+    found = fly(mission, conditions, start_times(mission, conditions))
+    assert found.outcome == "completed"
+    assert np.isnan((found.rise_time_90_s, found.overshoot_pct, found.settling_time_5pct_s)).all()
 
 
 @pytest.mark.parametrize("rate_hz", [125.0, 625.0])  # a tick of 8 and of 1.6 ms

@@ -58,6 +58,14 @@ def test_same_bits_with_eight(short: str) -> None:
     assert share > 0.5
 
 
+def test_same_bits_of_a_step_response(stepped: str) -> None:
+    flown, share = both_ways(stepped, {"CTL_LAW": PLUMBLINE}, EIGHT)
+    assert share > 0.5
+    for one in flown:
+        assert 1.0 < one.rise_time_90_s < one.settling_time_5pct_s < 2.0
+    assert len({one.overshoot_pct for one in flown}) == 8
+
+
 def test_same_bits_with_fewer_than_eight(short: str) -> None:
     _, share = both_ways(short, {"CTL_LAW": PLUMBLINE}, range(1, 6), "ideal")
     assert share > 0.5
