@@ -15,12 +15,13 @@ from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
+from gcs.analysis.definitions import METRICS, UNKNOWN
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
-from gcs.sweep.results import Flights, cells, completion_range, flights_by_law
+from gcs.sweep.results import STEP_FIGURES, Cells, Flights, cells, completion_range, flights_by_law
 from gcs.sweep.standouts import Standout, base_command, repeat_command, stored_standouts
 from gcs.sweep.store import Store
 from gcs.web.page import render
@@ -65,6 +66,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         version=version,
         flown=sum(len(flights.outcome) for flights in laws),
         laws=[_law(flights) for flights in laws],
+        step_names=_step_names() if any(flights.are_steps for flights in laws) else (),
         standouts=[_standout_row(plan, one, directory) for one in stored_standouts(directory, plan)],
         reaches=margins(plan, laws, tables),
         curves=curves,
@@ -100,9 +102,21 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
         "completed": _json_numbers(100.0 * found.success.ravel()),
         "median": _json_numbers(1e3 * found.error_median_m.ravel()),
         "worst": _json_numbers(1e3 * found.error_worst_m.ravel()),
+        "steps": _step_maps(found) if flights.are_steps else [],
         "varied": list(values),
         "shown": [_flight_record(flights, values, row) if row >= 0 else None for row in rows],
     }
+
+
+def _step_maps(found: Cells) -> list[dict[str, Any]]:
+    """The medians of the step response, in the order of a map's cells."""
+    maps = []
+    for name, values in found.step_medians.items():
+        metric = METRICS[name]
+        maps.append(
+            {"name": metric.label.lower(), "unit": metric.unit, "values": _json_numbers(values.ravel())}
+        )
+    return maps
 
 
 def _flight_record(flights: Flights, varied: Mapping[str, Floats], row: int) -> dict[str, Any]:
@@ -161,9 +175,21 @@ def _law(flights: Flights) -> dict[str, Any]:
         "flights": len(flights.outcome),
         "share": f"{100.0 * outcomes['completed'] / len(flights.outcome):.1f}",
         "ends": ", ".join(f"{name} {n}" for name, n in outcomes.most_common()),
-        "phases": ", ".join(f"{name} {n}" for name, n in phases.most_common()) or "–",
-        "worst": f"{1e3 * worst:.1f}" if math.isfinite(worst) else "–",
+        "phases": ", ".join(f"{name} {n}" for name, n in phases.most_common()) or UNKNOWN,
+        "worst": f"{1e3 * worst:.1f}" if math.isfinite(worst) else UNKNOWN,
+        "steps": _step_medians(flights),
     }
+
+
+def _step_names() -> list[str]:
+    """The headings of the medians of the step response."""
+    metrics = [METRICS[name] for name in STEP_FIGURES]
+    return [f"{metric.label.lower()}, median ({metric.unit})" for metric in metrics]
+
+
+def _step_medians(flights: Flights) -> list[str]:
+    values = [(METRICS[name], flights.median(name)) for name in STEP_FIGURES]
+    return [f"{v:.{metric.decimals}f}" if math.isfinite(v) else UNKNOWN for metric, v in values]
 
 
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:

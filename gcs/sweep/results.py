@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 BINS = 8  # for a parameter whose values were drawn
 COMPLETED = "completed"
+STEP_FIGURES = ("rise_time_90_s", "overshoot_pct", "settling_time_5pct_s")
+# of which medians are stated
+MEDIAN_FIGURES = ("load_error_max_m", "load_error_rms_m", *STEP_FIGURES, "psi_R_max", "psi_q_max")
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,19 @@ class Flights:
     seed: NDArray[np.int64]  # (n,)
     reference: str  # of the law, as the user named it
     reason: tuple[str, ...] = ()  # why a flight was not completed
+    # (n,) by name, MEDIAN_FIGURES; infinite: a time that passed without what it waits for; NaN: unknown
+    figures: Mapping[str, Floats] = field(default_factory=dict)
+
+    def median(self, name: str, rows: NDArray[Any] | slice = slice(None)) -> float:
+        """The median of a figure over those of the rows that completed; NaN if none has it."""
+        values = self.figures[name][rows]
+        known = values[self.completed[rows] & ~np.isnan(values)]
+        return float(np.median(known)) if len(known) else np.nan
+
+    @property
+    def are_steps(self) -> bool:
+        """Whether some flight has a step response."""
+        return bool(np.isfinite(self.figures["overshoot_pct"]).any())
 
 
 @dataclass(frozen=True)
@@ -46,6 +63,7 @@ class Cells:
     error_median_m: Floats  # of the flights that completed
     error_worst_m: Floats
     shown: NDArray[np.intp]  # row of the flight to show for a cell: a lost one, else the worst; -1: none
+    step_medians: Mapping[str, Floats]  # by name, STEP_FIGURES; of the flights that completed
 
 
 @dataclass(frozen=True)
@@ -75,6 +93,10 @@ def flights_by_law(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     error = values("load_error_max_m", float)
     index, seed = values("index", int), values("seed", int)
     varied = {v.name: values(v.name, float) for v in plan.varied}
+    figures = {name: values(name, float) for name in MEDIAN_FIGURES}
+    for name in ("rise_time_90_s", "settling_time_5pct_s"):
+        never = np.isnan(figures[name]) & np.isfinite(figures["overshoot_pct"])
+        figures[name] = np.where(never, np.inf, figures[name])
     found = []
     for reference in plan.laws:
         name = law_name(reference)
@@ -91,9 +113,22 @@ def flights_by_law(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
                 seed[rows],
                 reference,
                 tuple(reason[rows].tolist()),
+                {figure: column[rows] for figure, column in figures.items()},
             )
         )
     return found
+
+
+def law_record(flights: Flights) -> dict[str, object]:
+    """Numbers and medians of the flights of one law, as `gcs sweep --json` prints them; None: not known, or
+    more than half of the flights never got there."""
+    medians = {name: flights.median(name) for name in MEDIAN_FIGURES}
+    return {
+        "law": flights.law,
+        "flights": len(flights.outcome),
+        "completed": int(flights.completed.sum()),
+        "medians": {name: value if np.isfinite(value) else None for name, value in medians.items()},
+    }
 
 
 def levels(plan: SweepPlan, name: str) -> Floats:
@@ -120,6 +155,7 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
     flown = np.bincount(cell_of_flight, minlength=count).astype(float)
     completed_flights = np.bincount(cell_of_flight, weights=flights.completed.astype(float), minlength=count)
     median, worst = np.full(count, np.nan), np.full(count, np.nan)
+    step_medians = {name: np.full(count, np.nan) for name in STEP_FIGURES}
     shown = np.full(count, -1, dtype=np.intp)
     for cell in np.unique(cell_of_flight):
         rows = np.flatnonzero(cell_of_flight == cell)
@@ -128,6 +164,8 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
         lost = rows[~flights.completed[rows]]
         if len(rated):
             median[cell], worst[cell] = np.median(errors), errors.max()
+        for name, of_cells in step_medians.items():
+            of_cells[cell] = flights.median(name, rows)
         shown[cell] = lost[0] if len(lost) else rated[np.argmax(errors)] if len(rated) else rows[0]
     with np.errstate(invalid="ignore", divide="ignore"):
         success = np.where(flown > 0.0, completed_flights / flown, np.nan)
@@ -138,6 +176,7 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
         median.reshape(shape),
         worst.reshape(shape),
         shown.reshape(shape),
+        {name: medians.reshape(shape) for name, medians in step_medians.items()},
     )
 
 

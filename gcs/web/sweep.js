@@ -9,6 +9,9 @@
     { key: "median", name: "load error, median", unit: "mm" },
     { key: "worst", name: "load error, worst", unit: "mm" },
   ];
+  /** The figures of a map: its step response, if it has one, has its own range of colours. */
+  const kindsOf = (map) => KINDS.map((kind) => ({ ...kind, values: map[kind.key] })).concat(
+    map.steps.map((step) => ({ ...step, name: `${step.name}, median`, own: true })));
   // vermilion to blue for shares; light to dark for errors, by their logarithm
   const SHARES = [[213, 94, 0], [246, 227, 197], [0, 114, 178]];
   const ERRORS = [[253, 231, 37], [53, 183, 121], [33, 130, 142], [68, 1, 84]];
@@ -20,11 +23,17 @@
 
   function colourOf(kind, value) {
     if (value === null) return null;
+    if (kind.own) {
+      const known = kind.values.filter((other) => other !== null);
+      const low = Math.min(...known), high = Math.max(...known); // less than a tenth is no great difference
+      return mixed(ERRORS, (value - low) / (Math.max(high - low, 0.1 * high) || 1));
+    }
     if (kind.key === "completed") return mixed(SHARES, value / 100);
     return mixed(ERRORS, Math.log10(Math.max(value, 1)) / 3); // 1 mm ... 1 m
   }
 
   const number = (value) => (value === null ? "–" : value >= 10 || value === 0 ? value.toFixed(0) : value.toFixed(1));
+  const numberOf = (kind, value) => (kind.own && value !== null ? value.toPrecision(3) : number(value));
   const short = (value) => String(Number(value.toPrecision(4)));
 
   function draw(tag, attributes, parent, text) {
@@ -52,7 +61,8 @@
     const where = [labelled(map, 0, i), ...(map.names.length > 1 ? [labelled(map, 1, j)] : [])].join(", ");
     if (!map.flown[at]) return `${where}: not flown`;
     return `${where}: ${map.flown[at]} flights, ${number(map.completed[at])} % completed; ` +
-      `load error median ${number(map.median[at])} mm, worst ${number(map.worst[at])} mm`;
+      [`load error median ${number(map.median[at])} mm, worst ${number(map.worst[at])} mm`,
+        ...map.steps.map((step) => `${step.name} ${numberOf({ own: true }, step.values[at])} ${step.unit}`)].join(", ");
   }
 
   let picked = null; // the cell whose command is shown: {map, at}
@@ -82,7 +92,7 @@
     svg.setAttribute("aria-label", `${kind.name}, law ${map.law}`);
     const said = host.querySelector(".said");
     xs.forEach((_, i) => ys.forEach((__, j) => {
-      const at = flat ? i : i * ys.length + j, value = map[kind.key][at], rgb = colourOf(kind, value);
+      const at = flat ? i : i * ys.length + j, value = kind.values[at], rgb = colourOf(kind, value);
       const x = left + i * w, y = top + (ys.length - 1 - j) * h;
       const cell = draw("rect", { x, y, width: w, height: h, class: "cell", tabindex: 0, role: "button",
         fill: rgb ? `rgb(${rgb.join(",")})` : "var(--line)", "data-cell": at }, svg);
@@ -101,7 +111,7 @@
       if (picked && picked.map === map && picked.at === at) cell.classList.add("chosen");
       if (!numbers) return;
       const dark = rgb && 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] >= 128;
-      draw("text", { x: x + w / 2, y: y + h / 2 + 4, "text-anchor": "middle", class: rgb ? (dark ? "dark" : "pale") : "" }, svg, number(value));
+      draw("text", { x: x + w / 2, y: y + h / 2 + 4, "text-anchor": "middle", class: rgb ? (dark ? "dark" : "pale") : "" }, svg, numberOf(kind, value));
     }));
     const longest = DIGIT_PX * (Math.max(...xs.map((value) => short(value).length)) + 1);
     const stride = Math.ceil(longest / w), low = top + h * ys.length;
@@ -128,8 +138,9 @@
     const frame = document.createElement("div");
     frame.className = "frame";
     host.append(head, choice, frame, said);
-    let shown = KINDS[0];
-    KINDS.forEach((kind) => {
+    const kinds = kindsOf(map);
+    let shown = kinds[0];
+    kinds.forEach((kind) => {
       const button = document.createElement("button");
       button.type = "button";
       button.textContent = `${kind.name} (${kind.unit})`;
@@ -143,7 +154,7 @@
     document.getElementById("maps").append(host);
     // if every flight completes, only the errors are worth seeing
     const every = map.completed.every((share) => share === null || share === 100);
-    (every ? choice.lastChild : choice.firstChild).click();
+    choice.children[every ? KINDS.length - 1 : 0].click();
     const fade = () => { // the cells would cover a shadow like that of the other cards
       const { scrollLeft: before, scrollWidth, clientWidth } = frame;
       frame.classList.toggle("before", before > 1);

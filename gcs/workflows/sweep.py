@@ -21,15 +21,16 @@ from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied, varied_values
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
+from gcs.sweep.results import flights_by_law, law_record
 from gcs.sweep.run import SweepResult, sweep
 from gcs.sweep.standouts import (
     Standout,
     flight_settings,
     ignored_parameters,
     repeat_command,
-    stored_standouts,
+    standouts,
 )
-from gcs.sweep.store import TABLE_FILE
+from gcs.sweep.store import TABLE_FILE, Store
 from gcs.workflows.before_flight import mission_warnings
 from gcs.workflows.flight_inputs import setting_warnings, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
@@ -86,6 +87,7 @@ class Sweep:
     directory: Path
     result: Path  # the page, else the table
     flights: tuple[dict[str, object], ...]  # the flights that stand out
+    laws: tuple[dict[str, object], ...]  # numbers and medians of each law
 
     @property
     def exit_code(self) -> int:
@@ -105,6 +107,7 @@ class Sweep:
             "wall_s": round(self.counts.wall_s, 3),
             "flights_per_s": round(self.counts.flights_per_s, 2),
             "out": str(self.directory),
+            "laws": list(self.laws),
             "standouts": list(self.flights),
         }
 
@@ -148,7 +151,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
             options.fresh,
             partial(warm_up, quiet=options.quiet),
         )
-        found = stored_standouts(directory, plan)
+        laws = [flights for flights in flights_by_law(Store(directory, plan).read(), plan) if flights.outcome]
+        found = [one for flights in laws for one in standouts(flights)]
         if options.reports and not stop:
             _fly_again(plan, found, directory, options.quiet)
         if options.table_only:
@@ -158,7 +162,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
                 notify("drawing the report")
             result = write_report(directory, plan)
     flights = tuple(_standout_record(plan, one, directory) for one in found)
-    return Sweep(Path(plan.mission).stem, counts, plan.flights, directory, result, flights)
+    of_laws = tuple(map(law_record, laws))
+    return Sweep(Path(plan.mission).stem, counts, plan.flights, directory, result, flights, of_laws)
 
 
 @contextmanager

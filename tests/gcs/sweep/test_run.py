@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import re
 import shlex
 import shutil
+import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -21,14 +23,15 @@ from click.testing import CliRunner
 
 from autopilot.own.own_code import OwnCode
 from autopilot.shell.compiling import Part
+from gcs.analysis.definitions import METRICS
 from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.errors import GcsError, InputError
 from gcs.sweep import run, work
-from gcs.sweep.plan import PlanError, SweepPlan
+from gcs.sweep.plan import PlanError, SweepPlan, VariedParameter
 from gcs.sweep.plan_file import store_plan, sweep_files, sweep_origin
 from gcs.sweep.report import write_report
-from gcs.sweep.results import cells, completion_range, flights_by_law
+from gcs.sweep.results import cells, completion_range, flights_by_law, law_record
 from gcs.sweep.standouts import repeat_command, stored_standouts
 from gcs.sweep.store import Row, Store, columns
 from tests.doubles.browser import Browser
@@ -59,8 +62,6 @@ def without_clock(path: Path) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path, run.SweepResult]:
-    from gcs.sweep.plan import VariedParameter
-
     delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
     plan = SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
     directory = tmp_path_factory.mktemp("whole")
@@ -312,7 +313,7 @@ def test_flights_that_stand_out_are_those_of_the_table(
     assert {"--force", "--overwrite"} <= set(words), "it flies whatever it is, and as often as it is given"
 
 
-def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult], width: int) -> None:
+def open_page(browser: Browser, whole: tuple[SweepPlan, Path, object], width: int) -> None:
     """Open the page of the sweep and wait until its maps are drawn."""
     plan, directory, _ = whole
     browser.open(write_report(directory, plan).as_uri(), width, 844)
@@ -356,6 +357,71 @@ def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
     assert size * scale >= 11.0, "the map is read on a phone"
 
 
+@pytest.fixture(scope="module")
+def steps(stepped: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path]:
+    """Six flights of a step, of which those with the long delay are lost."""
+    delays = VariedParameter("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
+    plan = SweepPlan(stepped, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
+    directory = tmp_path_factory.mktemp("steps")
+    swept(plan, directory)
+    return plan, directory
+
+
+def test_the_step_response_is_in_table_record_and_page(steps: tuple[SweepPlan, Path]) -> None:
+    plan, directory = steps
+    rows = pq.read_table(directory / "flights.parquet").to_pylist()
+    (flights,) = flights_by_law(Store(directory, plan).read(), plan)
+    record: Any = law_record(flights)
+    assert (record["law"], record["flights"], record["completed"]) == ("thesis", 6, 4)
+    page = write_report(directory, plan).read_text(encoding="utf-8")
+    for name, decimals in (("rise_time_90_s", 3), ("overshoot_pct", 1), ("settling_time_5pct_s", 3)):
+        middle = statistics.median(row[name] for row in rows[:4])
+        assert record["medians"][name] == pytest.approx(middle)
+        assert f'median ({METRICS[name].unit})">{middle:.{decimals}f}</td>' in page
+    found = cells(flights, plan, ("SIM_ACT_DELAY_MS",)).step_medians["rise_time_90_s"]
+    assert found[1] == pytest.approx(statistics.median(row["rise_time_90_s"] for row in rows[2:4]))
+    assert math.isnan(found[2]), "of lost flights"
+
+
+def test_flights_that_never_settle_count_in_the_median(
+    steps: tuple[SweepPlan, Path], whole: tuple[SweepPlan, Path, run.SweepResult]
+) -> None:
+    plan, directory = steps
+    table = Store(directory, plan).read()
+    settling = table.column("settling_time_5pct_s").to_pylist()
+    for never, known in ((1, True), (3, False)):
+        column = pyarrow.array([math.nan] * never + settling[never:])
+        place = table.schema.get_field_index("settling_time_5pct_s")
+        (flights,) = flights_by_law(table.set_column(place, "settling_time_5pct_s", column), plan)
+        medians: Any = law_record(flights)["medians"]
+        assert (medians["settling_time_5pct_s"] is not None) == known
+    plan, directory, _ = whole
+    (flights,) = flights_by_law(Store(directory, plan).read(), plan)
+    medians = law_record(flights)["medians"]
+    assert medians["settling_time_5pct_s"] is None, "the mission is no step"
+    assert "overshoot" not in write_report(directory, plan).read_text(encoding="utf-8")
+
+
+def test_a_map_shows_the_step_response(browser: Browser, steps: tuple[SweepPlan, Path]) -> None:
+    plan, directory = steps
+    open_page(browser, (plan, directory, None), 1280)
+    buttons = browser.run(
+        "return [...document.querySelectorAll('.choice button')].map((one) => one.textContent)"
+    )
+    assert buttons[3:] == ["rise to 90 %, median (s)", "overshoot, median (%)", "settling to 5 %, median (s)"]
+    browser.run("document.querySelectorAll('.choice button')[3].click()")
+    (flights,) = flights_by_law(Store(directory, plan).read(), plan)
+    rise = cells(flights, plan, ("SIM_ACT_DELAY_MS",)).step_medians["rise_time_90_s"]
+    shown = browser.run(
+        "return [...document.querySelectorAll('rect.cell + text')].map((one) => one.textContent)"
+    )
+    assert shown == [*(f"{one:#.3g}" for one in rise[:2]), "–"]
+    browser.find("rect.cell[data-cell='0']").click()
+    assert f"rise to 90 % {rise[0]:#.3g} s, overshoot " in browser.find(".said").text
+    browser.listen()
+    assert browser.errors == []
+
+
 def test_the_map_is_drawn_anew_in_a_window_of_another_width(
     browser: Browser, whole: tuple[SweepPlan, Path, run.SweepResult]
 ) -> None:
@@ -386,6 +452,9 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
     assert "required load_error_max_m < 1e-6; found " in result.stderr
     record = json.loads(result.stdout)
     assert (record["flights"], record["completed"], record["failed"]) == (2, 2, 0)
+    (law,) = record["laws"]
+    assert (law["law"], law["completed"]) == ("thesis", 2) and law["medians"]["rise_time_90_s"] is None
+    assert 0.0 < law["medians"]["load_error_max_m"] <= record["load_error_max_m"]
     assert record["completed_fraction"] == 1.0 and 1e-6 < record["load_error_max_m"] < 0.3
     assert record["out"] == str(tmp_path) and record["flights_per_s"] > 0.0
     assert (tmp_path / "report.html").exists()
