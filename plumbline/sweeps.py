@@ -45,7 +45,7 @@ def sweep(
     mission: str | Path | Mission,
     *,
     vary: Mapping[str, Values] | Mapping[str | tuple[str, ...], Values] | None = None,
-    seeds: int = 1,
+    seeds: int | Iterable[int] = 1,
     sample: int | None = None,
     laws: Sequence[str] = (DEFAULT_LAW,),
     estimator: str | None = None,
@@ -61,7 +61,7 @@ def sweep(
     quiet: bool = True,
     kind: str = "pandas",
 ) -> Any:
-    """Fly a mission with every combination of the varied values, every law, and the seeds 1 ... `seeds`.
+    """Fly a mission with every combination of the varied values, every law, and every seed.
 
     `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or an object made in Python.
     `vary`: for each varied parameter of simulator or autopilot its values, as a list, or as a text like that
@@ -69,6 +69,7 @@ def sweep(
     (Latin hypercube) instead of the whole grid; of a list it draws the listed values, also if there are two.
     Parameters that are a key together, as `("SIM_CABLE_LEN", "VEH_CABLE_LEN")`, have the same value in each
     flight, and the table has the column of the first.
+    `seeds`: a number N for the seeds 1 ... N, or a range or list of seeds, as `range(11, 21)` or `[3, 7]`.
     `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
     of the vehicle's clock; by default one and a half times the expected duration plus a minute.
     `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
@@ -92,7 +93,7 @@ def sweep(
         arguments += [
             name_or_path("mission", mission),
             "--seeds",
-            str(whole_number("seeds", seeds, 1)),
+            _seeds(seeds),
         ]
         arguments += ["--sensors", name_or_path("sensors", sensors)]
         arguments += ["--vehicle", name_or_path("vehicle", vehicle)]
@@ -146,6 +147,19 @@ def _values(name: str, values: Any) -> str:
     if isinstance(values, str):
         return values
     return ",".join(map(repr, numbers(f"vary[{name!r}]", values)))
+
+
+def _seeds(seeds: Any) -> str:
+    """The seeds, as the command line writes them; or `Error`."""
+    from autopilot.shell.options import MAX_SEED
+    from gcs.sweep.plan import seeds_text
+
+    if not isinstance(seeds, Iterable):
+        return str(whole_number("seeds", seeds, 1))
+    listed = items("seeds", seeds, "a whole number, 1 or more, or a range or list of seeds")
+    if not listed:
+        raise GcsError(f"seeds = {shown_value(seeds)}; must be one seed at least")
+    return seeds_text([whole_number(f"seeds[{i}]", one, 0, MAX_SEED) for i, one in enumerate(listed)])
 
 
 def _laws(laws: Sequence[str]) -> Sequence[str]:

@@ -59,10 +59,10 @@ from gcs.shell.display import notify, results_to_stdout
 )
 @click.option(
     "--seeds",
-    type=WholeNumber(min=1),
-    default=1,
+    metavar="N|SEEDS",
+    default="1",
     show_default=True,
-    help="Number of seeds for each setting: 1, 2, 3 ...",
+    help="Fly each setting with the seeds 1 ... N, or with a range or list of them, as 11:20 or 3,7,20:29.",
 )
 @click.option(
     "--sample",
@@ -103,7 +103,7 @@ def sweep_command(
     vehicle: str,
     varied: tuple[str, ...],
     settings: tuple[str, ...],
-    seeds: int,
+    seeds: str,
     sample: int | None,
     limit_s: float | None,
     jobs: int | None,

@@ -11,13 +11,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from itertools import product
+from itertools import chain, pairwise, product
 from typing import Any, TypeVar
 
 from autopilot.own.law import law_name, law_number, own_law_reference
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
 from autopilot.own.trial import try_all
+from autopilot.shell.options import MAX_SEED
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
@@ -38,6 +39,7 @@ T = TypeVar("T")
 
 MAX_FLIGHTS = 10_000_000
 _MAX_VALUES = 10_000
+_MAX_SEED_DIGITS = len(str(MAX_SEED))
 _DRAW_SEED = 1  # for drawing the settings of `--sample`: another one would change the meaning of a plan
 
 
@@ -243,6 +245,57 @@ def parse_varied(text: str, sampled: bool) -> VariedParameter:
     # rounded to twelve digits: 0.1 and not 0.30000000000000004
     even = tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n))
     return VariedParameter(name, even, True, followers)
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """N: the seeds 1 ... N; else a list of seeds and of ranges FIRST:LAST of them, in ascending order."""
+    parts = text.split(",")
+    if len(parts) == 1 and ":" not in text:
+        parts = [f"1:{text}"]
+        if _seed(text, text) == 0:
+            raise PlanError("--seeds 0: flies nothing; --seeds 0:0 flies the seed 0")
+    ranges = []
+    for part in parts:
+        first, colon, last = part.partition(":")
+        low = _seed(text, first)
+        high = _seed(text, last) if colon else low
+        if low > high:
+            raise PlanError(f"--seeds {text}: the first end must not be above the second")
+        ranges.append(range(low, high + 1))
+    ranges.sort(key=lambda one: one.start)
+    for one, after in pairwise(ranges):
+        if after.start < one.stop:
+            raise PlanError(f"--seeds {text}: {after.start} is there twice; each seed is flown once")
+    if sum(one.stop - one.start for one in ranges) > MAX_FLIGHTS:
+        raise PlanError(f"--seeds {text}: too many, {MAX_FLIGHTS} flights at most")
+    return tuple(chain.from_iterable(ranges))
+
+
+def _seed(text: str, number: str) -> int:
+    number = number.strip()
+    if not (number.isascii() and number.isdecimal() and len(number) <= _MAX_SEED_DIGITS):
+        raise PlanError(
+            f"--seeds {text}: {number or 'nothing'!r} is no seed; must be a number N for the seeds 1 ... N, "
+            "a range or a list, as 11:20 or 3,7,20:29"
+        )
+    if int(number) > MAX_SEED:
+        raise PlanError(f"--seeds {text}: a seed is {MAX_SEED} at most")
+    return int(number)
+
+
+def seeds_text(seeds: Sequence[int]) -> str:
+    """The seeds as `parse_seeds` reads them, shortly."""
+    if tuple(seeds) == tuple(range(1, len(seeds) + 1)):
+        return str(len(seeds))
+    runs: list[list[int]] = []
+    for seed in seeds:
+        if runs and seed == runs[-1][-1] + 1:
+            runs[-1][1:] = [seed]
+        else:
+            runs.append([seed])
+    if len(runs) == 1:  # a number alone would be that of the seeds
+        return f"{runs[0][0]}:{runs[0][-1]}"
+    return ",".join(":".join(map(str, run)) for run in runs)
 
 
 def _parse_number(text: str, number: str) -> float:

@@ -18,7 +18,7 @@ from gcs.analysis.axes import Floats
 from gcs.analysis.definitions import METRICS, UNKNOWN
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan import SweepPlan, seeds_text
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import STEP_FIGURES, Cells, Flights, cells, completion_range, flights_by_law
@@ -62,6 +62,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         {"maps": maps},
         title=plan.mission,
         plan=plan,
+        seeds=seeds if ":" in (seeds := seeds_text(plan.seeds)) or "," in seeds else "",
         command=command,
         version=version,
         flown=sum(len(flights.outcome) for flights in laws),

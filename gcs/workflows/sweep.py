@@ -13,12 +13,12 @@ from autopilot.own.misspellings import misspelling_warnings
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode
 from gcs.batch.pool import dask_cluster, local_processes
 from gcs.batch.programs import cores
-from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
+from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.mission_files import load
 from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import MAX_FLIGHTS, SweepPlan, make_plan, parse_varied, varied_values
+from gcs.sweep.plan import SweepPlan, make_plan, parse_seeds, parse_varied, varied_values
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import flights_by_law, law_record
@@ -63,7 +63,7 @@ class SweepOptions:
     vehicle: str
     varied: Sequence[str]  # NAME=VALUES
     settings: Sequence[str]  # NAME=VALUE
-    seeds: int
+    seeds: str  # N, or a list and ranges
     sample: int | None
     jobs: int | None
     scheduler: str | None
@@ -114,14 +114,12 @@ class Sweep:
 
 def run_sweep(options: SweepOptions) -> Sweep:
     """Plan the sweep, fly its missing flights, and write its report; PlanError if it cannot be flown."""
-    if options.seeds > MAX_FLIGHTS:
-        raise InputError(f"--seeds {options.seeds}: too many, {MAX_FLIGHTS} flights at most")
     plan = make_plan(
         options.mission,
         options.vehicle,
         options.sensors,
         options.laws,
-        tuple(range(1, options.seeds + 1)),
+        parse_seeds(options.seeds),
         [parse_varied(text, options.sample is not None) for text in options.varied],
         dict(parse_setting(text) for text in options.settings),
         options.sample or 0,

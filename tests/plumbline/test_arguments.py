@@ -58,7 +58,10 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sweep settings": (lambda v: plumbline.sweep("hover", settings=v), NO_MAPPING),
     "sweep timeout": (lambda v: plumbline.sweep("hover", timeout_s=v), (0, -1, *NO_NUMBER)),
     "sweep fresh": (lambda v: plumbline.sweep("hover", fresh=v), NO_TRUTH_VALUE),
-    "sweep seeds": (lambda v: plumbline.sweep("hover", seeds=v), (0, 1.5, "x", None)),
+    "sweep seeds": (
+        lambda v: plumbline.sweep("hover", seeds=v),
+        (0, 1.5, "x", None, [], [-1], [True], {1: 2}, [2**63]),
+    ),
     "sweep sample": (lambda v: plumbline.sweep("hover", sample=v), (0, 1.5, "x")),
     "sweep laws": (lambda v: plumbline.sweep("hover", laws=v), (None, [], [3], *NO_LIST)),
     "sweep jobs": (lambda v: plumbline.sweep("hover", jobs=v), (0, 1.5, "x")),

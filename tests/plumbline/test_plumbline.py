@@ -145,7 +145,7 @@ def test_a_report_where_the_log_is_a_folder(flight: plumbline.Flight, tmp_path: 
 
 def test_a_sweep_is_a_table() -> None:
     vary = {"SIM_ACT_DELAY_MS": (0, 12.0)}
-    found = plumbline.sweep("hover", vary=vary, seeds=2, sensors="ideal", jobs=1, quiet=True)
+    found = plumbline.sweep("hover", vary=vary, seeds=range(1, 3), sensors="ideal", jobs=1, quiet=True)
     assert found["SIM_ACT_DELAY_MS"].tolist() == [0.0, 0.0, 12.0, 12.0]
     assert found["seed"].tolist() == [1, 2, 1, 2]
     assert found["outcome"].tolist()[:2] == ["completed"] * 2
@@ -240,6 +240,11 @@ WRONG: dict[str, tuple[Any, str]] = {
         "planner plumbline.examples.load_pid:LoadPid: LoadPid has no method plan",
     ),
     "seeds": (lambda: plumbline.sweep("hover", seeds=0), "seeds = 0; must be a whole number, 1 or more"),
+    "a seed": (
+        lambda: plumbline.sweep("hover", seeds=[3, 1.5]),  # type: ignore[list-item]
+        "seeds[1] = 1.5; must be a whole number from 0 to 9223372036854775807",
+    ),
+    "a seed twice": (lambda: plumbline.sweep("hover", seeds=[3, 3]), "seeds 3,3: 3 is there twice; each"),
     "jobs": (lambda: plumbline.sweep("hover", jobs=0), "jobs = 0; must be a whole number, 1 or more"),
     "varied": (
         lambda: plumbline.sweep("hover", vary={"SIM_WIND_E": ["fast"]}),  # type: ignore[list-item]

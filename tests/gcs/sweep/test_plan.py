@@ -20,7 +20,9 @@ from gcs.sweep.plan import (
     VariedParameter,
     from_json,
     make_plan,
+    parse_seeds,
     parse_varied,
+    seeds_text,
 )
 from gcs.sweep.plan_file import default_directory, load_command, store_plan, sweep_origin
 from gcs.sweep.report import write_report
@@ -239,6 +241,46 @@ def test_of_a_parameter_that_takes_whole_numbers_only_such_are_drawn(short: str)
     assert sorted(drawn) == [one for one in (0.0, 1.0, 2.0, 3.0, 4.0) for _ in range(4)]
     with pytest.raises(PlanError, match=r"SIM_ENGINE_FAIL = 0.5; must be a whole number"):
         planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.5, 4.0), True)], {}, sample=20)
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds", "short"),
+    [
+        ("3", (1, 2, 3), "3"),
+        ("1:3", (1, 2, 3), "3"),
+        ("11:14", (11, 12, 13, 14), "11:14"),
+        ("7:7", (7,), "7:7"),
+        ("0:0", (0,), "0:0"),
+        ("20:22, 7,3", (3, 7, 20, 21, 22), "3,7,20:22"),
+        ("1,2,4", (1, 2, 4), "1:2,4"),
+    ],
+)
+def test_seeds_are_a_number_ranges_or_a_list(text: str, seeds: tuple[int, ...], short: str) -> None:
+    assert parse_seeds(text) == seeds
+    assert seeds_text(seeds) == short
+    assert parse_seeds(short) == seeds
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "'nothing' is no seed; must be a number N for the seeds 1 ... N, a range or a list, as 11:20"),
+        ("-3", "'-3' is no seed"),
+        ("1.5", "'1.5' is no seed"),
+        ("1:5:2", "'5:2' is no seed"),
+        ("3,", "'nothing' is no seed"),
+        ("0", "--seeds 0: flies nothing; --seeds 0:0 flies the seed 0"),
+        ("5:1", "the first end must not be above the second"),
+        ("3,1:5", "3 is there twice"),
+        ("10000001", "too many, 10000000 flights at most"),
+        ("9223372036854775808:9223372036854775809", "a seed is 9223372036854775807 at most"),
+        ("1" * 5000, "is no seed"),
+    ],
+)
+def test_what_are_no_seeds(text: str, says: str) -> None:
+    with pytest.raises(PlanError) as error:
+        parse_seeds(text)
+    assert says in str(error.value)
 
 
 def test_a_plan_contains_those_with_fewer_seeds_and_values(plan: SweepPlan) -> None:

@@ -460,6 +460,29 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
     assert (tmp_path / "report.html").exists()
 
 
+def test_any_seeds_are_flown_continued_and_repeated(short: str, tmp_path: Path) -> None:
+    """Seed 3 is the same flight in whatever sweep."""
+    words = ["sweep", short, "--law", "thesis", "--jobs", "1", "--json", "--out"]
+
+    def flown(out: str, seeds: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        result = CliRunner().invoke(gcs, [*words, str(tmp_path / out), "--seeds", seeds], prog_name="gcs")
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout), without_clock(tmp_path / out)
+
+    record, rows = flown("some", "3,5:6")
+    assert [row["seed"] for row in rows] == ["3", "5", "6"]
+    assert {one["seed"] for one in record["standouts"]} <= {3, 5, 6}
+    assert f"--seed {record['standouts'][0]['seed']} " in record["standouts"][0]["command"]
+    page = (tmp_path / "some" / "report.html").read_text(encoding="utf-8")
+    assert "3 seeds (3,5:6)." in page
+    assert stored_plan(tmp_path / "some").seeds == (3, 5, 6)
+    record, more = flown("some", "6")
+    assert (record["flights"], record["flown"]) == (6, 3)
+    record, alone = flown("alone", "3:3")
+    by_seed = [[{**row, "index": ""} for row in found if row["seed"] == "3"] for found in (rows, more, alone)]
+    assert by_seed[0] == by_seed[1] == by_seed[2]
+
+
 def test_the_table_alone_is_written_where_that_is_asked_for(short: str, tmp_path: Path) -> None:
     words = ["sweep", short, "--jobs", "1", "--out", str(tmp_path), "--table-only", "--quiet"]
     result = CliRunner().invoke(gcs, words, prog_name="gcs")
