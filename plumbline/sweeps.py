@@ -152,7 +152,7 @@ def _values(name: str, values: Any) -> str:
 def _seeds(seeds: Any) -> str:
     """The seeds, as the command line writes them; or `Error`."""
     from autopilot.shell.options import MAX_SEED
-    from gcs.sweep.plan import seeds_text
+    from gcs.sweep.plan_values import seeds_text
 
     if not isinstance(seeds, Iterable):
         return str(whole_number("seeds", seeds, 1))

@@ -11,7 +11,8 @@ from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.file import belief_of
 from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
-from gcs.sweep.plan import PlanError, SweepPlan, from_json
+from gcs.sweep.plan import SweepPlan, from_json
+from gcs.sweep.plan_values import PlanError
 
 _OPTIONS = {
     "mission": "mission",

@@ -18,8 +18,9 @@ from gcs.analysis.axes import Floats
 from gcs.analysis.definitions import METRICS, UNKNOWN
 from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import SweepPlan, seeds_text
+from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
+from gcs.sweep.plan_values import seeds_text
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import STEP_FIGURES, Cells, Flights, cells, completion_range, flights_by_law
 from gcs.sweep.standouts import Standout, base_command, repeat_command, stored_standouts

@@ -18,8 +18,9 @@ from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import FlightResult, StartTimes, SweepFlight, fly, start_times
 from gcs.sweep.group import MIN_FLIGHTS, LaneGroup, fits_in_lanes
-from gcs.sweep.plan import Case, PlanError, SweepPlan
+from gcs.sweep.plan import Case, SweepPlan
 from gcs.sweep.plan_file import sweep_files
+from gcs.sweep.plan_values import PlanError
 from gcs.sweep.store import Row, row_of
 from gcs.sweep.warmup import lanes_part, sweep_parts
 from missions.model import Mission

@@ -18,8 +18,9 @@ from gcs.folders import PAGE_FILE, REPEATS_FOLDER
 from gcs.mission_files import load
 from gcs.shell.display import notify
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import SweepPlan, make_plan, parse_seeds, parse_varied, varied_values
+from gcs.sweep.plan import SweepPlan, make_plan
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
+from gcs.sweep.plan_values import parse_seeds, parse_varied, varied_values
 from gcs.sweep.report import write_report
 from gcs.sweep.results import flights_by_law, law_record
 from gcs.sweep.run import SweepResult, sweep

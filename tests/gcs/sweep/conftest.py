@@ -14,7 +14,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_mission
 from gcs.folders import PLAN_FILE
 from gcs.formats.missions import write_foreign
-from gcs.sweep.plan import SweepPlan, VariedParameter, from_json
+from gcs.sweep.plan import SweepPlan, from_json
+from gcs.sweep.plan_values import VariedParameter
 from missions.fileformat import parse_mission
 
 SHORT = """

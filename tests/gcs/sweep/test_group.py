@@ -18,7 +18,8 @@ from gcs.sweep import work
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import FlightResult, SweepFlight, fly, start_times
 from gcs.sweep.group import LaneGroup, fits_in_lanes
-from gcs.sweep.plan import SweepPlan, VariedParameter
+from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan_values import VariedParameter
 from gcs.sweep.work import Work, fly_cases
 from missions.fileformat import load_mission
 

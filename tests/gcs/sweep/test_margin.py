@@ -8,7 +8,8 @@ import pytest
 
 from benchmarks import cascade_margin
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import SweepPlan, VariedParameter
+from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan_values import VariedParameter
 
 
 def limits(law: str, name: str, nominal: float, to: tuple[float, float]) -> str:

@@ -14,17 +14,9 @@ from gcs.batch.reuse import Origin
 from gcs.closed_loop import build_onboard
 from gcs.sweep.cell import cell_of
 from gcs.sweep.margin import CUSTOM_LAW, linear_range
-from gcs.sweep.plan import (
-    PlanError,
-    SweepPlan,
-    VariedParameter,
-    from_json,
-    make_plan,
-    parse_seeds,
-    parse_varied,
-    seeds_text,
-)
+from gcs.sweep.plan import SweepPlan, from_json, make_plan
 from gcs.sweep.plan_file import default_directory, load_command, store_plan, sweep_origin
+from gcs.sweep.plan_values import PlanError, VariedParameter, parse_seeds, parse_varied, seeds_text
 from gcs.sweep.report import write_report
 from gcs.sweep.standouts import base_command, flight_settings
 from missions.fileformat import load_mission

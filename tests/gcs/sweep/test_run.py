@@ -28,8 +28,9 @@ from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.errors import GcsError, InputError
 from gcs.sweep import run, work
-from gcs.sweep.plan import PlanError, SweepPlan, VariedParameter
+from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_files, sweep_origin
+from gcs.sweep.plan_values import PlanError, VariedParameter
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, completion_range, flights_by_law, law_record
 from gcs.sweep.standouts import repeat_command, stored_standouts
