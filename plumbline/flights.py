@@ -76,7 +76,7 @@ def fly(
     and a half times the expected duration plus a minute.
     `force`: fly the mission even if it exceeds the limits of the vehicle. `quiet=False` shows progress on
     stderr, including compilation, which takes a minute or more before the first flight. A setting that may
-    be unintended causes a warning.
+    be unintended, or has no effect, causes a warning.
 
     A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
     profile, law, estimator, planner or parameter, if a value is not a number or out of its range, if a custom

@@ -6,14 +6,16 @@ import signal
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
 from gcs.workflows.flight_options import own_part_options
+from missions.toml_files import FileError
 from plumbline.arguments import (
     called_by_scripts,
     errors_for_python,
@@ -77,7 +79,7 @@ def sweep(
     that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
     which an interrupted sweep continues, or one with more seeds or values; by default nothing is kept.
     `fresh=True` discards flights that are there already, also those of another sweep. `quiet=False` shows
-    progress on stderr.
+    progress on stderr. A parameter that has no effect in any flight causes a warning.
 
     Returns a table with a row for each flight and the columns of flights.parquet (docs/cli.md): a pandas or
     polars DataFrame or an Arrow table, according to `kind`. A separate program flies the flights, so a script
@@ -95,17 +97,24 @@ def sweep(
             "--seeds",
             _seeds(seeds),
         ]
-        arguments += ["--sensors", name_or_path("sensors", sensors)]
-        arguments += ["--vehicle", name_or_path("vehicle", vehicle)]
-        for law in _laws(laws):
-            arguments += ["--law", law_reference(law)]
+        conditions = _Conditions(
+            name_or_path("vehicle", vehicle),
+            name_or_path("sensors", sensors),
+            [law_reference(law) for law in _laws(laws)],
+            setting_arguments(settings),
+            _varied(vary),
+        )
+        arguments += ["--sensors", conditions.sensors, "--vehicle", conditions.vehicle]
+        for option, values in (
+            ("--law", conditions.laws),
+            ("--vary", conditions.varied),
+            ("--set", conditions.settings),
+        ):
+            for value in values:
+                arguments += [option, value]
         arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
-        for varied in _varied(vary):
-            arguments += ["--vary", varied]
         if sample is not None:
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
-        for setting in setting_arguments(settings):
-            arguments += ["--set", setting]
         if timeout_s is not None:
             arguments += ["--timeout", repr(positive("timeout_s", timeout_s))]
         if jobs is not None:
@@ -116,6 +125,8 @@ def sweep(
             arguments += ["--fresh"]
         check_kind(kind)
         with errors_for_python():
+            if quiet:  # else `gcs sweep` says so
+                _warn_of_unused(conditions, sample is not None)
             _run([*arguments, "--out", str(folder)], quiet)
 
         from pyarrow import parquet
@@ -123,6 +134,32 @@ def sweep(
         from gcs.formats.arrow import path_for_arrow
 
         return as_frame(parquet.read_table(path_for_arrow(folder / "flights.parquet")), kind)
+
+
+class _Conditions(NamedTuple):
+    """What flights have in common, as the command line writes it."""
+
+    vehicle: str
+    sensors: str
+    laws: Sequence[str]
+    settings: Sequence[str]
+    varied: Sequence[str]
+
+
+def _warn_of_unused(conditions: _Conditions, sampled: bool) -> None:
+    """Warn, at the line that called `sweep`, of each parameter that has no effect in any flight. What is
+    wrong with vehicle or sensors is left to the sweep."""
+    from gcs.sweep.plan_values import parse_varied, varied_values
+    from gcs.workflows.flight_options import parse_setting
+    from gcs.workflows.unused_settings import unused_settings
+
+    settings = list(map(parse_setting, conditions.settings))
+    varied = varied_values([parse_varied(text, sampled) for text in conditions.varied])
+    with suppress(FileError):
+        lines = unused_settings(conditions.vehicle, conditions.sensors, conditions.laws, [*settings, *varied])
+        for name, line in lines.items():
+            option = "settings" if name in dict(settings) else "vary"
+            warnings.warn(f"{option}: {line}", stacklevel=4)
 
 
 def _varied(vary: Any) -> list[str]:

@@ -19,10 +19,13 @@ def check_options(options: FlightOptions) -> list[str]:
     if _only_shipped_inputs(options):
         return []
     from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings, vehicle_warnings
+    from gcs.workflows.unused_settings import unused_settings
 
     settings = list(map(parse_setting, options.settings))
     check_flight_inputs(options.vehicle, options.sensors, settings, options.own, options.ignored)
     warnings = [f"--set {line}" for line in setting_warnings(options.vehicle, settings)]
+    unused = unused_settings(options.vehicle, options.sensors, (options.law,), settings)
+    warnings += [f"--set {line}" for line in unused.values()]
     warnings += vehicle_warnings(options.vehicle)
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings

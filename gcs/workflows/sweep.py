@@ -35,6 +35,7 @@ from gcs.sweep.store import TABLE_FILE, Store
 from gcs.workflows.before_flight import mission_warnings
 from gcs.workflows.flight_inputs import setting_warnings, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
+from gcs.workflows.unused_settings import unused_settings
 from gcs.workflows.warmup import warm_up
 
 _CONTINUED = "completed flights are stored, run the same command again to continue"
@@ -181,13 +182,14 @@ def _print_warnings(plan: SweepPlan) -> None:
     others = [*mission_warnings(plan.planner, load(plan.mission)), *vehicle_warnings(plan.vehicle)]
     for line in dict.fromkeys([*own, *others]):
         notify(line)
-    for option, values in (
-        ("--set", list(plan.settings)),
-        ("--vary", varied_values(plan.varied)),
-    ):
+    settings, varied = list(plan.settings), varied_values(plan.varied)
+    unused = unused_settings(plan.vehicle, plan.sensors, plan.laws, [*settings, *varied])
+    for option, values in (("--set", settings), ("--vary", varied)):
         lines = setting_warnings(plan.vehicle, values)
         for line in {line.split(maxsplit=1)[0]: line for line in reversed(lines)}.values():
             notify(f"{option} {line}")
+        for name in dict.fromkeys(name for name, _ in values if name in unused):
+            notify(f"{option} {unused[name]}")
 
 
 def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quiet: bool) -> None:
