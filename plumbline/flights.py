@@ -133,12 +133,11 @@ def _warn(line: str) -> None:
 class Flight:
     """A finished flight: flown by `fly`, or read by `load`.
 
-    `mission` is the mission that was flown, or None for a flight that was read; `tlog` is the telemetry as
-    the bytes of a `.tlog`, the same as those of `gcs fly`.
+    `tlog` is the telemetry as the bytes of a `.tlog`, the same as those of `gcs fly`.
     """
 
     def __init__(self, tlog: bytes, meta: FlightMeta, mission: model.Mission | None = None) -> None:
-        self.mission = mission
+        self._given_mission = mission
         self.tlog = tlog
         self._meta = meta
 
@@ -155,6 +154,15 @@ class Flight:
         with errors_for_python():
             log = find_log(file_path("path", path))
             return cls(log.read_bytes(), meta_beside(log))
+
+    @cached_property
+    def mission(self) -> model.Mission | None:
+        """The mission that was flown. That of a flight that was read is the shipped one, or that of its file
+        if this is unchanged; otherwise it is made of the uploaded items, whose places are rounded to a
+        centimetre, and None if these are not in the telemetry."""
+        from gcs.workflows.recorded_mission import recorded_mission
+
+        return self._given_mission or recorded_mission(self._tracks, self._meta)
 
     @property
     def settings(self) -> dict[str, float | str]:
@@ -247,7 +255,7 @@ class Flight:
     def __repr__(self) -> str:
         error_m = self.summary["load_error_max_m"]
         error = "" if error_m is None else f", load error at most {1e3 * error_m:.1f} mm"
-        name = self._meta.mission if self.mission is None else self.mission.name
+        name = self._meta.mission if self._given_mission is None else self._given_mission.name
         return f"<Flight {name or 'of an unknown mission'}: {self.outcome}{error}>"
 
     def _repr_png_(self) -> bytes:

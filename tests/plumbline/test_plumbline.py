@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import subprocess
 import sys
@@ -80,7 +81,7 @@ def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
 def test_a_recorded_flight_is_read(flight: plumbline.Flight, tmp_path: Path) -> None:
     flight.report(tmp_path)
     found = plumbline.Flight.load(tmp_path)
-    assert (found.tlog, found.outcome, found.reason, found.mission) == (flight.tlog, "completed", "", None)
+    assert (found.tlog, found.outcome, found.reason) == (flight.tlog, "completed", "")
     # files keep nine digits of the wall time, from which the factor is computed
     factor = pytest.approx(flight.summary["real_time_factor"], rel=1e-8)
     assert found.summary == {**flight.summary, "real_time_factor": factor}
@@ -91,6 +92,41 @@ def test_a_recorded_flight_is_read(flight: plumbline.Flight, tmp_path: Path) -> 
     assert found.report(tmp_path / "again").read_bytes() == (tmp_path / "report.html").read_bytes()
 
 
+def test_the_mission_of_a_recorded_flight_is_that_which_was_flown(
+    flight: plumbline.Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    flight.report("made")
+    found = plumbline.Flight.load("made").mission
+    assert found is not None and (found.name, found.title) == (SHORT.name, SHORT.title)
+    assert [type(step) for step in found.steps] == [type(step) for step in SHORT.steps]
+    for step, flown in zip(found.steps, SHORT.steps, strict=True):
+        known, expected = vars_of(step), vars_of(flown)
+        assert known == pytest.approx(expected, abs=0.01)  # 1e-7 degrees
+    assert plumbline.fly(found, sensors="ideal", seed=2).outcome == "completed"
+
+    mine = plumbline.Mission.of(SHORT)
+    mine.save("short.toml")
+    flown_file = plumbline.fly("short.toml", sensors="ideal", seed=2)
+    flown_file.report("file")
+    assert plumbline.Flight.load("file").mission == flown_file.mission
+    mine.replace(steps=STEPS[::2]).save("short.toml")  # changed since
+    again = plumbline.Flight.load("file").mission
+    assert again is not None and again.steps == found.steps
+
+
+def vars_of(step: object) -> dict[str, float]:
+    """The numbers of a step."""
+    values = dataclasses.asdict(step)  # type: ignore[call-overload]
+    return {name: value for name, value in values.items() if isinstance(value, float | int)}
+
+
+def test_a_shipped_mission_of_a_recorded_flight_is_the_shipped_one(tmp_path: Path) -> None:
+    flown = plumbline.fly("case-a", sensors="ideal")
+    flown.report(tmp_path)
+    assert plumbline.Flight.load(tmp_path).mission == flown.mission
+
+
 def test_a_log_with_nothing_beside_it_is_read(flight: plumbline.Flight, tmp_path: Path) -> None:
     log = tmp_path / "captured.tlog"
     log.write_bytes(flight.tlog)
@@ -98,6 +134,7 @@ def test_a_log_with_nothing_beside_it_is_read(flight: plumbline.Flight, tmp_path
     assert (found.outcome, found.reason, found.summary["mission"]) == ("completed", "", None)
     assert found.settings == {}
     assert repr(found).startswith("<Flight of an unknown mission: completed, load error at most ")
+    assert found.mission is not None and len(found.mission.steps) == len(SHORT.steps)
 
 
 def test_what_holds_no_flight_is_told(tmp_path: Path) -> None:

@@ -1,0 +1,54 @@
+"""The mission of a recorded flight, from the items in its log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from autopilot.wire.items import MissionItemError, WireItem, located_steps
+from gcs.analysis.record import FlightMeta
+from gcs.analysis.tracks import Telemetry
+from gcs.errors import GcsError
+from gcs.mission_files import load
+from gcs.mission_items import flown_steps, items_of
+from missions.model import Mission
+
+_UNNAMED = "recorded"
+
+
+def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
+    """The mission that was flown; None if its items are not in the log, or are not all items that can be
+    flown.
+
+    A shipped mission, and that of a file that still has these items, is as it is there. Another one is made
+    of the items, which state places to 1e-7 degrees, a centimetre, and single precision.
+    """
+    if not telemetry.mission:
+        return None
+    if meta.mission:
+        try:
+            known = load(meta.mission)
+            if _same(items_of(known, telemetry.home), telemetry.mission):
+                return known
+        except GcsError:
+            pass
+    try:
+        steps = flown_steps(located_steps(telemetry.mission, telemetry.home))
+    except MissionItemError:
+        return None
+    name = Path(meta.mission or _UNNAMED).stem
+    return Mission(name, meta.title or name, "", (), tuple(one.step for one in steps))
+
+
+def _same(items: Sequence[WireItem], recorded: Sequence[WireItem]) -> bool:
+    """Whether items are those of a log, in which fractions have single precision."""
+    if len(items) != len(recorded):
+        return False
+    for field in WireItem._fields:
+        kind = np.int64 if field in ("x", "y") else np.float32
+        own, logged = (np.array([getattr(item, field) for item in each], kind) for each in (items, recorded))
+        if not np.array_equal(own, logged, equal_nan=True):
+            return False
+    return True
