@@ -33,9 +33,9 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """Peak speed of the load on the transfers that follow."""
+    """Peak speed of the load on the transfers that follow; None: that for which the vehicle is configured."""
 
-    speed_m_s: float
+    speed_m_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

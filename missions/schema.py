@@ -56,8 +56,11 @@ class WaypointItem(Item):
 
 
 class SpeedItem(Item):
-    speed_m_s: float = Field(
-        ge=limits.SLOWEST_M_S, le=limits.FASTEST_M_S, description="peak speed on the transfers that follow"
+    speed_m_s: float | None = Field(
+        None,
+        ge=limits.SLOWEST_M_S,
+        le=limits.FASTEST_M_S,
+        description="peak speed on the transfers that follow",
     )
 
     def step(self) -> model.Step:

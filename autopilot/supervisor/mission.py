@@ -80,11 +80,17 @@ def step_event(flight: Flight) -> Event:
     return Event.LAND_STEP if isinstance(step, Land) else Event.STEP
 
 
+def with_speed(flight: Flight, step: Speed, settings: Settings) -> Flight:
+    """The flight with the speed of transfers that the step sets."""
+    speed_m_s = settings.motion.speed_m_s if step.speed_m_s is None else step.speed_m_s
+    return replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
+
+
 def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> Flight:
     """The flight on its present mission step, which the event begins or resumes."""
     step = flight.mission.plan.steps[flight.mission.step]
     if isinstance(step, Speed):
-        flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
+        flight = with_speed(flight, step, settings)
     if isinstance(step, Land):
         return transition(flight, event, view, settings)
     if isinstance(step, Winch) and flight.cable.reel_target_m is None:

@@ -402,7 +402,10 @@ def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
 
 
 def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
-    start = MissionState(cable_m=limits.vehicle.cable_length_m, speed_m_s=limits.speed_m_s)
+    usual_m_s = limits.speed_m_s
+    start = MissionState(
+        cable_m=limits.vehicle.cable_length_m, speed_m_s=usual_m_s, usual_speed_m_s=usual_m_s
+    )
     gravity_m_s2 = limits.vehicle.gravity_m_s2
     return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2, gravity_m_s2=gravity_m_s2)
 

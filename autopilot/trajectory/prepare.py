@@ -154,7 +154,8 @@ def _entries(
     def walk(part: Sequence[Step], state: MissionState) -> tuple[TimelineEntry, ...]:
         return tuple(timeline(part, state, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
 
-    at_home = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
+    usual_m_s = limits.speed_m_s
+    at_home = MissionState(cable_m=limits.body.cable_length, speed_m_s=usual_m_s, usual_speed_m_s=usual_m_s)
     return walk(steps[: begin.step], at_home) + walk(steps[begin.step :], begin.state or at_home)
 
 

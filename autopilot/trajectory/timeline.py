@@ -95,6 +95,7 @@ class MissionState:
     cable_m: float | None = None  # None: not given
     released: bool = False
     speed_m_s: float = SPEED_M_S  # peak speed of transfers
+    usual_speed_m_s: float = SPEED_M_S  # the same where the mission sets none
 
     @property
     def position(self) -> Vec3 | None:
@@ -171,7 +172,7 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
                 return before
             return replace(before, expected=(here[0], here[1], 0.0), unknown_after=unknown_after)
         case Speed(speed_m_s=speed):
-            return replace(before, speed_m_s=speed)
+            return replace(before, speed_m_s=before.usual_speed_m_s if speed is None else speed)
         case Winch(length_m=length_change):
             lowered = None if here is None else (here[0], here[1], here[2] - length_change)
             cable = None if before.cable_m is None else before.cable_m + length_change
@@ -252,6 +253,6 @@ def expected_duration_s(
     vertical: VerticalSpeeds = USUAL_SPEEDS,
 ) -> float:
     """Expected seconds from arming to the end of the mission: the sum over its steps."""
-    start = MissionState(speed_m_s=speed, cable_m=cable_m)
+    start = MissionState(speed_m_s=speed, usual_speed_m_s=speed, cable_m=cable_m)
     entries = timeline(mission.steps, start, accel_m_s2=accel, vertical=vertical)
     return sum(entry.duration_s for entry in entries)

@@ -18,6 +18,7 @@ from missions.model import Delay, Land, Release, ReturnHome, Speed, Step, Takeof
 SLACK_FRACTION = 0.6  # of the cable's length: height of the vehicle above the load that lies on the ground
 SETTLE_S = 2.0  # hold time above the load on the ground, and again once it hangs
 _GROUND_SPEED = 1.0  # speed type of DO_CHANGE_SPEED
+_USUAL_SPEED = -2.0  # of DO_CHANGE_SPEED: the one for which the autopilot is configured
 _UNCHANGED = -1.0  # throttle
 _NAMES = {
     "Winch": "the winch",
@@ -77,9 +78,8 @@ def firmware_items(
                 east, north = 0.0, 0.0
                 items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=vehicle_position(), home=home))
             case Speed():
-                items.append(
-                    _item(mavlink.MAV_CMD_DO_CHANGE_SPEED, _GROUND_SPEED, step.speed_m_s, _UNCHANGED)
-                )
+                speed = _USUAL_SPEED if step.speed_m_s is None else step.speed_m_s
+                items.append(_item(mavlink.MAV_CMD_DO_CHANGE_SPEED, _GROUND_SPEED, speed, _UNCHANGED))
             case Delay():
                 items.append(
                     _item(

@@ -63,7 +63,8 @@ def describe(step: Step, released: bool) -> str:
             held = f", hold for {step.hold_s:g} s" if step.hold_s > 0.0 else ""
             return f"{'Fly' if released else 'Carry the load'} to {place}{held}"
         case Speed():
-            return f"From here on at most {step.speed_m_s:g} m/s"
+            limit = "the usual speed" if step.speed_m_s is None else f"{step.speed_m_s:g} m/s"
+            return f"From here on at most {limit}"
         case Delay():
             return f"Hold for {step.duration_s:g} s"
         case ReturnHome():

@@ -141,7 +141,8 @@ def _move_s(entry: TimelineEntry) -> float:
 
 
 def _start(table: AutopilotParameters) -> MissionState:
-    return MissionState(cable_m=table["VEH_CABLE_LEN"], speed_m_s=table["MIS_SPEED"])
+    usual_m_s = table["MIS_SPEED"]
+    return MissionState(cable_m=table["VEH_CABLE_LEN"], speed_m_s=usual_m_s, usual_speed_m_s=usual_m_s)
 
 
 def parameter_notes(belief: Vehicle, known: Collection[str]) -> Iterator[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.jet_table import COLUMNS, jets
 from autopilot.guidance.legs import LOAD_POSITION
-from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.mission import with_plan, with_speed
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, MissionPlan
 from autopilot.supervisor.step_legs import destination, step_legs
@@ -33,7 +33,7 @@ def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: flo
         if isinstance(step, Takeoff):
             position = destination(step, position, flight)
         elif isinstance(step, Speed):
-            flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
+            flight = with_speed(flight, step, settings)
         elif isinstance(step, _ENDING_STEPS):
             end = f"; items[{number}] ({KINDS[type(step)]}) ends it"
             break

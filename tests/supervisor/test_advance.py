@@ -364,6 +364,16 @@ def test_setting_the_current_item_in_flight_goes_there_at_once() -> None:
     assert sky.reached[-1] == land_item
 
 
+def test_a_speed_that_is_left_open_is_the_usual_one() -> None:
+    sky = start(
+        Takeoff(2.0), Speed(0.5), Waypoint(1.0, 0.0, 2.0), Speed(), Waypoint(0.0, 1.0, 2.0), model.Land()
+    )
+    sky.run(lambda s: s.flight.mission.step == 2)
+    assert sky.flight.mission.speed_m_s == 0.5
+    sky.run(lambda s: s.flight.mission.step == 4)
+    assert sky.flight.mission.speed_m_s == SETTINGS.motion.speed_m_s != 0.5
+
+
 def test_a_landing_that_is_called_off_by_another_item_is_called_off() -> None:
     sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.Land())
     sky.run(lambda s: s.flight.phase == Phase.LOWER)

@@ -231,3 +231,9 @@ def test_a_place_is_left_from_where_the_load_is():
     out_and_back = seconds(Waypoint(50.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0))
     out_and_stay = seconds(Waypoint(50.0, 0.0, 2.0), Waypoint(50.0, 0.0, 2.0))
     assert out_and_back > out_and_stay
+
+
+def test_a_speed_that_is_left_open_is_that_of_the_vehicle() -> None:
+    start = MissionState(speed_m_s=2.0, usual_speed_m_s=3.0)
+    slow = state_after(Speed(0.5), start)
+    assert (slow.speed_m_s, state_after(Speed(), slow).speed_m_s) == (0.5, 3.0)

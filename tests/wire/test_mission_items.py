@@ -554,6 +554,13 @@ def test_each_visit_to_an_item_states_what_is_flown_then() -> None:
     assert read_items([TERM, RUN], HOME)[1] == ((0, 0, 0), (1, 0, 0))
 
 
+def test_a_speed_of_minus_two_is_the_usual_one_and_written_as_it_was_read() -> None:
+    items = [item(178, 1.0, 2.0, -1.0), item(178, 1.0, -2.0, -1.0)]
+    steps = decode_items(items, HOME)
+    assert steps == (Speed(2.0), Speed(None))
+    assert [one.param2 for one in encode_steps(steps, HOME)] == [2.0, -2.0]
+
+
 def test_a_mission_of_jumps_in_jumps_is_refused_before_it_is_long() -> None:
     items = [item(93, 1.0), *(item(177, 0.0, 1000.0) for _ in range(50))]
     with pytest.raises(MissionItemError, match="more than 4000 items"):

@@ -137,7 +137,9 @@ COMMANDS: tuple[Command, ...] = (
         "peak speed of the transfers that follow; climb, descent and a speed of -1 change nothing",
         (
             Choice(1, "kind", "speed type", _SPEED_TYPE),
-            Number(2, "speed_m_s", "speed", "m/s", SLOWEST_M_S, FASTEST_M_S),
+            Number(
+                2, "speed_m_s", "speed", "m/s", SLOWEST_M_S, FASTEST_M_S, none=-2.0, none_means="`MIS_SPEED`"
+            ),
         ),
         Speed,
         is_default=True,
@@ -180,7 +182,8 @@ COMMANDS: tuple[Command, ...] = (
         m.MAV_CMD_DO_JUMP,
         f"the items from item p1 on again, p2 times (0 ... {MAX_JUMPS}) or without end (-1): then those "
         "behind it are never flown, and the repeated ones must take at least 0.5 s. A mission that comes to "
-        f"more than {MAX_FLOWN_ITEMS} items with all repetitions is refused",
+        f"more than {MAX_FLOWN_ITEMS} items with all repetitions is refused. If a jump becomes the present "
+        "item (MISSION_SET_CURRENT), it is taken",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
