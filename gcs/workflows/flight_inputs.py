@@ -1,7 +1,7 @@
 """Checks vehicle, sensors and settings of a flight before its programs are started.
 
-The programs would refuse the same errors, each in its own log; here they are reported immediately. No other
-module of the ground station knows both tables of parameters.
+The programs would refuse the same errors, each in its own log; here they are reported immediately. Only this
+module and `unused_settings` know both tables of parameters.
 """
 
 from __future__ import annotations

@@ -141,6 +141,13 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.settings",
         "sitl.vehicles",
     ),
+    "gcs.workflows.unused_settings": (
+        *GCS,
+        "gcs",
+        "sitl.sensors.files",
+        "sitl.sensors.overrides",
+        "sitl.vehicles",
+    ),
     "gcs.workflows.own_planner": (*GCS, "gcs", "autopilot.own", "autopilot.shell.watched_calls"),
     "gcs.workflows.refusals": (*GCS, "gcs", "autopilot.services.requests", "autopilot.supervisor"),
     "gcs.workflows.in_process_flight": (*GCS, "gcs", "autopilot.shell.watched_calls"),
