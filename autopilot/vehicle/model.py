@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import hypot, inf, isfinite
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, MAX_ROTORS, MIN_ROTORS, Layout, Rotor, regular_layout
@@ -49,6 +50,22 @@ def _force(unlimited: float, low: float, high: float) -> Any:
 
 
 Moment = Annotated[float, Field(ge=1e-6, le=100.0)]
+
+
+def _no_matrix(moments: Any) -> Any:
+    """The moments of inertia, unless they are the rows of a matrix."""
+    try:
+        is_matrix = np.ndim(moments) > 1
+    except ValueError:  # rows of different lengths
+        is_matrix = False
+    if is_matrix:
+        raise PydanticCustomError(
+            "moments", "must be three numbers; of a matrix give the diagonal, in axes in which the rest is 0"
+        )
+    return moments
+
+
+Moments = Annotated[tuple[Moment, Moment, Moment], BeforeValidator(_no_matrix)]
 Offset = Annotated[float, Field(ge=-1.0, le=1.0)]
 RotorMin = Annotated[float, _force(-inf, -MAX_ROTOR_FORCE_N, MAX_ROTOR_FORCE_N)]
 RotorMax = Annotated[float, _force(inf, MIN_ROTOR_MAX_N, MAX_ROTOR_FORCE_N)]
@@ -119,7 +136,7 @@ class Vehicle(BaseModel):
         description="where the cable is attached: forward, left and upward of the centre of mass",
         json_schema_extra={"unit": "m"},
     )
-    inertia_kg_m2: tuple[Moment, Moment, Moment] = Field(
+    inertia_kg_m2: Moments = Field(
         strict=False,  # TOML has lists, not tuples
         description="moments of inertia about the forward, left and upward axis",
         json_schema_extra={"unit": "kg m^2"},
@@ -301,7 +318,8 @@ class Vehicle(BaseModel):
         x, y, z = self.inertia_kg_m2
         if not (x <= y + z and y <= x + z and z <= x + y):
             raise ValueError(
-                f"inertia_kg_m2 = {[x, y, z]}; each must be <= the sum of the other two, or no body has it"
+                f"inertia_kg_m2 = {[x, y, z]}; each must be <= the sum of the other two, or no body has it; "
+                "check their order, about the forward, left and upward axis, and that all are in kg m^2"
             )
         curved = self.thrust_curve != self.thrust_curve_known
         if not self.limited and (self.battery or self.esc_steps or curved):

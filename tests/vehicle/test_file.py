@@ -195,7 +195,14 @@ BROKEN = [
     (
         "4.8e-3]",
         "4.8e-2]",
-        "inertia_kg_m2 = [0.00223, 0.00299, 0.048]; each must be <= the sum of the other two",
+        "inertia_kg_m2 = [0.00223, 0.00299, 0.048]; each must be <= the sum of the other two, or no body has "
+        "it; check their order, about the forward, left and upward axis, and that all are in kg m^2",
+    ),
+    (
+        "[2.23e-3, 2.99e-3, 4.8e-3]",
+        "[[2.23e-3, 0.0, 0.0], [0.0, 2.99e-3, 0.0], [0.0, 0.0, 4.8e-3]]",
+        "inertia_kg_m2 = [[0.00223, 0.0, 0.0], [0.0, 0.00299, ...; must be three numbers; of a matrix give "
+        "the diagonal, in axes in which the rest is 0 (moments of",
     ),
     ("friction = 0.6", "battery = 1", "battery = 1; must be true or false"),
     ("friction = 0.6", "friction = 9.0", "friction = 9.0; must be >= 0 and <= 5"),
