@@ -247,12 +247,18 @@ def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning:
 
 
 # what is wrong with an estimate
-VALID, NOT_A_NUMBER, NOT_A_ROTATION, NOT_A_UNIT_VECTOR, LOST = range(5)
+VALID, NOT_A_NUMBER, NOT_A_ROTATION, NOT_A_UNIT_VECTOR, NOT_A_DEVIATION, LOST = range(6)
 
 
 @kernel
 def _is_number(v: Vec3) -> bool:
     return isfinite(v[0] + v[1] + v[2])
+
+
+@kernel
+def _is_deviation(std: float) -> bool:
+    """Whether this is a standard deviation, or not given."""
+    return isnan(std) or (std >= 0.0 and isfinite(std))
 
 
 @kernel
@@ -266,6 +272,8 @@ def estimate_fault(estimate: Estimate) -> int:
         return NOT_A_NUMBER
     if not abs(dot(s.q_cable, s.q_cable) - 1.0) < UNIT_TOLERANCE:
         return NOT_A_UNIT_VECTOR
+    if not (_is_deviation(estimate.horizontal_std) and _is_deviation(estimate.vertical_std)):
+        return NOT_A_DEVIATION
     return VALID if is_rotation(s.R) else NOT_A_ROTATION
 
 
@@ -278,6 +286,9 @@ def fault_text(estimate: Estimate, fault: int) -> str:
         return f"gives q_cable = {_formatted(state.q_cable)}, which is no unit vector"
     if fault == NOT_A_ROTATION:
         return f"gives R = {_formatted(state.R)}, which is no rotation"
+    if fault == NOT_A_DEVIATION:
+        wrong = "vertical_std" if _is_deviation(estimate.horizontal_std) else "horizontal_std"
+        return f"gives {wrong} = {getattr(estimate, wrong):.4g}; must be 0 or more, and left out if not known"
     for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "a_quad"):
         vector = getattr(state, name)
         if not _is_number(vector):

@@ -35,7 +35,8 @@ def estimated(
     """An estimate: what laws are given as `now.state`, in its order, units and frames.
 
     Optional are `a_quad` (m/s^2; without it the built-in filter's is used), `tension` of the cable (N) and
-    the standard deviations of the vehicle's position (m, each axis), which are reported to ground stations.
+    the standard deviations of the vehicle's position (m, each axis, 0 or more), which are reported to ground
+    stations.
     """
     state = State(
         three_numbers(x_load, "x_load"),

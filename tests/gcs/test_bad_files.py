@@ -132,6 +132,21 @@ BAD = {
             "gives R = ((1, 0, 0), (0, 2, 0), (0, 0, 1)), which is no rotation (mine.py:8)",
         ),
         (
+            estimator("return memory, estimated(*s, horizontal_std=-1)"),
+            "gives horizontal_std = -1; must be 0 or more, and left out if not known (mine.py:8)",
+        ),
+        (
+            COMPILED.format(
+                body="s = now.built_in; return memory, estimated(s.x_load, s.v_load, s.q_cable, "
+                "s.q_cable_dot, s.x_quad, s.v_quad, s.R, s.omega_body, s.a_quad, vertical_std=-0.2)"
+            ),
+            "gives vertical_std = -0.2; must be 0 or more, and left out if not known (mine.py:",
+        ),
+        (
+            estimator("return memory, estimated(*s, vertical_std=float('inf'))"),
+            "gives vertical_std = inf; must be 0 or more, and left out if not known (mine.py:8)",
+        ),
+        (
             estimator("return memory, estimated(*s._replace(x_quad=(0, 0)))"),
             "x_quad has 2 numbers; must be 3 (mine.py:10)",
         ),
