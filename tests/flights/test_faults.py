@@ -223,6 +223,20 @@ def test_in_real_time_the_rotors_have_stopped_before_it_is_back_and_it_says_so()
     assert "".join(craft.texts) == "Restarted in flight after the rotors had stopped: disarmed"
 
 
+def test_one_that_is_back_while_the_vehicle_falls_says_that_it_is_in_the_air_until_it_rests() -> None:
+    craft = under_way(lockstep=False)
+    lose_ticks(craft, 0.7)
+    restart(craft)
+    states = []
+    while (state := craft.onboard.log_sample().snapshot.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND:
+        states.append(state)
+        craft.tick()
+        assert len(states) < 2000
+    assert set(states) == {mavlink.MAV_LANDED_STATE_IN_AIR}
+    assert craft.truth.vehicle_on_ground
+    assert norm(craft.truth.v_quad) < 0.02
+
+
 # ---- the simulator, restarted; lost ticks
 
 
