@@ -13,9 +13,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from missions.model import Mission
+from missions.model import TOLERANCE_M, Mission
 from missions.nearest import nearest
-from missions.schema import ITEMS, FileSpec, Item
+from missions.schema import ITEMS, FileSpec, Item, TrajectoryItem
 from missions.text_files import TextFileError, text_of
 from missions.toml_files import FileError, TomlFiles, format_value, problems
 
@@ -80,13 +80,13 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
         if not isinstance(kind, str) or kind not in ITEMS:
             errors.append(f"{locations[index]}: {at}.type {_kind_problem(item)}")
             continue
-        keys = {key: value for key, value in item.items() if key != "type"}
         try:
-            if kind == "trajectory":
-                keys = _with_rows(keys, Path(where).parent)
-            items.append(ITEMS[kind].model_validate(keys))
+            spec = ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"})
+            if isinstance(spec, TrajectoryItem) and spec.file is not None:
+                spec = _with_rows(spec, Path(where).parent / spec.file)
+            items.append(spec)
         except TextFileError as error:
-            errors.append(f"{locations[index]}: {at}.file = {format_value(keys['file'])}: {error}")
+            errors.append(f"{locations[index]}: {at}.file = {format_value(item['file'])}: {error}")
         except ValidationError as error:
             errors += problems(error, ITEMS[kind], locations[index], at, item)
     errors = errors or _order_problems([item["type"] for item in head.items], locations)
@@ -96,21 +96,20 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
     return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
 
 
-def _with_rows(keys: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The keys of a trajectory with the points of its file, which is found from `folder`; TextFileError
-    with the reason if there are none."""
-    file = keys.get("file")
-    if not isinstance(file, str) or "points" in keys:
-        return dict(keys)
-    from missions.trajectory import rows_of, through_rows  # loads much
+def _with_rows(item: TrajectoryItem, file: Path) -> TrajectoryItem:
+    """A trajectory through the rows of its file; TextFileError with the reason if there is none."""
+    from missions.trajectory import PathError, read_rows, through_rows  # loads much
 
+    text = text_of(file)
     try:
-        points = through_rows(rows_of(text_of(folder / file))).points
-        return {"points": [list(point) for point in points]}
-    except TextFileError:
-        raise
+        found = read_rows(text)
+        trajectory = through_rows(found.rows, TOLERANCE_M if item.tolerance_m is None else item.tolerance_m)
+    except PathError as error:
+        place = "" if error.index is None else f"line {found.lines[error.index]} "
+        raise TextFileError(f"{place}{error.text}") from None
     except ValueError as error:
-        raise TextFileError(f"row{error}" if str(error).startswith("[") else str(error).lstrip()) from None
+        raise TextFileError(str(error)) from None
+    return item.along(trajectory)
 
 
 def _is_misnamed_item(key: str, value: Any) -> bool:

@@ -125,33 +125,42 @@ class TrajectoryPoint(NamedTuple):
 
 
 ORIGIN = TrajectoryPoint(0.0, 0.0, 0.0, 0.0)
+TOLERANCE_M = 1e-3  # within which a trajectory passes rows
+# Derivatives of a trajectory that are zero at both ends: the load rests there, and of all such paths through
+# the points it has the smallest integral of the squared fifth derivative.
+ZERO_AT_ENDS = (1, 5, 6, 7)
 
 
 @dataclass(frozen=True, slots=True, init=False)
 class Trajectory:
     """Fly the load through timed points, from where the load's setpoint is when the step begins.
 
-    `points`: rows of t (s), east, north and up (m), as a list or an array (n, 4), 0.1 s apart or more. Their
-    times and places count from the first. The path is the spline of degree 9 that passes each point at its
-    time and is at rest at both ends. TypeError if a row has not four values.
+    `points`: rows of t (s), east, north and up (m), as a list, an array (n, 4) or a data frame, 0.1 s apart
+    or more. Their times and places count from the first. The path is the spline of degree 9 that passes each
+    point at its time, and whose speed is zero at both ends. TypeError if a row has not four values.
     """
 
     points: tuple[TrajectoryPoint, ...]
+    # east, north and altitude of the first row of the source, for a note if the load hangs elsewhere
+    first_m: tuple[float, float, float] | None = field(default=None, compare=False, repr=False)
 
-    def __init__(self, points: Iterable[Sequence[float]]) -> None:
-        rows = [tuple(row) for row in points]
+    def __init__(
+        self, points: Iterable[Sequence[float]], first_m: tuple[float, float, float] | None = None
+    ) -> None:
+        rows = [tuple(row) for row in (points.to_numpy() if hasattr(points, "to_numpy") else points)]
         for index, row in enumerate(rows):
             if len(row) != len(TrajectoryPoint._fields):
                 raise TypeError(f"points[{index}] has {len(row)} values; must be t_s, east_m, north_m, up_m")
         object.__setattr__(self, "points", tuple(TrajectoryPoint(*row) for row in rows))
+        object.__setattr__(self, "first_m", first_m)
 
     @classmethod
-    def through(cls, rows: Iterable[Sequence[float]]) -> Trajectory:
-        """The trajectory that passes rows (t, east, north, up) within a millimetre, however close they are:
-        those of a computed or recorded path. ValueError if no smooth path from rest to rest does."""
+    def through(cls, rows: Iterable[Sequence[float]], tolerance_m: float = TOLERANCE_M) -> Trajectory:
+        """The smoothest trajectory that passes rows (t, east, north, up) within `tolerance_m`, however close
+        they are: those of a computed or recorded path. ValueError if there is none from rest to rest."""
         from missions.trajectory import through_rows  # loads much
 
-        return through_rows(rows)
+        return through_rows(rows, tolerance_m)
 
     @property
     def duration_s(self) -> float:

@@ -165,6 +165,9 @@ class SignalsItem(Item):
 
 class TrajectoryItem(Item):
     file: str | None = Field(None, description="CSV file with the columns t_s, east_m, north_m, altitude_m")
+    tolerance_m: float | None = Field(
+        None, ge=1e-4, le=1.0, description="within which the path passes the rows of the file; none: 0.001"
+    )
     points: list[Annotated[list[float], Field(min_length=4, max_length=4)]] | None = Field(
         None, description="[t_s, east_m, north_m, altitude_m] of each, instead of a file"
     )
@@ -172,16 +175,23 @@ class TrajectoryItem(Item):
 
     @model_validator(mode="after")
     def _is_a_path(self) -> TrajectoryItem:
-        from missions.trajectory import through_points  # loads much
+        from missions.trajectory import PathError, through_points  # loads much
 
         if (self.file is None) == (self.points is None):
             found = "no file and no points" if self.points is None else "both a file and points"
             raise ValueError(f"has {found}; must have one of them")
         if self.points is not None:
+            if self.tolerance_m is not None:
+                raise ValueError("has tolerance_m and points, which are passed exactly")
             try:
                 self._trajectory = through_points(self.points)
-            except ValueError as error:
-                raise ValueError(f"points{error}") from None
+            except PathError as error:
+                raise ValueError(str(error).replace("rows", "points", 1)) from None
+        return self
+
+    def along(self, trajectory: model.Trajectory) -> TrajectoryItem:
+        """The item with the trajectory of its file."""
+        self._trajectory = trajectory
         return self
 
     def step(self) -> model.Step:

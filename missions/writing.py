@@ -45,6 +45,8 @@ def _keys(record: Any) -> dict[str, Any]:
     known = isinstance(record, (*KINDS, Term, Sine))
     for field in fields(record) if known else ():
         value = getattr(record, field.name)
+        if not field.compare:
+            continue
         if field.name.endswith("_rad"):
             found = _plain(value)
             key = field.name.removesuffix("_rad") + "_deg"

@@ -564,7 +564,7 @@ def _advice(entry: TimelineEntry, time: float) -> str:
     if isinstance(step, Takeoff | Land):
         return "lower load_mass_kg or raise rotor_max_n, or lower MIS_ACCEL in [parameters] of the vehicle"
     if isinstance(step, Trajectory):
-        return "give its points later times, or let it be flown slower (MIS_INFEASIBLE 1)"
+        return "give its points later times"
     if not isinstance(step, Signals):
         return "lower speed_m_s or the acceleration of transfers"
     accel = evaluate(signal_table(step.terms), time)[2]

@@ -20,7 +20,7 @@ from autopilot.trajectory.splines import (
     find_piece,
     interpolating_spline,
 )
-from missions.model import LoadPath, Signals, Sine, Term, Trajectory, TrajectoryPoint
+from missions.model import ZERO_AT_ENDS, LoadPath, Signals, Sine, Term, Trajectory, TrajectoryPoint
 
 NO_PIECES: PieceTable = np.zeros((0, COLUMNS))
 
@@ -46,7 +46,7 @@ def path_tables(step: LoadPath) -> PathTables:
 def _curve(points: tuple[TrajectoryPoint, ...]) -> PieceTable:
     """The spline through the points. Each start of a mission needs it several times."""
     rows = np.array(points)
-    return interpolating_spline(rows[:, 0], rows[:, 1:])
+    return interpolating_spline(rows[:, 0], rows[:, 1:], ZERO_AT_ENDS)
 
 
 @kernel

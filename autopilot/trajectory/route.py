@@ -79,7 +79,7 @@ def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Pa
         raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
     if not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         raise ValueError("times_s must increase")
-    return Path(interpolating_spline(times, places), _times(passes_s))
+    return Path(interpolating_spline(times, places, (1, 2, 3, 4)), _times(passes_s))
 
 
 def _times(passes_s: ArrayLike) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ For flight a spline is converted to a table: for each interval the coefficients 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import factorial
 
 import numpy as np
@@ -102,10 +103,10 @@ def power_table(breaks: Array, powers: Array) -> PieceTable:
     return table
 
 
-def interpolating_spline(times: Array, places: Array) -> PieceTable:
-    """The spline of degree 9 through places (n, 3) at increasing times (n,), n >= 2, from rest to rest:
-    derivatives 1 ... 4 are zero at both ends."""
-    rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
+def interpolating_spline(times: Array, places: Array, zero_at_ends: Sequence[int]) -> PieceTable:
+    """The spline of degree 9 through places (n, 3) at increasing times (n,), n >= 2, four of whose
+    derivatives are zero at both ends."""
+    rest = [(order, np.zeros(3)) for order in zero_at_ends]
     spline = scipy.interpolate.make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
     breaks = np.unique(spline.t)
     orders = [spline(breaks[:-1], nu=n) / factorial(n) for n in range(DEGREE + 1)]
