@@ -201,7 +201,7 @@ class LoadEstimate(NamedTuple):
     age_s: float
     rejected: float
     source: float  # NO_SENSOR, TRACKER or CAMERA
-    laid_height: float  # m, at which it lay when its cable came taut; NOT_LAID if it was in the air
+    laid_height: float  # m, at which it lay when its cable came taut; NOT_LAID if it is in the air
 
 
 class SensorErrors(NamedTuple):

@@ -67,6 +67,9 @@ PULL_TIME_S = 0.04  # time constant that smooths the measured pull
 # For LIFTING_S after the cable came taut, a load that pulls less than LIFTING_PULL of the pull of a
 # suspended load is assumed to be on the ground: pendulum and length then get little weight.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
+# m above where it lay, at which a tracked load is off the ground. Until then no pull is missing: a long cable
+# counts as taut many seconds before it is.
+LIFTED_HEIGHT = 0.05
 REJECTIONS_UNLOADED = 4.0  # rejected readings in a row that show the same
 # The taut cable of a tracked load does not carry, whatever its length, if its measured pull is less than this
 # share of the pendulum's.
@@ -184,6 +187,8 @@ def averaged_missing_pull(
     if load.source == TRACKER:
         if load.taut == 0.0:
             return 0.0
+        if load.laid_height > NOT_LAID:
+            return before
     elif load.taut == 0.0:
         if _may_pull(load, vehicle, history, tuning):
             # a gust is over: what it made of the pull is not missing when the cable begins to pull
@@ -371,6 +376,8 @@ def detect_tautness(
         load = _with_tautness(
             load, load.taut, load.length, pull, load.pull_duration_s + dt if carries_load else 0.0
         )
+        if load.taut > 0.0 and load.x_load[2] > load.laid_height + LIFTED_HEIGHT:
+            load = with_field(load, "laid_height", NOT_LAID)
         speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
         speed_known = (
             speed_var < KNOWN_SPEED_STD * KNOWN_SPEED_STD or load.tautness_age_s > SPEED_KNOWN_AFTER_S

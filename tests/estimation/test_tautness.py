@@ -26,7 +26,9 @@ from autopilot.estimation.records import (
 )
 from autopilot.estimation.tautness import (
     LIFT_OFF_SPEED_STD,
+    LIFTED_HEIGHT,
     averaged_missing_pull,
+    cable_is_unloaded,
     detect_tautness,
     tauten,
 )
@@ -250,3 +252,14 @@ def test_what_a_gust_adds_to_the_pull_is_missing_only_as_long_as_it_blows() -> N
 def test_the_pull_of_a_load_in_the_air_is_not_learned_as_missing() -> None:
     assert missed(laid(2.0)._replace(pull=WEIGHT), 0.0, 0.5, 8.0) == 0.0
     assert missed(laid()._replace(pull=WEIGHT), 0.0, 0.5, 8.0) < -0.9
+
+
+def test_no_pull_of_a_tracked_load_is_missing_before_it_was_lifted() -> None:
+    """A long cable counts as taut many seconds before it is: 100 m of it 1.5 m before, 10 s at 0.15 m/s."""
+    lies = laid()._replace(source=TRACKER, taut=1.0, tension=WEIGHT, laid_height=TUNING.load_height)
+    assert missed(lies, 0.0, 0.99, 10.0) == 0.0
+    assert cable_is_unloaded(lies._replace(tautness_age_s=10.0), 0.01, 0.0)
+    lifted = lies._replace(x_load=(0.0, 0.0, TUNING.load_height + LIFTED_HEIGHT + 0.01))
+    lifted = after(lifted, 0.3, 0.0, 1.0, DT)
+    assert lifted.laid_height == NOT_LAID
+    assert missed(lifted._replace(pull=0.3 * WEIGHT), 0.0, 1.0, 10.0) == pytest.approx(0.7, abs=0.01)
