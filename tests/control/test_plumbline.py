@@ -1236,6 +1236,19 @@ def test_it_is_selected_by_its_number_and_set_by_its_parameters() -> None:
     assert law_file.LAW.ramp_lag_s(law) == 0.0
 
 
+@pytest.mark.parametrize("cable_m", [0.7, 10.0, 30.0, 100.0])
+def test_a_vehicle_whose_cable_is_slack_holds_its_place_however_long_that_is(cable_m: float) -> None:
+    """The poles of position and attitude along a level axis: the load on 100 m of cable is followed with an
+    attitude loop of 3 rad/s, which a position loop of 2.5 rad/s makes unstable."""
+    law = built(VEH_CABLE_LEN=cable_m)
+    gains, position, vehicle = law.other_modes.gains, law.other_modes.position_gains, law.constants.vehicle
+    k_R, k_Omega = gains.k_R[0] / vehicle.inertia[0], gains.k_Omega[0] / vehicle.inertia[0]
+    k_x, k_v = position.k_x[0] / vehicle.quad_mass, position.k_v[0] / vehicle.quad_mass
+    poles = np.roots([1.0, k_Omega, k_R, k_R * k_v, k_R * k_x])
+    assert (-poles.real / np.abs(poles)).min() > 0.25
+    assert (gains.k_R == law.constants.gains.k_R) == (cable_m < 8.0)
+
+
 def test_load_and_cable_are_followed_more_slowly_while_the_rotors_cannot_give_the_moment(
     model: SimpleNamespace,
 ) -> None:

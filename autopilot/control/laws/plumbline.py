@@ -48,6 +48,9 @@ _MISSING_SHARE = 0.02
 # of omega_R: the greatest natural frequency of the filter that gives the derivatives of R_c in the modes
 # other than load position; a faster one passes noise that the attitude loop cannot follow
 ATTITUDE_FILTER_RATIO = 1.5
+# m, of the longest cable for which the modes without a load turn the vehicle as the load asks for. The load
+# on a longer one asks for less, with which the vehicle would oscillate while its cable is slack.
+MAX_SLACK_CABLE = 8.0
 # rad/s^3: a commanded direction whose acceleration changes faster has jumped, and has no derivative
 MAX_DIRECTION_JERK = 300.0
 
@@ -105,14 +108,19 @@ def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
         (MAX_SWING_RATIO / found.omega_x) ** 2 * swing_stiffness(vehicle) * vehicle.cable_length,
     )
     other_modes = thesis.build(table, vehicle)
+    slack = believed_design(table, with_cable_length(vehicle, min(vehicle.cable_length, MAX_SLACK_CABLE)))
     other_modes = other_modes._replace(
         filters=other_modes.filters._replace(
             attitude=filter_constants(
-                min(table["NGC_WN_R"], ATTITUDE_FILTER_RATIO * found.omega_R), table["NGC_ZETA"], period
+                min(table["NGC_WN_R"], ATTITUDE_FILTER_RATIO * slack.omega_R), table["NGC_ZETA"], period
             )
         ),
         gains=other_modes.gains._replace(
-            k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
+            k_R=slack.gains.k_R,
+            k_Omega=slack.gains.k_Omega,
+            k_q=gains.k_q,
+            k_omega=gains.k_omega,
+            epsilon=1.0,
         ),
     )
     return PlumblineLaw(constants, other_modes, 1e-3 * table["VEH_ACT_DELAY"])
