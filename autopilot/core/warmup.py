@@ -11,19 +11,19 @@ from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.jet_table import jets_ahead
 from autopilot.guidance.legs import (
-    LOAD_POSITION,
     QUAD_POSITION,
     Creep,
     Hold,
     Leg,
     PathStretch,
     SignalRun,
-    transfer_leg,
+    slack_leg,
 )
 from autopilot.guidance.setpoint_follower import start_following
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
+from autopilot.trajectory.slack_cable import LONG_WAY
 from autopilot.trajectory.splines import COLUMNS
 from autopilot.trajectory.timeline import AT_ORIGIN, state_after
 from autopilot.trajectory.waypoint_path import PathSegment
@@ -50,7 +50,8 @@ def warm_up_paths(setup: Setup) -> None:
     )
     legs: tuple[Leg, ...] = (
         Hold(load),
-        transfer_leg(load, above_load, 1.0, 1.0, LOAD_POSITION),
+        slack_leg(load, load),
+        slack_leg(load, (0.0, 0.0, 2.0 * LONG_WAY)),
         Creep(above_load, ZERO, QUAD_POSITION),
         SignalRun(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
         PathStretch(PathSegment(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),

@@ -11,6 +11,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import (
     Creep,
+    Cruise,
     Hold,
     Leg,
     PathStretch,
@@ -20,7 +21,7 @@ from autopilot.guidance.legs import (
     requested_jet,
 )
 from autopilot.trajectory.load_path import PathTables
-from autopilot.trajectory.reeling import reel
+from autopilot.trajectory.reeling import cruise, reel
 from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import PieceTable
@@ -71,6 +72,12 @@ def _reels(times: Floats, begin: Vec3, speed: float, ramp_s: float, cruise_s: fl
 
 
 @kernel
+def _cruises(times: Floats, begin: Vec3, velocity: Vec3, ramp_s: float, cruise_s: float, out: Floats) -> None:
+    for k in range(times.shape[0]):
+        _put(out[k], cruise(begin, velocity, ramp_s, cruise_s, times[k]))
+
+
+@kernel
 def _passes(
     times: Floats, table: PieceTable, begin_s: float, offset: Vec3, fade_s: float, out: Floats
 ) -> None:
@@ -96,6 +103,8 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
         )
     elif type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
+    elif type(leg) is Cruise:
+        _cruises(times_s, leg.begin, leg.velocity, leg.ramp_s, leg.cruise_s, found)
     elif type(leg) is PathStretch:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
     elif type(leg) is Reel:

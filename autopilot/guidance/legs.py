@@ -11,8 +11,9 @@ from math import inf, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
-from autopilot.trajectory.reeling import reel
+from autopilot.trajectory.reeling import cruise, reel
 from autopilot.trajectory.shaping import ShapedSignals
+from autopilot.trajectory.slack_cable import LONG_WAY, SLACK_RAMP_S, SLACK_SPEED, slack_duration_s
 from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, transfer, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
@@ -70,6 +71,26 @@ class Transfer:
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
         return transfer(self.begin, self.end, self.duration_s, t)
+
+
+@dataclass(frozen=True, slots=True)
+class Cruise:
+    """From rest to rest along a straight line, at constant velocity between two ramps of `ramp_s`."""
+
+    begin: Vec3
+    velocity: Vec3
+    ramp_s: float
+    cruise_s: float
+    control_mode: int
+
+    @property
+    def duration_s(self) -> float:
+        """From rest to rest."""
+        return 2.0 * self.ramp_s + self.cruise_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return cruise(self.begin, self.velocity, self.ramp_s, self.cruise_s, t)
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +406,7 @@ class LevelHold:
 Leg = (
     Hold
     | Transfer
+    | Cruise
     | Brake
     | PathStop
     | CatchLoad
@@ -421,10 +443,15 @@ def path_stop_leg(leg: Leg, t: float, accel_limit: float, min_duration_s: float)
     return PathStop(leg, t, max(min_duration_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
 
 
-def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mode: int) -> Transfer:
-    """A transfer whose peak speed and acceleration stay within the limits given."""
-    distance = norm(sub(end, begin))
-    return Transfer(begin, end, transfer_duration(distance, speed, accel), control_mode)
+def slack_leg(begin: Vec3, end: Vec3) -> Transfer | Cruise:
+    """A vehicle whose cable is slack moves from rest to rest."""
+    way = sub(end, begin)
+    distance = norm(way)
+    duration = slack_duration_s(distance)
+    if distance > LONG_WAY:
+        velocity = scale(SLACK_SPEED / distance, way)
+        return Cruise(begin, velocity, SLACK_RAMP_S, duration - 2.0 * SLACK_RAMP_S, QUAD_POSITION)
+    return Transfer(begin, end, duration, QUAD_POSITION)
 
 
 def reel_leg(begin: Vec3, length: float, target_length: float, speed: float, accel: float) -> Reel:

@@ -17,7 +17,7 @@ from autopilot.guidance.legs import (
     Leg,
     SwingDamping,
     carry_leg,
-    transfer_leg,
+    slack_leg,
 )
 from autopilot.guidance.setpoint_follower import (
     AttitudeSetpoint,
@@ -41,9 +41,9 @@ from autopilot.supervisor.step_legs import step_legs
 from autopilot.trajectory.slack_cable import (
     CLEARANCE,
     SET_DOWN_OFFSET,
-    SLACK_ACCEL,
-    SLACK_SPEED,
     TOUCH_SPEED,
+    creep_down_share,
+    creep_up_share,
 )
 from autopilot.trajectory.timeline import return_place
 from missions.model import AttitudeRun, LoadPath
@@ -64,11 +64,22 @@ def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     clear = view.x_load[2] + CLEARANCE * settings.cable_length_m
     up = (view.x_quad[0], view.x_quad[1], clear)
     over = (view.x_load[0], view.x_load[1], clear)
-    return (
-        transfer_leg(view.x_quad, up, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
-        transfer_leg(up, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
-        Creep(over, (0.0, 0.0, settings.motion.taut_speed_m_s), QUAD_POSITION),
+    near = (
+        over[0],
+        over[1],
+        view.x_load[2] + creep_up_share(settings.cable_length_m) * settings.cable_length_m,
     )
+    return (
+        slack_leg(view.x_quad, up),
+        slack_leg(up, over),
+        *_long_way(over, near),
+        Creep(near, (0.0, 0.0, settings.motion.taut_speed_m_s), QUAD_POSITION),
+    )
+
+
+def _long_way(begin: Vec3, end: Vec3) -> tuple[Leg, ...]:
+    """A leg of the slack vehicle that only a long cable has."""
+    return (slack_leg(begin, end),) if end != begin else ()
 
 
 def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -174,10 +185,13 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
     clear = min(view.x_quad[2], view.x_load[2] + CLEARANCE * settings.cable_length_m)
     down = (view.x_quad[0], view.x_quad[1], clear)
     aside = (view.x_load[0] - SET_DOWN_OFFSET * settings.cable_length_m, view.x_load[1], clear)
+    low_height = view.x_load[2] + creep_down_share(settings.cable_length_m) * settings.cable_length_m
+    low = (aside[0], aside[1], min(clear, low_height))
     return (
-        transfer_leg(view.x_quad, down, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
-        transfer_leg(down, aside, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
-        Creep(aside, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
+        slack_leg(view.x_quad, down),
+        slack_leg(down, aside),
+        *_long_way(aside, low),
+        Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
     )
 
 

@@ -1,9 +1,9 @@
-"""The motion of a winch from rest to rest: its rate rises, stays and falls as it rose."""
+"""Motions from rest to rest whose rate rises, stays and falls as it rose: of a winch, and along a line."""
 
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import ZERO, Vec3, axpy, scale
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.transfer import STEP_TERMS, transfer
 
@@ -25,7 +25,7 @@ def _ramp(ramp_s: float, t: float) -> Growth:
 
 @kernel
 def _growth(ramp_s: float, cruise_s: float, t: float) -> Growth:
-    """Growth of the cable for a rate of 1, before the end of the motion."""
+    """Growth for a rate of 1, before the end of the motion."""
     left = 2.0 * ramp_s + cruise_s - t
     if t <= ramp_s:
         return _ramp(ramp_s, max(t, 0.0))
@@ -52,4 +52,23 @@ def reel(begin: Vec3, speed: float, ramp_s: float, cruise_s: float, t: float) ->
         (0.0, 0.0, down * w[4]),
         (0.0, 0.0, down * w[5]),
         (0.0, 0.0, down * w[6]),
+    )
+
+
+@kernel
+def cruise(begin: Vec3, velocity: Vec3, ramp_s: float, cruise_s: float, t: float) -> Jet:
+    """Position and its derivatives 1 ... 6 at time t (s) along a straight line: the speed rises to that of
+    `velocity` (m/s) along the s of `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and
+    falls as it rose."""
+    if 2.0 * ramp_s + cruise_s - t <= 0.0:
+        return axpy(ramp_s + cruise_s, velocity, begin), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+    w = _growth(ramp_s, cruise_s, t)
+    return (
+        axpy(w[0], velocity, begin),
+        scale(w[1], velocity),
+        scale(w[2], velocity),
+        scale(w[3], velocity),
+        scale(w[4], velocity),
+        scale(w[5], velocity),
+        scale(w[6], velocity),
     )

@@ -8,8 +8,10 @@ import pytest
 from autopilot.guidance.jet_table import flies_requested_path, jets, jets_ahead
 from autopilot.guidance.legs import (
     LOAD_POSITION,
+    QUAD_POSITION,
     Brake,
     Creep,
+    Cruise,
     Hold,
     Leg,
     PathStop,
@@ -39,6 +41,7 @@ LEGS = (
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(CURVE)),
+    Cruise((0.1, 0.2, 0.3), (0.3, 0.1, -0.2), 0.7, 2.1, QUAD_POSITION),
     Reel((0.1, 0.2, 1.3), 2.0, 0.3, 0.7, 2.1),
     Reel((0.1, 0.2, 1.3), 2.0, -0.3, 0.5, 0.0),
     PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),

@@ -14,12 +14,12 @@ from autopilot.control.laws import chosen_law
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.guidance.legs import (
     LOAD_ATTITUDE,
-    LOAD_POSITION,
     MAX_LEAN_SINE,
     QUAD_ATTITUDE,
     QUAD_POSITION,
     Brake,
     Creep,
+    Cruise,
     Hold,
     Leg,
     PathStop,
@@ -32,10 +32,11 @@ from autopilot.guidance.legs import (
     carry_leg,
     path_stop_leg,
     reel_leg,
-    transfer_leg,
+    slack_leg,
 )
 from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory.shaping import shape, unshaped_signals
+from autopilot.trajectory.slack_cable import LONG_WAY, SLACK_ACCEL, SLACK_SPEED
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.trajectory.waypoint_path import PathSegment, plan_waypoint_path
 from autopilot.vehicle.file import load_vehicle
@@ -53,7 +54,8 @@ PASSAGE = PathSegment(_PATH.table(), 0.0, float(_TIMES[1]), HERE)
 BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
 LEGS: dict[str, Leg] = {
     "hold": Hold(HERE, 5.0),
-    "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
+    "transfer": carry_leg(HERE, THERE, 1.5, 1.5, 0.0),
+    "cruise": Cruise(HERE, (0.5, -0.3, 0.2), 0.7, 0.6, QUAD_POSITION),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
     "run": SignalRun(HERE, unshaped_signals(SIGNALS)),
@@ -198,10 +200,32 @@ def test_signals_start_where_the_load_hangs() -> None:
 
 
 def test_a_transfer_keeps_to_its_limits() -> None:
-    leg = transfer_leg(HERE, THERE, 1.5, 0.7, LOAD_POSITION)
+    leg = carry_leg(HERE, THERE, 1.5, 0.7, 0.0)
     along = [leg.jet(leg.duration_s * k / 200) for k in range(201)]
     assert max(norm(jet[1]) for jet in along) <= 1.5 * (1.0 + 1e-9)
     assert max(norm(jet[2]) for jet in along) == pytest.approx(0.7, rel=1e-3)
+
+
+@pytest.mark.parametrize("distance_m", [0.4, LONG_WAY, 1.01 * LONG_WAY, 60.0])
+def test_a_slack_vehicle_keeps_to_its_limits_from_rest_to_rest(distance_m: float) -> None:
+    end = (HERE[0], HERE[1] - 0.6 * distance_m, HERE[2] + 0.8 * distance_m)
+    leg = slack_leg(HERE, end)
+    along = [leg.jet(leg.duration_s * k / 2000) for k in range(2001)]
+    assert along[0] == (HERE, *[(0.0, 0.0, 0.0)] * 6)
+    assert along[-1][0] == pytest.approx(end, abs=ROUNDING) and along[-1][1:] == along[0][1:]
+    assert max(norm(jet[1]) for jet in along) <= SLACK_SPEED * (1.0 + 1e-9)
+    assert max(norm(jet[2]) for jet in along) <= SLACK_ACCEL * (1.0 + 1e-9)
+
+
+def test_however_far_it_climbs_a_slack_vehicle_leaves_the_ground_at_once() -> None:
+    """A transfer over 60 m takes 26 s for its first 5 mm, in which the gear would touch the ground again and
+    again."""
+    assert carry_leg(HERE, moved_up(60.0), SLACK_SPEED, SLACK_ACCEL, 0.0).jet(26.0)[0][2] < HERE[2] + 0.005
+    assert slack_leg(HERE, moved_up(60.0)).jet(2.0)[0][2] > HERE[2] + 0.3
+
+
+def moved_up(height_m: float) -> Vec3:
+    return (HERE[0], HERE[1], HERE[2] + height_m)
 
 
 @given(end=vectors, speed=st.floats(0.1, 5.0), accel=st.floats(0.1, 5.0))
@@ -209,7 +233,7 @@ def test_carrying_is_never_quicker_than_the_pendulum_and_else_as_quick_as_it_may
     end: Vec3, speed: float, accel: float
 ) -> None:
     leg = carry_leg((0.0, 0.0, 0.0), end, speed, accel, LEAST_S)
-    bare = transfer_leg((0.0, 0.0, 0.0), end, speed, accel, LOAD_POSITION)
+    bare = carry_leg((0.0, 0.0, 0.0), end, speed, accel, 0.0)
     if norm(end) == 0.0:
         assert leg.duration_s == 0.0
     else:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
-from autopilot.guidance.legs import LOAD_POSITION, transfer_leg
+from autopilot.guidance.legs import carry_leg
 from autopilot.guidance.setpoint_follower import (
     UNSPECIFIED,
     Circle,
@@ -64,7 +64,7 @@ def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bo
 @settings(max_examples=60, deadline=None)
 @given(at_s=st.floats(0.0, 9.7), place=vectors, is_fixed=st.booleans())
 def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_fixed: bool) -> None:
-    before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
+    before = carry_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, 0.0)
     wish = PositionSetpoint(place) if is_fixed else PositionSetpoint(velocity=place)
     *jets, _ = led(wish, 3.0, start_following(before.jet(at_s), PACE.rate))
     # measured in 300 examples: 1.50 m/s^2 and 5.9 m/s^3; with a point that begins at the velocity alone 1.63

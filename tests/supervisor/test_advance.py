@@ -41,6 +41,7 @@ from autopilot.supervisor.state import (
     Setpoints,
     View,
 )
+from autopilot.trajectory.slack_cable import tauten_duration_s
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
@@ -567,6 +568,25 @@ def test_a_load_that_swings_unnoticed_ends_the_climb() -> None:
     sky.run(lambda s: s.flight.phase != Phase.TAUTEN and s.now_us > 1_000_000, limit_s=60.0)
     assert sky.flight.phase == Phase.SET_DOWN
     assert sky.texts[-1] == "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
+
+
+def with_long_cable(cable_m: float) -> Sky:
+    """A vehicle that takes off beside a load on a long cable."""
+    sky = Sky(settings=replace(SETTINGS, cable_length_m=cable_m))
+    sky.view = sky.view._replace(x_quad=(-0.5 * cable_m, 0.0, sky.view.x_quad[2]))
+    sky.ask(Arm(True, False))
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    return sky
+
+
+def test_a_long_cable_is_flown_along_and_its_end_crept() -> None:
+    sky, cable_m, creep_m_s = with_long_cable(60.0), 60.0, SETTINGS.motion.taut_speed_m_s
+    sky.run(lambda s: s.flight.phase == Phase.LIFT)
+    begin_s = sky.setpoints[0][0]
+    taut_s = sky.setpoints[-1][0] - begin_s
+    assert taut_s == pytest.approx(tauten_duration_s(cable_m, creep_m_s), abs=2.0)
+    last = [jet for time_s, _, jet in sky.setpoints if taut_s - 50.0 < time_s - begin_s < taut_s - 0.5]
+    assert {jet[1] for jet in last} == {(0.0, 0.0, creep_m_s)}
 
 
 def test_a_gust_may_hide_the_pull_of_a_load_without_a_tracker() -> None:

@@ -335,6 +335,12 @@ def never_taut() -> Watched:
     return sky
 
 
+def long_cable() -> Watched:
+    sky = Watched(Takeoff(2.0), model.Land())
+    sky.settings = replace(sky.settings, cable_length_m=20.0)
+    return flown(sky)
+
+
 def given_up() -> Watched:
     sky = after(Watched(), Terminate(), wait_s=4.0)
     assert sky.flight.phase == Phase.DISARMED
@@ -363,6 +369,7 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
     offboard_rise: {Phase.DISARMED, Phase.HOLD, Phase.LOWER, Phase.SET_DOWN},
     fenced: {Phase.DISARMED, Phase.TAUTEN, Phase.SET_DOWN},
     never_taut: {Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED},
+    long_cable: TO_GROUND | {Phase.TAUTEN, Phase.SET_DOWN},
     given_up: {Phase.FAILSAFE, Phase.HOLD, Phase.DISARMED},
     left_armed: {Phase.ARMED, Phase.DISARMED},
 }

@@ -16,6 +16,7 @@ from autopilot.trajectory.timeline import (
     MissionState,
     VerticalSpeeds,
     expected_duration_s,
+    min_move_duration,
     return_place,
     state_after,
     timeline,
@@ -209,8 +210,8 @@ def test_a_long_cable_is_tautened_and_set_down_for_minutes():
     """Measured in flights of `hover` with `bebop` on longer cables: tauten and set_down, in s."""
     hover = Mission("m", "", "", (), (Takeoff(2.0), Land()))
     usual = expected_duration_s(hover)
-    for cable_m, tauten_s, set_down_s in ((8.0, 64.2, 59.9), (20.0, 160.8, 148.7)):
-        lift_s = 2.0 * transfer_duration(2.0, 0.8, 1.5)
+    for cable_m, tauten_s, set_down_s in ((20.0, 71.6, 70.8), (60.0, 201.6, 197.8)):
+        lift_s = 2.0 * max(transfer_duration(2.0, 0.8, 1.5), min_move_duration(cable_m, 9.81))
         assert expected_duration_s(hover, cable_m=cable_m) == pytest.approx(
             lift_s + tauten_s + set_down_s, rel=0.05
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, norm, sub
-from autopilot.guidance.legs import QUAD_POSITION, Creep, transfer_leg
+from autopilot.guidance.legs import Creep, slack_leg
 from autopilot.supervisor.phase_legs import HEIGHT_SIGMAS
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -22,7 +22,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
-from autopilot.trajectory.slack_cable import CLEARANCE, SLACK_ACCEL, SLACK_SPEED
+from autopilot.trajectory.slack_cable import creep_up_share
 
 MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
 LIFTING_TEXT = "Cable taut, lifting the load"
@@ -53,9 +53,8 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     over = (view.x_load[0], view.x_load[1], at[2])
     # each move over the load begins the climb anew: one that hangs unnoticed would be followed for ever
     is_too_late = view.now_us > give_up_us(flight, settings)
-    if (
-        not norm(sub(over, at)) <= MAX_LOAD_OFFSET
-    ):  # for example because the load was not seen well from the ground
+    # for example because the load was not seen well from the ground
+    if not norm(sub(over, at)) <= MAX_LOAD_OFFSET:
         if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
@@ -105,7 +104,7 @@ def give_up_us(flight: Flight, settings: Settings) -> int:
 def _moved_over_load(flight: Flight, view: View, creep: Creep, at: Vec3, over: Vec3) -> Flight:
     """The flight whose vehicle, which rises by `creep`, is moved from `at` to `over`, above the load."""
     legs = (
-        transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        slack_leg(at, over),
         replace(creep, begin=over),
     )
     return replace(flight, legs=legs, leg_start_us=view.now_us)
@@ -118,5 +117,6 @@ def max_setpoint_distance(settings: Settings) -> float:
 
 
 def last_setpoint_height(creep: Creep, settings: Settings) -> float:
-    """The same as a height over home (m), of a vehicle that rises from CLEARANCE above the load."""
-    return creep.begin[2] + max_setpoint_distance(settings) - CLEARANCE * settings.cable_length_m
+    """The same as a height over home (m), of a vehicle that creeps up to there."""
+    length = settings.cable_length_m
+    return creep.begin[2] + max_setpoint_distance(settings) - creep_up_share(length) * length
