@@ -45,7 +45,7 @@ from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, T
 from autopilot.supervisor.watches.fence import NO_ACTION, has_fence
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
-from autopilot.supervisor.watches.tautening import MAX_LOAD_OFFSET, give_up_us, last_setpoint_height
+from autopilot.supervisor.watches.tautening import give_up_us, last_setpoint_height, max_load_offset
 from autopilot.supervisor.watches.touchdown import (
     LOAD_DEPTH,
     ON_GROUND_DEPTH,
@@ -73,6 +73,7 @@ class Stretch(NamedTuple):
     period_us: int  # between the ticks for which the setpoints are computed
     watch: int
     threshold: float  # m: of the watch
+    offset_limit: float  # m: of the setpoint of a vehicle that pulls its cable taut, beside the load
     condition_met: (
         bool  # the supervisor has already noted that load or vehicle is down, or that the cable pulls
     )
@@ -101,6 +102,7 @@ def uncontrolled_stretch(until_us: int, now_us: int, idle: bool) -> Stretch:
         period_us=1,
         watch=NO_WATCH,
         threshold=0.0,
+        offset_limit=0.0,
         condition_met=False,
         stopped_height=inf,
         error_limit=inf,
@@ -147,6 +149,7 @@ def next_stretch(
         period_us=max(period_us, 1),
         watch=watch,
         threshold=threshold,
+        offset_limit=max_load_offset(settings),
         condition_met=flight.condition_since_us >= 0,
         stopped_height=flight.stopped_height,
         error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
@@ -271,7 +274,7 @@ def may_need_decision(
             return True
     if stretch.watch == TAUT:
         offset = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)
-        if target[2] > stretch.threshold or not norm(offset) <= MAX_LOAD_OFFSET:
+        if target[2] > stretch.threshold or not norm(offset) <= stretch.offset_limit:
             return True
         return (pull_share > TAUT_PULL_SHARE and taut) != stretch.condition_met
     if stretch.watch == LOAD_DOWN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -587,6 +588,22 @@ def test_a_long_cable_is_flown_along_and_its_end_crept() -> None:
     assert taut_s == pytest.approx(tauten_duration_s(cable_m, creep_m_s), abs=2.0)
     last = [jet for time_s, _, jet in sky.setpoints if taut_s - 50.0 < time_s - begin_s < taut_s - 0.5]
     assert {jet[1] for jet in last} == {(0.0, 0.0, creep_m_s)}
+
+
+def test_what_a_camera_sees_of_a_load_far_below_does_not_keep_the_vehicle_moving_over_it() -> None:
+    """Its noise of 3 mrad is 0.1 m on 30 m; each move began the climb anew, and the cable never came taut."""
+    sky, noise = with_long_cable(30.0), random.Random(1)
+    ideal = sky.obey
+
+    def seen() -> View:
+        told = ideal()
+        beside = (noise.gauss(0.0, 0.06), noise.gauss(0.0, 0.06), told.x_load[2])
+        return told if told.taut else told._replace(x_load=beside, load_tracked=False)
+
+    sky.obey = seen  # type: ignore[method-assign]
+    sky.run(lambda s: s.flight.phase in (Phase.LIFT, Phase.SET_DOWN))
+    taut_s = sky.setpoints[-1][0] - sky.setpoints[0][0]
+    assert taut_s == pytest.approx(tauten_duration_s(30.0, SETTINGS.motion.taut_speed_m_s), abs=5.0)
 
 
 def test_a_gust_may_hide_the_pull_of_a_load_without_a_tracker() -> None:

@@ -24,7 +24,9 @@ from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, ca
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.trajectory.slack_cable import creep_up_share
 
-MAX_LOAD_OFFSET = 0.08  # m; a rising vehicle that is farther beside the load is moved over it
+# m, and share of the cable's length: a rising vehicle that is farther beside the load is moved over it. What
+# a camera sees of a load far below is about as uncertain.
+MAX_LOAD_OFFSET, MAX_OFFSET_SHARE = 0.08, 0.01
 LIFTING_TEXT = "Cable taut, lifting the load"
 LIFTING_UNOBSERVED_TEXT = "Cable taut, lifting the load; no load sensor"
 LATE_FACTOR = 2.0  # factor of the time in which the setpoint rises from the load to its last height
@@ -54,7 +56,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     # each move over the load begins the climb anew: one that hangs unnoticed would be followed for ever
     is_too_late = view.now_us > give_up_us(flight, settings)
     # for example because the load was not seen well from the ground
-    if not norm(sub(over, at)) <= MAX_LOAD_OFFSET:
+    if not norm(sub(over, at)) <= max_load_offset(settings):
         if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
@@ -120,3 +122,8 @@ def last_setpoint_height(creep: Creep, settings: Settings) -> float:
     """The same as a height over home (m), of a vehicle that creeps up to there."""
     length = settings.cable_length_m
     return creep.begin[2] + max_setpoint_distance(settings) - creep_up_share(length) * length
+
+
+def max_load_offset(settings: Settings) -> float:
+    """How far beside the load (m) the setpoint of a rising vehicle may be."""
+    return max(MAX_LOAD_OFFSET, MAX_OFFSET_SHARE * settings.cable_length_m)
