@@ -13,7 +13,7 @@ from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scal
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
 from autopilot.trajectory.reeling import cruise, reel
 from autopilot.trajectory.shaping import ShapedSignals
-from autopilot.trajectory.slack_cable import LONG_WAY, SLACK_RAMP_S, SLACK_SPEED, slack_duration_s
+from autopilot.trajectory.slack_cable import LONG_WAY, LONG_WAY_RAMP_S, LONG_WAY_SPEED, slack_duration_s
 from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, transfer, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
@@ -449,8 +449,8 @@ def slack_leg(begin: Vec3, end: Vec3) -> Transfer | Cruise:
     distance = norm(way)
     duration = slack_duration_s(distance)
     if distance > LONG_WAY:
-        velocity = scale(SLACK_SPEED / distance, way)
-        return Cruise(begin, velocity, SLACK_RAMP_S, duration - 2.0 * SLACK_RAMP_S, QUAD_POSITION)
+        velocity = scale(LONG_WAY_SPEED / distance, way)
+        return Cruise(begin, velocity, LONG_WAY_RAMP_S, duration - 2.0 * LONG_WAY_RAMP_S, QUAD_POSITION)
     return Transfer(begin, end, duration, QUAD_POSITION)
 
 

@@ -14,11 +14,11 @@ CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack ve
 SET_DOWN_OFFSET = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
-# A longer way is flown at constant speed between two ramps: a transfer from rest to rest would begin so
-# gently that the vehicle stays at the ground for a minute, where its gear touches again and again until it
+# m, m/s: a longer way is flown at constant speed between two ramps. A transfer from rest to rest would begin
+# so gently that the vehicle stays at the ground for a minute, where its gear touches again and again until it
 # turns over.
-LONG_WAY = 4.0  # m
-SLACK_RAMP_S = PEAK_SPEED * SLACK_SPEED / SLACK_ACCEL  # of either ramp
+LONG_WAY, LONG_WAY_SPEED = 4.0, 1.0
+LONG_WAY_RAMP_S = PEAK_SPEED * LONG_WAY_SPEED / SLACK_ACCEL  # of either ramp
 # Heights over the load, in cable lengths, at which creeping begins: until the cable is taut, and until the
 # vehicle stands. They are used where the way to there is long.
 CREEP_UP_SHARE, CREEP_DOWN_SHARE = 0.85, 0.2
@@ -55,5 +55,5 @@ def set_down_duration_s(cable_m: float) -> float:
 def slack_duration_s(distance_m: float) -> float:
     """Time (s) in which a vehicle whose cable is slack flies so far, from rest to rest."""
     if distance_m > LONG_WAY:
-        return distance_m / SLACK_SPEED + SLACK_RAMP_S
+        return distance_m / LONG_WAY_SPEED + LONG_WAY_RAMP_S
     return transfer_duration(distance_m, SLACK_SPEED, SLACK_ACCEL)
