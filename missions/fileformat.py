@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from missions.model import TOLERANCE_M, Mission
 from missions.nearest import nearest
+from missions.places import misplaced_trajectories
 from missions.schema import ITEMS, FileSpec, Item, TrajectoryItem
 from missions.text_files import TextFileError, text_of
 from missions.toml_files import FileError, TomlFiles, format_value, problems
@@ -93,6 +94,9 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
     if errors:
         raise MissionFileError(errors)
     steps = tuple(item.step() for item in items)
+    errors = [f"{locations[i]}: items[{i}] {problem}" for i, problem in misplaced_trajectories(steps)]
+    if errors:
+        raise MissionFileError(errors)
     return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
 
 

@@ -12,6 +12,7 @@ from gcs.errors import GcsError, InputError, input_error
 from missions import model
 from missions.fileformat import MissionFileError, load_mission, mission_of
 from missions.model import KINDS, Signals, Step, Term
+from missions.places import misplaced_trajectories
 from missions.toml_files import FileError
 from missions.writing import mission_table, write_toml
 from plumbline.arguments import file_path, items, name_or_file, shown_value, text
@@ -56,6 +57,8 @@ class Mission(model.Mission):
             checked = mission_of(table, name, name)
         except MissionFileError as error:
             raise input_error(error) from None
+        if misplaced := [f"{name}: items[{i}] {text}" for i, text in misplaced_trajectories(step_list)]:
+            raise InputError(*misplaced)
         super().__init__(checked.name, checked.title, checked.description, checked.assumptions, checked.steps)
 
     @classmethod

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import MissionItemError, WireItem, located_steps
 
-MAX_ITEMS = 2000
-
 _MAGIC = b"PLMI"
 _VERSION = 1
 _HEADER = struct.Struct("<4sHH")

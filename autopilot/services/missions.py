@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.services.mission_store import MAX_ITEMS, StoredMission, plan_id
+from autopilot.services.mission_store import StoredMission, plan_id
 from autopilot.services.records import (
     Announce,
     AreasChanged,
@@ -46,6 +46,7 @@ from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_fro
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import AREA_READERS
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, home_item, is_home, located_steps
+from autopilot.wire.items.limits import MAX_ITEMS
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
 MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items

@@ -194,6 +194,12 @@ def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
     return RotorSettings(table.layout, low, high, weight_n)
 
 
+def shapes_paths(table: AutopilotParameters, follows_shaped: bool) -> bool:
+    """Whether paths are shaped with these parameters; `follows_shaped`: it is worthwhile with the law."""
+    shaping = table["MIS_SHAPE"]
+    return shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
+
+
 def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
     """The limits within which paths are shaped: the assumed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
@@ -219,12 +225,10 @@ def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
         cos(radians(table["MIS_TILT_DEG"])),
         1e-3 * table["VEH_ROTOR_TAU"],
     )
-    shaping = table["MIS_SHAPE"]
-    shaped = shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
     return PathLimits(
         body,
         bounds,
-        shaped,
+        shapes_paths(table, follows_shaped),
         table["MIS_SHAPE_ERR"],
         int(table["MIS_INFEASIBLE"]),
         table["MIS_SPEED"],

@@ -79,7 +79,7 @@ def describe(step: Step, released: bool) -> str:
         case Signals():
             return f"Fly signals for {step.duration_s:g} s: {_terms(step.terms)}"
         case Trajectory():
-            return f"Fly a trajectory of {len(step.points)} points for {step.duration_s:g} s"
+            return f"Fly a trajectory of {len(step.points)} points for {step.duration_s:g} s: {_extent(step)}"
         case AttitudeRun():
             return _attitude_run(step)
 
@@ -107,6 +107,12 @@ def _terms(terms: Sequence[Term]) -> str:
 def _term(term: Term) -> str:
     sines = "".join(f" × sine of {factor.period_s:g} s" for factor in term.factors)
     return f"{_m(term.amplitude_m)} along {term.axis}{sines}"
+
+
+def _extent(step: Trajectory) -> str:
+    """Where its points are, relative to its beginning."""
+    axes = zip(("east", "north", "up"), *(point[1:] for point in step.points), strict=True)
+    return ", ".join(f"{min(places):.2f} to {max(places):.2f} m {name}" for name, *places in axes)
 
 
 def _attitude_run(step: AttitudeRun) -> str:

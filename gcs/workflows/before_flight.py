@@ -65,10 +65,10 @@ def check_mission(mission: Mission, options: FlightOptions) -> None:
     """GcsError unless the vehicle can fly the mission, or the options waive this check."""
     if options.force or options.allows_infeasible:
         return
-    shaped = options.law == "plumbline"
+    follows_shaped = options.law == "plumbline"
     settings = options.mission_settings
-    if not is_known_flyable(mission, options.vehicle, shaped, settings):
+    if not is_known_flyable(mission, options.vehicle, follows_shaped, settings):
         from gcs.workflows.flyable import require_flyable
 
         with notify_if_slow(CHECKING_TEXT, options.quiet):
-            require_flyable(mission, options.vehicle, shaped, settings)
+            require_flyable(mission, options.vehicle, follows_shaped, settings)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
 
+from autopilot.supervisor.settings import shapes_paths
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
@@ -249,8 +250,9 @@ def check_mission(
         if not ends_on_ground(mission):
             notes += ("note: does not end on the ground: for gcs upload, not for gcs fly or gcs sweep",)
     table = with_settings(autopilot_parameters(limits.vehicle), settings)
+    shaped = shapes_paths(table, not as_asked)
     found = [*violations(mission, vehicle, limits, not as_asked, settings), *winch_violations(mission, table)]
-    reports = [] if found else path_reports(mission, limits, planner, not as_asked)
+    reports = [] if found else path_reports(mission, limits, planner, shaped)
     answer = Answer() if found else ask_supervisor(mission, table, not as_asked, planner)
     warnings = (
         *(f"warning: {text}" for text in answer.warnings),
@@ -259,7 +261,7 @@ def check_mission(
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
         *timeout_warnings(mission, reports, table),
     )
-    if as_asked and any(isinstance(step, LoadPath | AttitudeRun) for step in mission.steps):
+    if not shaped and any(isinstance(step, LoadPath | AttitudeRun) for step in mission.steps):
         warnings += (
             "note: how near a law without preview keeps to this, and whether its own errors lose the "
             f"flight, only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
+from autopilot.supervisor.settings import shapes_paths
 from autopilot.trajectory.feasibility import VehicleLimits, Violation, check
+from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.errors import GcsError
 from gcs.foreign_mission import home_of
 from gcs.mission_files import load
 from gcs.mission_items import in_file_terms, items_of
 from gcs.workflows.flight_options import Settings
 from gcs.workflows.flyable_marks import mark_flyable
-from gcs.workflows.vehicle_limits import load_limits
+from gcs.workflows.vehicle_limits import load_limits, with_settings
 from missions.model import Mission
 
 
 def violations(
-    mission: Mission, vehicle: str, limits: VehicleLimits, shaped: bool = True, settings: Settings = ()
+    mission: Mission,
+    vehicle: str,
+    limits: VehicleLimits,
+    follows_shaped: bool = True,
+    settings: Settings = (),
 ) -> list[Violation]:
-    """What the vehicle with these limits, which `settings` have set, cannot fly of the mission, with paths
-    `shaped` by the autopilot or as requested.
+    """What the vehicle with these limits, which `settings` have set, cannot fly of the mission.
+    `follows_shaped`: with a law for which its autopilot shapes paths by default.
 
     InputError if no vehicle would accept its items.
     """
     items_of(mission, home_of(mission))
-    found = check(mission, limits, shaped)
+    table = with_settings(autopilot_parameters(limits.vehicle), settings)
+    found = check(mission, limits, shapes_paths(table, follows_shaped))
     if not found:
-        mark_flyable(mission, vehicle, shaped, settings)
+        mark_flyable(mission, vehicle, follows_shaped, settings)
     return found
 
 
@@ -37,9 +44,11 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     return mission
 
 
-def require_flyable(mission: Mission, vehicle: str, shaped: bool = True, settings: Settings = ()) -> None:
+def require_flyable(
+    mission: Mission, vehicle: str, follows_shaped: bool = True, settings: Settings = ()
+) -> None:
     """GcsError unless the vehicle can fly the mission, with these parameters of missions (MIS_)."""
-    found = violations(mission, vehicle, load_limits(vehicle, settings), shaped, settings)
+    found = violations(mission, vehicle, load_limits(vehicle, settings), follows_shaped, settings)
     if found:
         summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
         texts = [in_file_terms(str(one), mission) for one in found]

@@ -18,21 +18,21 @@ from missions.toml_files import FileError
 _CHECK = ROOT / "gcs" / "workflows" / "flyable.py"  # imports all code that determines the result
 
 
-def is_known_flyable(mission: Mission, vehicle: str, shaped: bool, settings: Settings = ()) -> bool:
-    """True if a check of this mission for this vehicle, with paths shaped or not, and with these parameters
-    of missions, has found no problem."""
+def is_known_flyable(mission: Mission, vehicle: str, follows_shaped: bool, settings: Settings = ()) -> bool:
+    """True if a check of this mission for this vehicle, with a law that follows shaped paths or not, and
+    with these parameters of missions, has found no problem."""
     try:
-        return is_marked(_CHECK, _mark_name(mission, vehicle, shaped, settings))
+        return is_marked(_CHECK, _mark_name(mission, vehicle, follows_shaped, settings))
     except FileError:  # of the vehicle's file, which the check will report
         return False
 
 
-def mark_flyable(mission: Mission, vehicle: str, shaped: bool, settings: Settings = ()) -> None:
+def mark_flyable(mission: Mission, vehicle: str, follows_shaped: bool, settings: Settings = ()) -> None:
     """Store for later flights that the check has found no problem."""
-    mark_ready(_CHECK, (_mark_name(mission, vehicle, shaped, settings),))
+    mark_ready(_CHECK, (_mark_name(mission, vehicle, follows_shaped, settings),))
 
 
-def _mark_name(mission: Mission, vehicle: str, shaped: bool, settings: Settings) -> str:
+def _mark_name(mission: Mission, vehicle: str, follows_shaped: bool, settings: Settings) -> str:
     texts = [VEHICLES.read(one).text for one in (vehicle, belief_of(vehicle))]
-    inputs = (mission.steps, texts, shaped, *settings)
+    inputs = (mission.steps, texts, follows_shaped, *settings)
     return f"flies-{hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]}"

@@ -6,15 +6,30 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from numpy.typing import NDArray
 
 from autopilot.trajectory.load_path import evaluate_load_path, path_tables
-from missions.fileformat import MissionFileError, load_mission, parse_mission
+from missions.fileformat import MissionFileError, load_mission, mission_of, parse_mission
 from missions.limits import MAX_POINTS, SHORTEST_POINT_S
-from missions.model import ORIGIN, Trajectory
-from missions.trajectory import COLUMNS, TOLERANCE_M, rows_of, through_points, through_rows
+from missions.model import (
+    ORIGIN,
+    TOLERANCE_M,
+    AttitudeRun,
+    Delay,
+    Land,
+    ReturnHome,
+    Speed,
+    Step,
+    Takeoff,
+    Trajectory,
+    Waypoint,
+    Winch,
+)
+from missions.trajectory import COLUMNS, read_rows, through_points, through_rows
 from missions.writing import mission_table, write_toml
+from plumbline import Error, Mission
 
 Array = NDArray[np.float64]
 
@@ -25,10 +40,10 @@ def smooth_share(u: Array) -> Array:
 
 
 def eight(duration_s: float, spacing_s: float, laps: int = 2) -> Array:
-    """Rows of a figure of eight at 1.5 m, which begins 3 m east of home."""
+    """Rows of a figure of eight over home, at 1 m."""
     times = np.arange(0.0, duration_s + 0.5 * spacing_s, spacing_s)
     phase = 2.0 * np.pi * laps * smooth_share(times / times[-1])
-    return np.column_stack([times, 3.0 + 2.0 * np.sin(phase), np.sin(2.0 * phase), np.full_like(times, 1.5)])
+    return np.column_stack([times, 2.0 * np.sin(phase), np.sin(2.0 * phase), np.full_like(times, 1.0)])
 
 
 def places_at(trajectory: Trajectory, times: Array) -> Array:
@@ -88,24 +103,34 @@ MOVING = np.column_stack([np.arange(0.0, 5.0, 0.01)] * 2 + [np.zeros(500)] * 2)
 @pytest.mark.parametrize(
     ("rows", "text"),
     [
-        ([], " has 0 entries; must be two at least"),
-        ([(0.0, 0.0, 0.0)], "[0] has 3 numbers; must be t_s, east_m, north_m, altitude_m"),
-        ([(0.0,) * 4, (1.0, np.nan, 0.0, 0.0)], "[1] contains a value that is not a number"),
-        ([(0.0,) * 4, (1.0,) * 4, (1.0,) * 4], "[2]: 1 s comes after 1 s; times must increase"),
-        ([(0.0,) * 4, (0.05, 0.0, 0.0, 0.0)], " lasts 0.05 s; must be 0.1 ... 3600 s"),
-        ([(0.0,) * 4, (9.0, 1001.0, 0.0, 0.0)], " leads further than 1000 m from its first place"),
-        (MOVING, "must be at rest where it begins and ends; must be 0.001 m at most"),
+        ([], "path has 0 rows; must be two at least"),
+        ([(0.0, 0.0, 0.0)], "rows[0] has 3 numbers; must be t_s, east_m, north_m, altitude_m"),
+        ([(0.0,) * 4, (1.0, np.nan, 0.0, 0.0)], "rows[1] contains a value that is not a number"),
+        ([(0.0,) * 4, (1.0,) * 4, (1.0,) * 4], "rows[2] is at 1 s, and the one before at 1 s; times must"),
+        ([(0.0,) * 4, (0.05, 0.0, 0.0, 0.0)], "path lasts 0.05 s; must be 0.1 ... 3600 s"),
+        ([(0.0,) * 4, (9.0, 1001.0, 0.0, 0.0)], "path leads further than 1000 m from the first"),
+        (
+            [(0.0, 0.0, 0.0, 1.0), (9.0, 0.0, 0.0, -1.5)],
+            "rows[1] has altitude_m = -1.5; must be >= 0: it counts up",
+        ),
+        (MOVING, "rows[0] is where the path begins at 1.00 m/s; must be at rest: add a run-up"),
+        (
+            MOVING[::-1] * [-1.0, 1.0, 1.0, 1.0],
+            "rows[0] is where the path begins at 1.00 m/s; must be at rest",
+        ),
+        (SPIKE, "rows[900] at 9 s is 1"),
         (
             SPIKE,
-            "[900], at 9 s, is 0.0",
+            "mm beside the nearest smooth path; must be 1 mm at most: smooth the rows, or allow more (tol",
         ),
-        ([(0.01 * k, 0.0, 0.0, 0.0) for k in range(9)] + [(3.0,) * 4], "make them equally far apart"),
-        (eight(1200.0, 0.4, laps=200), " lasts 1200 s; must be 1000 s at most: divide it"),
         (
-            eight(600.0, 0.6, laps=150),
-            " has 1001 rows too far apart for a fit; must be 1000 at most: divide it",
+            [(0.01 * k, 0.0, 0.0, 0.0) for k in range(9)] + [(9.0,) * 4],
+            "path has 10 rows, up to 8.92 s apart; must be at most 2 s apart",
         ),
-        (eight(600.0, 0.4, laps=150), "smooth path through the rows; must be"),
+        (
+            eight(2500.0, 2.49, laps=99),
+            "path has 1005 rows, up to 2.49 s apart; must be 1000 at most that are as far",
+        ),
     ],
 )
 def test_rows_through_which_no_smooth_path_leads_are_refused(rows: Array, text: str) -> None:
@@ -116,8 +141,11 @@ def test_rows_through_which_no_smooth_path_leads_are_refused(rows: Array, text: 
 @pytest.mark.parametrize(
     ("points", "text"),
     [
-        ([[0.0] * 4, [0.05, 0.1, 0.0, 0.0], [1.0] * 4], "points[1] is 0.05 s after the point before"),
-        ([[0.1 * k, 0.0, 0.0, 0.0] for k in range(MAX_POINTS + 1)], "points has 1001 entries; must be 1000"),
+        ([[0.0] * 4, [0.05, 0.1, 0.0, 0.0], [1.0] * 4], "points[1] comes 0.05 s after the one before"),
+        (
+            [[0.1 * k, 0.0, 0.0, 0.0] for k in range(MAX_POINTS + 1)],
+            "path has 1001 points; must be 1000 at most",
+        ),
         ([[0.0] * 4, [1.0] * 3], "points[1] = [1.0, 1.0, 1.0]; must be a list of at least 4"),
         ([[0.0] * 4, [1.0, "a", 0.0, 0.0]], 'points[1][1] = "a"; must be a number'),
     ],
@@ -154,11 +182,11 @@ def test_a_file_of_rows_is_found_beside_the_mission_and_saved_as_points(tmp_path
     ("item", "csv", "text"),
     [
         ('file = "no.csv"', "", 'items[1].file = "no.csv": no such file'),
-        ('file = "p.csv"', "", 'file = "p.csv": has 0 entries'),
+        ('file = "p.csv"', "", 'file = "p.csv": has 0 rows; must be two'),
         (
             'file = "p.csv"',
             "t,x,y,z\n0,0,0,0",
-            'file = "p.csv": line 1: has no column t_s; its first',
+            'file = "p.csv": line 1 has no column t_s; the first',
         ),
         (
             'file = "p.csv"',
@@ -169,7 +197,20 @@ def test_a_file_of_rows_is_found_beside_the_mission_and_saved_as_points(tmp_path
         (
             'file = "p.csv"',
             f"{HEAD}\n0,0,0,0\n0,0,0,0",
-            "row[1]: 0 s comes after 0 s; times must",
+            "line 3 is at 0 s, and the one before at 0 s; times must",
+        ),
+        (
+            'file = "p.csv"',
+            HEAD.replace(",", ";"),
+            "line 1 has semicolons; numbers must be separated by commas",
+        ),
+        ('file = "p.csv"', HEAD.replace(",", "\t"), "line 1 has tabs; numbers must be separated by commas"),
+        ('file = "p.csv"\nscale = 2.0', "", "items[1].scale: unknown key"),
+        ('file = "p.csv"\ntolerance_m = -1.0', "", "items[1].tolerance_m = -1.0; must be >= 0.0001 and <= 1"),
+        (
+            "points = [[0, 0, 0, 0], [1, 1, 0, 0]]\ntolerance_m = 0.1",
+            "",
+            "has tolerance_m and points, which are",
         ),
         ("", "", "items[1] has no file and no points; must have one of them"),
         ('file = "p.csv"\npoints = []', "", "items[1] has both a file and points; must have one of them"),
@@ -189,4 +230,70 @@ def test_what_is_wrong_with_a_file_of_rows_is_told_in_a_line(
 
 def test_columns_may_stand_in_any_order_and_among_others() -> None:
     text = "altitude_m,north_m,east_m,speed,t_s\n4,3,2,9,1\n"
-    assert list(rows_of(text)) == [[1.0, 2.0, 3.0, 4.0]]
+    assert read_rows(text) == ([[1.0, 2.0, 3.0, 4.0]], [2])
+    assert read_rows(f"# note\n\n# {text}").rows == [[1.0, 2.0, 3.0, 4.0]], "as NumPy writes it"
+
+
+def test_a_noisy_path_is_followed_within_its_tolerance() -> None:
+    rows = eight(30.0, 0.02)
+    rows[1:-1, 1:] += np.random.default_rng(1).normal(0.0, 0.003, (len(rows) - 2, 3))
+    with pytest.raises(ValueError, match="mm beside the nearest smooth path"):
+        Trajectory.through(rows)
+    found = Trajectory.through(rows, tolerance_m=0.015)
+    exact = eight(30.0, 0.02)
+    off_m = np.linalg.norm(places_at(found, exact[:, 0]) - (exact[:, 1:] - exact[0, 1:]), axis=1)
+    assert off_m.max() < 0.01
+
+
+@pytest.mark.parametrize("profile", ["minimum jerk", "half cosine", "trapezoid"])
+def test_a_path_whose_acceleration_or_jerk_jumps_at_its_ends_is_as_smooth_as_it_is(profile: str) -> None:
+    """With more derivatives that are zero at the ends, a moment of 20 N m would be needed there."""
+    t = np.arange(0.0, 4.0001, 0.01)
+    u = t / 4.0
+    shares = {
+        "minimum jerk": u**3 * (10.0 - 15.0 * u + 6.0 * u**2),
+        "half cosine": 0.5 - 0.5 * np.cos(np.pi * u),
+        "trapezoid": np.where(u < 0.5, 2.0 * u**2, 1.0 - 2.0 * (1.0 - u) ** 2),
+    }
+    rows = np.column_stack([t, 2.0 * shares[profile], 0.0 * t, 0.0 * t + 1.0])
+    found = through_rows(rows)
+    assert np.abs(places_at(found, t)[:, 0] - rows[:, 1]).max() <= TOLERANCE_M + 1e-5
+    tables = path_tables(found)
+    accelerations = np.array([evaluate_load_path(tables, float(at))[2][0] for at in t])
+    assert np.abs(accelerations).max() < 1.25 * np.abs(np.diff(rows[:, 1], 2)).max() / 0.01**2
+
+
+def test_a_table_of_pandas_is_rows() -> None:
+    rows = eight(12.0, 0.01)
+    assert Trajectory.through(pandas.DataFrame(rows)) == Trajectory.through(rows)
+    points = [(0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3)]
+    assert Trajectory(pandas.DataFrame(points)) == Trajectory(points)
+
+
+@pytest.mark.parametrize(
+    ("before", "first", "there"),
+    [
+        ((), (0.0, 0.0, 1.0), True),
+        ((), (1.0, 0.0, 1.0), False),
+        ((), (0.0, 0.0, 0.0), True),
+        ((Waypoint(1.0, 2.0, 3.0),), (1.0, 2.0, 3.0), True),
+        ((Waypoint(1.0, 2.0, 3.0), ReturnHome()), (0.0, 0.0, 3.0), True),
+        ((Waypoint(1.0, 2.0, 3.0), Winch(0.5), Delay(1.0), Speed(1.0)), (1.0, 2.0, 2.5), True),
+        ((Waypoint(1.0, 2.0, 3.0), Winch(0.5)), (1.0, 2.0, 3.0), False),
+        ((Trajectory([ORIGIN, (5.0, 1.0, 0.0, 0.5)]),), (1.0, 0.0, 1.5), True),
+        ((AttitudeRun("load", 0.1, 0.0, 1.0),), (9.0, 9.0, 9.0), True),  # nobody knows
+    ],
+)
+def test_a_path_in_places_from_home_begins_where_the_load_hangs(
+    before: tuple[Step, ...], first: tuple[float, float, float], there: bool
+) -> None:
+    x, y, z = first
+    path = Trajectory([(0.0, x, y, z), (5.0, x + 1.0, y, z + 1.0)])
+    steps = (Takeoff(1.0), *before, path, Land())
+    if there:
+        Mission("m", steps)
+        return
+    with pytest.raises(Error, match=re.escape(f"begins at {x:g}, {y:g}, {z:g} m, and the load hangs at")):
+        Mission("m", steps)
+    with pytest.raises(MissionFileError, match="put a waypoint at its first row before it"):
+        mission_of(mission_table("t", "", (), steps), "m", "m")

@@ -160,7 +160,7 @@ WRONG: dict[str, tuple[Any, str]] = {
         lambda: Mission(
             "m", [Takeoff(1.0), Trajectory([(0.05 * k, 0.0, 0.0, 0.0) for k in range(9)]), Land()]
         ),
-        "m: items[1] points[1] is 0.05 s after the point before; must be 0.1 s at least; closer",
+        "m: items[1] points[1] comes 0.05 s after the one before; must be 0.1 s at least; closer",
     ),
     "nothing": (lambda: Mission("m", []), "items = []; must be a list of at least 1"),
     "after release": (lambda: Mission("m", [Takeoff(1.0), Release(), Winch(0.1), Land()]), "needs the load"),

@@ -30,12 +30,12 @@ def test_each_point_is_passed_at_its_time_from_rest_to_rest() -> None:
     for point in LOOP.points:
         assert evaluate_load_path(tables, point.t_s)[0] == pytest.approx(point[1:], abs=1e-9)
     for t in (0.0, LOOP.duration_s):
-        assert np.abs(evaluate_load_path(tables, t)[1:5]).max() < 1e-6
+        assert np.abs(evaluate_load_path(tables, t)[1]).max() < 1e-9
 
 
 def test_derivatives_are_those_of_the_spline() -> None:
     rows = np.array(LOOP.points)
-    rest = [(order, np.zeros(3)) for order in (1, 2, 3, 4)]
+    rest = [(order, np.zeros(3)) for order in (1, 5, 6, 7)]
     spline = make_interp_spline(rows[:, 0], rows[:, 1:], 9, bc_type=(rest, rest))
     tables = path_tables(LOOP)
     for t in np.linspace(0.1, 8.9, 37):
@@ -67,7 +67,7 @@ def test_a_gentle_one_is_flown_nearly_as_asked_and_a_hasty_one_slower() -> None:
     limits = LIMITS.shaping
     gentle = shaped_path(LOOP, limits)
     assert gentle.problem == ""
-    assert gentle.path.distance_m < 1e-3
+    assert gentle.path.distance_m < 2e-3  # beside the jumps of acceleration at its ends
     assert gentle.path.duration_s == LOOP.duration_s
     hasty = slower_step(LOOP, 0.25)
     assert "it exceeds" in shaped_path(hasty, limits._replace(when_infeasible=REFUSE)).problem

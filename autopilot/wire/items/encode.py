@@ -11,7 +11,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Command
 from autopilot.wire.items.decode import located_steps
 from autopilot.wire.items.fields import WIRE_FIELD, Height, Place
-from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE, WireItem
+from autopilot.wire.items.limits import MAX_ITEMS
+from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMANDS
 from autopilot.wire.parameter_table import float32
 from missions.model import Mission, Signals, Step, Trajectory
@@ -38,6 +39,9 @@ def encode_steps(steps: Sequence[Step], home: Home) -> tuple[WireItem, ...]:
     items: list[WireItem] = []
     for step in steps:
         items.extend([_item(record, home, len(items)) for record in _records(step)])
+    if len(items) > MAX_ITEMS:
+        text = f"the mission becomes {len(items)} items; a vehicle keeps {MAX_ITEMS} at most"
+        raise MissionItemError(MAX_ITEMS, text, mavlink.MAV_MISSION_NO_SPACE)
     located_steps(items, home)  # raises if the vehicle would refuse the items
     return tuple(items)
 

@@ -26,6 +26,7 @@ __all__ = [
     "LOWEST_M",
     "MAX_FACTORS",
     "MAX_FLOWN_ITEMS",
+    "MAX_ITEMS",
     "MAX_JUMPS",
     "MAX_POINTS",
     "MAX_RADIUS_M",
@@ -42,6 +43,7 @@ __all__ = [
 
 LONGEST_S = 86400.0
 LARGEST_PHASE_RAD = 100.0
+MAX_ITEMS = 2000  # of a stored mission
 FARTHEST_M = 100_000.0  # from home, as far as the earth may be assumed flat
 FASTEST_M_S = 100.0
 MAX_JUMPS = 1000  # repetitions of one jump
