@@ -11,7 +11,7 @@ from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import Bounds, rotor_bounds
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
-from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, AutopilotParameters
+from autopilot.vehicle.parameters import AutopilotParameters, shapes_paths
 from autopilot.vehicle.rotors import allocation_columns, control_authority
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
@@ -192,12 +192,6 @@ def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
     if table["VEH_ROTOR_LIM"] == 0.0:
         low, high = -MAX_ROTOR_FORCE_N, MAX_ROTOR_FORCE_N
     return RotorSettings(table.layout, low, high, weight_n)
-
-
-def shapes_paths(table: AutopilotParameters, follows_shaped: bool) -> bool:
-    """Whether paths are shaped with these parameters; `follows_shaped`: it is worthwhile with the law."""
-    shaping = table["MIS_SHAPE"]
-    return shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
 
 
 def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:

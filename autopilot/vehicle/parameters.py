@@ -147,3 +147,9 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
         "quad_drag_n_s_m": belief.quad_drag_n_s_m,
         "quad_drag_quadratic_n_s2_m2": belief.quad_drag_quadratic_n_s2_m2,
     }
+
+
+def shapes_paths(table: AutopilotParameters, follows_shaped: bool) -> bool:
+    """Whether paths are shaped with these parameters; `follows_shaped`: it is worthwhile with the law."""
+    shaping = table["MIS_SHAPE"]
+    return shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
 
-from autopilot.supervisor.settings import shapes_paths
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
-from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
+from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters, shapes_paths
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from autopilot.supervisor.settings import shapes_paths
 from autopilot.trajectory.feasibility import VehicleLimits, Violation, check
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.parameters import autopilot_parameters, shapes_paths
 from gcs.errors import GcsError
 from gcs.foreign_mission import home_of
 from gcs.mission_files import load

@@ -21,6 +21,7 @@ from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE, GcsError, InputError
 from gcs.mission_files import load
+from gcs.workflows import flyable
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
@@ -252,3 +253,20 @@ def test_what_no_check_judges_is_not_set(setting: str) -> None:
     name = setting.partition("=")[0]
     with pytest.raises(InputError, match=f"--set {name}: must be a parameter of the autopilot"):
         check_mission("hover", "bebop", False, settings=[parse_setting(setting)])
+
+
+@pytest.mark.parametrize(
+    ("law", "shape", "shaped"),
+    [
+        *(("plumbline", None, True), ("plumbline", 0.0, False), ("plumbline", 2.0, True)),
+        *(("thesis", None, False), ("thesis", 1.0, False), ("thesis", 2.0, True)),
+    ],
+)
+def test_the_check_before_a_flight_follows_what_shapes_paths(
+    law: str, shape: float | None, shaped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(flyable, "check", lambda mission, limits, shaped: asked.append(shaped) or [])
+    settings = () if shape is None else (("MIS_SHAPE", shape),)
+    assert flyable.violations(load("hover"), "bebop", BEBOP_LIMITS, law == "plumbline", settings) == []
+    assert asked == [shaped]

@@ -10,7 +10,6 @@ import pytest
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.endpoint import REACHED_INTERVAL_US, REACHED_REPETITIONS
 from autopilot.services.identity import ARDUPILOT, PX4, Identity
-from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import (
     ACK_INTERVAL_US,
     ACK_REPETITIONS,
@@ -24,6 +23,7 @@ from autopilot.services.requests import ChangeAltitude, ReplaceMission, Repositi
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem, home_item, located_steps
+from autopilot.wire.items.limits import MAX_ITEMS
 
 LAT, LON = round(Home().latitude_deg * 1e7), round(Home().longitude_deg * 1e7)
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
