@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from math import degrees, inf, nextafter, radians
@@ -13,15 +14,22 @@ from typing import Any
 from missions.model import KINDS, Sine, Step, Term
 from missions.toml_files import FileError
 
+# an array of numbers, each on a line of its own
+_NUMBERS = re.compile(r"\[\n((?:\s*[-+.\de]+,\n)+)\s*\]")
+
 
 def write_toml(path: str | PathLike[str], table: Mapping[str, Any]) -> None:
     """Write these keys and values to a file and replace an existing one; FileError with the reason if not."""
     import tomli_w
 
     try:
-        Path(path).write_text(tomli_w.dumps(table), encoding="utf-8")
+        Path(path).write_text(_NUMBERS.sub(_in_a_line, tomli_w.dumps(table)), encoding="utf-8")
     except OSError as error:
         raise FileError([f"{path}: cannot be written: {error.strerror}"]) from None
+
+
+def _in_a_line(array: re.Match[str]) -> str:
+    return f"[{', '.join(array[1].replace(',', ' ').split())}]"
 
 
 def mission_table(
