@@ -14,6 +14,7 @@ from autopilot.guidance.legs import (
     Cruise,
     Hold,
     Leg,
+    PathResume,
     PathStretch,
     Reel,
     SignalRun,
@@ -124,7 +125,8 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
 def flies_requested_path(leg: Leg) -> bool:
     """Whether the setpoints of a leg are those of the path that was requested: of all legs except signals
     that were shaped."""
-    return not isinstance(leg, SignalRun) or len(leg.path.pieces) == 0
+    run = leg.run if isinstance(leg, PathResume) else leg
+    return not isinstance(run, SignalRun) or len(run.path.pieces) == 0
 
 
 def jets_ahead(legs: Sequence[Leg], times_s: Floats) -> Floats:

@@ -39,6 +39,40 @@ def _moved(anchor: Vec3, jet: Jet) -> Jet:
     return (add(anchor, x), v, a, j, s, c, p)
 
 
+def _at_pace(path: Jet, rates: tuple[float, ...]) -> Jet:
+    """The jet of y(sigma(t)) from that of y and the derivatives 1 ... 6 of sigma; Faa di Bruno's formula."""
+    a, b, c, d, e, f = rates
+    x, *y = path
+    weights: tuple[tuple[float, ...], ...] = (
+        (a,),
+        (b, a * a),
+        (c, 3.0 * a * b, a**3),
+        (d, 3.0 * b * b + 4.0 * a * c, 6.0 * a * a * b, a**4),
+        (
+            e,
+            10.0 * b * c + 5.0 * a * d,
+            15.0 * a * b * b + 10.0 * a * a * c,
+            10.0 * a**3 * b,
+            a**5,
+        ),
+        (
+            f,
+            10.0 * c * c + 15.0 * b * d + 6.0 * a * e,
+            15.0 * b**3 + 60.0 * a * b * c + 15.0 * a * a * d,
+            45.0 * a * a * b * b + 20.0 * a**3 * c,
+            15.0 * a**4 * b,
+            a**6,
+        ),
+    )
+    later = []
+    for row in weights:
+        total = ZERO
+        for weight, derivative in zip(row, y, strict=False):
+            total = axpy(weight, derivative, total)
+        later.append(total)
+    return (x, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
 @dataclass(frozen=True, slots=True)
 class Hold:
     """Stay at a point for `duration_s` (infinite: until another leg replaces this one)."""
@@ -159,7 +193,12 @@ class PathStop:
     @property
     def end(self) -> Vec3:
         """Where the motion ends."""
-        return self.leg.jet(self._time(self.stop_s))[0]
+        return self.leg.jet(self.end_s)[0]
+
+    @property
+    def end_s(self) -> float:
+        """Time in `leg` at which the motion ends."""
+        return self._time(self.stop_s)
 
     def _time(self, t: float) -> float:
         """sigma: 1 - s integrated term by term."""
@@ -170,41 +209,13 @@ class PathStop:
         return self.begin_s + gone * self.stop_s
 
     def jet(self, t: float) -> Jet:
-        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg; Faa di Bruno's formula."""
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
         t = t + self.elapsed_s
         if t >= self.stop_s:
             return _rest(self.end)
         t = max(t, 0.0)
-        a, b, c, d, e, f = (w[0] for w in transfer((1.0, 0.0, 0.0), ZERO, self.stop_s, t)[:6])
-        x, *y = self.leg.jet(self._time(t))
-        weights: tuple[tuple[float, ...], ...] = (
-            (a,),
-            (b, a * a),
-            (c, 3.0 * a * b, a**3),
-            (d, 3.0 * b * b + 4.0 * a * c, 6.0 * a * a * b, a**4),
-            (
-                e,
-                10.0 * b * c + 5.0 * a * d,
-                15.0 * a * b * b + 10.0 * a * a * c,
-                10.0 * a**3 * b,
-                a**5,
-            ),
-            (
-                f,
-                10.0 * c * c + 15.0 * b * d + 6.0 * a * e,
-                15.0 * b**3 + 60.0 * a * b * c + 15.0 * a * a * d,
-                45.0 * a * a * b * b + 20.0 * a**3 * c,
-                15.0 * a**4 * b,
-                a**6,
-            ),
-        )
-        later = []
-        for row in weights:
-            total = ZERO
-            for weight, derivative in zip(row, y, strict=False):
-                total = axpy(weight, derivative, total)
-            later.append(total)
-        return (x, later[0], later[1], later[2], later[3], later[4], later[5])
+        rates = tuple(w[0] for w in transfer((1.0, 0.0, 0.0), ZERO, self.stop_s, t)[:6])
+        return _at_pace(self.leg.jet(self._time(t)), rates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,6 +313,48 @@ class SignalRun:
     def requested(self, t: float) -> Jet:
         """The same for the requested path."""
         return _moved(self.anchor, self.path.requested(t - self.path.lead_s))
+
+
+@dataclass(frozen=True, slots=True)
+class PathResume:
+    """The rest of a run after a stop along it: the time of the run passes ever faster, and then as it should.
+
+    x(t) = y(sigma(t)), sigma' = s(t / start) with the s of `autopilot.trajectory.transfer`: every derivative
+    continues from rest without a jump, and no part of the path is flown faster than in the run.
+    """
+
+    run: SignalRun
+    begin_s: float  # time in `run` at which the load rests
+    start_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """Time to the end of the run: of the start, half is lost."""
+        return self.run.duration_s - self.begin_s + 0.5 * self.start_s
+
+    def run_time(self, t: float) -> float:
+        """sigma: the time in the run, `t` seconds into the leg."""
+        if t >= self.start_s:
+            return self.begin_s + t - 0.5 * self.start_s
+        u = max(t, 0.0) / self.start_s
+        gone = 0.0
+        for power, c in STEP_TERMS:
+            gone += c * u ** (power + 1) / (power + 1)
+        return self.begin_s + gone * self.start_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return self._started(self.run.jet(self.run_time(t)), t)
+
+    def requested(self, t: float) -> Jet:
+        """The same for the requested path."""
+        return self._started(self.run.requested(self.run_time(t)), t)
+
+    def _started(self, path: Jet, t: float) -> Jet:
+        if t >= self.start_s:
+            return path
+        return _at_pace(path, tuple(w[0] for w in transfer(ZERO, (1.0, 0.0, 0.0), self.start_s, t)[:6]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,6 +466,7 @@ Leg = (
     | Creep
     | Reel
     | SignalRun
+    | PathResume
     | PathStretch
     | Swing
     | SwingDamping
@@ -424,7 +478,7 @@ Leg = (
 
 def requested_jet(leg: Leg, t: float) -> Jet:
     """The requested motion where the leg flies a shaped one; otherwise the motion that it flies."""
-    return leg.requested(t) if isinstance(leg, SignalRun) else leg.jet(t)
+    return leg.requested(t) if isinstance(leg, SignalRun | PathResume) else leg.jet(t)
 
 
 def brake_leg(

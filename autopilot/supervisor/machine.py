@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import inf
 
 from autopilot.guidance.legs import Creep, Leg
-from autopilot.supervisor.motion import damping_leg, tracks_attitude, with_control_modes
+from autopilot.supervisor.motion import damping_leg, stopped_run_of, tracks_attitude, with_control_modes
 from autopilot.supervisor.phase_legs import ENTRY_LEGS
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -63,6 +63,9 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
         legs = (damping_leg(flight.legs[0], view, settings, ends_step=False),)
     else:
         legs = ENTRY_LEGS[phase](flight, view, settings) if phase in ENTRY_LEGS else ()
+    if flight.phase == Phase.MISSION and phase != Phase.MISSION:
+        stopped_run = stopped_run_of(flight, view, settings) or flight.mission.stopped_run
+        flight = replace(flight, mission=replace(flight.mission, stopped_run=stopped_run))
     entered = replace(
         flight,
         phase=phase,
@@ -96,6 +99,8 @@ def _reset_on_disarm(flight: Flight) -> Flight:
         action_when_armed=ActionWhenArmed.NOTHING,
         heading=flight.heading.at_rest(),
         rotors_lost=0,  # whether they turn is detected after the next start
-        mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
+        mission=replace(
+            flight.mission, active=False, waiting=False, step=0, step_anchor=None, stopped_run=None
+        ),
         cable=replace(flight.cable, reel_target_m=None, failed_lifts=0, slack_step=-1),
     )

@@ -60,7 +60,7 @@ def with_current_step(flight: Flight, step: int) -> Flight:
     """The flight with another step of the mission as the present one, not begun yet."""
     return replace(
         flight,
-        mission=replace(flight.mission, step=step, step_anchor=None, final_item=None),
+        mission=replace(flight.mission, step=step, step_anchor=None, stopped_run=None, final_item=None),
         cable=replace(flight.cable, reel_target_m=None),
     )
 

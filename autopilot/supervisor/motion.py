@@ -12,6 +12,9 @@ from autopilot.guidance.legs import (
     QUAD_POSITION,
     Leg,
     LevelHold,
+    PathResume,
+    PathStop,
+    SignalRun,
     Swing,
     SwingDamping,
     brake_leg,
@@ -111,6 +114,24 @@ def stopping_legs(flight: Flight, view: View, settings: Settings) -> tuple[tuple
         )
         brake = brake_leg(x, v, a, accel, min_duration_s)
     return (brake,), brake.end
+
+
+def stopped_run_of(flight: Flight, view: View, settings: Settings) -> PathResume | None:
+    """How the signals or trajectory that are flown continue after the stop of `stopping_legs`; None if there
+    are none, or they have ended."""
+    leg = flight.legs[0] if flight.legs else None
+    if not isinstance(leg, SignalRun | PathResume | PathStop):
+        return None
+    stopping, _ = stopping_legs(flight, view, settings)
+    stop = stopping[0] if stopping and isinstance(stopping[0], PathStop) else None
+    path, at_s = (leg, leg_time_s(flight, view.now_us)) if stop is None else (stop.leg, stop.end_s)
+    if isinstance(path, PathResume):
+        at_s = path.run_time(at_s)
+        path = path.run
+    if not isinstance(path, SignalRun) or at_s >= path.duration_s:
+        return None
+    start_s = settings.min_move_s if stop is None else stop.stop_s
+    return PathResume(path, at_s, min(start_s, 2.0 * (path.duration_s - at_s)))
 
 
 def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, min_duration_s: float = 0.0) -> Leg:

@@ -198,12 +198,12 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     step = flight.mission.plan.steps[flight.mission.step]
     legs, here = stopping_legs(flight, view, settings)
-    anchor = flight.mission.step_anchor
+    run = flight.mission.stopped_run if isinstance(step, LoadPath) else None
+    # signals and trajectories continue where they stopped; an attitude run is flown again from where it began
+    anchor = flight.mission.step_anchor if run is None else run.jet(0.0)[0]
     if anchor is not None and isinstance(step, LoadPath | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
-        # a step that is resumed after a pause is flown again from where it began
-        back = carry(here, anchor, flight.mission.speed_m_s, settings)
-        return (*legs, back, *step_legs(step, anchor, flight, settings))
-    return (*legs, *step_legs(step, here, flight, settings))
+        legs, here = (*legs, carry(here, anchor, flight.mission.speed_m_s, settings)), anchor
+    return (*legs, *(step_legs(step, here, flight, settings) if run is None else (run,)))
 
 
 ENTRY_LEGS: dict[Phase, Callable[[Flight, View, Settings], tuple[Leg, ...]]] = {

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
 from autopilot.guidance.heading import HEADING_EAST, Heading
-from autopilot.guidance.legs import Leg
+from autopilot.guidance.legs import Leg, PathResume
 from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle, FollowLimits, SetpointStream
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
@@ -146,6 +146,7 @@ class MissionProgress:
     waiting: bool = False  # begins when its paths are prepared
     final_item: int | None = None  # of a mission that is complete: the item that it ended with
     step_anchor: Vec3 | None = None  # where the present step began
+    stopped_run: PathResume | None = None  # how signals or a trajectory continue that were interrupted
     takeoff_altitude_m: float = 0.0
     speed_m_s: float = 0.0  # of transfers
 

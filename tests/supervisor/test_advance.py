@@ -11,7 +11,16 @@ from typing import Any
 import pytest
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import LOAD_POSITION, Brake, Creep, Hold, SignalRun, Swing, SwingDamping
+from autopilot.guidance.legs import (
+    LOAD_POSITION,
+    Brake,
+    Creep,
+    Hold,
+    PathResume,
+    SignalRun,
+    Swing,
+    SwingDamping,
+)
 from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
 from autopilot.onboard.snapshot import flight_status
 from autopilot.services.requests import (
@@ -45,7 +54,18 @@ from autopilot.supervisor.state import (
 from autopilot.trajectory.slack_cable import tauten_duration_s
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
-from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    LoadPath,
+    Signals,
+    Sine,
+    Speed,
+    Takeoff,
+    Term,
+    Trajectory,
+    Waypoint,
+)
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, hanging, view
 
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
@@ -256,21 +276,48 @@ def test_a_pause_in_any_step_stops_and_continuing_finishes_the_mission(step: int
     assert sky.reached == list(sky.flight.mission.plan.sequence)
 
 
-def test_signals_begin_again_from_their_anchor_after_a_pause() -> None:
-    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), SIGNALS, model.Land())
+TRAJECTORY = Trajectory([(0.0,) * 4, (2.0, 1.0, 0.5, 0.2), (4.0, 0.5, 1.0, 0.0), (7.0, 0.0, 0.0, 0.1)])
+
+
+@pytest.mark.parametrize("path", [SIGNALS, TRAJECTORY])
+@pytest.mark.parametrize("away", [False, True])
+def test_a_path_that_is_paused_continues_where_it_stopped(path: LoadPath, away: bool) -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), path, model.Land())
     sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], SignalRun))
     run = sky.flight.legs[0]
     assert isinstance(run, SignalRun)
     sky.wait(1.2)
+    for _ in range(2):  # once more while it is resumed
+        sky.ask(Pause())
+        sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+        place = sky.view.x_load
+        if away:
+            assert sky.ask(Reposition(3.0, 3.0, 3.0, True)).result == ACCEPTED
+            sky.wait(9.0)
+        assert sky.ask(Continue()).result == ACCEPTED
+        sky.run(lambda s: isinstance(s.flight.legs[0], PathResume))
+        assert sky.view.x_load == pytest.approx(place, abs=1e-3)
+        sky.wait(0.9)
+    resumed = sky.flight.legs[0]
+    assert isinstance(resumed, PathResume)
+    assert resumed.run == run
+    assert resumed.begin_s > 1.2
+    sky.run(lambda s: s.flight.mission.step == 3)
+    assert sky.view.x_load == pytest.approx(run.jet(run.duration_s)[0], abs=1e-3)
+    assert sky.flight.mission.stopped_run is None
+
+
+def test_a_path_that_is_chosen_anew_after_a_pause_begins_anew() -> None:
+    sky = start(Takeoff(2.0), SIGNALS, model.Land())
+    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], SignalRun))
+    sky.wait(1.2)
     sky.ask(Pause())
     sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
-    assert norm(sub(sky.view.x_load, run.anchor)) > 0.01, "paused somewhere else"
+    place = sky.view.x_load
+    assert sky.ask(SetCurrent(sky.flight.mission.plan.sequence[1])).result == ACCEPTED
     sky.ask(Continue())
     sky.run(lambda s: isinstance(s.flight.legs[0], SignalRun))
-    again = sky.flight.legs[0]
-    assert isinstance(again, SignalRun)
-    assert again.anchor == pytest.approx(run.anchor, abs=1e-9)
-    assert sky.view.x_load == pytest.approx(run.anchor, abs=1e-3)
+    assert sky.flight.legs[0].anchor == pytest.approx(place, abs=1e-3)
 
 
 def test_two_attitude_runs_follow_each_other_without_a_stop_and_the_last_is_calmed() -> None:

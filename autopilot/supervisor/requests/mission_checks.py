@@ -90,7 +90,7 @@ def remaining_timeline(flight: Flight, view: View, settings: Settings) -> Remain
         here = stopping_legs(flight, view, settings)[1]
         length = cable_length_at(flight, here, settings)
         if mission.step_anchor is not None and isinstance(steps[0], LoadPath | AttitudeRun):
-            here = mission.step_anchor  # flown again from where it began
+            here = mission.step_anchor  # its path counts from where it began
         if cable.reel_target_m is not None and isinstance(steps[0], Winch):  # resumed
             steps = (replace(steps[0], length_m=cable.reel_target_m - length), *steps[1:])
         start = MissionState(here, cable_m=length, released=cable.released)

@@ -112,7 +112,7 @@ duration_s = 5.0
 
 [[items.terms]]
 axis = "y"
-amplitude_m = 0.4
+amplitude_m = 0.297
 rise_s = 1.5
 hold_s = 1.0
 fall_s = 1.5
@@ -122,7 +122,8 @@ fall_s = 1.5
 
 @pytest.fixture(scope="session")
 def swung(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """0.4 m to the north and back: a path that no check before the flight examines."""
+    """To the north and back, 3 mm before a fence at 0.3 m: within it for the check before the flight, but not
+    for the supervisor, which extends the way to a stop."""
     path: Path = tmp_path_factory.mktemp("missions") / "swung.toml"
     waypoint = SHORT[SHORT.index('[[items]]\ntype = "waypoint"') : SHORT.index('[[items]]\ntype = "land"')]
     path.write_text(SHORT.replace(waypoint, SWING.lstrip()), encoding="utf-8")
