@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from itertools import groupby
+from math import ceil, inf, isfinite
 from typing import Any
 
 from autopilot.wire.convert.axes import ned_from_enu
@@ -15,6 +16,8 @@ _POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: "inclusion",
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: "exclusion",
 }
+_POINT = mavlink.PLUMBLINE_LOAD_TRAJECTORY_POINT
+_MAX_POINTS = 200  # of trajectories that are drawn; each has a mark
 _POSITION_COMMANDS = {
     mavlink.MAV_CMD_NAV_TAKEOFF,
     mavlink.MAV_CMD_NAV_WAYPOINT,
@@ -67,20 +70,38 @@ def rally_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
 
 
 def waypoints_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
-    """The positions that a mission specifies, in order, beginning with home; not the path between them."""
+    """The positions that a mission specifies, in order, beginning with home; not the path between them. The
+    points of a trajectory count from the position before it; of many, some are left out."""
     places: list[list[float]] = [[0.0, 0.0, 0.0]]
-    for item in items:
-        if (
-            item.command not in _POSITION_COMMANDS
-            or item.frame not in _HEIGHT_ABOVE_HOME
-            or not -inf < item.z < inf
-        ):
+    for is_trajectory, found in groupby(items, lambda item: item.command == _POINT):
+        if is_trajectory:
+            places += _trajectory_points(list(found), places[-1])
             continue
-        north, east = _north_east(item, home) if item.x or item.y else places[-1][:2]
-        ground = 0.0 if _HEIGHT_ABOVE_HOME[item.frame] else home.altitude_m
-        height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else item.z - ground
-        places.append([north, east, round(-height, 3)])
+        for item in found:
+            if (
+                item.command not in _POSITION_COMMANDS
+                or item.frame not in _HEIGHT_ABOVE_HOME
+                or not -inf < item.z < inf
+            ):
+                continue
+            north, east = _north_east(item, home) if item.x or item.y else places[-1][:2]
+            ground = 0.0 if _HEIGHT_ABOVE_HOME[item.frame] else home.altitude_m
+            height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else item.z - ground
+            places.append([north, east, round(-height, 3)])
     return places if len(places) > 1 else []
+
+
+def _trajectory_points(items: Sequence[WireItem], begin: list[float]) -> list[list[float]]:
+    """Places along trajectories in a row, the first of which begins at `begin`."""
+    places = [begin]
+    for item in items:
+        point = (item.param1, item.param2, item.param3)
+        if item.x == 0:
+            begin = places[-1]
+        elif all(map(isfinite, point)):
+            places.append([round(a + b, 3) for a, b in zip(begin, point, strict=True)])
+    every = ceil(len(places) / _MAX_POINTS)
+    return [*places[1:-1:every], places[-1]] if len(places) > 1 else []
 
 
 def _north_east(item: WireItem, home: Home) -> list[float]:
