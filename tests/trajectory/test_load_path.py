@@ -8,7 +8,7 @@ from scipy.interpolate import make_interp_spline
 
 from autopilot.trajectory.feasibility import VehicleLimits, check, paths
 from autopilot.trajectory.load_path import evaluate_load_path, path_joints, path_tables, slower_step
-from autopilot.trajectory.prepare import REFUSE, SLOW_DOWN, shaped_path
+from autopilot.trajectory.prepare import shaped_path
 from autopilot.trajectory.timeline import MissionState, state_after, timeline
 from autopilot.vehicle.file import load_vehicle
 from missions.model import Land, Mission, Signals, Sine, Takeoff, Term, Trajectory
@@ -63,17 +63,14 @@ def test_it_ends_at_its_last_point_at_rest() -> None:
     assert path_joints(LOOP) == ()
 
 
-def test_a_gentle_one_is_flown_nearly_as_asked_and_a_hasty_one_slower() -> None:
+def test_a_gentle_one_is_flown_nearly_as_asked_and_a_hasty_one_is_refused() -> None:
     limits = LIMITS.shaping
     gentle = shaped_path(LOOP, limits)
     assert gentle.problem == ""
     assert gentle.path.distance_m < 2e-3  # beside the jumps of acceleration at its ends
     assert gentle.path.duration_s == LOOP.duration_s
-    hasty = slower_step(LOOP, 0.25)
-    assert "it exceeds" in shaped_path(hasty, limits._replace(when_infeasible=REFUSE)).problem
-    slowed = shaped_path(hasty, limits._replace(when_infeasible=SLOW_DOWN))
-    assert slowed.problem == ""
-    assert 1.0 < slowed.path.duration_factor < 4.0
+    hasty = Trajectory([(0.0,) * 4, (0.25, 0.16, 0.0, 0.0), (0.75, 1.44, 0.0, 0.0), (1.0, 1.6, 0.0, 0.0)])
+    assert "it exceeds the bounds of rotors" in shaped_path(hasty, limits).problem
 
 
 def test_the_check_says_what_is_wrong_with_a_trajectory() -> None:
