@@ -44,7 +44,6 @@ from gcs.closed_loop import Conditions
 from gcs.formats.missions import write_foreign
 from gcs.mission_files import load
 from gcs.recorded.column_map import MAPS, ColumnMap
-from gcs.shell.link import free_port
 from gcs.sweep import plan as plans
 from gcs.sweep.flight import fly as fly_swept
 from gcs.sweep.flight import start_times
@@ -57,6 +56,7 @@ from plumbline import Land, Mission, Takeoff, Waypoint
 from plumbline.frames import as_frame
 from sitl.sensors.files import parse_profile
 from tests.doubles.pages import PAGES, REASONS, ROOT, Block, split
+from tests.doubles.ports import ground_port
 from tests.gcs.conftest import LiveVehicle, ScriptedVehicle
 
 LANGUAGES = {"sh", "python", "toml", "yaml", "text"}
@@ -181,7 +181,7 @@ class Telling(ScriptedVehicle):
 @pytest.fixture(scope="module")
 def vehicle() -> Iterator[str]:
     """The port of a running vehicle that obeys commands and has the parameters of our autopilot."""
-    port = free_port()
+    port = ground_port()
     thread = LiveVehicle(port)
     thread.vehicle = Telling()
     thread.vehicle.HEARTBEAT_US = 50_000

@@ -16,7 +16,7 @@ import pytest
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
-from gcs.shell.link import free_port
+from tests.doubles.ports import ground_port
 
 TICK_US = 20_000
 PX4_HOLD = 0x03040000
@@ -389,7 +389,7 @@ class LiveVehicle(threading.Thread):
 @pytest.fixture
 def live() -> Iterator[tuple[ScriptedVehicle, str]]:
     """A running vehicle, and the port to which it sends."""
-    port = free_port()
+    port = ground_port()
     thread = LiveVehicle(port)
     thread.vehicle.HEARTBEAT_US = 50_000
     thread.start()

@@ -17,6 +17,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.shell.link import UdpSocket, free_port
 from plumbline import Land, Mission, Takeoff, Waypoint
 from tests.doubles.pages import ROOT, split
+from tests.doubles.ports import ground_port
 
 pytestmark = pytest.mark.processes
 
@@ -35,7 +36,8 @@ def test_the_script_of_docs_python_md_flies(start: Callable[..., Any]) -> None:
 def running(start: Callable[..., Any]) -> tuple[str, Any]:
     """Start a simulator and an autopilot on free ports, and wait until it flies; return its address and the
     autopilot."""
-    simulator, truth, port = (f"127.0.0.1:{free_port()}" for _ in range(3))
+    ports = free_port(), free_port(), ground_port()
+    simulator, truth, port = (f"127.0.0.1:{port}" for port in ports)
     start("sitl", "--listen", simulator, "--truth", truth, "--speed", "20", "--sensors", "ideal")
     words = ("--sim", simulator, "--gcs", port, "--api", "none", "--storage", "storage")
     autopilot = start("autopilot", *words)

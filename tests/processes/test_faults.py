@@ -16,6 +16,7 @@ import pytest
 from gcs.shell.link import LOOPBACK, free_port, parse_address
 from gcs.shell.session import Session
 from gcs.workflows.status import status_record
+from tests.doubles.ports import ground_port
 
 if TYPE_CHECKING:
     from click.testing import Result
@@ -42,7 +43,8 @@ class Flight:
 
     def __init__(self, start: Start, command: Command, storage: Path, *options: str) -> None:
         self._start, self._command, self._storage, self._options = start, command, storage, options
-        self._sim, self._truth, self.ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
+        ports = free_port(), free_port(), ground_port()
+        self._sim, self._truth, self.ground = (f"{LOOPBACK}:{port}" for port in ports)
         self.sitl = self.begin_sitl()
         self.autopilot = self.begin_autopilot()
 

@@ -18,6 +18,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
 from gcs.shell.link import LOOPBACK, free_port
+from tests.doubles.ports import ground_port
 
 if TYPE_CHECKING:
     from conftest import Program
@@ -38,7 +39,7 @@ def port(start: Start, tmp_path: Path) -> str:
 
 def vehicle(start: Start, tmp_path: Path, *options: str) -> str:
     """Start a vehicle and wait until it flies with its simulator; return its port."""
-    sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
+    sim, truth, ground = (f"{LOOPBACK}:{port}" for port in (free_port(), free_port(), ground_port()))
     logs = tmp_path / "storage" / "card" / "log"
     logs.mkdir(parents=True)
     (logs / "2026-01-01_00-00-00.ulg").write_bytes(LOG)

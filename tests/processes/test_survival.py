@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from gcs.shell.link import LOOPBACK, free_port
+from tests.doubles.ports import ground_port
 
 if TYPE_CHECKING:
     from click.testing import Result
@@ -32,7 +33,7 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(
     start: Start, command: Command, tmp_path: Path
 ) -> None:
     """As by kill -9 in the middle of a mission."""
-    sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
+    sim, truth, ground = (f"{LOOPBACK}:{port}" for port in (free_port(), free_port(), ground_port()))
     storage = str(tmp_path / "storage")
 
     def autopilot() -> Program:
