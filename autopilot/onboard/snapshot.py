@@ -58,8 +58,8 @@ from autopilot.supervisor.state import (
     Phase,
     SetpointSource,
     View,
+    has_fence,
 )
-from autopilot.supervisor.watches.fence import has_fence
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.convert.battery import NO_READING, BatteryReading
 from autopilot.wire.convert.geodesy import Home

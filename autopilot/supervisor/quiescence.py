@@ -38,11 +38,12 @@ from autopilot.supervisor.state import (
     ActionWhenArmed,
     Flight,
     Phase,
+    has_fence,
     leg_time_s,
     needs_load_estimate,
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, TAUT_PULL_SHARE
-from autopilot.supervisor.watches.fence import NO_ACTION, has_fence
+from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LIFT_OFF_US, MIN_GAP
 from autopilot.supervisor.watches.tautening import give_up_us, last_setpoint_height, max_load_offset

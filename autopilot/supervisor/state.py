@@ -319,6 +319,12 @@ def fence_violation(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     return fence.violation(x_load[0], x_load[1])
 
 
+def has_fence(flight: Flight, settings: Settings) -> bool:
+    """Whether there is a fence, in force or not: zones that were uploaded, or limits by parameters."""
+    limits = settings.fence
+    return bool(flight.area.fence.zones) or limits.radius_m > 0.0 or limits.height_m > 0.0
+
+
 def is_fence_active(flight: Flight, settings: Settings) -> bool:
     """Whether the fence is in force: GF_ACTION names a reaction to a breach, and it is not switched off."""
     return settings.fence.action != 0 and flight.area.fence_enabled

@@ -196,13 +196,15 @@ def truth_option(function: F) -> F:
 
 def pictures_option(function: F) -> F:
     """--pictures, --pictures-pdf and --pictures-svg of every command that writes a report: the format."""
-    help_texts = {
-        "--pictures": "Draw track.png, position.png, error.png and the other pictures too (docs/report.md).",
-        "--pictures-pdf": "Draw all pictures as PDF, for papers.",
-        "--pictures-svg": "Draw all pictures as SVG.",
-    }
-    for option, help_text in reversed(help_texts.items()):
-        picture_format = option.removeprefix("--pictures").lstrip("-") or "png"
+    for picture_format, option, help_text in (
+        ("svg", "--pictures-svg", "Draw all pictures as SVG."),
+        ("pdf", "--pictures-pdf", "Draw all pictures as PDF, for papers."),
+        (
+            "png",
+            "--pictures",
+            "Draw track.png, position.png, error.png and the other pictures too (docs/report.md).",
+        ),
+    ):
         function = click.option(option, "pictures", flag_value=picture_format, help=help_text)(function)
     return function
 

@@ -69,11 +69,10 @@ def build_report(
     else:
         delete_report(out_dir)
 
-    pictures = PICTURES[:1]  # the page contains it
+    pictures = list(PICTURES[:1])  # the page contains it
     if picture_format is not None:
-        drawn = {picture.file for picture in pictures}
-        wanted = [picture.as_format(picture_format) for picture in PICTURES]
-        pictures += tuple(picture for picture in wanted if picture.file not in drawn)
+        wanted = (picture.as_format(picture_format) for picture in PICTURES)
+        pictures += (picture for picture in wanted if picture.file != pictures[0].file)
     remaining = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
     total = len(remaining)
 

@@ -19,7 +19,7 @@ from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.mission_checks import forbidden_rally_text
 from autopilot.supervisor.requests.verdicts import ACCEPTED
 from autopilot.supervisor.settings import Settings, settings_from
-from autopilot.supervisor.state import Area, Flight, MissionPlan, View
+from autopilot.supervisor.state import Area, Flight, MissionPlan, View, has_fence
 from autopilot.trajectory.prepare import UNPREPARED, prepare
 from autopilot.trajectory.route import Planner
 from autopilot.vehicle.parameters import AutopilotParameters
@@ -56,9 +56,9 @@ def ask_supervisor(
     settings = settings_from(table, ramp_lag_s=0.0, supports_reeling=True, follows_shaped=shaped)
     located = tuple(located_steps(items, home))
     steps, sequence = tuple(one.step for one in located), tuple(one.last for one in located)
-    prepared = UNPREPARED
-    if area.fence.zones or settings.fence.radius_m or settings.fence.height_m:  # may forbid a curve
-        prepared = prepare(steps, sequence, settings.limits, planner=planner)
+    fenced = has_fence(Flight(area=area), settings)
+    # a fence may forbid a curve
+    prepared = prepare(steps, sequence, settings.limits, planner=planner) if fenced else UNPREPARED
     count = len(items)
     flight = with_plan(Flight(area=area), MissionPlan(steps, sequence, count, prepared))
 
@@ -76,14 +76,14 @@ def ask_supervisor(
         *islice(refusals(flight, settings, *of_mission), 1),
     )
     warnings = [forbidden_rally_text(flight, settings)]
-    if not found and settings.fence.action:
+    if not found and fenced and settings.fence.action:
         margin_m = (
             _FENCE_MARGIN_M + settings.cable_length_m * settings.limits.accel_m_s2 / table["VEH_GRAVITY"]
         )
-        nearer = (refusals(*fenced, *of_mission) for fenced in _nearer_fences(flight, settings, margin_m))
-        near, leads, _ = next(chain.from_iterable(nearer), "").partition(" leads ")
+        nearer = (refusals(*near, *of_mission) for near in _nearer_fences(flight, settings, margin_m))
+        way, leads, _ = next(chain.from_iterable(nearer), "").partition(" leads ")
         if leads:
-            way = near.removeprefix("Mission denied: ")
+            way = way.removeprefix("Mission denied: ")
             warnings.append(
                 f"{way} leads within {margin_m:.1f} m of the fence: wind, or the vehicle that swings the "
                 "load, may breach it, which interrupts the flight (GF_ACTION)"

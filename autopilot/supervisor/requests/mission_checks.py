@@ -21,6 +21,7 @@ from autopilot.supervisor.state import (
     View,
     fence_problem,
     first_fence_violation,
+    has_fence,
     is_fence_active,
     load_position_below,
 )
@@ -149,10 +150,10 @@ def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
 def fence_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which item leads beyond the fence, and why; an empty string if none does.
 
-    This checks the straight ways to take-off height, to waypoints and home, and the places at which signals
-    and the winch leave the load; signals are watched in flight, and for curves there is `curve_exit_problem`.
+    This checks the straight ways to take-off height, to waypoints and home, the paths of signals and
+    trajectories, and the place at which the winch leaves the load; for curves there is `curve_exit_problem`.
     """
-    if not is_fence_active(flight, settings):
+    if not (is_fence_active(flight, settings) and has_fence(flight, settings)):
         return ""
     for seq, entry in ahead:
         reason = _violation_of_step(flight, entry, settings)
@@ -211,7 +212,7 @@ def _first_violation(flight: Flight, entry: TimelineEntry, places: Iterable[Vec3
 def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
     """Which item is reached on a curve through waypoints that leads beyond the fence, and why; an empty
     string if none is, or if the curves are not prepared yet."""
-    if not is_fence_active(flight, settings):
+    if not (is_fence_active(flight, settings) and has_fence(flight, settings)):
         return ""
     mission = flight.mission
     paths = mission.plan.prepared.paths[mission.step :]

@@ -15,6 +15,7 @@ from autopilot.supervisor.state import (
     Flight,
     View,
     first_fence_violation,
+    has_fence,
     interrupt_mission,
     is_fence_active,
     load_position_below,
@@ -26,12 +27,6 @@ from autopilot.supervisor.watches.watch_result import WatchResult
 NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
 FENCE_EVENTS = {2: (Event.HOLD, "holding"), 3: (Event.RETURN, "returning"), 5: (Event.LAND, "landing")}
 STOP_MARGIN = 0.05  # share by which the stopping distance is extended: while the load speeds up, it grows
-
-
-def has_fence(flight: Flight, settings: Settings) -> bool:
-    """Whether there is a fence, in force or not: zones that were uploaded, or limits by parameters."""
-    limits = settings.fence
-    return bool(flight.area.fence.zones) or limits.radius_m > 0.0 or limits.height_m > 0.0
 
 
 def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
