@@ -49,9 +49,9 @@ def sweep(
     vary: Mapping[str, Values] | Mapping[str | tuple[str, ...], Values] | None = None,
     seeds: int | Iterable[int] = 1,
     sample: int | None = None,
-    laws: Sequence[str] = (DEFAULT_LAW,),
-    estimator: str | None = None,
-    planner: str | None = None,
+    laws: Sequence[str | type] = (DEFAULT_LAW,),
+    estimator: str | type | None = None,
+    planner: str | type | None = None,
     sensors: str | Path | Sensors = "lab",
     vehicle: str | Path | Vehicle = "bebop",
     settings: Mapping[str, float] | None = None,
@@ -74,10 +74,11 @@ def sweep(
     `seeds`: a number N for the seeds 1 ... N, or a range or list of seeds, as `range(11, 21)` or `[3, 7]`.
     `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
     of the vehicle's clock; by default one and a half times the expected duration plus a minute.
-    `estimator` and `planner`: a custom one for all flights, as `FILE.py:CLASS`. `jobs`: number of flights at
-    the same time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client,
-    that flies them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from
-    which an interrupted sweep continues, or one with more seeds or values; by default nothing is kept.
+    `laws`: names, `FILE.py:CLASS`, or classes (docs/laws.md). `estimator` and `planner`: a custom one for all
+    flights, given in the same ways. `jobs`: number of flights at the same time, by default one per core;
+    `scheduler`: the address of a Dask scheduler, or a Dask client, that flies them instead. `out`: the
+    directory in which table and page are kept (docs/cli.md), and from which an interrupted sweep continues,
+    or one with more seeds or values; by default nothing is kept.
     `fresh=True` discards flights that are there already, also those of another sweep. `quiet=False` shows
     progress on stderr. A parameter that has no effect in any flight causes a warning.
 
@@ -92,6 +93,7 @@ def sweep(
             out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
             arguments += ["--table-only"]  # the page would be deleted with the folder
         folder = file_path("out", out)
+        classes = folder / "classes"
         arguments += [
             name_or_path("mission", mission),
             "--seeds",
@@ -100,7 +102,7 @@ def sweep(
         conditions = _Conditions(
             name_or_path("vehicle", vehicle),
             name_or_path("sensors", sensors),
-            [law_reference(law) for law in _laws(laws)],
+            [law_reference(law, classes) for law in _laws(laws)],
             setting_arguments(settings),
             _varied(vary),
         )
@@ -112,7 +114,9 @@ def sweep(
         ):
             for value in values:
                 arguments += [option, value]
-        arguments += own_part_options(estimator_reference(estimator), planner_reference(planner))
+        arguments += own_part_options(
+            estimator_reference(estimator, classes), planner_reference(planner, classes)
+        )
         if sample is not None:
             arguments += ["--sample", str(whole_number("sample", sample, 1))]
         if timeout_s is not None:
@@ -199,7 +203,7 @@ def _seeds(seeds: Any) -> str:
     return seeds_text([whole_number(f"seeds[{i}]", one, 0, MAX_SEED) for i, one in enumerate(listed)])
 
 
-def _laws(laws: Sequence[str]) -> Sequence[str]:
+def _laws(laws: Sequence[str | type]) -> Sequence[str | type]:
     wanted = f"a list of laws, as [{DEFAULT_LAW!r}]"
     if not (found := items("laws", laws, wanted)):
         raise GcsError(f"laws = {laws!r}; must be {wanted}")

@@ -3,6 +3,7 @@
 my_law.py:MyLaw       the class of a file; `:MyLaw` may be left out if the file has only one such class
 package.module:MyLaw  the class of a module
 my-law                an entry point, of the group that the caller names
+my_law.pkl            a class that was saved by `autopilot.own.saved_class`
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ import hashlib
 import re
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 from autopilot.own.interruption import is_interruption
+from autopilot.own.saved_class import SUFFIX, load_class, saved_file
 from missions.nearest import did_you_mean
 from missions.toml_files import other_kind_hint
 
@@ -28,6 +31,8 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _MAX_ERROR_CHARS = 120  # most characters of an error that are reported
 _MAX_COMPILER_CHARS = 240  # the same for errors of the compiler, which name types before the reason
 _loading: list[Path] = []  # files of custom classes that are being loaded; the last one's code runs now
+_loaded: dict[str, _Loaded] = {}  # by the name of the module
+_local_classes: dict[str, type] = {}  # of this process, by their references
 
 
 class OwnError(ValueError):
@@ -42,7 +47,11 @@ def find_class(
 
     OwnError if there is no such file, module, class or entry point, or if its module cannot be loaded.
     """
+    if reference in _local_classes:
+        return _local_classes[reference]
     location, _, name = reference.rpartition(":") if ":" in reference else (reference, "", "")
+    if reference.endswith(SUFFIX):
+        return _saved_class(reference)
     if location.endswith(".py"):
         module, label = _module_from_file(location), location
     elif ":" in reference:
@@ -73,6 +82,23 @@ def find_class(
     return found
 
 
+def local_reference(kind: type) -> str:
+    """A reference by which this process finds a class that no module has under its name."""
+    reference = f"{kind.__module__}:{kind.__qualname__}"
+    _local_classes[reference] = kind
+    return reference
+
+
+def _saved_class(location: str) -> type:
+    path = Path(location).expanduser()
+    if not path.is_file():
+        raise OwnError(f"{location}: no such file")
+    try:
+        return load_class(path)
+    except BaseException as error:
+        raise OwnError(f"{location}: {error_text(error, None, path.name)}") from error
+
+
 def _example_names(role: str) -> tuple[str, str]:
     """Names of a file and of a class in it, for messages about a kind of class."""
     word = role.rpartition(" ")[2]
@@ -93,17 +119,41 @@ def _is_same_file(first: str | None, second: Path) -> bool:
     return first is not None and Path(first).is_file() and second.samefile(first)
 
 
+class _Loaded(NamedTuple):
+    """The module of a custom class's file, and the modules beside it that it imports, with their files."""
+
+    module: ModuleType
+    beside: dict[str, Path]
+    digest: str  # of these files when they were loaded
+
+
 def _load_module(path: Path, label: str) -> ModuleType:
-    # named by its content, so that a changed file is another module. It must be in `sys.modules` under its
-    # name, by which records resolve their annotations
-    name = f"{path.stem}_{hashlib.sha256(str(path).encode() + path.read_bytes()).hexdigest()[:12]}"
-    if name in sys.modules:
-        return sys.modules[name]
+    # named by its content, so that a changed file is another module
+    name = f"{path.stem}_{_digest_of([path], str(path))}"
+    if (loaded := _loaded.pop(name, None)) is not None:
+        if _digest_of(loaded.beside.values()) == loaded.digest:
+            _loaded[name] = loaded
+            return loaded.module
+        for outdated in (name, *loaded.beside):
+            sys.modules.pop(outdated, None)
+    of_others = {one for loaded in _loaded.values() for one in loaded.beside}
+    before = set(sys.modules) - of_others
+    module = _run_module(path, name, label)
+    beside = {
+        one: file
+        for one in set(sys.modules) - before - {name}
+        if (file := _file_of(one)) is not None and _is_beside(path, str(file))
+    }
+    _loaded[name] = _Loaded(module, beside, _digest_of(beside.values()))
+    return module
+
+
+def _run_module(path: Path, name: str, label: str) -> ModuleType:
     spec = spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise OwnError(f"{label}: is no Python file")
     module = module_from_spec(spec)
-    sys.modules[name] = module
+    sys.modules[name] = module  # under its name, by which records resolve their annotations
     folder = str(path.parent)
     sys.path.insert(0, folder)  # files beside it can be imported
     _loading.append(path)
@@ -117,6 +167,18 @@ def _load_module(path: Path, label: str) -> ModuleType:
         if folder in sys.path:
             sys.path.remove(folder)
     return module
+
+
+def _digest_of(files: Iterable[Path], text: str = "") -> str:
+    digest = hashlib.sha256(text.encode())
+    for file in sorted(files):
+        digest.update(file.read_bytes() if file.is_file() else b"")
+    return digest.hexdigest()[:12]
+
+
+def _file_of(module: str) -> Path | None:
+    location = getattr(sys.modules.get(module), "__file__", None)
+    return Path(location) if location else None
 
 
 def file_being_loaded() -> Path | None:
@@ -156,10 +218,10 @@ def _class_from_entry_point(name: str, group: str, role: str, shipped: Sequence[
 
 
 def source_file(kind: type) -> Path | None:
-    """The file in which a class is written; None if there is none."""
-    module = sys.modules.get(kind.__module__)
-    location = getattr(module, "__file__", None)
-    return Path(location) if location else None
+    """The file in which a class is written or saved; None if there is none."""
+    if (path := saved_file(kind)) is not None:
+        return path
+    return _file_of(kind.__module__)
 
 
 def source_digest(kind: type) -> str:

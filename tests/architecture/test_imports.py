@@ -41,6 +41,8 @@ OWN = (  # custom laws, estimators and planners, by name
     "autopilot.own.estimator",
     "autopilot.own.law",
     "autopilot.own.planner",
+    "autopilot.own.saved_class",
+    "autopilot.own.set_attributes",
     "autopilot.own.source",
 )
 GCS = (
@@ -74,7 +76,12 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.supervisor": (*LEAVES, RECORDS, "autopilot.guidance", "autopilot.services"),
     **{one: (*LEAVES, *(other for other in OWN if other != one)) for one in OWN},
     "autopilot.own.interruption": (),
-    "autopilot.own.source": ("autopilot.own.interruption", "missions.nearest", "missions.toml_files"),
+    "autopilot.own.source": (
+        "autopilot.own.interruption",
+        "autopilot.own.saved_class",
+        "missions.nearest",
+        "missions.toml_files",
+    ),
     "autopilot.own": (*LEAVES, "autopilot.control", "autopilot.estimation"),
     "autopilot.core": (
         *LEAVES,

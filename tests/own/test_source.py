@@ -67,6 +67,25 @@ def test_a_file_that_was_changed_is_another_law() -> None:
     assert load_law("mine.py").name == "Better"
 
 
+def test_so_is_one_that_imports_a_file_that_was_changed() -> None:
+    law = f"from gain import GAIN\n{FINE}    gain = GAIN\n"
+    written(law, "one.py")
+    written(law, "other.py")
+    written("GAIN = 3.0", "gain.py")
+    before = [load_law(name).kind for name in ("one.py", "other.py")]
+    assert [load_law(name).kind for name in ("one.py", "other.py")] == before
+    written(
+        "GAIN = 40.0", "gain.py"
+    )  # of another length, by which Python knows that its bytecode is outdated
+    after = [load_law(name).kind for name in ("one.py", "other.py")]
+    assert [kind.gain for kind in (*before, *after)] == [3.0, 3.0, 40.0, 40.0]  # type: ignore[attr-defined]
+    written("GAIN = 4 +", "gain.py")
+    with pytest.raises(OwnError, match=re.escape("one.py: SyntaxError: invalid syntax (gain.py:1)")):
+        load_law("one.py")
+    written("GAIN = 500.0", "gain.py")
+    assert load_law("one.py").kind.gain == 500.0  # type: ignore[attr-defined]
+
+
 def test_its_parameters_are_the_autopilots() -> None:
     brought = '    parameters = {"MY_GAIN": Parameter(2.0, 0.0, 5.0, "1/s", "A gain")}\n'
     written(FINE.replace("import force", "import Parameter, force") + brought)

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -177,11 +178,22 @@ def test_a_planner_that_is_never_asked_is_told() -> None:
     assert "planner is not used" not in run("check", "square", "--planner", PLANNER).stdout
 
 
+def heavier_by(factor: float) -> type:
+    class Made(LoadPid):
+        name = "heavier"
+
+        def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+            believed = now.believed._replace(load_mass=factor * now.believed.load_mass)
+            return super().load_position(memory, now._replace(believed=believed))
+
+    return Made
+
+
 def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """And it flies each as `fly` does."""
+    """And it flies each as `fly` does, also one that only this process has."""
     path = tmp_path / "mine.py"
     path.write_text(SAYS)
-    laws = (f"{__file__}:Heavier", f"{path}:Fails")
+    laws = (heavier_by(1.02), f"{path}:Fails")
     out = tmp_path / "out"
     rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
     assert capfd.readouterr() == ("", "said by a worker\n")
@@ -189,10 +201,27 @@ def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[s
     error_m = plumbline.fly("hover", law=Heavier, quiet=True).summary["load_error_max_m"]
     assert rows[0]["load_error_max_m"] == pytest.approx(error_m, rel=1e-3)
     plan = json.loads((out / "plan.json").read_text())
-    assert plan["origin"]["settings"]["plan"]["laws"] == list(laws)
+    (saved,) = (out / "classes").iterdir()
+    assert plan["origin"]["settings"]["plan"]["laws"] == [str(saved), laws[1]]
+    flown_again = plumbline.fly("hover", law=str(saved), quiet=True)
+    assert flown_again.tlog == plumbline.fly("hover", law=laws[0], quiet=True).tlog
     path.write_text(FAILS.replace("3.0", "2.0"))
     with pytest.raises(plumbline.Error, match="holds another sweep"):
         plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True)
+
+
+def test_a_class_whose_attributes_were_set_is_not_swept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Heavier, "name", "heavier-still")
+    with pytest.raises(plumbline.Error, match=re.escape("law Heavier: Heavier.name was set after the class")):
+        plumbline.sweep("hover", laws=[Heavier])
+
+
+def test_one_that_holds_what_cannot_be_saved_is_not_swept() -> None:
+    kind = heavier_by(1.02)
+    kind.lock = threading.Lock()  # type: ignore[attr-defined]
+    told = "law Made cannot be given to other processes (cannot pickle '_thread.lock' object)"
+    with pytest.raises(plumbline.Error, match=re.escape(told)):
+        plumbline.sweep("hover", laws=[kind])
 
 
 def test_two_laws_of_one_name_are_not_swept(tmp_path: Path) -> None:
