@@ -26,6 +26,7 @@ from gcs.foreign_mission import home_of
 from gcs.mission_items import areas_of, items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
+from sitl.sensor_log import SensorLog
 
 _GROUND = "ground"
 
@@ -52,10 +53,18 @@ def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | N
     return Onboard(table, identity_of(table), options, mission)
 
 
-def build_simulator(conditions: Conditions, home: Home, lockstep: bool = True) -> HilSimulator:
+def build_simulator(
+    conditions: Conditions, home: Home, lockstep: bool = True, sensor_log: SensorLog | None = None
+) -> HilSimulator:
     """A simulator for these conditions."""
     return HilSimulator.build(
-        conditions.vehicle, conditions.sensors, conditions.seed, conditions.settings, home, lockstep
+        conditions.vehicle,
+        conditions.sensors,
+        conditions.seed,
+        conditions.settings,
+        home,
+        lockstep,
+        log=sensor_log,
     )
 
 
@@ -69,17 +78,20 @@ def fly(
     watch: Watch | None = None,
     client: FlightClient | None = None,
     on_turn: Callable[[], None] = lambda: None,
+    log_sensors: Callable[[bytes], object] | None = None,
 ) -> Outcome:
     """Fly a mission from take-off to landing; the log receives what `gcs fly --lockstep` writes.
 
     `watch` is called with the cores at every tick, before the world advances; if it returns False, the flight
     ends. Without `watch`, ticks at which nothing is to be decided are flown in machine code. `client`
-    replaces the usual ground station client; `on_turn` is called after each of its turns.
+    replaces the usual ground station client; `on_turn` is called after each of its turns. `log_sensors`
+    is called with the bytes of a log (`sitl.sensor_log`), also of some ticks after the end of the flight.
     """
     home = home_of(mission)
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
-    simulator = build_simulator(conditions, home)
+    sensor_log = None if log_sensors is None else SensorLog(log_sensors)
+    simulator = build_simulator(conditions, home, sensor_log=sensor_log)
     if client is None:
         expected_s = expected_flight_s(mission, onboard.parameters)
         client = FlightClient(

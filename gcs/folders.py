@@ -14,6 +14,7 @@ from gcs.errors import InputError, reason, write_error
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
+SENSOR_LOG, SENSORS_FOLDER = "sensors.log", "sensors"  # log of a simulator, and the tables made of it
 REPEATS_FOLDER = "flights"  # in a sweep's folder: flights that were flown again, each with a report
 LOCK_FILE = ".lock"  # of a folder into which several flights are written
 # every folder of results contains exactly one of these three files, which identifies its kind

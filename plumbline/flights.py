@@ -16,7 +16,7 @@ from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError, write_error
-from gcs.folders import PAGE_FILE, TLOG_FILE, check_no_other_results, make_folder
+from gcs.folders import PAGE_FILE, SENSORS_FOLDER, TLOG_FILE, check_no_other_results, make_folder
 from gcs.foreign_mission import ForeignMission
 from gcs.mission_files import load
 from gcs.workflows.flight_meta import meta_of
@@ -40,6 +40,7 @@ from plumbline.missions import Mission
 from plumbline.references import estimator_reference, law_reference, planner_reference
 
 if TYPE_CHECKING:
+    from gcs.analysis.readings import Readings
     from gcs.analysis.record import FlightMeta, Record
     from gcs.analysis.samples import Samples
     from gcs.analysis.tracks import Telemetry
@@ -62,6 +63,7 @@ def fly(
     settings: Settings | None = None,
     timeout_s: float | None = None,
     force: bool = False,
+    log_sensors: bool = False,
     quiet: bool = True,
 ) -> Flight:
     """Fly a mission from take-off to landing, as fast as this machine can.
@@ -74,9 +76,10 @@ def fly(
     parameters of the simulator (`SIM_...`) and of the autopilot that differ from their defaults. `seed`:
     seed of all noise. `timeout_s`: time limit of the flight in seconds of the vehicle's clock; by default one
     and a half times the expected duration plus a minute.
-    `force`: fly the mission even if it exceeds the limits of the vehicle. `quiet=False` shows progress on
-    stderr, including compilation, which takes a minute or more before the first flight. A setting that may
-    be unintended, or has no effect, causes a warning.
+    `force`: fly the mission even if it exceeds the limits of the vehicle. `log_sensors`: keep every reading
+    of every sensor and the true state, for `Flight.readings`. `quiet=False` shows progress on stderr,
+    including compilation, which takes a minute or more before the first flight. A setting that may be
+    unintended, or has no effect, causes a warning.
 
     A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
     profile, law, estimator, planner or parameter, if a value is not a number or out of its range, if a custom
@@ -106,18 +109,21 @@ def fly(
         force=force,
         overwrite=False,
         limit_s=None if timeout_s is None else positive("timeout_s", timeout_s),
+        log_sensors=log_sensors,
         estimator=estimator_reference(estimator),
         planner=planner_reference(planner),
     )
-    log = io.BytesIO()
+    log, sensor_log = io.BytesIO(), io.BytesIO()
     started_s = time.perf_counter()
     with errors_for_python():
-        outcome = fly_in_process(flown, options, TlogWriter(log), _warn)
+        outcome = fly_in_process(
+            flown, options, TlogWriter(log), _warn, sensor_log.write if log_sensors else None
+        )
     wall_s = time.perf_counter() - started_s
     meta = meta_of(flown, options, outcome, wall_s)
     if flown is mission:  # the path of its file is of interest to the command alone
         meta = replace(meta, mission=flown.name)
-    return Flight(log.getvalue(), meta, flown)
+    return Flight(log.getvalue(), meta, flown, sensor_log.getvalue())
 
 
 def _load(mission: str) -> model.Mission:
@@ -136,8 +142,17 @@ class Flight:
     `tlog` is the telemetry as the bytes of a `.tlog`, the same as those of `gcs fly`.
     """
 
-    def __init__(self, tlog: bytes, meta: FlightMeta, mission: model.Mission | None = None) -> None:
+    def __init__(
+        self,
+        tlog: bytes,
+        meta: FlightMeta,
+        mission: model.Mission | None = None,
+        sensor_log: bytes = b"",
+        folder: Path | None = None,
+    ) -> None:
+        """`folder`: that of the recorded flight; `sensor_log`: as described in `sitl.sensor_log`."""
         self._given_mission = mission
+        self._sensor_log, self._folder = sensor_log, folder
         self.tlog = tlog
         self._meta = meta
 
@@ -153,7 +168,7 @@ class Flight:
 
         with errors_for_python():
             log = find_log(file_path("path", path))
-            return cls(log.read_bytes(), meta_beside(log))
+            return cls(log.read_bytes(), meta_beside(log), folder=log.parent)
 
     @cached_property
     def mission(self) -> model.Mission | None:
@@ -194,6 +209,43 @@ class Flight:
 
         return as_frame(flight_table(self._tracks, self._samples, self._meta.to_json()), kind)
 
+    def readings(self, sensor: str, kind: Literal["pandas", "polars", "arrow"] = "pandas") -> Any:
+        """The readings of one sensor (docs/sensors.md), in the order in which they arrived: `imu`, `mocap`,
+        `load_tracker`, `cable_sensor`, `gnss`, `barometer` and `magnetometer`, as far as these are fitted,
+        and `rotor_speed`; or, as `truth`, the true state at each tick. As a pandas or polars DataFrame, or as
+        an Arrow table.
+
+        `Error` if there is no such sensor, or if the flight was flown without `log_sensors=True`.
+        """
+        tables = self._readings.tables
+        if text("sensor", sensor, "imu") not in tables:
+            hint = did_you_mean(sensor, tables)
+            raise GcsError(f"readings {sensor!r}: there are none; {hint}must be one of {', '.join(tables)}")
+        return as_frame(tables[sensor], kind)
+
+    @property
+    def calibration(self) -> dict[str, Any]:
+        """What is known of the sensors whose readings were kept (noise, delays, lever arms), and of vehicle
+        and place (docs/sensors.md). `Error` if the flight was flown without `log_sensors=True`."""
+        return self._readings.calibration
+
+    @property
+    def _readings(self) -> Readings:
+        if self._kept_readings is None:
+            raise GcsError(
+                "the readings of this flight were not kept; fly it with log_sensors=True, or gcs fly "
+                "--log-sensors"
+            )
+        return self._kept_readings
+
+    @cached_property
+    def _kept_readings(self) -> Readings | None:
+        from gcs.analysis.readings import load_readings, readings_of
+
+        if self._sensor_log:
+            return readings_of(self._sensor_log, self._samples.end_s)
+        return None if self._folder is None else load_readings(self._folder / SENSORS_FOLDER)
+
     def plot(self, name: str = "overview") -> Picture:
         """One picture of the report: overview, track, position, error, angles, psi, rotors or tension."""
         from gcs.report.plots import PICTURES, View
@@ -223,6 +275,7 @@ class Flight:
         `Error` if the directory holds another flight, unless `overwrite=True`, which replaces that flight.
         The same flight may be written again.
         """
+        from gcs.analysis.readings import write_readings
         from gcs.workflows.report import make_report
         from gcs.workflows.vehicle_processes import LOGS
 
@@ -234,10 +287,13 @@ class Flight:
                 raise GcsError(
                     f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
                 )
+            readings = self._kept_readings  # read before their files may be replaced
             for name in LOGS:  # of another flight
                 (folder / name).unlink(missing_ok=True)
             write_atomically(folder / TLOG_FILE, self.tlog)
             make_report(folder / TLOG_FILE, folder, self._meta, quiet, pictures="png" if pictures else None)
+            if readings is not None:
+                write_readings(folder / SENSORS_FOLDER, readings)
         return folder / PAGE_FILE
 
     @cached_property

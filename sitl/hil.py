@@ -29,6 +29,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.simulator_frames import Answer, read_answer
+from sitl.calibration import calibration
 from sitl.interfaces.frame import Frame, frame_of
 from sitl.messages import (
     CAMERA,
@@ -47,6 +48,7 @@ from sitl.parameter_server import ParameterServer
 from sitl.plant.attachment import effective_mass
 from sitl.plant.drive import battery_of, share_left, voltage_until_empty
 from sitl.plant.records import Truth
+from sitl.sensor_log import NOT_LOGGED, SensorLog
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
@@ -103,10 +105,12 @@ class HilSimulator:
         truth_every: int = 2,
         boot_id: int = 0,
         layout: Layout = PLUS,
+        log: SensorLog | None = None,
     ) -> None:
         """`truth` as in the vehicle file; `table` holds the SIM_* parameters, which may change in flight.
 
         `boot_id`: unique number of this run of the world; a reboot begins the run with the next number.
+        `log`: receives the sensors of each tick.
         """
         self.pacing = PacingFigures()
         self._file_truth = truth
@@ -119,6 +123,7 @@ class HilSimulator:
         self._status_us = SECOND_US if lockstep else _STATUS_PERIOD_US
         self._truth_every = truth_every
         self._boot_id = boot_id
+        self._log = log
         # machine code, after its first use
         self._put_sensors: Callable[..., tuple[int, int]] | None = None
         self._put_truth: Callable[..., int] | None = None
@@ -155,6 +160,11 @@ class HilSimulator:
         frames = sensors * waiting + len(self._layout) + 1
         self._buffer = np.zeros(frames * MAX_FRAME_BYTES, np.uint8)
         self._written = self._buffer.data
+        if self._log is not None:
+            known = calibration(
+                truth, self._profile, settings, self._home, self._layout, self._seed, core.rows
+            )
+            self._log.begin(known, len(self._buffer))
         self._announcing_boot = False  # whether SIM_BOOT is sent at the next tick too
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
@@ -174,6 +184,7 @@ class HilSimulator:
         lockstep: bool = True,
         truth_every: int = 2,
         boot_id: int = 0,
+        log: SensorLog | None = None,
     ) -> HilSimulator:
         """A simulator built from the options of the command line.
 
@@ -188,7 +199,7 @@ class HilSimulator:
                 table.set(name, value)
         table.freeze()
         profile, place = load_profile(sensors), home or Home()
-        return cls(truth, table, profile, seed, place, lockstep, truth_every, boot_id, file.layout)
+        return cls(truth, table, profile, seed, place, lockstep, truth_every, boot_id, file.layout, log)
 
     @property
     def now_us(self) -> int:
@@ -384,7 +395,8 @@ class HilSimulator:
             return None
         times = (now_us, core.tick_count, tick_us, until_us, self._truth_every)
         buffers = FrameBuffers(self._latest, self._constants, self._buffer, self._payload)
-        return self._batches.next_batch(times, core.rows, core.chain, buffers)
+        log = NOT_LOGGED if self._log is None else self._log.rows
+        return self._batches.next_batch(times, core.rows, core.chain, buffers, log)
 
     @property
     def _next_message_us(self) -> int:
@@ -401,6 +413,8 @@ class HilSimulator:
         result = self._batches.result()
         if result is None:
             return
+        if self._log is not None:
+            self._log.flush()
         self._command_us = result.now_us - self.core.settings.tick_us
         self.core.set_tick(result.now_us, result.ticks)
         self._command = tuple(result.forces[: len(self._layout)]) if result.armed else self._stopped
@@ -431,6 +445,8 @@ class HilSimulator:
             self._put_sensors = entry_point_of(put_sensors, *arguments)
         length, writer.sequence = self._put_sensors(*arguments)
         frames = self._written[:length].tobytes()
+        if self._log is not None:
+            self._log.put(core.rows, self._buffer, length)
         return message_frames + frames if message_frames else frames
 
     def _truth_frames(self) -> bytes | None:

@@ -23,6 +23,7 @@ from autopilot.wire.compiled import Bytes
 from autopilot.wire.simulator_frames import read_answer
 from sitl.messages import VEHICLE_SYSTEM, put_sensors, put_truth
 from sitl.plant.rotors import REQUESTED
+from sitl.sensor_log import NOT_LOGGED, LogRows, put_instant
 from sitl.world import WorldRows, rotors_of, world_tick
 
 Ints = NDArray[np.int64]
@@ -53,6 +54,7 @@ class KernelAddresses(NamedTuple):
     world_tick: int
     put_sensors: int
     put_truth: int
+    put_instant: int  # 0: nothing is logged
 
 
 class TickBatch(NamedTuple):
@@ -66,6 +68,7 @@ class TickBatch(NamedTuple):
     constants: Row
     buffer: Bytes
     payload: Bytes
+    log: LogRows
     code: KernelAddresses
 
 
@@ -107,16 +110,21 @@ class BatchBuilder:
         self._code: KernelAddresses | None = None  # after its first use
 
     def next_batch(
-        self, times: tuple[int, int, int, int, int], rows: WorldRows, chain: Any, buffers: FrameBuffers
+        self,
+        times: tuple[int, int, int, int, int],
+        rows: WorldRows,
+        chain: Any,
+        buffers: FrameBuffers,
+        log: LogRows,
     ) -> TickBatch | None:
         """The data of the next ticks. `times`: the time now (us), the number of this tick, the duration of a
         tick (us), the time of the first tick that is left to Python (us), and the number of ticks from one
         truth to the next. None where nothing is compiled."""
-        self._code = self._code or kernel_addresses(rows, chain, buffers)
+        self._code = self._code or kernel_addresses(rows, chain, buffers, log)
         if self._code is None:
             return None
         self._numbers[:] = *times, *(writer.sequence for writer in self._writers), 0, 0, 0, 0
-        return TickBatch(self._numbers, self._command, rows, chain, *buffers, self._code)
+        return TickBatch(self._numbers, self._command, rows, chain, *buffers, log, self._code)
 
     def result(self) -> BatchResult | None:
         """The results; None: there were no ticks. The sequence counters of the writers are updated."""
@@ -134,7 +142,9 @@ class BatchBuilder:
         return BatchResult(numbers[NOW_US], numbers[TICKS], *last_answer, numbers[LENGTH])
 
 
-def kernel_addresses(rows: WorldRows, chain: Any, buffers: FrameBuffers) -> KernelAddresses | None:
+def kernel_addresses(
+    rows: WorldRows, chain: Any, buffers: FrameBuffers, log: LogRows
+) -> KernelAddresses | None:
     """The kernels for such a world, compiled or loaded if necessary; None where nothing is compiled."""
     if not hasattr(world_tick, "overloads"):
         return None
@@ -145,4 +155,5 @@ def kernel_addresses(rows: WorldRows, chain: Any, buffers: FrameBuffers) -> Kern
         kernel_address_of(world_tick, rows, rows.rotors[REQUESTED], False, 0.0, chain),
         kernel_address_of(put_sensors, rows, 0, latest, constants, buffer, payload, 0),
         kernel_address_of(put_truth, *truth_rows, buffer, payload, 0, 0),
+        0 if log is NOT_LOGGED else kernel_address_of(put_instant, log, rows, buffer, 0),
     )

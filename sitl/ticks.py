@@ -16,6 +16,7 @@ from autopilot.wire.compiled import MAX_FRAME_BYTES, Bytes
 from sitl.hil import MIN_SNAP_SPEED
 from sitl.messages import DIALECT_FRAMES, VEHICLE_SYSTEM
 from sitl.plant.rotors import REQUESTED
+from sitl.sensor_log import has_room
 from sitl.sim_core import SNAP_SPEED
 from sitl.tick_batch import (
     ARMED,
@@ -68,9 +69,11 @@ def advance_with_answer(batch: TickBatch, address: int, size: int) -> bool:
 
 @kernel
 def can_continue(batch: TickBatch) -> bool:
-    """Whether nothing but sensors and truth must be sent at this tick."""
+    """Whether nothing but sensors and truth must be sent at this tick, and its sensors can be logged."""
     return bool(
-        batch.numbers[NOW_US] < batch.numbers[UNTIL_US] and batch.rows.world[SNAP_SPEED] <= MIN_SNAP_SPEED
+        batch.numbers[NOW_US] < batch.numbers[UNTIL_US]
+        and batch.rows.world[SNAP_SPEED] <= MIN_SNAP_SPEED
+        and has_room(batch.log)
     )
 
 
@@ -91,7 +94,7 @@ def put_truth_if_due(batch: TickBatch, buffer: Bytes) -> int:
 
 @kernel
 def put_next_sensors(batch: TickBatch) -> int:
-    """Write the sensors of this tick into `batch.buffer`; returns their number of bytes."""
+    """Write the sensors of this tick into `batch.buffer`, and log them; returns their number of bytes."""
     numbers = batch.numbers
     length, sequence = call_put_sensors(
         batch.code.put_sensors,
@@ -106,4 +109,6 @@ def put_next_sensors(batch: TickBatch) -> int:
         ),
     )
     numbers[LENGTH], numbers[SEQUENCE] = length, sequence
+    if batch.code.put_instant != 0:
+        call_kernel_at(batch.code.put_instant, (batch.log, batch.rows, batch.buffer, length))
     return int(length)

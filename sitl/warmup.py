@@ -10,9 +10,10 @@ def main() -> None:
     print_compiled_kernels()
     # only now: the import itself compiles the first ones
     from sitl.hil import HilSimulator
+    from sitl.sensor_log import SensorLog
     from sitl.shell.tick_loop import warm_up
 
-    simulator = HilSimulator.build()
+    simulator = HilSimulator.build(log=SensorLog(len))
     warm_up(simulator)
     simulator.truth_datagram()
     simulator.receive(b"")

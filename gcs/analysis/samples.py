@@ -65,6 +65,11 @@ class Samples:
     quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
 
     @property
+    def end_s(self) -> float:
+        """The time of the last sample; -1 if there is none."""
+        return float(self.time_s[-1]) if len(self.time_s) else -1.0
+
+    @property
     def error_m(self) -> Floats:
         """(n, 3) true minus requested load position, e_x of (3-40)."""
         return self.actual_m - self.requested_m

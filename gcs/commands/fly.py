@@ -85,6 +85,11 @@ _STARTED_ONLY = (
 )
 @ignore_option
 @click.option(
+    "--log-sensors",
+    is_flag=True,
+    help="Keep every reading of every sensor and the true state, as tables; see docs/sensors.md.",
+)
+@click.option(
     "--out",
     type=OUTPUT_FOLDER,
     help="Folder for telemetry and report.  [default: flights/MISSION-TIME]",
@@ -123,6 +128,7 @@ def fly_command(
     real_time: bool,
     settings: tuple[str, ...],
     ignore: tuple[str, ...],
+    log_sensors: bool,
     out: Path | None,
     connect: Address | None,
     truth_at: Address | None,
@@ -173,6 +179,9 @@ def fly_command(
     elif ctx.get_parameter_source("sysid") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--sysid is that of a running vehicle: add --connect", ctx)
 
+    if log_sensors and (connect is not None or firmware is not None):
+        other = "--connect" if connect is not None else "--autopilot"
+        raise click.UsageError(f"--log-sensors and {other} exclude each other", ctx)
     program = None
     if firmware is not None:
         if connect is not None or real_time:
@@ -248,6 +257,7 @@ def fly_command(
         planner=planner or "",
         truth_at=truth_at,
         pictures=pictures,
+        log_sensors=log_sensors,
         ignored=ignore,
     )
     run = f"gcs fly {mission}"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from autopilot.shell.atomic_file import write_atomically
 from gcs.analysis.record import FlightMeta, Record, flight_record
-from gcs.analysis.samples import samples_of
+from gcs.analysis.samples import Samples, samples_of
 from gcs.analysis.telemetry import load_telemetry
-from gcs.folders import PAGE_FILE, SUMMARY_FILE
+from gcs.folders import PAGE_FILE, SENSOR_LOG, SENSORS_FOLDER, SUMMARY_FILE
 
 META_FILE = "meta.json"
 PARQUET_FILE = "flight.parquet"
@@ -73,7 +73,9 @@ def build_report(
     if picture_format is not None:
         wanted = (picture.as_format(picture_format) for picture in PICTURES)
         pictures += (picture for picture in wanted if picture.file != pictures[0].file)
-    remaining = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
+    sensor_log = out_dir / SENSOR_LOG
+    steps = [PARQUET_FILE, SENSORS_FOLDER] if sensor_log.is_file() else [PARQUET_FILE]
+    remaining = ["reading telemetry", *steps, *(picture.file for picture in pictures), PAGE_FILE]
     total = len(remaining)
 
     def done(step: str) -> None:
@@ -104,6 +106,9 @@ def build_report(
         metadata = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
         write_flight(out_dir / PARQUET_FILE, telemetry, samples, metadata)
         done(PARQUET_FILE)
+        if SENSORS_FOLDER in steps:
+            _write_readings(sensor_log, out_dir / SENSORS_FOLDER, samples)
+            done(SENSORS_FOLDER)
         replay = replay_of(telemetry, samples, meta)
         drawing.finish(lambda picture: done(picture.file))
     page = render_page(record, meta, replay, changed_settings(telemetry, meta), out_dir)
@@ -112,14 +117,24 @@ def build_report(
     return record
 
 
+def _write_readings(log: Path, folder: Path, samples: Samples) -> None:
+    """Make tables of the readings until the end of the telemetry, and delete their log."""
+    from gcs.analysis.readings import readings_of, write_readings
+
+    write_readings(folder, readings_of(log.read_bytes(), samples.end_s))
+    log.unlink()
+
+
 def delete_report(directory: Path) -> None:
     """Delete the report of an earlier flight, including files that were made on demand."""
+    from gcs.analysis.readings import delete_readings
     from gcs.report.plots import PICTURE_FORMATS, PICTURES
 
     files = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)
     pictures = (picture.as_format(one).file for picture in PICTURES for one in PICTURE_FORMATS)
     for name in (*files, *pictures):
         (directory / name).unlink(missing_ok=True)
+    delete_readings(directory / SENSORS_FOLDER)
 
 
 def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -> Path:

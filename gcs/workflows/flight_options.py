@@ -48,6 +48,7 @@ class FlightOptions:
     planner: str = ""
     truth_at: Address | None = None  # where the simulator of `connect` sends the truth
     pictures: str | None = None  # format of all pictures of the report; None: only that of its page
+    log_sensors: bool = False  # make tables of all readings
     ignored: tuple[str, ...] = ()  # parameters in the vehicle's file that have no effect
 
     @property
@@ -72,6 +73,7 @@ class FlightOptions:
         words += ["--seed", str(self.seed)]
         words += ["--lockstep"] if self.speed is None else ["--speed", f"{self.speed:g}"]
         words += ["--real-time"] if self.real_time else []
+        words += ["--log-sensors"] if self.log_sensors else []
         for setting in self.settings:
             words += ["--set", setting]
         words += ["--force"] if self.force else []

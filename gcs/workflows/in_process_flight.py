@@ -20,11 +20,16 @@ from missions.model import Mission
 
 
 def fly_in_process(
-    mission: Mission, options: FlightOptions, log: FrameLog, warn: Callable[[str], None] = lambda _: None
+    mission: Mission,
+    options: FlightOptions,
+    log: FrameLog,
+    warn: Callable[[str], None] = lambda _: None,
+    log_sensors: Callable[[bytes], object] | None = None,
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `warn` is called with a line for each option that may be unintended.
+    `warn` is called with a line for each option that may be unintended, `log_sensors` with the bytes of a log
+    of the sensors.
     """
     for line in (*check_options(options), *mission_warnings(options.planner, mission)):
         warn(line)
@@ -46,5 +51,5 @@ def fly_in_process(
             options.own,
             ignored=frozenset(options.ignored),
         )
-        outcome = fly(mission, conditions, log, client=client, on_turn=show)
+        outcome = fly(mission, conditions, log, client=client, on_turn=show, log_sensors=log_sensors)
     return with_blamed_settings(outcome, options)

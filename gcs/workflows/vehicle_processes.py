@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from autopilot.wire.convert.geodesy import Home
+from gcs.folders import SENSOR_LOG
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
 from gcs.workflows.flight_options import (
@@ -27,7 +28,7 @@ from gcs.workflows.flight_options import (
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
-LOGS = (ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG)
+LOGS = (ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG, SENSOR_LOG)
 _OTHER_STATIONS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 
 
@@ -98,6 +99,7 @@ def _start(
         "--truth",
         truth,
     ]
+    world += ["--log-sensors", str(out / SENSOR_LOG)] if options.log_sensors else []
     processes.start("sitl", [*world, *pace, *both, *simulator_settings, "--quiet"], out / SIMULATOR_LOG)
     link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_OTHER_STATIONS]
     onboard = ["--sim", simulator, "--storage", str(storage), "--law", options.law]

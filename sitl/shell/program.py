@@ -6,6 +6,8 @@ import os
 import secrets
 import signal
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import click
 
@@ -23,6 +25,7 @@ from autopilot.shell.options import (
     address_option,
     address_text,
     home_option,
+    os_error_text,
     print_errors,
     reduce_latency,
     setting_option,
@@ -33,6 +36,7 @@ from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator
 from sitl.interfaces.frame import FrameError
 from sitl.pacing import Pacing
+from sitl.sensor_log import SensorLog
 from sitl.sensors.shipped import PROFILES, ProfileError
 from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
 from sitl.shell.link import Link
@@ -46,6 +50,23 @@ def _run_on(cpu: int) -> None:
     except (AttributeError, OSError):
         text = f"--cpu {cpu}: cannot run on this core; leave --cpu out, or name another"
         raise click.UsageError(text) from None
+
+
+def _append_to(path: Path) -> Callable[[bytes], object]:
+    """A function that appends bytes to a new file; it raises ValueError with one line if it cannot."""
+
+    def append(data: bytes) -> None:
+        try:
+            file.write(data)
+            file.flush()
+        except OSError as error:
+            raise ValueError(f"{path}: {os_error_text(error)}") from None
+
+    try:
+        file = path.open("wb")
+    except OSError as error:
+        raise ValueError(f"{path}: {os_error_text(error)}") from None
+    return append
 
 
 @click.command("sitl", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -114,6 +135,12 @@ def _run_on(cpu: int) -> None:
     multiple=True,
     help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.",
 )
+@click.option(
+    "--log-sensors",
+    type=click.Path(dir_okay=False, path_type=Path),
+    hidden=True,
+    help="File for the log of `sitl.sensor_log`, of which gcs fly makes tables.",
+)
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
 @click.option(
@@ -135,6 +162,7 @@ def main(
     truth: Address,
     truth_every: int | None,
     settings: tuple[tuple[str, float], ...],
+    log_sensors: Path | None,
     home: Home | None,
     cpu: int | None,
     parameters: bool,
@@ -185,7 +213,7 @@ def main(
         # first, so that no message of an autopilot is lost while kernels are compiled
         link = Link(listen, truth, notify)
 
-        def build() -> HilSimulator:
+        def build(log: SensorLog | None = None) -> HilSimulator:
             return HilSimulator.build(
                 vehicle,
                 sensors,
@@ -195,6 +223,7 @@ def main(
                 not real_time,
                 truth_every,
                 boot_id=secrets.randbits(63),
+                log=log,
             )
 
         compiled = SIMULATOR.ready
@@ -209,7 +238,7 @@ def main(
         warm.advance()
         if not compiled:
             SIMULATOR.mark_done()
-        simulator = build()
+        simulator = build(None if log_sensors is None else SensorLog(_append_to(log_sensors)))
         if cpu is not None:
             _run_on(cpu)
         # not if it would spin for most of the time, which would keep other programs from running

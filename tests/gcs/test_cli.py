@@ -148,6 +148,7 @@ def test_version():
         (["fly", "hover", "--set", "=3"], "NAME=VALUE"),
         (["fly", "hover", "--connect", "14550", "--seed", "3"], "--seed is for processes"),
         (["fly", "hover", "--connect", "14550", "--set", "SIM_WIND_E=3"], "--set is for processes"),
+        (["fly", "hover", "--log-sensors", "--connect"], "--log-sensors and --connect exclude each other"),
         (["fly", "--connect", "hover"], "must be PORT, HOST:PORT"),
         (["fly", "hover", "--timeout", "0"], "--timeout"),
         (["mode", "backflip"], "hold"),

@@ -41,6 +41,24 @@ def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs:
     }
 
 
+def test_the_readings_of_a_flight_over_udp_are_those_of_the_same_flight_in_one_process(
+    gcs: Gcs, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    flown = gcs("fly", "hover", "--sensors", "field", "--log-sensors", "--out", str(out), "--quiet")
+    assert (flown.returncode, flown.stderr) == (0, "gcs: hover: completed\n")
+    assert not (out / "sensors.log").exists()
+    flight = plumbline.fly("hover", sensors="field", log_sensors=True)
+    flight.report(tmp_path / "here")
+    assert (out / "flight.tlog").read_bytes() == flight.tlog
+    files = sorted(file.name for file in (out / "sensors").iterdir())
+    assert len(files) == len(flight.calibration["sensors"]) + 3  # speeds of rotors, truth, calibration
+    for name in files:
+        assert (out / "sensors" / name).read_bytes() == (tmp_path / "here" / "sensors" / name).read_bytes(), (
+            name
+        )
+
+
 def test_a_plan_of_another_ground_station_leaves_the_log_of_the_same_flight_in_one_process(
     gcs: Gcs, tmp_path: Path
 ) -> None:
