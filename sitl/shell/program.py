@@ -138,8 +138,8 @@ def _append_to(path: Path) -> Callable[[bytes], object]:
 @click.option(
     "--log-sensors",
     type=click.Path(dir_okay=False, path_type=Path),
-    hidden=True,
-    help="File for the log of `sitl.sensor_log`, of which gcs fly makes tables.",
+    metavar="FILE",
+    help="Log all readings and the true state, for gcs report; see docs/sensors.md.",
 )
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
@@ -190,6 +190,8 @@ def main(
         raise click.UsageError(
             f"{interface} runs on the wall clock and does not wait: leave --lockstep and --speed out"
         )
+    if log_sensors is not None and kind.run is not None:
+        raise click.UsageError(f"--log-sensors is for {PLUMBLINE}: {interface} receives other messages")
     real_time = real_time or kind.real_time
     listen = listen or kind.listen
     truth_every = truth_every or kind.truth_every

@@ -38,6 +38,7 @@ def invoke(tmp_path: Path):
         (sitl, ["--set", "SIM_RATE_HZ=300"], "SIM_RATE_HZ = 300 Hz; a tick must be "),
         (sitl, ["--set", "SIM_DROP_PCT=300"], "SIM_DROP_PCT = 300.0 %; must be "),
         (sitl, ["--real-time", "--lockstep"], "--lockstep and --real-time exclude each other"),
+        (sitl, ["--log-sensors", "x", "--for", "px4"], "--log-sensors is for plumbline: px4 receives"),
         (autopilot, ["--vehicle", "nothing"], "unknown vehicle 'nothing'; shipped: "),
         (autopilot, ["--law", "nothing"], "--law 'nothing': no control law of that name; "),
         (

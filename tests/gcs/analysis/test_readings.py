@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import plumbline
 from autopilot.own.own_code import OwnCode
+from autopilot.wire.tlog import TlogWriter
 from gcs import closed_loop
 from gcs.analysis.readings import Readings, readings_of
+from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from missions.model import Land, Mission, Takeoff, Waypoint
 from plumbline.estimators import Estimate, Sensed, estimated
@@ -210,6 +214,17 @@ def test_a_log_that_is_cut_off_or_restarted_is_read() -> None:
     assert again.tables["imu"].equals(whole.tables["imu"].slice(0, 2))
 
 
+@pytest.mark.parametrize("sensors", ["lab", "rtk"])
+def test_every_column_is_described(sensors: str) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    log = BytesIO()
+    HilSimulator.build(sensors=sensors, log=SensorLog(log.write))
+    for table in readings_of(log.getvalue(), 1.0).tables.values():
+        for name in table.column_names:
+            first = re.sub(r"(?<![a-z])[yz](?=_|$)", "x", re.sub(r"rotor(.*)_\d_", r"rotor\1_1_", name))
+            assert f"`{first.replace('quaternion_x', 'quaternion_w')}`" in page, name
+
+
 def test_the_log_names_each_number_of_a_tick() -> None:
     assert len(COLUMNS) == len(set(COLUMNS))
     assert json.loads(logged_header())["columns"] == list(COLUMNS)
@@ -220,6 +235,19 @@ def logged_header() -> bytes:
     log = BytesIO()
     HilSimulator.build(vehicle="octorotor", sensors="ideal", log=SensorLog(log.write))
     return log.getvalue().partition(b"\n")[0]
+
+
+def test_a_report_makes_tables_of_the_log_of_a_simulator_that_ran_by_itself(tmp_path: Path) -> None:
+    log, frames = BytesIO(), Frames()
+    closed_loop.fly(SHORT, Conditions(), frames, log_sensors=log.write)
+    with (tmp_path / "flight.tlog").open("wb") as file:
+        for unix_us, frame in frames.written:
+            TlogWriter(file).write(unix_us, frame)
+    (tmp_path / "sensors.log").write_bytes(log.getvalue())
+    assert CliRunner().invoke(gcs, ["report", str(tmp_path), "--quiet"]).exit_code == 0
+    assert not (tmp_path / "sensors.log").exists()
+    flight = plumbline.Flight.load(tmp_path)
+    assert flight.readings("truth", "arrow")["time_s"][-1] == flight.telemetry("arrow")["time_s"][-1]
 
 
 def test_tables_are_written_read_and_replaced(tmp_path: Path) -> None:
