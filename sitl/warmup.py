@@ -13,7 +13,7 @@ def main() -> None:
     from sitl.sensor_log import SensorLog
     from sitl.shell.tick_loop import warm_up
 
-    simulator = HilSimulator.build(log=SensorLog(len))
+    simulator = HilSimulator.build(log=SensorLog(lambda data: None))
     warm_up(simulator)
     simulator.truth_datagram()
     simulator.receive(b"")

@@ -20,13 +20,14 @@ from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
+from gcs.analysis.readings_ulog import readings_ulog
 from gcs.analysis.tracks import Ints
 from gcs.formats.arrow import array_of, path_for_arrow
 
 if TYPE_CHECKING:
     import pyarrow
 
-CALIBRATION_FILE = "calibration.json"
+CALIBRATION_FILE, ULOG_FILE = "calibration.json", "sensors.ulg"
 TRUTH = "truth"  # the table of the true state
 _MICRO = 1e-6
 _TRACKER = 0  # LOAD_SENSOR.sensor_id
@@ -38,10 +39,12 @@ Table = dict[str, Any]  # columns of numbers by name
 
 
 class Readings(NamedTuple):
-    """The tables by the names of their sensors and `truth`, and what calibration.json contains."""
+    """The tables by the names of their sensors and `truth`, and the contents of calibration.json and
+    sensors.ulg."""
 
     tables: dict[str, pyarrow.Table]
     calibration: dict[str, Any]
+    ulog: bytes
 
 
 class _Log(NamedTuple):
@@ -58,19 +61,20 @@ def readings_of(log: bytes, until_s: float) -> Readings:
     found = _parsed(log, round(until_s / _MICRO))
     sensors = found.calibration["sensors"]
     tables = dict(_sensor_tables(found))
-    fitted = {name: tables[name] for name in (*sensors, "rotor_speed")}
-    arrow = {name: _arrow(table) for name, table in {**fitted, TRUTH: _truth(found)}.items()}
-    return Readings(arrow, found.calibration)
+    fitted = {**{name: tables[name] for name in (*sensors, "rotor_speed")}, TRUTH: _truth(found)}
+    arrow = {name: _arrow(table) for name, table in fitted.items()}
+    return Readings(arrow, found.calibration, readings_ulog(fitted))
 
 
 def write_readings(folder: Path, readings: Readings) -> None:
-    """Write a file for each table, and calibration.json."""
+    """Write a file for each table, sensors.ulg and calibration.json."""
     from pyarrow import parquet
 
     delete_readings(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name, table in readings.tables.items():
         parquet.write_table(table, path_for_arrow(folder / f"{name}.parquet"), compression="zstd")
+    (folder / ULOG_FILE).write_bytes(readings.ulog)
     text = json.dumps(readings.calibration, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(folder / CALIBRATION_FILE, text.encode())
 
@@ -84,14 +88,15 @@ def load_readings(folder: Path) -> Readings | None:
         return None
     files = sorted(folder.glob("*.parquet"))
     tables = {file.stem: parquet.read_table(path_for_arrow(file)) for file in files}
-    return Readings(tables, json.loads(calibration.read_text(encoding="utf-8")))
+    known = json.loads(calibration.read_text(encoding="utf-8"))
+    return Readings(tables, known, (folder / ULOG_FILE).read_bytes())
 
 
 def delete_readings(folder: Path) -> None:
     """Delete what `write_readings` has written there."""
     if (folder / CALIBRATION_FILE).is_file():
-        for file in (*folder.glob("*.parquet"), folder / CALIBRATION_FILE):
-            file.unlink()
+        for file in (*folder.glob("*.parquet"), folder / ULOG_FILE, folder / CALIBRATION_FILE):
+            file.unlink(missing_ok=True)
         if not any(folder.iterdir()):
             folder.rmdir()
 

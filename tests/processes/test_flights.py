@@ -52,7 +52,7 @@ def test_the_readings_of_a_flight_over_udp_are_those_of_the_same_flight_in_one_p
     flight.report(tmp_path / "here")
     assert (out / "flight.tlog").read_bytes() == flight.tlog
     files = sorted(file.name for file in (out / "sensors").iterdir())
-    assert len(files) == len(flight.calibration["sensors"]) + 3  # speeds of rotors, truth, calibration
+    assert len(files) == len(flight.calibration["sensors"]) + 4  # speeds of rotors, truth, calibration, ULog
     for name in files:
         assert (out / "sensors" / name).read_bytes() == (tmp_path / "here" / "sensors" / name).read_bytes(), (
             name

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pyulog import ULog
 
 import plumbline
+from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
 from autopilot.own.own_code import OwnCode
 from autopilot.wire.tlog import TlogWriter
 from gcs import closed_loop
@@ -195,6 +197,46 @@ def test_the_biases_are_those_that_the_readings_contain() -> None:
     )
     assert np.abs(bias).min() > 1e-5
     assert np.allclose(measured[1:], there[1:] + bias[:-1], rtol=0.0, atol=SINGLE)
+
+
+@pytest.mark.parametrize("sensors", ["lab", "rtk"])
+def test_the_ulog_has_the_readings_in_the_axes_of_px4(sensors: str, tmp_path: Path) -> None:
+    readings, _ = flown(Conditions(sensors=sensors))
+    (tmp_path / "sensors.ulg").write_bytes(readings.ulog)
+    log = ULog(str(tmp_path / "sensors.ulg"))
+    assert not log.file_corruption
+
+    def same(topic: str, field: str, table: str, names: list[str], turned: Any) -> None:
+        data, rows = log.get_dataset(topic).data, columns(readings, table, *names)
+        logged = np.stack([data[f"{field}[{i}]"] for i in range(len(names))], axis=-1)
+        times = columns(readings, table, "time_s")
+        assert np.array_equal(data["timestamp"], np.rint(times * 1e6).astype(int)), topic
+        if "timestamp_sample" in data:
+            measured = columns(readings, table, "measured_s")
+            assert np.array_equal(data["timestamp_sample"], np.rint(measured * 1e6).astype(int)), topic
+        assert np.allclose(logged, [turned(tuple(row)) for row in rows], rtol=SINGLE, atol=SINGLE), topic
+
+    quaternion = [f"vehicle_quaternion_{part}" for part in "wxyz"]
+    same("sensor_combined", "gyro_rad", "imu", axes("gyro", "rad_s"), frd_from_flu)
+    same("sensor_combined", "accelerometer_m_s2", "imu", axes("accel", "m_s2"), frd_from_flu)
+    same("vehicle_attitude_groundtruth", "q", "truth", quaternion, quat_ned_frd_from_enu_flu)
+    same("load_state_groundtruth", "cable", "truth", axes("cable_true"), ned_from_enu)
+    place = log.get_dataset("vehicle_local_position_groundtruth").data
+    assert np.allclose(-place["z"], columns(readings, "truth", "vehicle_true_z_m"), rtol=SINGLE, atol=SINGLE)
+    if sensors == "lab":
+        same("vehicle_mocap_odometry", "position", "mocap", axes("", "m"), ned_from_enu)
+        same("load_position", "position", "load_tracker", axes("", "m"), ned_from_enu)
+        deviation = log.get_dataset("vehicle_mocap_odometry").data["orientation_variance[2]"] ** 0.5
+        assert np.allclose(deviation, columns(readings, "mocap", "attitude_std_rad"))
+        return
+    same("vehicle_magnetometer", "magnetometer_ga", "magnetometer", axes("field", "gauss"), frd_from_flu)
+    same("load_direction", "direction", "cable_sensor", axes("direction"), frd_from_flu)
+    fix = log.get_dataset("sensor_gps").data
+    assert np.array_equal(fix["latitude_deg"], columns(readings, "gnss", "latitude_deg"))
+    assert np.allclose(fix["vel_n_m_s"], columns(readings, "gnss", "velocity_y_m_s"))
+    assert set(fix["fix_type"]) == {6}
+    pressure = log.get_dataset("sensor_baro").data["pressure"]
+    assert np.allclose(pressure, columns(readings, "barometer", "pressure_pa"), rtol=SINGLE)
 
 
 def test_a_log_that_is_cut_off_or_restarted_is_read() -> None:
