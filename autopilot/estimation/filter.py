@@ -65,7 +65,7 @@ ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 # m and rad relative to the vehicle, of a load that no tracker measures: one of them is enough
 LOAD_STD_TO_FLY, CABLE_STD_TO_FLY = 0.1, 0.14
-STATED_STD_FACTOR = 1.2  # times the deviation that the receiver states
+STATED_STD_FACTOR = 1.5  # times the deviation that the receiver states
 MAX_FIX_AGE_S = 2.0  # for which the IMU bridges a gap between fixes, and between heights of the barometer
 MAX_DIRECTION_AGE_S = 1.0  # for which the pendulum bridges a gap between directions to the load
 # For which the pendulum bridges a gap between a tracker's readings, whose velocity starts it better: a load

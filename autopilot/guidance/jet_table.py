@@ -11,7 +11,6 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import (
     Creep,
-    Cruise,
     Hold,
     Leg,
     PathResume,
@@ -22,7 +21,7 @@ from autopilot.guidance.legs import (
     requested_jet,
 )
 from autopilot.trajectory.load_path import PathTables
-from autopilot.trajectory.reeling import cruise, reel
+from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import PieceTable
@@ -41,9 +40,11 @@ def _put(row: Floats, jet: Jet) -> None:
 
 
 @kernel
-def _transfers(times: Floats, begin: Vec3, end: Vec3, duration: float, out: Floats) -> None:
+def _straight_ways(
+    times: Floats, begin: Vec3, end: Vec3, duration: float, ramp_s: float, out: Floats
+) -> None:
     for k in range(times.shape[0]):
-        _put(out[k], transfer(begin, end, duration, times[k]))
+        _put(out[k], straight_way(begin, end, duration, ramp_s, times[k]))
 
 
 @kernel
@@ -73,12 +74,6 @@ def _reels(times: Floats, begin: Vec3, speed: float, ramp_s: float, cruise_s: fl
 
 
 @kernel
-def _cruises(times: Floats, begin: Vec3, velocity: Vec3, ramp_s: float, cruise_s: float, out: Floats) -> None:
-    for k in range(times.shape[0]):
-        _put(out[k], cruise(begin, velocity, ramp_s, cruise_s, times[k]))
-
-
-@kernel
 def _passes(
     times: Floats, table: PieceTable, begin_s: float, offset: Vec3, fade_s: float, out: Floats
 ) -> None:
@@ -103,9 +98,7 @@ def jets(leg: Leg, times_s: Floats, requested: bool = False) -> Floats:
             times_s, path.tables, path.pieces, path.duration_s, path.lead_s, leg.anchor, as_requested, found
         )
     elif type(leg) is Transfer:
-        _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
-    elif type(leg) is Cruise:
-        _cruises(times_s, leg.begin, leg.velocity, leg.ramp_s, leg.cruise_s, found)
+        _straight_ways(times_s, leg.begin, leg.end, leg.pace.duration_s, leg.pace.ramp_s, found)
     elif type(leg) is PathStretch:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
     elif type(leg) is Reel:

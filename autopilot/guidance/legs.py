@@ -11,11 +11,11 @@ from math import inf, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
-from autopilot.trajectory.reeling import cruise, reel
+from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import ShapedSignals
-from autopilot.trajectory.slack_cable import LONG_WAY, LONG_WAY_RAMP_S, LONG_WAY_SPEED, slack_duration_s
+from autopilot.trajectory.slack_cable import slack_pace
 from autopilot.trajectory.swing import swing_direction
-from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, transfer, transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, Pace, pace, transfer
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -99,32 +99,17 @@ class Transfer:
 
     begin: Vec3
     end: Vec3
-    duration_s: float
+    pace: Pace
     control_mode: int = LOAD_POSITION
-
-    def jet(self, t: float) -> Jet:
-        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
-        return transfer(self.begin, self.end, self.duration_s, t)
-
-
-@dataclass(frozen=True, slots=True)
-class Cruise:
-    """From rest to rest along a straight line, at constant velocity between two ramps of `ramp_s`."""
-
-    begin: Vec3
-    velocity: Vec3
-    ramp_s: float
-    cruise_s: float
-    control_mode: int
 
     @property
     def duration_s(self) -> float:
         """From rest to rest."""
-        return 2.0 * self.ramp_s + self.cruise_s
+        return self.pace.duration_s
 
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
-        return cruise(self.begin, self.velocity, self.ramp_s, self.cruise_s, t)
+        return straight_way(self.begin, self.end, self.pace.duration_s, self.pace.ramp_s, t)
 
 
 @dataclass(frozen=True, slots=True)
@@ -459,7 +444,6 @@ class LevelHold:
 Leg = (
     Hold
     | Transfer
-    | Cruise
     | Brake
     | PathStop
     | CatchLoad
@@ -497,15 +481,9 @@ def path_stop_leg(leg: Leg, t: float, accel_limit: float, min_duration_s: float)
     return PathStop(leg, t, max(min_duration_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
 
 
-def slack_leg(begin: Vec3, end: Vec3) -> Transfer | Cruise:
+def slack_leg(begin: Vec3, end: Vec3) -> Transfer:
     """A vehicle whose cable is slack moves from rest to rest."""
-    way = sub(end, begin)
-    distance = norm(way)
-    duration = slack_duration_s(distance)
-    if distance > LONG_WAY:
-        velocity = scale(LONG_WAY_SPEED / distance, way)
-        return Cruise(begin, velocity, LONG_WAY_RAMP_S, duration - 2.0 * LONG_WAY_RAMP_S, QUAD_POSITION)
-    return Transfer(begin, end, duration, QUAD_POSITION)
+    return Transfer(begin, end, slack_pace(norm(sub(end, begin))), QUAD_POSITION)
 
 
 def reel_leg(begin: Vec3, length: float, target_length: float, speed: float, accel: float) -> Reel:
@@ -527,9 +505,11 @@ def winch_hold_height(leg: Leg) -> float | None:
     return leg.top_m if isinstance(leg, Reel) else None
 
 
-def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, min_duration_s: float) -> Transfer:
+def carry_leg(
+    begin: Vec3, end: Vec3, speed: float, accel: float, min_move_s: float, min_duration_s: float = 0.0
+) -> Transfer:
     """A transfer of the load within the limits given, and no quicker than `min_duration_s` unless the
-    distance is zero."""
+    distance is zero; see `autopilot.trajectory.transfer.pace`."""
     distance = norm(sub(end, begin))
-    duration = max(min_duration_s, transfer_duration(distance, speed, accel)) if distance > 0.0 else 0.0
-    return Transfer(begin, end, duration, LOAD_POSITION)
+    way = pace(distance, speed, accel, min_move_s)
+    return Transfer(begin, end, way.stretched(min_duration_s) if distance > 0.0 else way)

@@ -136,7 +136,7 @@ def stopped_run_of(flight: Flight, view: View, settings: Settings) -> PathResume
 
 def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, min_duration_s: float = 0.0) -> Leg:
     """A transfer of the load to another place, at rest at both ends, that takes at least `min_duration_s`."""
-    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(min_duration_s, settings.min_move_s))
+    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, settings.min_move_s, min_duration_s)
 
 
 def cable_length_at(flight: Flight, here: Vec3, settings: Settings) -> float:

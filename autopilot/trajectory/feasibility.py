@@ -35,6 +35,7 @@ from autopilot.trajectory.shaping import ShapedSignals, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.splines import Array
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
+from autopilot.trajectory.transfer import Pace
 from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.rotors import ROTOR_MARGIN, allocation_columns
@@ -363,7 +364,7 @@ def paths(
         else:
             extremes = _survey(entry, limits, shaped)
             is_run = isinstance(entry.step, AttitudeRun)
-            duration_s = entry.duration_s if is_run else _transfer_s(entry, limits, shaped)
+            duration_s = entry.duration_s if is_run else _transfer(entry, limits, shaped).duration_s
         if extremes is not None:
             report = _path_report(entry, duration_s, distance, extremes, slowed)
             asked = (s.asked_m_s for s in prepared.slow_paths if s.first <= entry.item <= s.last)
@@ -410,9 +411,9 @@ def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry
     return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2, gravity_m_s2=gravity_m_s2)
 
 
-def _transfer_s(entry: TimelineEntry, limits: VehicleLimits, shaped: bool) -> float:
-    """Duration (s) of the transfer of a step as it is flown."""
-    return max(entry.transfer_s, min_transfer_s(entry, limits.shaping)) if shaped else entry.transfer_s
+def _transfer(entry: TimelineEntry, limits: VehicleLimits, shaped: bool) -> Pace:
+    """The transfer of a step as it is flown."""
+    return entry.transfer.stretched(min_transfer_s(entry, limits.shaping)) if shaped else entry.transfer
 
 
 def _survey(entry: TimelineEntry, limits: VehicleLimits, shaped: bool = False) -> Peaks | None:
@@ -421,7 +422,7 @@ def _survey(entry: TimelineEntry, limits: VehicleLimits, shaped: bool = False) -
     if isinstance(entry.step, AttitudeRun):
         return survey_attitude(entry.step, entry.begin[2], limits.body)
     if entry.transfer_s > 0.0:
-        return survey_transfer(entry.begin, entry.end, _transfer_s(entry, limits, shaped), limits.body)
+        return survey_transfer(entry.begin, entry.end, _transfer(entry, limits, shaped), limits.body)
     return None
 
 

@@ -14,9 +14,10 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.load_path import PathTables, evaluate_load_path, path_joints, path_tables
+from autopilot.trajectory.reeling import straight_way
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.swing import swing_direction
-from autopilot.trajectory.transfer import transfer
+from autopilot.trajectory.transfer import Pace
 from missions.model import AttitudeRun, LoadPath, Signals
 
 Samples = NDArray[np.float64]
@@ -162,11 +163,18 @@ def _fill_load_path(
 
 
 @kernel
-def _fill_transfer(
-    p0: Vec3, p1: Vec3, duration: float, times: Samples, body: KernelBody, efforts: Samples, rows: Samples
+def _fill_straight_way(
+    p0: Vec3,
+    p1: Vec3,
+    duration: float,
+    ramp: float,
+    times: Samples,
+    body: KernelBody,
+    efforts: Samples,
+    rows: Samples,
 ) -> None:
     for i in range(times.shape[0]):
-        _fill_sample(rows[i], transfer(p0, p1, duration, times[i]), body, efforts)
+        _fill_sample(rows[i], straight_way(p0, p1, duration, ramp, times[i]), body, efforts)
 
 
 @kernel
@@ -237,11 +245,15 @@ def survey_load_path(step: LoadPath, anchor: Vec3, body: Body) -> Peaks:
     return _peaks(times, rows)
 
 
-def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
+def survey_transfer(p0: Vec3, p1: Vec3, pace: Pace, body: Body) -> Peaks:
     """Extremes along a rest-to-rest transfer."""
+    duration, ramp = pace
     times = np.linspace(0.0, duration, _TRANSFER_SAMPLES)
+    if ramp > 0.0:  # nothing changes between the ramps
+        rising = np.linspace(0.0, ramp, _TRANSFER_SAMPLES)
+        times = np.concatenate([rising, duration - rising[::-1]])
     rows = np.empty((times.size, _COLUMNS))
-    _fill_transfer(p0, p1, duration, times, *to_kernel_body(body), rows)
+    _fill_straight_way(p0, p1, duration, ramp, times, *to_kernel_body(body), rows)
     return _peaks(times, rows)
 
 

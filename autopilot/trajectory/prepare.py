@@ -177,7 +177,8 @@ def min_transfer_s(entry: TimelineEntry, limits: PathLimits) -> float:
     if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
         return 0.0
     for _ in range(_LENGTHENING_TRIES):
-        if _transfer_fits(survey_transfer(entry.begin, entry.end, duration, limits.body), limits.bounds):
+        peaks = survey_transfer(entry.begin, entry.end, entry.transfer.stretched(duration), limits.body)
+        if _transfer_fits(peaks, limits.bounds):
             break
         duration *= _LENGTHENING
     return 0.0 if duration == entry.transfer_s else duration

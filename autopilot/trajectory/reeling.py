@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, axpy, scale
+from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.transfer import STEP_TERMS, transfer
 
@@ -56,13 +56,14 @@ def reel(begin: Vec3, speed: float, ramp_s: float, cruise_s: float, t: float) ->
 
 
 @kernel
-def cruise(begin: Vec3, velocity: Vec3, ramp_s: float, cruise_s: float, t: float) -> Jet:
-    """Position and its derivatives 1 ... 6 at time t (s) along a straight line: the speed rises to that of
-    `velocity` (m/s) along the s of `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and
-    falls as it rose."""
-    if 2.0 * ramp_s + cruise_s - t <= 0.0:
-        return axpy(ramp_s + cruise_s, velocity, begin), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
-    w = _growth(ramp_s, cruise_s, t)
+def straight_way(begin: Vec3, end: Vec3, duration: float, ramp_s: float, t: float) -> Jet:
+    """Position and its derivatives 1 ... 6 at time t (s) along a straight line, from rest to rest: along
+    `transfer`, or, with a ramp, at constant speed between two ramps of `ramp_s`, on which the speed follows
+    the s of `autopilot.trajectory.transfer`."""
+    if ramp_s == 0.0 or t >= duration:
+        return transfer(begin, end, duration, t)
+    velocity = scale(1.0 / (duration - ramp_s), sub(end, begin))
+    w = _growth(ramp_s, duration - 2.0 * ramp_s, t)
     return (
         axpy(w[0], velocity, begin),
         scale(w[1], velocity),

@@ -16,7 +16,7 @@ from math import dist, pi, sqrt
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
 from autopilot.trajectory.load_path import evaluate_load_path, path_tables
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.transfer import Pace, pace
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -111,7 +111,7 @@ ANYWHERE = MissionState(expected=None)
 class TimelineEntry:
     """A step with the states before and after it, and its expected duration.
 
-    `transfer_s` is the part of the duration in which the load travels from rest to rest; 0 if it does not.
+    `transfer` is the pace at which the load travels from rest to rest; 0 s if it does not.
     `home` is the place to which a return leads, None for other steps.
     """
 
@@ -119,9 +119,14 @@ class TimelineEntry:
     step: Step
     before: MissionState
     after: MissionState
-    transfer_s: float
+    transfer: Pace
     duration_s: float
     home: Vec3 | None = None
+
+    @property
+    def transfer_s(self) -> float:
+        """Time in which the load travels from rest to rest."""
+        return self.transfer.duration_s
 
     @property
     def begin(self) -> Vec3:
@@ -147,9 +152,9 @@ def timeline(
     before = start
     for item, step in enumerate(steps):
         after = state_after(step, before, home)
-        moving, waiting = _travel_and_wait_s(step, before, after, accel_m_s2, vertical, gravity_m_s2)
+        moving, waiting = _travel_and_wait(step, before, after, accel_m_s2, vertical, gravity_m_s2)
         place = home if isinstance(step, ReturnHome) else None
-        yield TimelineEntry(item, step, before, after, moving, moving + waiting, place)
+        yield TimelineEntry(item, step, before, after, moving, moving.duration_s + waiting, place)
         before = after
 
 
@@ -210,15 +215,15 @@ def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
     return min((home, *rally), key=lambda place: dist(place[:2], here[:2]))
 
 
-def _travel_and_wait_s(
+def _travel_and_wait(
     step: Step,
     before: MissionState,
     after: MissionState,
     accel: float,
     vertical: VerticalSpeeds,
     gravity: float,
-) -> tuple[float, float]:
-    """Time (s) in which the load travels, and in which it does not."""
+) -> tuple[Pace, float]:
+    """The pace at which the load travels, and the time (s) in which it does not."""
     speed, waiting = before.speed_m_s, 0.0
     cable = USUAL_CABLE_M if before.cable_m is None else before.cable_m
     match step:
@@ -233,16 +238,14 @@ def _travel_and_wait_s(
         case Winch(speed_m_s=rate):
             speed = min(speed, rate or REEL_M_S)
         case Release():
-            return 0.0, RELEASE_S
+            return Pace(0.0), RELEASE_S
         case Delay() | AttitudeRun() | Signals() | Trajectory():
-            return 0.0, step.duration_s
+            return Pace(0.0), step.duration_s
     if before.expected is None or after.expected is None:
-        return 0.0, waiting
+        return Pace(0.0), waiting
     distance = dist(before.expected, after.expected)
-    travelling = transfer_duration(distance, speed, accel)
-    if distance > 0.0 and not isinstance(step, Winch):
-        travelling = max(travelling, min_move_duration(max(cable, 0.0), gravity))
-    return travelling, waiting
+    min_move_s = 0.0 if isinstance(step, Winch) else min_move_duration(max(cable, 0.0), gravity)
+    return pace(distance, speed, accel, min_move_s), waiting
 
 
 def expected_duration_s(

@@ -6,11 +6,15 @@ its first six derivatives zero at both ends. Its slope is 12012 u^6 (1 - u)^6, w
 * the peak speed is `PEAK_SPEED` distance / duration, halfway (u = 1/2): 12012 / 2^12 = 3003/1024,
 * the peak acceleration is `PEAK_ACCELERATION` distance / duration^2, where (1 - 2u)^2 = 1/11:
   6 * 12012 * (5/22)^5 / sqrt(11).
+
+Over a long way this takes almost three times as long as the peak speed would, and the load creeps at both
+ends. A long way is therefore flown at constant speed between two ramps, along which the speed follows s.
 """
 
 from __future__ import annotations
 
 from math import comb, sqrt
+from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
@@ -20,6 +24,10 @@ from autopilot.trajectory.signals import Jet
 STEP_TERMS = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
 PEAK_SPEED = 3003.0 / 1024.0
 PEAK_ACCELERATION = 72072.0 * (5.0 / 22.0) ** 5 / sqrt(11.0)
+
+# s: a way that would take longer along the polynomial alone is flown at constant speed in between
+CRUISE_AFTER_S = 10.0
+_RAMP_SHARE = 1.0 / 3.0  # of the time of the shortest such way
 
 # of u^13 ... u^7; there are no lower powers
 _COEFFICIENTS = tuple(float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k) for k in range(6, -1, -1))
@@ -59,6 +67,41 @@ def transfer(p0: Vec3, p1: Vec3, duration: float, t: float) -> Jet:
         scale(120.0 * s5 * r2 * r2 * r, path),
         scale(even * 720.0 * s6 * r2 * r2 * r2, path),
     )
+
+
+class Pace(NamedTuple):
+    """How long a way takes from rest to rest, and each of the two ramps at its ends; 0: the polynomial over
+    the whole way."""
+
+    duration_s: float
+    ramp_s: float = 0.0
+
+    def stretched(self, duration_s: float) -> Pace:
+        """The same in at least so many seconds."""
+        if duration_s <= self.duration_s:
+            return self
+        return Pace(duration_s, self.ramp_s * duration_s / self.duration_s)
+
+
+def pace(distance: float, speed_max: float, accel_max: float, min_move_s: float = 0.0) -> Pace:
+    """The pace over a distance (m) with peak speed <= speed_max (m/s) and peak acceleration <= accel_max
+    (m/s^2). No move, and no ramp, takes less than `min_move_s`.
+
+    The duration grows with the distance: the shortest way that is flown at constant speed takes as long as
+    the longest that is not.
+    """
+    if distance == 0.0:
+        return Pace(0.0)
+    duration = max(transfer_duration(distance, speed_max, accel_max), min_move_s)
+    least_s = max(CRUISE_AFTER_S, min_move_s / _RAMP_SHARE)
+    if duration <= least_s:
+        return Pace(duration)
+    # either ramp covers half the way that its time would at full speed
+    speed = min(
+        speed_max, sqrt(distance * accel_max / PEAK_SPEED), distance / ((1.0 - _RAMP_SHARE) * least_s)
+    )
+    ramp = max(PEAK_SPEED * speed / accel_max, min_move_s, least_s - distance / speed)
+    return Pace(ramp + distance / speed, ramp)
 
 
 @kernel

@@ -11,7 +11,6 @@ from autopilot.guidance.legs import (
     QUAD_POSITION,
     Brake,
     Creep,
-    Cruise,
     Hold,
     Leg,
     PathStop,
@@ -25,6 +24,7 @@ from autopilot.supervisor.settings import path_limits
 from autopilot.supervisor.state import Flight, jet_ahead
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.shaping import ShapedSignals, unshaped_signals
+from autopilot.trajectory.transfer import Pace
 from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -36,15 +36,15 @@ SIGNALS = Signals(5.0, TERMS)
 CURVE = Trajectory([(0.0,) * 4, (1.5, 0.5, 0.2, 0.1), (3.0, 0.2, 0.6, 0.0), (5.0, 0.3, 0.1, 0.2)])
 LEGS = (
     Hold((1.0, 2.0, 3.0)),
-    Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0),
+    Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), Pace(4.0)),
     Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
     Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(SIGNALS)),
     SignalRun((0.1, 0.2, 0.3), unshaped_signals(CURVE)),
-    Cruise((0.1, 0.2, 0.3), (0.3, 0.1, -0.2), 0.7, 2.1, QUAD_POSITION),
+    Transfer((0.1, 0.2, 0.3), (0.9, 0.3, -0.4), Pace(3.5, 0.7), QUAD_POSITION),
     Reel((0.1, 0.2, 1.3), 2.0, 0.3, 0.7, 2.1),
     Reel((0.1, 0.2, 1.3), 2.0, -0.3, 0.5, 0.0),
-    PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
+    PathStop(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), Pace(4.0)), 1.0, 2.0, 0.3),
 )
 
 
@@ -78,7 +78,7 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
 
 
 def test_the_path_ahead_goes_on_into_what_follows() -> None:
-    first, second = Transfer((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), 2.0), Hold((1.0, 0.0, 1.0), 0.5)
+    first, second = Transfer((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), Pace(2.0)), Hold((1.0, 0.0, 1.0), 0.5)
     third = SignalRun((1.0, 0.0, 1.0), unshaped_signals(SIGNALS))
     flight = Flight(legs=(first, second), following=(third,))
     times = np.arange(1000) * 0.004

@@ -19,7 +19,6 @@ from autopilot.guidance.legs import (
     QUAD_POSITION,
     Brake,
     Creep,
-    Cruise,
     Hold,
     Leg,
     PathResume,
@@ -29,6 +28,7 @@ from autopilot.guidance.legs import (
     SignalRun,
     Swing,
     SwingDamping,
+    Transfer,
     brake_leg,
     carry_leg,
     path_stop_leg,
@@ -39,6 +39,7 @@ from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory.shaping import shape, unshaped_signals
 from autopilot.trajectory.slack_cable import LONG_WAY, LONG_WAY_SPEED, SLACK_ACCEL, SLACK_SPEED
 from autopilot.trajectory.timeline import min_move_duration
+from autopilot.trajectory.transfer import Pace, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment, plan_waypoint_path
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -56,7 +57,7 @@ BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
 LEGS: dict[str, Leg] = {
     "hold": Hold(HERE, 5.0),
     "transfer": carry_leg(HERE, THERE, 1.5, 1.5, 0.0),
-    "cruise": Cruise(HERE, (0.5, -0.3, 0.2), 0.7, 0.6, QUAD_POSITION),
+    "long transfer": carry_leg(HERE, (40.0, -20.0, 9.0), 3.0, 1.5, 0.0),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
     "run": SignalRun(HERE, unshaped_signals(SIGNALS)),
@@ -221,9 +222,10 @@ def test_a_slack_vehicle_keeps_to_its_limits_from_rest_to_rest(distance_m: float
 
 
 def test_however_far_it_climbs_a_slack_vehicle_leaves_the_ground_at_once() -> None:
-    """A transfer over 60 m takes 26 s for its first 5 mm, in which the gear would touch the ground again and
-    again."""
-    assert carry_leg(HERE, moved_up(60.0), SLACK_SPEED, SLACK_ACCEL, 0.0).jet(26.0)[0][2] < HERE[2] + 0.005
+    """A transfer over 60 m without ramps takes 26 s for its first 5 mm, in which the gear would touch the
+    ground again and again."""
+    gentle = Pace(transfer_duration(60.0, SLACK_SPEED, SLACK_ACCEL))
+    assert Transfer(HERE, moved_up(60.0), gentle).jet(26.0)[0][2] < HERE[2] + 0.005
     assert slack_leg(HERE, moved_up(60.0)).jet(2.0)[0][2] > HERE[2] + 0.2
 
 
@@ -239,8 +241,11 @@ def test_carrying_is_never_quicker_than_the_pendulum_and_else_as_quick_as_it_may
     bare = carry_leg((0.0, 0.0, 0.0), end, speed, accel, 0.0)
     if norm(end) == 0.0:
         assert leg.duration_s == 0.0
-    else:
+    elif leg.pace.ramp_s == 0.0:
         assert leg.duration_s == max(LEAST_S, bare.duration_s)
+    else:  # the ramps, too, are moves
+        assert leg.pace.ramp_s == max(LEAST_S, bare.pace.ramp_s)
+        assert 0.0 <= leg.duration_s - bare.duration_s <= max(LEAST_S - bare.pace.ramp_s, 0.0) + 1e-9
 
 
 def test_the_least_duration_of_a_move_at_the_cable_of_table_4_1() -> None:

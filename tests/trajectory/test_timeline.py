@@ -13,6 +13,7 @@ from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     RELEASE_S,
+    USUAL_CABLE_M,
     MissionState,
     VerticalSpeeds,
     expected_duration_s,
@@ -21,7 +22,7 @@ from autopilot.trajectory.timeline import (
     state_after,
     timeline,
 )
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, pace, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from missions.model import (
@@ -139,8 +140,9 @@ def test_states_join_and_a_return_says_where_it_leads() -> None:
     assert [entry.item for entry in found] == [0, 1, 2, 3, 4]
     assert all(a.after == b.before for a, b in pairwise(found))
     assert [entry.home for entry in found] == [None, None, None, HOME, None]
-    assert found[2].transfer_s == transfer_duration(4.0, 0.5, 1.0)
-    assert found[3].transfer_s == transfer_duration(3.0, 0.5, 1.0)
+    least_s = min_move_duration(USUAL_CABLE_M, 9.81)
+    assert found[2].transfer == pace(4.0, 0.5, 1.0, least_s)
+    assert found[3].transfer == pace(3.0, 0.5, 1.0, least_s)
 
 
 def test_a_return_by_mode_leads_to_the_nearest_of_home_and_rally_points() -> None:
@@ -183,8 +185,9 @@ def test_the_least_time_of_a_return_is_that_of_the_way_to_the_home_that_is_set()
     weak = LIMITS._replace(bounds=LIMITS.bounds._replace(rotor_high=1.24), accel_m_s2=2.5, speed_m_s=15.0)
     far = (20.0, 0.0, 0.0)
     least = prepare((Takeoff(5.0), ReturnHome()), range(2), weak, far).min_durations_s[1]
-    assert least > transfer_duration(20.0, 15.0, 2.5)
-    along = survey_transfer((0.0, 0.0, 5.0), (20.0, 0.0, 5.0), least, weak.body)
+    usual = pace(20.0, 15.0, 2.5, min_move_duration(weak.body.cable_length, weak.body.gravity))
+    assert least > usual.duration_s
+    along = survey_transfer((0.0, 0.0, 5.0), (20.0, 0.0, 5.0), usual.stretched(least), weak.body)
     assert along.rotor_high.value <= 1.24
     assert prepare((Takeoff(5.0), ReturnHome()), range(2), weak).min_durations_s[1] == 0.0, (
         "there is no way to go"
@@ -221,11 +224,13 @@ def test_a_long_cable_is_tautened_and_set_down_for_minutes():
 
 
 def test_half_the_speed_takes_twice_as_long():
-    """Far enough that the acceleration sets no bound."""
+    """Beside the ramps, which are the shorter the slower it is."""
     there = Waypoint(1000.0, 0.0, 2.0)
     rest = seconds(Speed(1.0), Waypoint(0.0, 0.0, 2.0))
     slow, fast = (seconds(Speed(speed), there) - rest for speed in (1.0, 2.0))
-    assert slow == pytest.approx(2.0 * fast)
+    least_s = min_move_duration(USUAL_CABLE_M, 9.81)
+    assert slow == pytest.approx(1000.0 + least_s)
+    assert fast == pytest.approx(500.0 + 2.0 * PEAK_SPEED / 1.5)
 
 
 def test_a_place_is_left_from_where_the_load_is():

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.trajectory.transfer import PEAK_ACCELERATION, PEAK_SPEED, transfer, transfer_duration
+from autopilot.geometry.linear import ZERO, norm, scale, sub
+from autopilot.trajectory.reeling import straight_way
+from autopilot.trajectory.transfer import (
+    PEAK_ACCELERATION,
+    PEAK_SPEED,
+    pace,
+    transfer,
+    transfer_duration,
+)
 
 P0, P1 = (1.0, -2.0, 3.0), (4.0, 2.0, 2.5)
 # Horner with alternating coefficients up to 24024 on half the interval leaves some twelve digits, relative
@@ -78,6 +88,53 @@ def test_it_moves_one_way_only(t: float) -> None:
     # |p1 - p0| is 5.02 m
     assert -1e-12 <= np.dot(np.subtract(jet[0], P0), np.subtract(P1, P0)) / 25.25 <= 1.0 + 1e-12
     assert np.dot(jet[1], np.subtract(P1, P0)) >= 0.0
+
+
+@given(
+    distance=st.floats(0.01, 3000.0),
+    speed=st.floats(0.1, 20.0),
+    accel=st.floats(0.1, 10.0),
+    min_move=st.floats(0.0, 15.0),
+)
+def test_a_paced_way_keeps_to_its_limits(
+    distance: float, speed: float, accel: float, min_move: float
+) -> None:
+    duration, ramp = pace(distance, speed, accel, min_move)
+    assert duration >= min_move and (ramp == 0.0 or min_move <= ramp <= 0.5 * duration * (1.0 + 1e-12))
+    way = (0.6 * distance, 0.0, -0.8 * distance)
+    share = np.linspace(0.0, 1.0, 401)
+    times = np.concatenate([ramp * share, duration - ramp * share]) if ramp > 0.0 else duration * share
+    jets = [straight_way(ZERO, way, duration, ramp, t) for t in times.tolist()]
+    assert max(norm(jet[1]) for jet in jets) <= speed * (1.0 + 1e-9)
+    assert max(norm(jet[2]) for jet in jets) <= accel * (1.0 + 1e-9)
+    assert straight_way(ZERO, way, duration, ramp, duration)[0] == way
+    assert (
+        norm(sub(straight_way(ZERO, way, duration, ramp, 0.5 * duration)[0], scale(0.5, way)))
+        < 1e-9 * distance
+    )
+
+
+def test_a_long_way_takes_little_longer_than_at_full_speed() -> None:
+    assert pace(1000.0, 5.0, 1.5).duration_s == pytest.approx(1000.0 / 5.0 + PEAK_SPEED * 5.0 / 1.5)
+
+
+@given(speed=st.floats(0.1, 20.0), accel=st.floats(0.1, 10.0), min_move=st.floats(0.0, 15.0))
+def test_a_longer_way_takes_longer(speed: float, accel: float, min_move: float) -> None:
+    """Also from a way on the polynomial to one with constant speed."""
+    distances = np.geomspace(0.01, 3000.0, 400).tolist()
+    durations = [pace(distance, speed, accel, min_move).duration_s for distance in distances]
+    assert all(after >= before * (1.0 - 1e-12) for before, after in pairwise(durations))
+    # nowhere by more than in proportion to the way
+    assert all(after <= 1.04 * before for before, after in pairwise(durations))
+
+
+def test_a_stretched_way_keeps_its_shape() -> None:
+    usual = pace(300.0, 5.0, 1.5)
+    slow = usual.stretched(2.0 * usual.duration_s)
+    assert usual.stretched(1.0) == usual and slow.ramp_s == pytest.approx(2.0 * usual.ramp_s)
+    for share in (0.05, 0.3, 0.8):
+        at = [straight_way(P0, P1, *one, share * one.duration_s)[0] for one in (usual, slow)]
+        assert at[0] == pytest.approx(at[1], abs=1e-12)
 
 
 def test_plain_python_and_machine_code_agree_to_the_bit() -> None:

@@ -16,7 +16,8 @@ from autopilot.trajectory.peaks import Body, survey_transfer
 from autopilot.trajectory.prepare import REFUSE, PathLimits, prepare
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
 from autopilot.trajectory.splines import Array
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.timeline import min_move_duration
+from autopilot.trajectory.transfer import pace, transfer_duration
 from autopilot.trajectory.waypoint_path import (
     ROTATION_TIME_S,
     MinimumSnap,
@@ -289,8 +290,9 @@ def test_a_single_transfer_takes_longer_where_a_bound_binds() -> None:
     assert gentle.min_durations_s == (0.0,) * 5
     weak = LIMITS._replace(bounds=BOUNDS._replace(rotor_high=1.35))
     least = prepare(steps, range(5), weak).min_durations_s
-    assert least[2] > 1.05 * transfer_duration(400.0, 15.0, 1.5)
-    along = survey_transfer((0.0, 0.0, 5.0), (400.0, 0.0, 5.0), least[2], BODY)
+    usual = pace(400.0, 15.0, 1.5, min_move_duration(BODY.cable_length, BODY.gravity))
+    assert least[2] > 1.05 * usual.duration_s
+    along = survey_transfer((0.0, 0.0, 5.0), (400.0, 0.0, 5.0), usual.stretched(least[2]), BODY)
     assert along.rotor_high.value <= 1.35
     assert least[4] == 0.0
 

@@ -83,10 +83,12 @@ UNKNOWN_POSITION_STD = 100.0  # m: the first fix decides the position
 MAX_MAGNETIC_AGE_S = 0.2
 MIN_SIN_ANGLE = 0.01  # sine of the angle between specific force and magnetic field
 # With a slow error that returns to zero, the best estimate of the position is half of the first and half of
-# the last fix: the position then follows each metre of a plain receiver's drift by half. It should stay where
-# it was and be carried by the velocities, so the drift is assumed to return to zero ten times as slowly as it
-# wanders.
-PLAIN_REVERSION = 0.1
+# the last fix: the position then follows each metre of a plain receiver's drift by half. In a short flight it
+# should stay where it was and be carried by the velocities, so the drift is assumed to return to zero more
+# slowly than it wanders. In a long one the random walk of the velocities must not add up: at this rate, the
+# uncertainty of the position stays what the receiver states. In the first minute the position then follows a
+# drift of 1.5 m by 0.38 m; at a tenth by 0.32 m, and the uncertainty would grow for hours.
+PLAIN_REVERSION = 0.3
 
 
 @kernel
