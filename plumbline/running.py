@@ -23,6 +23,7 @@ from gcs.clients import command
 from gcs.clients.modes import ALIASES, MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
+from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.link import monotonic_us, parse_address
 from gcs.shell.session import Session
@@ -61,9 +62,15 @@ _LEAST_REEL_M = 1e-3  # for less the winch may stay still
 _STILL_S = 1.5  # three times the interval of WINCH_STATUS
 _NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
-    "holding": lambda state: state.phase == "hold",
+    "holding": lambda state: state.holding is True,
     "mission complete": lambda state: state.mission == "complete",
     "landed": lambda state: state.armed is False,
+}
+# messages that must be newer than the request to wait: one from before the last command may say that what
+# this command begins is already over
+_REPORTED_BY = {
+    "holding": mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    "mission complete": mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
 }
 
 
@@ -182,8 +189,8 @@ class RunningVehicle:
     ) -> None:
         """Fly the load to a position and hold it there; without `up_m` at its present height.
 
-        The load has arrived when it is within 0.1 m of the position and slower than 0.1 m/s. A mission that
-        is being flown ends. After a release the position is that of the vehicle.
+        The load has arrived when its path has ended, within 0.1 m of the position, and it is slower than
+        0.1 m/s. A mission that is being flown ends. After a release the position is that of the vehicle.
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
@@ -192,11 +199,12 @@ class RunningVehicle:
         self._require_armed("goto")
         self._command(lambda session: reposition(session, place, False, checked_speed_m_s).operation)
         if wait:
-            self.wait(lambda state: self._has_arrived(state, place), limit_s)
+            view, reported_by = self._session.view, mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT
+            self.wait(_newly(view, reported_by, lambda state: self._has_arrived(state, place)), limit_s)
 
     def _has_arrived(self, state: State, place: tuple[float, float, float | None]) -> bool:
         position, speed_m_s = self._session.view.motion_without_load or (state.load_m, state.load_speed_m_s)
-        if position is None or speed_m_s is None:
+        if position is None or speed_m_s is None or not state.holding:
             return False
         offsets = [
             actual - wanted for actual, wanted in zip(position, place, strict=True) if wanted is not None
@@ -267,7 +275,7 @@ class RunningVehicle:
         self._command(lambda session: command.grab(session.target))
 
     def pause(self) -> None:
-        """Hold the load where it is."""
+        """Stop the load, and hold it; `wait("holding")` returns when it has come to rest."""
         self._command(lambda session: command.pause(session.target))
 
     def resume(self) -> None:
@@ -306,10 +314,11 @@ class RunningVehicle:
     def wait(self, until: str | float | Condition = "landed", timeout_s: float = 600.0) -> State:
         """Wait until a condition holds, and return the state in which it held.
 
-        `until`: one of `ready`, `holding`, `mission complete` and `landed` (disarmed), a function of the
-        state, or a number of seconds (0 or more) of the vehicle's clock. `Error` if the condition does not
-        hold within `timeout_s` seconds of the vehicle's clock (for a number of seconds there is no limit), or
-        if the vehicle is disarmed or falls silent before.
+        `until`: one of `ready`, `holding` (at rest: the stop, or the way to a place, has ended), `mission
+        complete` and `landed` (disarmed), a function of the state, or a number of seconds (0 or more) of the
+        vehicle's clock. `Error` if the condition does not hold within `timeout_s` seconds of the vehicle's
+        clock (for a number of seconds there is no limit), or if the vehicle is disarmed or falls silent
+        before.
         """
         condition, what = self._condition(until)
         checked_s = positive("timeout_s", timeout_s)
@@ -322,7 +331,10 @@ class RunningVehicle:
                 raise GcsError(
                     f"wait {until!r}: must be one of {', '.join(_NAMED_CONDITIONS)}, a number or a function"
                 )
-            return _NAMED_CONDITIONS[until], f"{until!r}"
+            condition, reported_by = _NAMED_CONDITIONS[until], _REPORTED_BY.get(until)
+            if reported_by is not None:
+                condition = _newly(self._session.view, reported_by, condition)
+            return condition, f"{until!r}"
         if isinstance(until, int | float):
             clock, awaited_s = _Clock(), not_negative("wait", until)
             return lambda state: clock.elapsed_s(state) >= awaited_s, f"{awaited_s:g} s"
@@ -453,6 +465,12 @@ class _Clock:
     def stalled_s(self) -> float:
         """How long the vehicle's clock has stood still, by the clock of this machine."""
         return (monotonic_us() - self._changed_us) * 1e-6
+
+
+def _newly(view: VehicleView, message_id: int, condition: Condition) -> Condition:
+    """That the condition holds, and that the vehicle has sent this message since now."""
+    before = view.latest.frame(message_id)
+    return lambda state: view.latest.frame(message_id) is not before and condition(state)
 
 
 def _reeled(length_m: float, before_m: float | None) -> Condition:

@@ -21,6 +21,7 @@ class State:
     ready_to_arm: bool | None
     landed: str | None  # on the ground, in the air, taking off, landing
     phase: str | None  # as docs/architecture.md names them, in lower case
+    holding: bool | None  # at rest in phase hold: the stop, or the way to a place, has ended
     time_s: float | None  # since boot, by the vehicle's clock
     mission: str | None  # none, not started, active, paused, complete
     mission_item: int | None
@@ -56,6 +57,7 @@ def state_of(view: VehicleView) -> State:
     winch = view.latest.get("WINCH_STATUS")
     return State(
         **record,
+        holding=view.holding,
         load_speed_m_s=speed,
         cable_length_m=None if winch is None else float(winch.line_length),
         winch_moving=None if winch is None else bool(winch.status & mavlink.MAV_WINCH_STATUS_MOVING),

@@ -29,6 +29,8 @@ _SOURCES = {
     if "source" in kind.fieldnames
 }
 
+# a leg that holds a position; what levels or calms the vehicle controls an attitude
+_POSITION_MODES = (mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, mavlink.PLUMBLINE_CONTROL_QUAD_POSITION)
 _PHASES = {
     value: str(entry.name).removeprefix("PLUMBLINE_PHASE_").replace("_", " ").lower()
     for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
@@ -171,6 +173,18 @@ class VehicleView:
     def phase_name(self) -> str | None:
         phase = self.phase
         return None if phase is None else _PHASES.get(phase, f"phase {phase}")
+
+    @property
+    def holding(self) -> bool | None:
+        """Whether load, or vehicle after a release, is held at rest: in phase hold, with no path left to fly,
+        be it of a stop or to a place."""
+        setpoint = self.latest.get("LOAD_SETPOINT")
+        if setpoint is None:
+            return None
+        is_position = setpoint.control_mode in _POSITION_MODES
+        return (
+            is_position and setpoint.phase == mavlink.PLUMBLINE_PHASE_HOLD and math.isnan(setpoint.duration)
+        )
 
     @property
     def mission_state(self) -> str | None:

@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable
 from dataclasses import fields
+from math import nan
 from typing import Any
 
 import pytest
@@ -19,8 +20,8 @@ from gcs.clients.vehicle_view import VehicleView
 from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows.reposition import reposition
 from plumbline import RunningVehicle
-from plumbline.running import Condition, _reeled
-from plumbline.state import State
+from plumbline.running import Condition, _newly, _reeled
+from plumbline.state import State, state_of
 
 WRONG: dict[str, tuple[Any, str]] = {
     "address": (lambda: plumbline.connect("14550x"), "address '14550x'; must be PORT, HOST:PORT, udpin:"),
@@ -167,24 +168,28 @@ def test_a_link_that_fails_while_it_listens_serves_the_next_request() -> None:
 
 
 class ReportingSession(QuietSession):
-    """A session with a vehicle that has reported these messages, and does not move while its clock runs."""
+    """A session with a vehicle that has reported these messages, and reports those of `at(time_s)` while its
+    clock runs."""
 
     lost = False
 
-    def __init__(self, *reported: Any) -> None:
+    def __init__(self, *reported: Any, at: Callable[[float], Any]) -> None:
         super().__init__()
         self.view = VehicleView()
         self._time_us = 0
+        self._at = at
+        self._frames = FrameWriter(1, 1)  # numbers the messages: they differ
         for message in reported:
             self._hear(message)
 
     def _hear(self, message: Any) -> None:
-        for received in messages(FrameWriter(1, 1).frame(message))[0]:
+        for received in messages(self._frames.frame(message))[0]:
             self.view.update(received, 0)
 
     def pass_time(self) -> None:
-        """A second of the vehicle's clock."""
-        self._time_us += 1_000_000
+        """A tenth of a second of the vehicle's clock."""
+        self._time_us += 100_000
+        self._hear(self._at(self._time_us * 1e-6))
         errors = mavlink.MAVLink_cascade_errors_message(self._time_us, ZERO3, *[ZERO3] * 5, 0, 0, 0, ZERO3, 3)
         self._hear(errors)
 
@@ -194,12 +199,62 @@ class ReportingSession(QuietSession):
 
 
 ZERO3, REST, LEVEL = (0.0,) * 3, (0.0,) * 9, (1.0, 0.0, 0.0, 0.0)
+ARMED = mavlink.MAVLink_heartbeat_message(
+    2, mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_MODE_FLAG_SAFETY_ARMED, 0, 4, 3
+)
+LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
+
+
+def in_hold(time_s: float, duration_s: float, control_mode: int = LOAD_POSITION) -> Any:
+    """LOAD_SETPOINT in phase hold, of a leg of this duration."""
+    time_us, phase = round(time_s * 1e6), mavlink.PLUMBLINE_PHASE_HOLD
+    return mavlink.MAVLink_load_setpoint_message(
+        time_us, *REST, *ZERO3, 0.0, duration_s, 0, phase, control_mode
+    )
+
+
+def in_mission(state: int) -> Any:
+    """MISSION_CURRENT with this MISSION_STATE."""
+    return mavlink.MAVLink_mission_current_message(0, 3, state)
+
+
+COMPLETE, ACTIVE = in_mission(mavlink.MISSION_STATE_COMPLETE), in_mission(mavlink.MISSION_STATE_ACTIVE)
+
+
+@pytest.mark.parametrize(
+    ("until", "under_way", "over"),
+    [("holding", in_hold(0.0, 2.0), in_hold(0.0, nan)), ("mission complete", ACTIVE, COMPLETE)],
+    ids=["holding", "mission complete"],
+)
+def test_a_wait_ends_with_what_the_last_command_began(until: str, under_way: Any, over: Any) -> None:
+    """What was reported before is over too."""
+    session = ReportingSession(ARMED, over, at=lambda time_s: under_way if time_s < 5.0 else over)
+    with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
+        assert (vehicle.wait(until).time_s or 0.0) >= 5.0
+
+
+def test_a_message_from_before_tells_nothing_new() -> None:
+    session = ReportingSession(COMPLETE, at=lambda _: COMPLETE)
+    is_new = _newly(session.view, mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, lambda _: True)
+    assert not is_new(state_of(session.view))
+    session.pass_time()
+    assert is_new(state_of(session.view))
+
+
+def test_a_vehicle_that_is_only_kept_level_does_not_hold() -> None:
+    level = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
+    session = ReportingSession(ARMED, at=lambda time_s: in_hold(time_s, nan, level))
+    with (
+        RunningVehicle(session, 1.0) as vehicle,  # type: ignore[arg-type]
+        pytest.raises(plumbline.Error, match="not within 2 s of the vehicle's clock"),
+    ):
+        vehicle.wait("holding", timeout_s=2.0)
 
 
 @pytest.mark.parametrize(
     ("control_mode", "here"),
     [
-        (mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, (0.0, 0.0, 0.02)),
+        (LOAD_POSITION, (0.0, 0.0, 0.02)),
         (mavlink.PLUMBLINE_CONTROL_QUAD_POSITION, (1.0, 0.5, 3.0)),
     ],
     ids=["with its load", "after a release"],
@@ -208,14 +263,15 @@ def test_what_position_commands_refer_to_is_awaited(
     control_mode: int, here: tuple[float, float, float]
 ) -> None:
     """The load rests at home, and the vehicle flies at (1, 0.5, 3)."""
-    armed, estimated = mavlink.MAV_MODE_FLAG_SAFETY_ARMED, mavlink.PLUMBLINE_SOURCE_ESTIMATED
+    estimated = mavlink.PLUMBLINE_SOURCE_ESTIMATED
     session = ReportingSession(
-        mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, armed, 0, 4, 3),
+        ARMED,
         mavlink.MAVLink_gps_global_origin_message(473977420, 85455940, 0),
         mavlink.MAVLink_home_position_message(473977420, 85455940, 0, 0, 0, 0, LEVEL, 0, 0, 0),
         mavlink.MAVLink_load_state_message(0, 0.0, 0.0, -0.02, *REST, 0.7, 0.0, 0, 0, estimated),
         mavlink.MAVLink_local_position_ned_message(0, 0.5, 1.0, -3.0, *ZERO3),
-        mavlink.MAVLink_load_setpoint_message(0, *REST, *ZERO3, 0.0, 0.0, 0, 0, control_mode),
+        in_hold(0.0, nan, control_mode),
+        at=lambda time_s: in_hold(time_s, nan, control_mode),
     )
     with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
         vehicle.goto(*here, timeout_s=2.0)

@@ -109,7 +109,8 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
         vehicle.start()
         assert vehicle.wait(lambda state: state.mission_item == 1).mission_items == 3
         vehicle.pause()
-        vehicle.wait("holding")
+        rests = vehicle.wait("holding")
+        assert rests.phase == "hold" and rests.load_speed_m_s == pytest.approx(0.0, abs=0.01)
         vehicle.resume()
         assert vehicle.wait().mission == "complete"
         assert vehicle.state.load_m == pytest.approx((0.5, 0.0, 0.02), abs=0.1)
