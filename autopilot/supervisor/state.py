@@ -308,15 +308,38 @@ def first_fence_violation(fence: Fence, places: Iterable[Vec3], settings: Settin
     return next(filter(None, (fence_violation(fence, place, settings) for place in places)), "")
 
 
+class FenceViolation(NamedTuple):
+    """Why load or vehicle may not be at a place: the limit, by how much it is exceeded (m), and what was
+    measured there."""
+
+    limit: str
+    beyond_m: float
+    measured: str
+
+
 def fence_violation(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
-    if settings.fence.radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence.radius_m:
-        return f"beyond the fence, GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
+    found = measured_fence_violation(fence, x_load, settings)
+    if found is None:
+        return ""
+    return f"{found.limit} ({found.measured})" if HEIGHT_LIMIT_PARAMETER in found.limit else found.limit
+
+
+def measured_fence_violation(fence: Fence, x_load: Vec3, settings: Settings) -> FenceViolation | None:
+    """The same with what it is measured by; None if they may be there."""
+    limits, distance_m = settings.fence, hypot(x_load[0], x_load[1])
+    if 0.0 < limits.radius_m < distance_m:
+        text = f"beyond the fence, GF_MAX_HOR_DIST {limits.radius_m:g} m from home"
+        return FenceViolation(text, distance_m - limits.radius_m, f"{distance_m:.2f} m from home")
     height_m = x_load[2] + settings.cable_length_m
-    if settings.fence.height_m > 0.0 and height_m > settings.fence.height_m:
-        limit = f"{HEIGHT_LIMIT_PARAMETER} {settings.fence.height_m:g} m above home"
-        return f"beyond the fence, {limit} (vehicle at {height_m:.2f} m)"
-    return fence.violation(x_load[0], x_load[1])
+    if 0.0 < limits.height_m < height_m:
+        text = f"beyond the fence, {HEIGHT_LIMIT_PARAMETER} {limits.height_m:g} m above home"
+        return FenceViolation(text, height_m - limits.height_m, f"vehicle at {height_m:.2f} m")
+    text = fence.violation(x_load[0], x_load[1])
+    if not text:
+        return None
+    depth_m = fence.depth(x_load[0], x_load[1])
+    return FenceViolation(text, depth_m, f"{depth_m:.2f} m from its edge")
 
 
 def has_fence(flight: Flight, settings: Settings) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot
+from math import hypot, inf
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.command_names import numbered_name
@@ -51,6 +51,19 @@ class Polygon:
             x1, y1 = x2, y2
         return inside
 
+    def distance_to_edge(self, x: float, y: float) -> float:
+        """Distance (m) of the point from the nearest side."""
+        nearest = inf
+        x1, y1 = self.corners[-1]
+        for x2, y2 in self.corners:
+            along_x, along_y = x2 - x1, y2 - y1
+            squared = along_x * along_x + along_y * along_y
+            share = ((x - x1) * along_x + (y - y1) * along_y) / squared if squared > 0.0 else 0.0
+            share = min(max(share, 0.0), 1.0)
+            nearest = min(nearest, hypot(x - x1 - share * along_x, y - y1 - share * along_y))
+            x1, y1 = x2, y2
+        return nearest
+
     def moved(self, east_m: float, north_m: float) -> Polygon:
         """The same area elsewhere."""
         return replace(self, corners=tuple((x + east_m, y + north_m) for x, y in self.corners))
@@ -67,6 +80,10 @@ class Disc:
     def contains(self, x: float, y: float) -> bool:
         """Whether the point is inside."""
         return hypot(x - self.centre[0], y - self.centre[1]) <= self.radius
+
+    def distance_to_edge(self, x: float, y: float) -> float:
+        """Distance (m) of the point from the circle."""
+        return abs(hypot(x - self.centre[0], y - self.centre[1]) - self.radius)
 
     def moved(self, east_m: float, north_m: float) -> Disc:
         """The same area elsewhere."""
@@ -90,6 +107,15 @@ class Fence:
         if any(zone.contains(x, y) for zone in self.zones if not zone.inclusion):
             return "in an exclusion zone of the fence"
         return ""
+
+    def depth(self, x: float, y: float) -> float:
+        """Distance (m) of a point that may not be flown over from the edge of the nearest inclusion zone, or
+        of the exclusion zones in which it lies."""
+        inclusions = [zone for zone in self.zones if zone.inclusion]
+        if inclusions and not any(zone.contains(x, y) for zone in inclusions):
+            return min(zone.distance_to_edge(x, y) for zone in inclusions)
+        forbidding = [zone for zone in self.zones if not zone.inclusion and zone.contains(x, y)]
+        return max((zone.distance_to_edge(x, y) for zone in forbidding), default=0.0)
 
     def moved(self, east_m: float, north_m: float) -> Fence:
         """The same fence elsewhere."""

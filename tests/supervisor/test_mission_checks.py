@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import accumulate
+from math import cos, dist, sin
 from typing import Any
 
 import pytest
@@ -237,10 +238,63 @@ def test_the_paths_of_signals_and_trajectories_are_checked_and_the_next_way_begi
         (through((2.0, 3.0), (0.0, 4.5)), ""),
     ):
         text = uploaded(fenced(), Takeoff(2.0), path, Land())
-        assert text == (f"Mission denied: item 1 leads {why}" if why else None)
+        assert (text or "").startswith(f"Mission denied: item 1 leads {why} after " if why else "")
+        assert bool(text) == bool(why)
     beside = through((2.0, 3.0), (0.0, 4.5))
     text = uploaded(fenced(), Takeoff(2.0), beside, Waypoint(0.0, 1.0, 2.0), Land())
     assert text == f"Mission denied: item 2 leads {ZONE}"
+
+
+@pytest.mark.parametrize(
+    ("limits", "told"),
+    [
+        (
+            {"fence": Fence((Disc(True, (0.0, 0.0), 2.9),))},
+            "outside the fence after 3.9 s; worst at 6.0 s: 1.10 m from its edge",
+        ),
+        (
+            {"fence": Fence((Polygon(False, ((-9.0, 1.9), (9.0, 1.9), (9.0, 9.0), (-9.0, 9.0))),))},
+            "into an exclusion zone of the fence after 3.0 s; worst at 6.0 s: 2.10 m from its edge",
+        ),
+        (
+            {"fence": Fence(), "radius_m": 2.9},
+            "beyond the fence, GF_MAX_HOR_DIST 2.9 m from home after 3.9 s; worst at 6.0 s: 4.00 m from home",
+        ),
+        (
+            {"fence": Fence(), "height_m": 3.0},
+            "beyond the fence, GF_MAX_VER_DIST 3 m above home after 2.3 s; worst at 6.0 s: vehicle at 3.70 m",
+        ),
+    ],
+    ids=["out", "in", "far", "high"],
+)
+def test_a_path_beyond_the_fence_is_told_with_when_and_where_it_is_worst(
+    limits: dict[str, Any], told: str
+) -> None:
+    """4 m north and 1 m up within 6 s, and back: along half a cosine it has gone the share s of the way after
+    6 acos(1 - 2 s) / pi s, which the check sees within the next 0.1 s."""
+    out_and_back = Signals(12.0, (Term("y", 4.0, 0.0, 6.0, 0.0, 6.0), Term("z", 1.0, 0.0, 6.0, 0.0, 6.0)))
+    text = uploaded(fenced(**limits), Takeoff(2.0), Waypoint(0.0, 0.0, 2.0), out_and_back, Land())
+    assert text == f"Mission denied: item 2 leads {told}, load at N 4.0 E 0.0, 3.0 m up"
+
+
+@pytest.mark.parametrize(
+    "zone", [Disc(True, (1.0, 2.0), 3.0), Polygon(True, ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)))]
+)
+def test_the_edge_of_a_zone_is_as_near_as_its_nearest_point(zone: Disc | Polygon) -> None:
+    turns = [0.001 * k for k in range(6284)]
+    shares = [0.0005 * k for k in range(2001)]
+    edge = (
+        [(1.0 + 3.0 * cos(turn), 2.0 + 3.0 * sin(turn)) for turn in turns]
+        if isinstance(zone, Disc)
+        else [
+            (x + share * (u - x), y + share * (v - y))
+            for (x, y), (u, v) in zip(zone.corners, zone.corners[1:] + zone.corners[:1], strict=True)
+            for share in shares
+        ]
+    )
+    for place in ((5.0, 5.0), (1.0, 1.0), (2.0, 1.0), (-3.0, 0.5), (3.0, -7.0)):
+        nearest = min(dist(place, other) for other in edge)
+        assert zone.distance_to_edge(*place) == pytest.approx(nearest, abs=2e-3)
 
 
 BEYOND = "Mission denied: item 2 leads beyond the fence, GF_MAX_VER_DIST 3 m above home"

@@ -9,6 +9,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from autopilot.geometry.linear import Vec3, add, axpy, norm, sub
 from autopilot.supervisor.motion import cable_length_at, stopping_legs
 from autopilot.supervisor.requests.limits import MIN_ALTITUDE_M
@@ -24,10 +26,12 @@ from autopilot.supervisor.state import (
     has_fence,
     is_fence_active,
     load_position_below,
+    measured_fence_violation,
 )
 from autopilot.supervisor.step_legs import NEAR_START
-from autopilot.trajectory.load_path import evaluate_load_path, path_tables
+from autopilot.trajectory.load_path import path_tables
 from autopilot.trajectory.prepare import MissionBegin, waypoint_path_starts
+from autopilot.trajectory.shaping import requested_jets
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     MIN_REEL_M,
@@ -36,7 +40,7 @@ from autopilot.trajectory.timeline import (
     cable_length_problem,
     timeline,
 )
-from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
+from autopilot.trajectory.waypoint_path import PathSegment, sample_path
 from autopilot.wire.statustext import listed
 from missions.model import AttitudeRun, LoadPath, ReturnHome, Step, Takeoff, Waypoint, Winch
 
@@ -182,31 +186,54 @@ def _violation_of_step(flight: Flight, entry: TimelineEntry, settings: Settings)
     if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | LoadPath | Winch):
         return ""
     # a way that begins beyond the fence leads back: only its end counts
-    if begin is None or _first_violation(flight, entry, (begin,), settings):
+    if begin is None or isinstance(entry.step, Winch) or _first_violation(flight, entry, (begin,), settings):
         return _first_violation(flight, entry, (end,), settings)
-    return _first_violation(flight, entry, _places_on_way(entry.step, begin, end), settings)
+    if isinstance(entry.step, LoadPath):
+        return _violation_of_path(flight, entry, entry.step, begin, settings)
+    return _first_violation(flight, entry, _points_along(begin, end), settings)
 
 
-def _places_on_way(step: Step, begin: Vec3, end: Vec3) -> Iterable[Vec3]:
-    """Places on the way of a step, up to its end."""
-    if isinstance(step, Winch):
-        return (end,)
-    if not isinstance(step, LoadPath):
-        return _points_along(begin, end)
-    tables = path_tables(step)
+def _violation_of_path(
+    flight: Flight, entry: TimelineEntry, step: LoadPath, begin: Vec3, settings: Settings
+) -> str:
+    """Why load or vehicle may not be where signals or a trajectory lead, from when on, and when and where the
+    limit is exceeded most; an empty string if they may."""
+    fence, there = flight.area.fence, _settings_after(entry, settings)
     pieces = min(math.ceil(step.duration_s / CHECK_SPACING_S), MAX_CHECK_POINTS)
-    times = ((k + 1) / pieces * step.duration_s for k in range(pieces))
-    return (add(begin, evaluate_load_path(tables, t)[0]) for t in times)
+    times = np.linspace(0.0, step.duration_s, pieces + 1)[1:]
+    displacements = requested_jets(path_tables(step), step.duration_s, times)[0].tolist()
+    places = _load_places(entry, (add(begin, (x, y, z)) for x, y, z in displacements), there)
+    found = [
+        (violation, t, place)
+        for t, place in zip(times.tolist(), places, strict=True)
+        if (violation := measured_fence_violation(fence, place, there)) is not None
+    ]
+    if not found:
+        return ""
+    first, first_s, _ = found[0]
+    same = (one for one in found if one[0].limit == first.limit)
+    worst, worst_s, place = max(same, key=lambda one: one[0].beyond_m)
+    east, north, up = (round(value, 1) + 0.0 for value in place)
+    where = f"{worst.measured}, load at N {north} E {east}, {up} m up"
+    return f"{first.limit} after {first_s:.1f} s; worst at {worst_s:.1f} s: {where}"
 
 
 def _first_violation(flight: Flight, entry: TimelineEntry, places: Iterable[Vec3], settings: Settings) -> str:
     """Why load or vehicle may not be at one of the places to which a step leads; an empty string if they may
     be at all of them."""
-    cable = entry.after.cable_m
-    if cable is not None:
-        settings = replace(settings, cable_length_m=cable)
-    loads = (load_position_below(place, settings) if entry.after.released else place for place in places)
-    return first_fence_violation(flight.area.fence, loads, settings)
+    settings = _settings_after(entry, settings)
+    return first_fence_violation(flight.area.fence, _load_places(entry, places, settings), settings)
+
+
+def _load_places(entry: TimelineEntry, places: Iterable[Vec3], settings: Settings) -> Iterable[Vec3]:
+    """Where the load hangs, or would hang if it were not released, at these places of a step."""
+    return (load_position_below(place, settings) for place in places) if entry.after.released else places
+
+
+def _settings_after(entry: TimelineEntry, settings: Settings) -> Settings:
+    """The settings with the length that the cable has after a step."""
+    cable_m = entry.after.cable_m
+    return settings if cable_m is None else replace(settings, cable_length_m=cable_m)
 
 
 def curve_exit_problem(flight: Flight, ahead: RemainingSteps, settings: Settings) -> str:
@@ -234,8 +261,8 @@ def _points_on_curve(path: PathSegment, entry: TimelineEntry) -> Iterable[Vec3]:
     """Places on a segment of a path through waypoints, at most about CHECK_SPACING_M apart."""
     straight_m = norm(sub(entry.end, entry.begin))
     pieces = min(MIN_CURVE_POINTS + math.ceil(2.0 * straight_m / CHECK_SPACING_M), MAX_CHECK_POINTS)
-    step_s = (path.end_s - path.begin_s) / pieces
-    return (evaluate_path(path.table, path.begin_s + k * step_s)[0] for k in range(1, pieces + 1))
+    times = np.linspace(path.begin_s, path.end_s, pieces + 1)[1:]
+    return ((x, y, z) for x, y, z in sample_path(path.table, times)[0].tolist())
 
 
 def _points_along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
