@@ -6,6 +6,8 @@ import errno
 import os
 from typing import TYPE_CHECKING
 
+from missions.errors import Error
+
 if TYPE_CHECKING:
     from missions.toml_files import FileError
 
@@ -17,14 +19,10 @@ EXIT_REQUIRED = 4  # a requirement of --require was not met
 EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, the code that shells use
 
 
-class GcsError(Exception):
-    """A known error. Its text is one line for display; `lines` has a line for each problem."""
+class GcsError(Error):
+    """A known error with the exit code of a command that ends by it."""
 
     exit_code = EXIT_ERROR
-
-    def __init__(self, *lines: str) -> None:
-        super().__init__("; ".join(lines))
-        self.lines = lines
 
 
 def from_clone(extra: str) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from missions.errors import PathError
 from missions.model import TOLERANCE_M, Mission
 from missions.nearest import nearest
 from missions.places import misplaced_trajectories
@@ -102,7 +103,7 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
 
 def _with_rows(item: TrajectoryItem, file: Path) -> TrajectoryItem:
     """A trajectory through the rows of its file; TextFileError with the reason if there is none."""
-    from missions.trajectory import PathError, read_rows, through_rows  # loads much
+    from missions.trajectory import read_rows, through_rows  # loads much
 
     text = text_of(file)
     try:

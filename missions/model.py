@@ -10,6 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from missions.path_rows import path_rows
+
 Axis = Literal["x", "y", "z"]
 Controlled = Literal["vehicle", "load"]
 
@@ -137,7 +139,7 @@ class Trajectory:
 
     `points`: rows of t (s), east, north and up (m), as a list, an array (n, 4) or a data frame, 0.1 s apart
     or more. Their times and places count from the first. The path is the spline of degree 9 that passes each
-    point at its time, and whose speed is zero at both ends. TypeError if a row has not four values.
+    point at its time, and whose speed is zero at both ends. `Error` if a row has not four values.
     """
 
     points: tuple[TrajectoryPoint, ...]
@@ -147,17 +149,14 @@ class Trajectory:
     def __init__(
         self, points: Iterable[Sequence[float]], first_m: tuple[float, float, float] | None = None
     ) -> None:
-        rows = [tuple(row) for row in (points.to_numpy() if hasattr(points, "to_numpy") else points)]
-        for index, row in enumerate(rows):
-            if len(row) != len(TrajectoryPoint._fields):
-                raise TypeError(f"points[{index}] has {len(row)} values; must be t_s, east_m, north_m, up_m")
+        rows = path_rows(points, TrajectoryPoint._fields, "points")
         object.__setattr__(self, "points", tuple(TrajectoryPoint(*row) for row in rows))
         object.__setattr__(self, "first_m", first_m)
 
     @classmethod
     def through(cls, rows: Iterable[Sequence[float]], tolerance_m: float = TOLERANCE_M) -> Trajectory:
         """The smoothest trajectory that passes rows (t, east, north, up) within `tolerance_m`, however close
-        they are: those of a computed or recorded path. ValueError if there is none from rest to rest."""
+        they are: those of a computed or recorded path. `Error` if there is none from rest to rest."""
         from missions.trajectory import through_rows  # loads much
 
         return through_rows(rows, tolerance_m)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
 from missions import limits, model
+from missions.errors import PathError
 
 Seconds = Annotated[float, Field(ge=0.0, le=limits.LONGEST_S)]
 RunSeconds = Annotated[float, Field(ge=limits.SHORTEST_RUN_S, le=limits.LONGEST_S)]
@@ -166,7 +167,10 @@ class SignalsItem(Item):
 class TrajectoryItem(Item):
     file: str | None = Field(None, description="CSV file with the columns t_s, east_m, north_m, altitude_m")
     tolerance_m: float | None = Field(
-        None, ge=1e-4, le=1.0, description="within which the path passes the rows of the file; none: 0.001"
+        None,
+        ge=limits.FINEST_TOLERANCE_M,
+        le=limits.COARSEST_TOLERANCE_M,
+        description="within which the path passes the rows of the file; none: 0.001",
     )
     points: list[Annotated[list[float], Field(min_length=4, max_length=4)]] | None = Field(
         None, description="[t_s, east_m, north_m, altitude_m] of each, instead of a file"
@@ -175,7 +179,7 @@ class TrajectoryItem(Item):
 
     @model_validator(mode="after")
     def _is_a_path(self) -> TrajectoryItem:
-        from missions.trajectory import PathError, through_points  # loads much
+        from missions.trajectory import through_points  # loads much
 
         if (self.file is None) == (self.points is None):
             found = "no file and no points" if self.points is None else "both a file and points"

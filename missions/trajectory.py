@@ -15,8 +15,19 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from missions.limits import FARTHEST_M, LONGEST_S, MAX_POINTS, SHORTEST_POINT_S
+from missions.errors import Error, PathError
+from missions.limits import (
+    COARSEST_TOLERANCE_M,
+    FARTHEST_M,
+    FINEST_TOLERANCE_M,
+    LONGEST_S,
+    MAX_POINTS,
+    SHORTEST_POINT_S,
+)
 from missions.model import ORIGIN, TOLERANCE_M, ZERO_AT_ENDS, Trajectory
+from missions.path_rows import path_rows
+from missions.toml_files import format_value
+from missions.writing import plain_value
 
 Array = NDArray[np.float64]
 Vec3 = tuple[float, float, float]
@@ -32,17 +43,6 @@ _ROUNDING_S = 1e-9  # of times that are whole milliseconds
 _ROWS_HINT = "closer rows, as of a computed path, belong in a file (in Python: Trajectory.through)"
 _END_ROWS, _END_S = 5, 0.1  # by which the speed at an end is found
 _AT_REST_M_S, _SPEED_SIGMAS = 0.05, 5.0
-
-
-class PathError(ValueError):
-    """There is no path through the rows. `text` says why, `index` which row it is about (None: all)."""
-
-    def __init__(self, text: str, index: int | None = None) -> None:
-        super().__init__(text, index)
-        self.text, self.index = text, index
-
-    def __str__(self) -> str:
-        return f"path {self.text}" if self.index is None else f"rows[{self.index}] {self.text}"
 
 
 def through_points(points: Iterable[Sequence[float]]) -> Trajectory:
@@ -66,6 +66,9 @@ def through_rows(rows: Iterable[Sequence[float]], tolerance_m: float = TOLERANCE
     within `tolerance_m`; rows that are too far apart for a fit are its points themselves. PathError if there
     is no such path.
     """
+    within_m, finest_m, coarsest_m = plain_value(tolerance_m), FINEST_TOLERANCE_M, COARSEST_TOLERANCE_M
+    if not isinstance(within_m, float) or not finest_m <= within_m <= coarsest_m:
+        raise Error(f"tolerance_m = {tolerance_m!r}; must be {finest_m:g} ... {coarsest_m:g} m")
     table, first_m = _checked(rows)
     times, places = table[:, 0], table[:, 1:]
     gaps = np.diff(times)
@@ -78,24 +81,25 @@ def through_rows(rows: Iterable[Sequence[float]], tolerance_m: float = TOLERANCE
         if np.diff(knots).min() < SHORTEST_POINT_S - _ROUNDING_S:
             break
         points, distances = _fit(knots, times, places)
-        if distances.max() <= tolerance_m:
+        if distances.max() <= within_m:
             return _trajectory(knots, points.round(_DECIMALS), first_m)
         if nearest is None or distances.max() < nearest[0]:
             nearest = float(distances.max()), int(distances.argmax())
     if gaps.min() >= SHORTEST_POINT_S - _ROUNDING_S and len(times) <= MAX_POINTS:
         return _trajectory(times.round(3), places, first_m)
-    raise _no_fit(table, nearest, tolerance_m)
+    raise _no_fit(table, nearest, within_m)
 
 
 def _checked(rows: Any) -> tuple[Array, Vec3]:
     """The rows (n, 4), each counted from the first, and the place of the first; PathError if they make no
     path."""
-    found = [list(row) for row in (rows.to_numpy() if hasattr(rows, "to_numpy") else rows)]
-    for index, row in enumerate(found):
-        if len(row) != len(COLUMNS):
-            raise PathError(f"has {len(row)} numbers; must be {', '.join(COLUMNS)}", index)
+    found = [[plain_value(value) for value in row] for row in path_rows(rows, COLUMNS, "rows")]
     if len(found) < 2:
         raise PathError(f"has {len(found)} rows; must be two at least")
+    for index, row in enumerate(found):
+        for name, value in zip(COLUMNS, row, strict=True):
+            if not isinstance(value, float):
+                raise PathError(f"has {name} = {format_value(value)}; must be a number", index)
     table = np.array(found, dtype=np.float64)
     if not np.isfinite(table).all():
         index = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])

@@ -56,15 +56,15 @@ def _keys(record: Any) -> dict[str, Any]:
         if not field.compare:
             continue
         if field.name.endswith("_rad"):
-            found = _plain(value)
+            found = plain_value(value)
             key = field.name.removesuffix("_rad") + "_deg"
             table[key] = _degrees(found) if isinstance(found, float) else found
         elif field.name == "points":
-            table["points"] = [[_plain(number) for number in row] for row in value]
+            table["points"] = [[plain_value(number) for number in row] for row in value]
         elif isinstance(value, Sequence) and not isinstance(value, str):
             table |= {field.name: [_keys(part) for part in value]} if value else {}
         elif value is not None:
-            table[field.name] = _plain(value)
+            table[field.name] = plain_value(value)
     if isinstance(record, Term) and record.hold_s is None:
         table.pop("fall_s", None)  # the term stays at its top
     return table
@@ -75,7 +75,7 @@ def is_truth_value(value: Any) -> bool:
     return type(value).__name__ in ("bool", "bool_")
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """A number as a float, infinite for an integer beyond the range of floats; other values as they are. True
     and False, also numpy's, are no numbers."""
     if is_truth_value(value):

@@ -19,7 +19,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from gcs.errors import GcsError as Error
+from missions.errors import Error
 from missions.model import (
     AttitudeRun,
     Delay,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -134,8 +135,31 @@ MOVING = np.column_stack([np.arange(0.0, 5.0, 0.01)] * 2 + [np.zeros(500)] * 2)
     ],
 )
 def test_rows_through_which_no_smooth_path_leads_are_refused(rows: Array, text: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(text)):
+    with pytest.raises(Error, match=re.escape(text)) as refusal:
         through_rows(rows)
+    assert isinstance(refusal.value, ValueError), "scripts may catch it as such"
+
+
+ROWS = [[0.0, 0.0, 0.0, 1.0], [9.0, 1.0, 0.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Trajectory.through(None), "path = None; must be rows of t_s, east_m"),  # type: ignore[arg-type]
+        (lambda: Trajectory.through("0,0,0,1"), "path = '0,0,0,1'; must be rows of"),  # type: ignore[arg-type]
+        (lambda: Trajectory.through(np.zeros(4)), "rows[0] = np.float64(0.0); must be t_s, east_m"),
+        (lambda: Trajectory.through([["0", 0.0, 0.0, 1.0], ROWS[1]]), 'rows[0] has t_s = "0"; must be a num'),  # type: ignore[list-item]
+        (lambda: Trajectory.through(np.array(ROWS, complex)), "rows[0] has t_s = 0j; must be a number"),
+        (lambda: Trajectory.through(ROWS, -1.0), "tolerance_m = -1.0; must be 0.0001 ... 1 m"),
+        (lambda: Trajectory.through(ROWS, "fine"), "tolerance_m = 'fine'; must be 0.0001 ... 1 m"),  # type: ignore[arg-type]
+        (lambda: Trajectory([row[:3] for row in ROWS]), "points[0] has 3 numbers; must be t_s, east_m"),
+        (lambda: Trajectory(5), "path = 5; must be rows of t_s, east_m, north_m, up_m"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_are_no_rows_is_an_error_of_one_line(make: Callable[[], Trajectory], text: str) -> None:
+    with pytest.raises(Error, match=re.escape(text)):
+        make()
 
 
 @pytest.mark.parametrize(
