@@ -44,6 +44,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     estimated_quat = linear(estimated_attitude.time_s, estimated_attitude.quat_wxyz, t)
     acceleration = linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
     acceleration[np.isnan(samples.desired_m).any(axis=1)] = np.nan  # zero is sent where there is no path
+    began_s = as_of(setpoint.time_s, setpoint.time_s - setpoint.elapsed_s, t)
     wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 
     def interpolated(values: Floats) -> Floats:
@@ -56,6 +57,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     return {
         "time_s": t,
         "mission_item": samples.item,
+        "item_time_s": t - began_s,
         "control_mode": samples.control_mode,
         "in_mission": samples.in_mission,
         **_component_columns("load_desired", "m", samples.desired_m),
