@@ -24,7 +24,7 @@ from gcs.commands.options import (
 from gcs.formats.missions import is_foreign
 from gcs.shell.link import Address
 from gcs.shell.session import Session
-from gcs.workflows.transfer import download, download_to, upload
+from gcs.workflows.transfer import MISSION_ENDING, download, download_to, upload
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _FENCE = mavlink.MAV_MISSION_TYPE_FENCE
@@ -59,11 +59,11 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
     """Download the mission from the vehicle.
 
     Each line is one mission item as transferred; null and - stand for values that are not given. With FILE,
-    which must end in .plan or .waypoints, the mission is written for other ground stations, a .plan with
-    fence and rally points. An existing FILE is replaced.
+    the mission is written as a mission file (.toml) or for other ground stations (.plan, with fence and rally
+    points, or .waypoints). An existing FILE is replaced.
     """
-    if file is not None and not is_foreign(file):
-        raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")
+    if file is not None and not is_foreign(file) and file.suffix.lower() != MISSION_ENDING:
+        raise click.BadParameter(f"{file}; must end in .plan, .waypoints or .toml", param_hint="FILE")
     if file is None:
         items = download(address)
     else:

@@ -64,14 +64,20 @@ def write_foreign(
     if not is_foreign(path):
         endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
-    if items and is_home_row(items[0]) and _is_home(items[0], home):  # ArduPilot's item 0
-        items = redirected(items[1:], lambda target: max(target - 1, 0))
+    items = without_home(items, home)
     in_plan = path.suffix.lower() == PLAN_ENDING
     text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items, home)
     try:
         write_atomically(path, text.encode())
     except OSError as error:
         raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def without_home(items: Sequence[WireItem], home: Home) -> Sequence[WireItem]:
+    """The items without the home that a vehicle with ArduPilot's identity has as item 0."""
+    if items and is_home_row(items[0]) and _is_home(items[0], home):
+        return redirected(items[1:], lambda target: max(target - 1, 0))
+    return items
 
 
 def read_mission(path: Path) -> ForeignMission:

@@ -30,7 +30,7 @@ def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
     if meta.mission:
         try:
             known = load(meta.mission)
-            if _same(items_of(known, telemetry.home), telemetry.mission):
+            if same_items(items_of(known, telemetry.home), telemetry.mission):
                 return known
         except GcsError:
             pass
@@ -42,7 +42,7 @@ def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
     return Mission(name, meta.title or name, "", (), tuple(one.step for one in steps))
 
 
-def _same(items: Sequence[WireItem], recorded: Sequence[WireItem]) -> bool:
+def same_items(items: Sequence[WireItem], recorded: Sequence[WireItem]) -> bool:
     """Whether items are those of a log, in which fractions have single precision."""
     if len(items) != len(recorded):
         return False

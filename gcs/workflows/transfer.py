@@ -8,12 +8,19 @@ from pathlib import Path
 
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, home_item
+from autopilot.wire.items import MissionItemError, WireItem, home_item, located_steps
 from gcs.clients.missions import AREA_NAMES, MissionDownload, MissionUpload
-from gcs.errors import GcsError, RefusedError
+from gcs.errors import GcsError, RefusedError, input_error
 from gcs.foreign_mission import ForeignMission
 from gcs.formats.jumps import redirected
-from gcs.formats.missions import PLAN_ENDING, is_foreign, mission_of, read_foreign, write_foreign
+from gcs.formats.missions import (
+    PLAN_ENDING,
+    is_foreign,
+    mission_of,
+    read_foreign,
+    without_home,
+    write_foreign,
+)
 from gcs.formats.plan import Plan
 from gcs.mission_files import is_mission_file
 from gcs.mission_items import areas_of, home_difference, in_mission_terms, items_of
@@ -22,11 +29,17 @@ from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.before_flight import CHECKING_TEXT
 from gcs.workflows.flyable import load_checked, require_flyable
+from gcs.workflows.recorded_mission import same_items
 from gcs.workflows.running_flight import vehicle_home
+from missions.fileformat import MissionFileError
+from missions.fileformat import mission_of as steps_of
+from missions.toml_files import FileError
+from missions.writing import mission_table, write_toml
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
+MISSION_ENDING = ".toml"
 
 
 PrintLine = Callable[[str], None]
@@ -127,8 +140,8 @@ def download(address: Address) -> list[WireItem]:
 
 
 def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
-    """Write the vehicle's mission to a .plan file, with fence and rally points, or to a .waypoints file;
-    return its items, and what was written in words."""
+    """Write the vehicle's mission to a mission file, to a .plan file, with fence and rally points, or to a
+    .waypoints file; return its items, and what was written in words."""
     with Session(address) as session:
         session.find()
         items = _download_items(session, _MISSION)
@@ -136,10 +149,31 @@ def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
         fence = _download_items(session, _FENCE) if has_areas else []
         rally = _download_items(session, _RALLY) if has_areas else []
         home = vehicle_home(session)
-    write_foreign(file, items, home, fence, rally)
+    if file.suffix.lower() == MISSION_ENDING:
+        _write_mission(file, items, home)
+    else:
+        write_foreign(file, items, home, fence, rally)
     lists = (items, "item"), (fence, "fence item"), (rally, "rally point")
     counts = ((len(one), f"{what}{'s' * (len(one) != 1)}") for one, what in lists if one or one is items)
     return items, ", ".join(f"{count} {what}" for count, what in counts)
+
+
+def _write_mission(file: Path, items: Sequence[WireItem], home: Home) -> None:
+    """Write the steps of the items as a mission file; GcsError if it would give other items."""
+    needed = f"{file}: not written: {{}}; {file.with_suffix(PLAN_ENDING).name} would hold all of it"
+    counted = without_home(items, home)
+    try:
+        steps = [one.step for one in located_steps(counted, home)]
+        table = mission_table(file.stem, "", (), steps)
+        mission = steps_of(table, file.stem, "the mission")
+    except (MissionItemError, MissionFileError) as error:
+        raise GcsError(needed.format(error)) from None
+    if not same_items(items_of(mission, home), counted):
+        raise GcsError(needed.format("a mission file has no item for a part of this mission"))
+    try:
+        write_toml(file, table)
+    except FileError as error:
+        raise input_error(error) from None
 
 
 def _download_items(session: Session, kind: int) -> list[WireItem]:

@@ -15,9 +15,11 @@ from contextlib import closing
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import plumbline
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
@@ -31,6 +33,7 @@ from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows import readiness as readiness_module
 from gcs.workflows import status as status_module
 from gcs.workflows import view as view_module
+from gcs.workflows.recorded_mission import same_items
 from missions.model import Land, Signals, Sine, Takeoff, Term, Waypoint
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -495,6 +498,43 @@ def test_a_plan_goes_up_and_comes_down_equal(live, tmp_path, ending):
         assert json.loads(back.read_text())["mission"]["items"] == plan["mission"]["items"]
     assert run("upload", str(back), "--connect", port).exit_code == EXIT_DONE
     assert repr(vehicle.mission) == repr(first)
+
+
+@pytest.mark.parametrize("name", ["square", "case-b", "load-attitude", "delivery", "eight"])
+def test_a_mission_comes_down_as_a_file_that_goes_up_again(live, tmp_path, name):
+    vehicle, port = live
+    file, back = tmp_path / f"{name}.toml", tmp_path / "back.toml"
+    if name == "eight":
+        turn = np.linspace(0.0, 1.0, 1001)
+        phase = 2.0 * np.pi * turn**4 * (35.0 - 84.0 * turn + 70.0 * turn**2 - 20.0 * turn**3)
+        rows = np.column_stack([12.0 * turn, np.sin(phase), 0.5 * np.sin(2.0 * phase), 0.0 * turn]).round(4)
+        plumbline.Mission(
+            name, [plumbline.Takeoff(1.5), plumbline.Trajectory.through(rows), plumbline.Land()]
+        ).save(file)
+    assert run("upload", str(file) if file.exists() else name, "--connect", port).exit_code == EXIT_DONE
+    first = list(vehicle.mission)
+    done = run("download", str(back), "--connect", port)
+    assert done.exit_code == EXIT_DONE, done.stderr
+    assert done.stdout == f"{len(first)} items written to {back}\n"
+    assert run("clear", "--connect", port).exit_code == EXIT_DONE
+    assert run("upload", str(back), "--connect", port).exit_code == EXIT_DONE
+    assert same_items(vehicle.mission, first)
+
+
+def test_a_mission_with_items_that_mission_files_do_not_have_is_not_written_to_one(live, tmp_path):
+    _, port = live
+    file, back = tmp_path / "in.plan", tmp_path / "back.toml"
+    plan = plan_of(
+        (22, [0, 0, 0, None, 47.397742, 8.545594, 2.5]),
+        (115, [90.0, 0, 0, 0, 0, 0, 0]),
+        (16, [0, 0, 0, None, 47.397745, 8.5455941, 3.25]),
+        (21, [0, 0, 0, None, 0, 0, 0]),
+    )
+    file.write_text(json.dumps(plan))
+    assert run("upload", str(file), "--connect", port).exit_code == EXIT_DONE
+    told = one_line(run("download", str(back), "--connect", port), EXIT_ERROR)
+    assert "not written: a mission file has no item for a part" in told and "back.plan would hold" in told
+    assert not back.exists()
 
 
 def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp_path):
