@@ -1,4 +1,4 @@
-"""Where the load hangs before each step, as far as the steps say it; trajectories that begin elsewhere."""
+"""Where each step leaves the load, as far as the steps say it; trajectories that begin elsewhere."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from missions.model import (
 
 Vec3 = tuple[float, float, float]
 
+_HOME = (0.0, 0.0, 0.0)
 _NEAR_M = 0.05  # a trajectory may begin this far from where the load hangs
 
 
@@ -34,17 +35,18 @@ def misplaced_trajectories(steps: Sequence[Step]) -> Iterator[tuple[int, str]]:
                 places = f"begins at {_shown(first)}, and the load hangs at {_shown(here)} then"
                 advice = "put a waypoint at its first row before it, or count its places from there"
                 yield index, f"{places}; {advice} (first row 0, 0, 0)"
-        here = _place_after(step, here)
+        here = place_after(step, here)
 
 
-def _place_after(step: Step, here: Vec3 | None) -> Vec3 | None:
-    """Where the load hangs after a step that begins at `here`; None: not known."""
+def place_after(step: Step, here: Vec3 | None, home: Vec3 = _HOME) -> Vec3 | None:
+    """Where the load is after a step that begins at `here`, ENU, m, as far as the step itself says it; None:
+    not known. A take-off from an unknown place is assumed to be from the origin; a return leads to `home`."""
     match step:
-        case Takeoff():
-            return (0.0, 0.0, step.altitude_m)
-        case Waypoint():
-            return (step.east_m, step.north_m, step.altitude_m)
-        case Signals() | AttitudeRun() | Release() | Land():
+        case Takeoff(altitude_m=altitude):
+            return (0.0, 0.0, altitude) if here is None else (here[0], here[1], altitude)
+        case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
+            return (east, north, altitude)
+        case Signals() | AttitudeRun() | Release():
             return None
     if here is None:
         return None
@@ -57,9 +59,11 @@ def _place_after(step: Step, here: Vec3 | None) -> Vec3 | None:
                 here[2] + end[3] - begin[3],
             )
         case ReturnHome():
-            return (0.0, 0.0, here[2])
-        case Winch():
-            return (here[0], here[1], here[2] - step.length_m)
+            return (home[0], home[1], here[2])
+        case Land():
+            return (here[0], here[1], 0.0)
+        case Winch(length_m=length_change):
+            return (here[0], here[1], here[2] - length_change)
     return here
 
 

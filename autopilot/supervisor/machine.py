@@ -64,7 +64,7 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
     else:
         legs = ENTRY_LEGS[phase](flight, view, settings) if phase in ENTRY_LEGS else ()
     if flight.phase == Phase.MISSION and phase != Phase.MISSION:
-        stopped_run = stopped_run_of(flight, view, settings) or flight.mission.stopped_run
+        stopped_run = stopped_run_of(flight, view, settings, legs) or flight.mission.stopped_run
         flight = replace(flight, mission=replace(flight.mission, stopped_run=stopped_run))
     entered = replace(
         flight,

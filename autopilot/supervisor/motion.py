@@ -116,13 +116,16 @@ def stopping_legs(flight: Flight, view: View, settings: Settings) -> tuple[tuple
     return (brake,), brake.end
 
 
-def stopped_run_of(flight: Flight, view: View, settings: Settings) -> PathResume | None:
-    """How the signals or trajectory that are flown continue after the stop of `stopping_legs`; None if there
-    are none, or they have ended."""
+def stopped_run_of(
+    flight: Flight, view: View, settings: Settings, next_legs: tuple[Leg, ...]
+) -> PathResume | None:
+    """How the signals or trajectory that are flown continue after the stop of `stopping_legs`, with which the
+    next legs may begin; None if there are none, or they have ended."""
     leg = flight.legs[0] if flight.legs else None
     if not isinstance(leg, SignalRun | PathResume | PathStop):
         return None
-    stopping, _ = stopping_legs(flight, view, settings)
+    begins_with_stop = bool(next_legs) and isinstance(next_legs[0], PathStop)
+    stopping = next_legs if begins_with_stop else stopping_legs(flight, view, settings)[0]
     stop = stopping[0] if stopping and isinstance(stopping[0], PathStop) else None
     path, at_s = (leg, leg_time_s(flight, view.now_us)) if stop is None else (stop.leg, stop.end_s)
     if isinstance(path, PathResume):

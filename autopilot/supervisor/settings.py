@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, inf, radians
+from math import radians
 
 from autopilot.guidance.heading import HeadingLimits
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import PathLimits
-from autopilot.trajectory.rotor_demand import Bounds, rotor_bounds
+from autopilot.trajectory.rotor_demand import bounds_along_paths
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
 from autopilot.vehicle.parameters import AutopilotParameters, shapes_paths
@@ -196,27 +196,25 @@ def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
 
 def path_limits(table: AutopilotParameters, follows_shaped: bool) -> PathLimits:
     """The limits within which paths are shaped: the assumed vehicle, and the MIS_ parameters."""
-    low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
-    limited = table["VEH_ROTOR_LIM"] != 0.0
-    load_mass, gravity = table["VEH_LOAD_MASS"], table["VEH_GRAVITY"]
+    rotor_range = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     body = Body(
         table["VEH_QUAD_MASS"],
-        load_mass,
+        table["VEH_LOAD_MASS"],
         table["VEH_CABLE_LEN"],
         (table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]),
-        gravity,
+        table["VEH_GRAVITY"],
         table["VEH_ARM_LEN"],
         table["VEH_TORQUE"],
         table["PLB_DRAG"],
         table["PLB_DRAG_2"],
         allocation_columns(table.layout),
     )
-    low, high = rotor_bounds(low, high, 0.01 * table["MIS_ROTOR_MARG"], body.hover_force)
-    bounds = Bounds(
-        low if limited else -inf,
-        high if limited else inf,
-        0.01 * table["MIS_TENSION"] * load_mass * gravity,
-        cos(radians(table["MIS_TILT_DEG"])),
+    bounds = bounds_along_paths(
+        body,
+        rotor_range if table["VEH_ROTOR_LIM"] != 0.0 else None,
+        0.01 * table["MIS_ROTOR_MARG"],
+        0.01 * table["MIS_TENSION"],
+        radians(table["MIS_TILT_DEG"]),
         1e-3 * table["VEH_ROTOR_TAU"],
     )
     return PathLimits(

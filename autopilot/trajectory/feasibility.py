@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import cos, degrees, inf, nextafter, radians
+from math import degrees, inf, nextafter, radians
 
 import numpy as np
 from numpy import linspace
@@ -29,7 +29,7 @@ from autopilot.trajectory.peaks import (
     survey_transfer,
 )
 from autopilot.trajectory.prepare import REFUSE, PathLimits, min_transfer_s, prepare, shaped_path
-from autopilot.trajectory.rotor_demand import Bounds, rotor_bounds
+from autopilot.trajectory.rotor_demand import bounds_along_paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.shaping import ShapedSignals, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
@@ -129,14 +129,12 @@ class VehicleLimits:
     def shaping(self) -> PathLimits:
         """The limits to which the autopilot shapes paths: its MIS_ parameters, by default as delivered."""
         vehicle = self.vehicle
-        low, high = rotor_bounds(
-            vehicle.rotor_min_n, vehicle.rotor_max_n, self.rotor_margin, self.body.hover_force
-        )
-        bounds = Bounds(
-            low if vehicle.limited else -inf,
-            high if vehicle.limited else inf,
-            self.min_tension_share * vehicle.load_mass_kg * vehicle.gravity_m_s2,
-            cos(self.tilt_max_rad),
+        bounds = bounds_along_paths(
+            self.body,
+            (vehicle.rotor_min_n, vehicle.rotor_max_n) if vehicle.limited else None,
+            self.rotor_margin,
+            self.min_tension_share,
+            self.tilt_max_rad,
             # by way of the milliseconds of VEH_ROTOR_TAU: the same limits to the last bit give the same paths
             1e-3 * (1e3 * vehicle.rotor_tau_s),
         )

@@ -7,7 +7,7 @@ with a heading of 0. Where the rotors' force is less than the weight, the rate c
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import cos, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,29 @@ def rotor_bounds(low: float, high: float, margin: float, hover: float) -> tuple[
     """
     reserve = margin * (high - low)
     return low + min(reserve, max(_LOW_RESERVE * (hover - low), 0.0)), high - reserve
+
+
+def bounds_along_paths(
+    body: Body,
+    rotor_range: tuple[float, float] | None,
+    rotor_margin: float,
+    min_tension_share: float,
+    tilt_max_rad: float,
+    rotor_tau_s: float,
+) -> Bounds:
+    """What a vehicle allows along its paths.
+
+    `rotor_range`: forces (N) between which a rotor can give any; None: it has no limits. `rotor_margin`: the
+    share of this range kept free for control. `min_tension_share`: the least tension of the cable, as a share
+    of the load's weight. `rotor_tau_s`: the lag of the rotors.
+    """
+    low, high = (
+        (-inf, inf)
+        if rotor_range is None
+        else rotor_bounds(rotor_range[0], rotor_range[1], rotor_margin, body.hover_force)
+    )
+    tension_low = min_tension_share * body.load_mass * body.gravity
+    return Bounds(low, high, tension_low, cos(tilt_max_rad), rotor_tau_s)
 
 
 def gentler_bounds(body: Body, bounds: Bounds) -> Bounds | None:

@@ -21,7 +21,6 @@ from missions.model import (
     AttitudeRun,
     Delay,
     Land,
-    LoadPath,
     Mission,
     Release,
     ReturnHome,
@@ -33,6 +32,7 @@ from missions.model import (
     Waypoint,
     Winch,
 )
+from missions.places import place_after
 
 # Estimates, only for progress bars and time-outs: what the autopilot needs, besides the vehicle's motion, to
 # detect that the cable is taut, and the touch-downs of load and vehicle.
@@ -161,33 +161,30 @@ def timeline(
 def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionState:
     """The state after a step. A take-off from an unknown place is assumed to be from the origin."""
     here = before.expected
+    there = place_after(step, here, home)
     match step:
-        case Takeoff(altitude_m=altitude):
-            if here is None:
-                return replace(before, expected=(0.0, 0.0, altitude), unknown_after="")
-            return replace(before, expected=(here[0], here[1], altitude))
-        case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
-            return replace(before, expected=(east, north, altitude), unknown_after="")
-        case ReturnHome():
-            return before if here is None else replace(before, expected=(home[0], home[1], here[2]))
+        case Takeoff() | Waypoint():
+            is_known = isinstance(step, Waypoint) or here is None
+            return replace(before, expected=there, unknown_after="" if is_known else before.unknown_after)
+        case ReturnHome() | Delay():
+            return replace(before, expected=there)
         case Land():
             # without a load the vehicle may land beside the load that lies there
             unknown_after = before.unknown_after or ("a landing beside the load" if before.released else "")
-            if here is None:
-                return before
-            return replace(before, expected=(here[0], here[1], 0.0), unknown_after=unknown_after)
+            return before if here is None else replace(before, expected=there, unknown_after=unknown_after)
         case Speed(speed_m_s=speed):
             return replace(before, speed_m_s=before.usual_speed_m_s if speed is None else speed)
         case Winch(length_m=length_change):
-            lowered = None if here is None else (here[0], here[1], here[2] - length_change)
             cable = None if before.cable_m is None else before.cable_m + length_change
-            return replace(before, expected=lowered, cable_m=cable)
+            return replace(before, expected=there, cable_m=cable)
         case Release():
             if before.released:
                 return before
             above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
             return replace(before, expected=above, unknown_after="a release", released=True)
-        case Signals() | Trajectory():
+        case Trajectory():
+            return replace(before, expected=there)
+        case Signals():
             x, v = _path_end(step)
             moving = dot(v, v) > AT_REST_M2_S2
             unknown_after = "signals that end in motion" if moving else before.unknown_after
@@ -196,15 +193,13 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
             )
         case AttitudeRun():
             return replace(before, unknown_after="an attitude run")
-        case Delay():
-            return before
     raise AssertionError(step)
 
 
 @lru_cache(maxsize=64)
-def _path_end(step: LoadPath) -> tuple[Vec3, Vec3]:
-    """Displacement and velocity at the end of signals or a trajectory. Each start of a mission needs those of
-    all its paths several times."""
+def _path_end(step: Signals) -> tuple[Vec3, Vec3]:
+    """Displacement and velocity at the end of signals. Each start of a mission needs those of all its paths
+    several times."""
     x, v, *_ = evaluate_load_path(path_tables(step), step.duration_s)
     return x, v
 
