@@ -158,7 +158,8 @@ class PathReport:
     `distance_m` is the greatest distance between the flown and the requested path; forces are in N;
     `tilt_deg` is that of the vehicle; `speed_m_s` is the greatest speed of the load (0 in an attitude run,
     which gives none). Of paths through waypoints, `beside_m` is the greatest distance from the straight line
-    between two of them, and `asked_m_s` the speed asked for if the path is much slower, else 0.
+    between two of them, and `asked_m_s` the speed asked for if the path is much slower, else 0. `lead_s` is
+    the time from the beginning of the item to that of the requested signals or trajectory.
     """
 
     item: int
@@ -173,6 +174,7 @@ class PathReport:
     speed_m_s: float = 0.0
     beside_m: float = 0.0
     asked_m_s: float = 0.0
+    lead_s: float = 0.0
 
     def __str__(self) -> str:
         return self.text()
@@ -190,6 +192,7 @@ class PathReport:
             rotor_high_n=max(self.rotor_high_n, other.rotor_high_n),
             tension_low_n=min(self.tension_low_n, other.tension_low_n),
             tilt_deg=max(self.tilt_deg, other.tilt_deg),
+            lead_s=max(self.lead_s, other.lead_s),
         )
 
     def text(self, times: int = 1) -> str:
@@ -203,6 +206,8 @@ class PathReport:
             near = f", {self.slowed:.2f} times as long as asked{near.removesuffix(' asked')}"
         if self.beside_m > _TOLD_BESIDE_M:
             near = f", up to {self.beside_m:.1f} m beside the straight line"
+        if self.lead_s:
+            near = f" with {self.lead_s:.2f} s before it begins{near}"
         speed = f"load to {self.speed_m_s:.2f} m/s, " if self.speed_m_s else ""
         return (
             f"items[{self.item}] ({self.kind}): {f'{times} times, up to ' if times > 1 else ''}"
@@ -366,7 +371,8 @@ def paths(
         if extremes is not None:
             report = _path_report(entry, duration_s, distance, extremes, slowed)
             asked = (s.asked_m_s for s in prepared.slow_paths if s.first <= entry.item <= s.last)
-            reports.append(replace(report, beside_m=beside, asked_m_s=next(asked, 0.0)))
+            lead_s = path.lead_s if isinstance(path, ShapedSignals) else 0.0
+            reports.append(replace(report, beside_m=beside, asked_m_s=next(asked, 0.0), lead_s=lead_s))
     return reports
 
 

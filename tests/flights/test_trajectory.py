@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import plumbline
+from autopilot.trajectory.feasibility import paths
+from autopilot.trajectory.load_path import evaluate_load_path, path_tables
+from gcs.workflows.vehicle_limits import load_limits
 from plumbline import Land, Mission, Takeoff, Trajectory
 
 
@@ -29,3 +32,15 @@ def test_a_helix_given_by_rounded_rows_is_followed() -> None:
     at_rows = np.column_stack([np.interp(since, times, rows[:, k]) for k in (1, 2, 3)])
     asked = flown[[f"load_asked_{axis}_m" for axis in "xyz"]].to_numpy() - [0.0, 0.0, 1.0]
     assert asked == pytest.approx(at_rows, abs=2e-3), "the tolerance of the fit, and rows 15 mm apart"
+
+
+def test_a_path_with_a_shaped_beginning_starts_as_long_after_its_item_as_the_check_says() -> None:
+    hasty = Trajectory([(0.0, 0.0, 0.0, 0.0), (4.0, 2.0, 0.0, 0.0), (8.0, 0.0, 0.0, 0.0)])
+    mission = Mission("hasty", [Takeoff(1.5), hasty, Land()])
+    (report,) = (one for one in paths(mission, load_limits("bebop")) if one.kind == "trajectory")
+    assert report.lead_s > 0.1 and f" with {report.lead_s:.2f} s before it begins, at most " in str(report)
+    flown = plumbline.fly(mission).telemetry(kind="pandas")
+    flown = flown[flown.in_mission]
+    tables, since = path_tables(hasty), flown.item_time_s.to_numpy() - report.lead_s
+    east_m = [evaluate_load_path(tables, min(max(t, 0.0), 8.0))[0][0] for t in since.tolist()]
+    assert flown.load_asked_x_m.to_numpy() == pytest.approx(east_m, abs=1e-4)
