@@ -39,6 +39,7 @@ from autopilot.supervisor.step_legs import (
     prepared_path,
     step_legs,
 )
+from autopilot.supervisor.watches.slack import NOT_LIFTED_TEXT
 from autopilot.trajectory.timeline import MissionState, state_after
 from autopilot.trajectory.waypoint_path import PathSegment
 from missions.model import AttitudeRun, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint, Winch
@@ -117,8 +118,8 @@ def after_last_leg(flight: Flight, view: View, settings: Settings) -> tuple[Flig
             return _with_legs(
                 flight, (LiftWait(end, LIFT_PATIENCE_S, LOAD_POSITION, start[2]),), view
             ), Report()
-        text = "The load was not lifted: landing"
-        return transition(interrupt_mission(flight), Event.LAND, view, settings), Report(((CRITICAL, text),))
+        landing = transition(interrupt_mission(flight), Event.LAND, view, settings)
+        return landing, Report(((CRITICAL, NOT_LIFTED_TEXT),))
     if flight.mission.active and flight.phase in (Phase.LIFT, Phase.MISSION):
         return _after_step(flight, view, settings)
     if flight.phase == Phase.LIFT and flight.action_when_armed == ActionWhenArmed.OFFBOARD:

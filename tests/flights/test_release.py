@@ -8,7 +8,7 @@ import pytest
 
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import Delay, Land, Takeoff, Waypoint
+from missions.model import Delay, Land, Speed, Takeoff, Waypoint
 from missions.model import Release as ReleaseStep
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED
@@ -147,3 +147,20 @@ def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     assert sorted(set(reached)) == [0, 1, 2, 3, 4, 5]
     assert craft.texts.count("Load released") == 1
+
+
+def test_a_delivered_load_stays_where_it_was_seen_best() -> None:
+    """Readings from afar, good to half a metre, moved it by 0.3 m."""
+    craft = Craft(
+        Takeoff(1.0),
+        ReleaseStep(),
+        Speed(4.0),
+        Waypoint(0.0, 0.0, 15.0),
+        Waypoint(20.0, 0.0, 15.0),
+        sensors="rtk",
+    )
+    craft.begin()
+    craft.run(lambda c: c.truth.x_quad[2] > 5.0)
+    seen_m = math.dist(craft.estimate.load.x_load[:2], craft.truth.x_load[:2])
+    craft.run(lambda c: c.truth.x_quad[0] > 19.0, 60.0)
+    assert math.dist(craft.estimate.load.x_load[:2], craft.truth.x_load[:2]) == seen_m

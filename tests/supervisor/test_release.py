@@ -10,7 +10,7 @@ from autopilot.guidance.legs import QUAD_POSITION, Creep
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
 from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.requests.decide import decide
-from autopilot.supervisor.state import CableState, Flight, Phase
+from autopilot.supervisor.state import CableState, Flight, MissionProgress, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered, hanging
@@ -71,7 +71,7 @@ def test_a_vehicle_without_its_load_creeps_to_the_ground_however_high_it_stands(
     gear_m: float, height_std_m: float
 ) -> None:
     settings = replace(SETTINGS, gear_height_m=gear_m)
-    flight = replace(Flight(), cable=CableState(released=True))
+    flight = Flight(mission=MissionProgress(speed_m_s=1.0), cable=CableState(released=True))
     seen = hanging()._replace(height_std=height_std_m)
     *_, down, creep = entered(flight, Phase.LOWER, seen, settings).legs
     assert isinstance(creep, Creep)

@@ -80,18 +80,26 @@ def test_no_vehicle_dives_after_a_load_that_no_tracker_sees(phase: Phase) -> Non
     }[phase]
 
 
-def test_a_load_that_was_not_lifted_is_tried_again_three_times() -> None:
+LEFT_ON_THE_GROUND = (Phase.SET_DOWN, ["The load was not lifted: landing"])
+CAUGHT = (Phase.LIFT, ["Cable slack: falling with the load to catch it"])
+
+
+@pytest.mark.parametrize(("tracked", "at_last"), [(True, CAUGHT), (False, LEFT_ON_THE_GROUND)])
+def test_a_load_that_was_not_lifted_is_tried_again_three_times(
+    tracked: bool, at_last: tuple[Phase, list[str]]
+) -> None:
     """A gust and no load pulled at the vehicle."""
     flight = entered(Flight(), Phase.LIFT, hanging(), SETTINGS)
     after: list[tuple[Phase, list[str]]] = []
     for k in range(1, 5):
         assert flight.phase == Phase.LIFT
         for passed_us in (1_100_000, 1_140_000):
-            flight, report = advance(flight, view(k * 2_000_000 + passed_us), SETTINGS)
+            seen = view(k * 2_000_000 + passed_us)._replace(load_tracked=tracked)
+            flight, report = advance(flight, seen if tracked else seen._replace(taut=False), SETTINGS)
         after.append((flight.phase, [text for _, text in report.texts]))
         if flight.phase == Phase.TAUTEN:
             flight = transition(flight, Event.TAUT, hanging((k + 1) * 2_000_000), SETTINGS)
     again = (Phase.TAUTEN, ["Cable slack, the load is not lifted: pulling it taut again"])
-    assert after == [again] * 3 + [(Phase.LIFT, ["Cable slack: falling with the load to catch it"])]
+    assert after == [again] * 3 + [at_last]
     disarmed = transition(flight, Event.DISARM, view(20_000_000), SETTINGS)
     assert disarmed.cable.failed_lifts == 0

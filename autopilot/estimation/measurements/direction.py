@@ -106,12 +106,14 @@ def correct_load_on_ground(
                 state, load_with_status(load, load.age_s, load.rejected + 1.0, load.source), state.resets
             )
         var = 1.0
-    k = var / (var + variance)
+    # slow errors are the same in all readings and do not average out: readings reduce the variance only to
+    # theirs, and those from afar move nothing that was seen better from near by
+    reducible_var = max(var - slow_var, 0.0)
+    k = reducible_var / (reducible_var + variance)
     x_load = (load.x_load[0] + k * innovation[0], load.x_load[1] + k * innovation[1], load.x_load[2])
-    # slow errors are the same in all readings and do not average out
     return with_load(
         state,
-        with_observed_position(load, x_load, max((1.0 - k) * var, slow_var), reading.age_s),
+        with_observed_position(load, x_load, var - k * reducible_var, reading.age_s),
         state.resets,
     )
 

@@ -26,6 +26,7 @@ from autopilot.supervisor.watches.watch_result import WatchResult
 LIFT_OFF_US = 1_000_000  # time after which a load that is being lifted is off the ground
 ON_GROUND_SPEED = 0.3  # m/s; a smaller speed of a fallen load is noise or creep
 MAX_FAILED_LIFTS = 3  # after which a load that does not leave the ground is left there
+NOT_LIFTED_TEXT = "The load was not lifted: landing"
 MIN_FALL_S = 1.0  # of a catch, after which a vehicle that does not move is down
 MIN_GAP = 0.005  # m by which the ends must be closer than the taut length for the cable to count as slack
 SLACK_US = 20_000  # time for which this must be the case
@@ -48,7 +49,8 @@ def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
         if flight.phase == Phase.LIFT and lies and flight.cable.failed_lifts < MAX_FAILED_LIFTS:
             return _after_failed_lift(flight)
         if not view.load_tracked:  # nothing shows where it falls
-            return _after_loss(flight, "Cable without pull, load lost: landing")
+            lost_text = "Cable without pull, load lost: landing"
+            return _after_loss(flight, NOT_LIFTED_TEXT if flight.phase == Phase.LIFT else lost_text)
         cable = replace(flight.cable, slack_since_us=-1)
         catch = CatchLoad(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
         flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
