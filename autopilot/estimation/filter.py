@@ -2,8 +2,8 @@
 
 `control_state` is the state passed to the control laws. `vehicle_problem` and `load_problem` decide
 whether the estimate is good enough for flight, `problem_texts` states why it is not, and `estimate_loss`
-why it is not even good enough for a landing. `knows_attitude` and `knows_height` tell which parts of the
-vehicle's estimate remain when the rest is not good enough for flight.
+why it is not even good enough for a landing. `knows_attitude`, `knows_height` and `knows_speed` tell which
+parts of the vehicle's estimate remain when the rest is not good enough.
 """
 
 from __future__ import annotations
@@ -61,6 +61,7 @@ from autopilot.wire.parameter_table import ParameterTable
 
 POSITION_STD_TO_FLY = 0.05  # m, with trackers
 FIX_STD_TO_FLY = 0.15  # m, beyond the deviation that a receiver states: margin for coasting or a float fix
+KNOWN_SPEED_STD = 2.0  # m/s, above that of any start: an impact leaves more
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 # m and rad relative to the vehicle, of a load that no tracker measures: one of them is enough
@@ -91,6 +92,8 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         gravity=table["VEH_GRAVITY"],
         gyro_std=table["EST_GYRO_STD"],
         accel_std=table["EST_ACC_STD"],
+        gyro_range=table["EST_GYRO_RANGE"],
+        accel_range=table["EST_ACC_RANGE"],
         gyro_bias_std=table["EST_GYRO_BIAS"],
         accel_bias_std=table["EST_ACC_BIAS"],
         gyro_bias_walk=table["EST_GYRO_WALK"],
@@ -172,14 +175,17 @@ def estimate(
     load = state.load
     state = predict(state, history, latest_imu, tuning, dt, thrust, moment)
     state = correct_tautening(state, history, load, tuning, dt)
-    state = correct_pull(state, history, tuning, thrust)
+    # readings that are older than the last impact are dropped
+    max_age_s = state.clipping.impact_age_s
+    if max_age_s > 0.0:
+        state = correct_pull(state, history, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == POSE:
             valid, pose = read_pose(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if valid:
+            if valid and pose.age_s <= max_age_s:
                 state = correct_pose(state, history, pose, tuning)
     for i in range(count):
-        if inbox[i, KIND] == FIELD:
+        if inbox[i, KIND] == FIELD and tuning.magnetic_age <= max_age_s:
             field = read_vector(inbox[i])
             strength = norm(field)
             if isfinite(strength) and strength > 0.0:
@@ -187,23 +193,25 @@ def estimate(
     for i in range(count):
         if inbox[i, KIND] == FIX:
             valid, fix = read_fix(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if valid:
+            if valid and fix.age_s <= max_age_s:
                 state = correct_gnss(state, history, fix, tuning, thrust)
     for i in range(count):
-        if inbox[i, KIND] == HEIGHT and isfinite(inbox[i, READING]):
+        is_height = inbox[i, KIND] == HEIGHT and isfinite(inbox[i, READING])
+        if is_height and tuning.barometer_age <= max_age_s:
             state = correct_barometer(state, history, inbox[i, READING], tuning.barometer_age, tuning)
-    vehicle_accepted = state.vehicle.rejected == 0.0
+    # a load is measured together with the vehicle, whose position it would decide after an impact
+    vehicle_accepted = state.vehicle.rejected == 0.0 and state.vehicle.age_s <= max_age_s
     for i in range(count):
         if inbox[i, KIND] == LOAD:
             valid, reading = read_load(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
             if reeling:
                 reading = with_field(reading, "v_load", axpy(-cable.rate, along, reading.v_load))
-            if valid and vehicle_accepted:
+            if valid and vehicle_accepted and reading.age_s <= max_age_s:
                 state = correct_load(state, history, reading, tuning)
     for i in range(count):
         if inbox[i, KIND] == DIRECTION:
             valid, direction = read_direction(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
-            if valid:
+            if valid and direction.age_s <= max_age_s:
                 state = correct_direction(state, history, direction, tuning)
     if state.vehicle.source == RECEIVER:
         state = correct_zero_velocity(state, history, tuning, thrust)
@@ -297,6 +305,13 @@ def knows_attitude(state: EstimatorState, problem: int) -> bool:
         and state.vehicle.source != NO_SENSOR
         and state.uncertainty.tilt <= TILT_STD_TO_LAND
     )
+
+
+@kernel
+def knows_speed(state: EstimatorState) -> bool:
+    """Whether the vehicle's velocity is known: an impact beyond the range of the accelerometer hides it until
+    the next readings. Written so that NaN is not."""
+    return bool(state.uncertainty.speed <= KNOWN_SPEED_STD)
 
 
 @kernel

@@ -14,6 +14,7 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.estimation.air import air_walk, predict_air
+from autopilot.estimation.clipping import add_impact_noise, update_clipping
 from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
 from autopilot.estimation.history import store_state
 from autopilot.estimation.records import (
@@ -229,6 +230,7 @@ def state_uncertainty(history: History, load: LoadEstimate, size: int) -> Uncert
         sqrt(P[ATTITUDE + 2, ATTITUDE + 2]),
         sqrt(load_var),
         sqrt(relative_var),
+        sqrt(max(P[VELOCITY, VELOCITY], P[VELOCITY + 1, VELOCITY + 1], P[VELOCITY + 2, VELOCITY + 2])),
     )
 
 
@@ -261,6 +263,9 @@ def predict(
     vibration = update_vibration(state.vibration, imu, state.last_imu, tuning, dt)
     accel_var = accel_noise(vibration, tuning)
     gyro_var = gyro_noise(vibration, tuning)
+    clipping = update_clipping(state.clipping, state.vibration, imu, state.last_imu, tuning, dt)
+    if clipping.gyro > 0.0:
+        gyro_var = max(gyro_var, tuning.gyro_range * tuning.gyro_range)
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
     a = vehicle.accel_quad
     cable_accel_std, separation_std = pendulum_error(state, tuning)
@@ -284,6 +289,17 @@ def predict(
     )
     if vehicle.source > 0.0:
         propagate_covariance(history, inputs, tuning, dt, state.size)
+        if clipping.impact_age_s == 0.0:
+            add_impact_noise(
+                history,
+                clipping,
+                R,
+                state.vehicle.v_quad,
+                inputs.across,
+                inputs.along,
+                inputs.length,
+                inputs.taut,
+            )
     if load.taut > 0.0:
         predicted_load = predict_taut(load, vehicle, air, tuning, dt)
     else:
@@ -312,6 +328,7 @@ def predict(
         state_uncertainty(history, load, state.size),
         imu,
         vibration,
+        clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
         state.resets,
         state.memory_s,

@@ -127,6 +127,8 @@ class EstimatorTuning(NamedTuple):
     gravity: float
     gyro_std: float
     accel_std: float
+    gyro_range: float  # rad/s, full scale
+    accel_range: float  # m/s^2
     gyro_bias_std: float  # rad/s, at switch-on
     accel_bias_std: float  # m/s^2
     gyro_bias_walk: float  # rad/s per square root of a second
@@ -246,6 +248,15 @@ class Vibration(NamedTuple):
     low_passed: tuple[Vec3, Vec3, Vec3, Vec3]  # m/s^2, the accelerometer through one to four low-passes
 
 
+class Clipping(NamedTuple):
+    """Samples of the inertial unit at its full scale."""
+
+    accel: Vec3  # 1 for each body axis of the accelerometer that an impact cut in the last step, else 0
+    gyro: float  # 1 if an impact cut the gyroscope in the last step, else 0
+    impact_age_s: float  # since the last such step; infinite before the first
+    samples: float  # of the accelerometer that were cut so far
+
+
 class Uncertainty(NamedTuple):
     """Standard deviations of the estimate, as of the last prediction."""
 
@@ -255,6 +266,7 @@ class Uncertainty(NamedTuple):
     heading: float
     load: float  # m, each axis; relative to the vehicle while nothing tracks the load
     relative: float  # m, each axis: of the vehicle without the receiver's slow error
+    speed: float  # m/s, of the vehicle along the world axis on which it is known least
 
 
 class EstimatorState(NamedTuple):
@@ -268,6 +280,7 @@ class EstimatorState(NamedTuple):
     uncertainty: Uncertainty
     last_imu: ImuReading
     vibration: Vibration
+    clipping: Clipping
     missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
     resets: float
     memory_s: float  # s, age of the oldest reading so far: corrections go back this far in the ring
@@ -327,9 +340,10 @@ def blank_state() -> EstimatorState:
         ),
         sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0),
-        uncertainty=Uncertainty(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+        uncertainty=Uncertainty(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
+        clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
         resets=0.0,
         memory_s=0.0,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.core.tick import ControlMemory, EstimateSummary
-from autopilot.estimation.filter import NO_LOAD, NO_LOAD_DIRECTION, knows_attitude, knows_height
+from autopilot.estimation.filter import NO_LOAD, NO_LOAD_DIRECTION, knows_attitude, knows_height, knows_speed
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
@@ -28,6 +28,13 @@ _HORIZONTAL_FLAGS = (
     mavlink.ESTIMATOR_VELOCITY_HORIZ
     | mavlink.ESTIMATOR_POS_HORIZ_REL
     | mavlink.ESTIMATOR_POS_HORIZ_ABS
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+)
+# what is not known without the velocity
+_SPEED_FLAGS = (
+    mavlink.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink.ESTIMATOR_VELOCITY_VERT
     | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
     | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
 )
@@ -116,14 +123,14 @@ _FORCES, _ROTORS = _offset(Instant, "forces"), _offset(Instant, "rotors")
 def estimator_flags(state: EstimatorState, problem: int) -> int:
     """ESTIMATOR_STATUS_FLAGS of an estimate with this problem of the vehicle or of its inertial unit: the
     parts of the vehicle's state that are known."""
-    if problem == 0:
-        return _ATTITUDE_FLAG | _HEIGHT_FLAGS | _HORIZONTAL_FLAGS
     flags = 0
-    if knows_attitude(state, problem):
-        flags |= _ATTITUDE_FLAG
-    if knows_height(state, problem):
-        flags |= _HEIGHT_FLAGS
-    return flags
+    if problem == 0:
+        flags = _ATTITUDE_FLAG | _HEIGHT_FLAGS | _HORIZONTAL_FLAGS
+    elif knows_attitude(state, problem):
+        flags = _ATTITUDE_FLAG
+        if knows_height(state, problem):
+            flags |= _HEIGHT_FLAGS
+    return flags if knows_speed(state) else flags & ~_SPEED_FLAGS
 
 
 @kernel

@@ -591,9 +591,9 @@ def _sortie(m: CoreSnapshot) -> tuple[Any, ...]:
     return (m.source.sortie,)
 
 
-@_provides("vibration")
+@_provides("vibration", "clipped_samples")
 def _vibration(m: CoreSnapshot) -> tuple[Any, ...]:
-    return (vibration(m.condition),)
+    return vibration(m.condition), int(m.estimator.clipping.samples)
 
 
 @_provides("wind")

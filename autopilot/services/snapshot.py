@@ -180,6 +180,7 @@ class Snapshot:
     readings: SensorReadings | None = None  # None: no inertial sample yet
     sortie: Sortie = _NO_SORTIE
     vibration: Vec3 = ZERO  # m/s^2, body
+    clipped_samples: int = 0  # of the accelerometer, at its full scale
     wind: Vec3 = _UNKNOWN  # m/s, the direction towards which it blows
     battery_voltage: float = math.nan  # V
     battery_current: float = math.nan  # A

@@ -247,7 +247,7 @@ def _ekf_status_report(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _vibration(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (mavlink.MAVLink_vibration_message(s.now_us, *s.vibration, 0, 0, 0),)
+    return (mavlink.MAVLink_vibration_message(s.now_us, *s.vibration, s.clipped_samples, 0, 0),)
 
 
 def _wind_cov(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

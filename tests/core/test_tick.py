@@ -160,13 +160,14 @@ def put_rows(core: FlightCore, rows: list[Any], now_us: int) -> int:
 
 
 def numbers_of(core: FlightCore) -> list[float]:
-    """All numbers of the estimate except the ages, which are infinite for sensors that have never
+    """All numbers of the estimate except the ages, which are infinite for impacts and sensors that have never
     reported."""
     e = core.estimator
     e = e._replace(
         vehicle=e.vehicle._replace(age_s=0.0),
         load=e.load._replace(age_s=0.0),
         sensor_errors=e.sensor_errors._replace(magnetic_age=0.0, barometer_age=0.0),
+        clipping=e.clipping._replace(impact_age_s=0.0),
     )
     row = np.zeros(len(core.rows.estimator))
     pack(e, row, 0)

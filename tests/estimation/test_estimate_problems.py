@@ -30,7 +30,7 @@ OLDEST_S = 0.5
 PROMISED = 0.1  # m, slow part of a receiver's error
 # with a receiver: 0.15 m and 1.5 times the error that it states
 FIX_LEVEL = 0.15 + 1.5 * PROMISED
-NO_DOUBT = Uncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_DOUBT = Uncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 VEHICLE_AGE, LOAD_AGE = "age of the vehicle", "age of the load"
 
 NO_POSE = "no vehicle pose from a tracker"

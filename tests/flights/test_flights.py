@@ -84,7 +84,7 @@ def test_every_law_lifts_with_noisy_readings(law: int) -> None:
 def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
     """The estimate is that of the instant of the inertial reading, the command that for when it acts."""
     ticks, late_ms = 10, 40.0
-    craft = Craft(Takeoff(1.0), Waypoint(6.0, 0.0, 1.0), Land(), SIM_SENS_LAT_MS=late_ms)
+    craft = Craft(Takeoff(1.0), Waypoint(12.0, 0.0, 1.0), Land(), SIM_SENS_LAT_MS=late_ms)
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     truths = []

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from math import nan
 
+import numpy as np
 import pytest
 
 from autopilot.estimation.records import ImuReading
-from autopilot.geometry.linear import ZERO, norm
+from autopilot.geometry.linear import ZERO, norm, sub
 from autopilot.onboard.fall_watch import MAX_SILENCE_US, REST_US, FallWatch
 from autopilot.onboard.snapshot import CoreSnapshot
 from autopilot.services.snapshot import PREARM, Sortie
@@ -86,6 +87,25 @@ def test_a_vehicle_that_is_disarmed_by_force_is_in_the_air_until_it_rests(
     assert craft.command(ARM_DISARM, 1.0) == mavlink.MAV_RESULT_DENIED
     assert "Arming denied: falling, not at rest yet" in craft.texts
     assert fall(craft) == [(IN_AIR, mavlink.MAV_STATE_FLIGHT_TERMINATION)]
+
+
+@pytest.mark.parametrize("sensors", ["lab", "lab-real", "rtk", "gps"])
+def test_the_estimate_survives_an_impact_beyond_the_range_of_the_accelerometer(sensors: str) -> None:
+    craft = holding(5.0, sensors)
+    assert craft.command(ARM_DISARM, 0.0, FORCE) == ACCEPTED
+    # 4 s, in which a plain receiver's height and the barometer's may differ by a metre
+    offsets, wrong_speeds = [], 0
+    for _ in range(1000):
+        craft.tick()
+        seen = moment(craft)
+        offsets.append(craft.truth.x_quad[2] - seen.x_quad[2])
+        if seen.estimator_flags & mavlink.ESTIMATOR_VELOCITY_VERT:
+            wrong_speeds += norm(sub(craft.truth.v_quad, seen.v_quad)) > 2.0
+    assert seen.clipped_samples >= 3
+    assert np.ptp(offsets) < 1.0
+    assert wrong_speeds <= 1, "the impact begins before the sample that shows it"
+    vibration = [m for m in craft.heard if m.get_type() == "VIBRATION"][-1]
+    assert (vibration.clipping_0, vibration.clipping_1) == (seen.clipped_samples, 0)
 
 
 def test_a_terminated_flight_is_on_the_ground_as_soon_as_the_vehicle_rests() -> None:
