@@ -34,6 +34,10 @@ SATURATING = (
     (2.0, 0.02, 0.09, 0.05),
 )
 
+# demands of less thrust than the weight, with moments for which rotors of up to 4 N would have to give more
+LIFTING = ((1.0, 0.6, 0.1, 0.0), (-2.0, 0.3, -0.5, 0.02), (5.4, 0.1, -0.9, 0.05))
+STRONG_MAX_N = 4.0
+
 # rotors that differ from each other, in positions without symmetry
 UNEVEN: Layout = (
     Rotor(-1.0, 0.1, -1.0, 1.0),
@@ -125,15 +129,23 @@ def best_efforts(vehicle: Vehicle, layout: Layout, demand: tuple[float, ...]) ->
             found.append(float(solved.x[0]))
         return found[0], found[1]
 
-    def share(begin: Any, along: Any) -> float:
-        return float(np.clip(ends(begin, along, lift)[1], 0.0, 1.0)) if np.any(along) else 1.0
+    def share(begin: Any, along: Any, beside: Any) -> float:
+        return float(np.clip(ends(begin, along, beside)[1], 0.0, 1.0)) if np.any(along) else 1.0
+
+    def possible(sideways: Any, begin: Any, beside: Any) -> Any:
+        both = share(begin, sideways.sum(axis=1), beside)
+        parts = both * sideways
+        for i in (0, 1):
+            rest = (1.0 - both) * sideways[:, i]
+            parts[:, i] += share(begin + parts.sum(axis=1), rest, beside) * rest
+        return parts
 
     sideways = columns[:, 1:] * (demand[1] / vehicle.arm, demand[2] / vehicle.arm)
-    both = share(np.zeros(len(layout)), sideways.sum(axis=1))
-    level = both * sideways.sum(axis=1)
-    for column in sideways.T:
-        rest = (1.0 - both) * column
-        level = level + share(level, rest) * rest
+    parts = possible(sideways, np.zeros(len(layout)), lift)
+    ceiling = max(demand[0], (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
+    if ends(parts.sum(axis=1), lift, yaw_column)[0] > ceiling:
+        parts = possible(parts, ceiling * lift, yaw_column)
+    level = parts.sum(axis=1)
     efforts = level + np.clip(demand[0], *ends(level, lift, yaw_column)) * lift
     wanted = demand[3] / vehicle.torque_ratio - does[3] @ efforts
     efforts = efforts + np.clip(wanted, *ends(efforts, yaw_column, None)) * yaw_column
@@ -148,11 +160,14 @@ def any_rotors_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicl
     strengths = np.array([rotor.strength for rotor in UNEVEN])
     does = np.array([(1.0, arm * r.y, -arm * r.x, c * r.yaw) for r in UNEVEN]).T
     inverse = np.linalg.pinv(does * strengths)
+    strong = vehicle._replace(rotor_min=0.1, rotor_max=STRONG_MAX_N)
     limits = vehicle._replace(rotor_min=0.1, rotor_max=1.5)
-    for demand in ((4.9, 0.01, -0.02, 0.003), ROOM_FOR_YAW, *SATURATING):
+    demands = [(limits, demand) for demand in ((4.9, 0.01, -0.02, 0.003), ROOM_FOR_YAW, *SATURATING)]
+    for limits, demand in demands + [(strong, demand) for demand in LIFTING]:
         result = mix(demand[0], demand[1:], limits, 1.0, UNEVEN, room=laws)
         plain = inverse @ np.array(demand)
-        assert result.saturated == sum(1 << i for i, u in enumerate(plain) if not 0.1 <= u <= 1.5)
+        beyond = [not limits.rotor_min <= u <= limits.rotor_max for u in plain]
+        assert result.saturated == sum(1 << i for i, over in enumerate(beyond) if over)
         close(result.forces, strengths * best_efforts(limits, UNEVEN, demand), PROGRAMME)
         close((result.achieved_thrust, *result.achieved_moment), does @ np.array(result.forces), EXACT)
 

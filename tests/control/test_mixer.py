@@ -13,6 +13,9 @@ from autopilot.vehicle.layout import Layout, Rotor
 from tests.doubles.mixing import mix
 
 BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
+WEIGHT = (BEBOP.quad_mass + BEBOP.load_mass) * BEBOP.gravity
+# rotors that could give more than the weight beside any moment
+STRONG = BEBOP._replace(rotor_max=4.0)
 INF = float("inf")
 ROUNDING = 1e-12  # N, N m: sums of four numbers of order one
 PROGRAMME = 1e-6  # N: feasibility tolerance of the linear programmes
@@ -42,21 +45,34 @@ def test_demand_within_limits_is_done_exactly(forces: tuple[float, float, float,
     assert result.saturated == 0
 
 
+@pytest.mark.parametrize("vehicle", [BEBOP, STRONG], ids=["bebop", "strong"])
 @settings(max_examples=60, deadline=None)
 @given(thrusts, moments)
-def test_roll_and_pitch_are_kept_whenever_possible(thrust: float, moment: tuple[float, float, float]) -> None:
-    """A programme looks for any four forces with that roll and pitch; a moment that is impossible is cut to
-    the limit."""
-    result = mix(thrust, moment, BEBOP, 1.0)
-    rows = rotor_rows(BEBOP)[1:3]
-    found = linprog(np.zeros(4), A_eq=rows, b_eq=moment[:2], bounds=[(BEBOP.rotor_min, BEBOP.rotor_max)] * 4)
-    wanted = np.array(moment[:2])
-    if found.status == 0:
-        np.testing.assert_allclose(result.achieved_moment[:2], wanted, atol=PROGRAMME)
-    greatest = BEBOP.arm * (BEBOP.rotor_max - BEBOP.rotor_min)
-    np.testing.assert_allclose(
-        result.achieved_moment[:2], np.clip(wanted, -greatest, greatest), atol=ROUNDING
-    )
+def test_roll_and_pitch_are_kept_whenever_the_demanded_thrust_or_the_weight_makes_room(
+    vehicle: Vehicle, thrust: float, moment: tuple[float, float, float]
+) -> None:
+    """A programme looks for any four forces with that roll and pitch, whose sum is at most the greater of the
+    two; of an impossible moment, each part is as near to its demand as is possible beside the other."""
+    result = mix(thrust, moment, vehicle, 1.0)
+    thrust_row, *rows = rotor_rows(vehicle)[:3]
+    bounds = [(vehicle.rotor_min, vehicle.rotor_max)] * 4
+    room = {"A_ub": [thrust_row], "b_ub": [max(thrust, WEIGHT)], "bounds": bounds}
+    wanted, achieved = np.array(moment[:2]), np.array(result.achieved_moment[:2])
+    if linprog(np.zeros(4), A_eq=rows, b_eq=wanted, **room).status == 0:
+        np.testing.assert_allclose(achieved, wanted, atol=PROGRAMME)
+    for part, other in ((0, 1), (1, 0)):
+        sign = np.sign(wanted[part])
+        best = linprog(-sign * rows[part], A_eq=[rows[other]], b_eq=[achieved[other]], **room)
+        assert best.status == 0
+        nearest = min(abs(wanted[part]), max(-best.fun, 0.0))
+        assert abs(achieved[part]) == pytest.approx(nearest, abs=PROGRAMME)
+        assert achieved[part] * sign >= 0.0
+
+
+@given(thrusts, moments)
+def test_no_moment_lifts_the_vehicle(thrust: float, moment: tuple[float, float, float]) -> None:
+    result = mix(thrust, moment, STRONG, 1.0)
+    assert result.achieved_thrust <= max(thrust, WEIGHT) + PROGRAMME
 
 
 @settings(max_examples=60, deadline=None)

@@ -22,8 +22,10 @@ rows. For the plus quadrotor of (2-13) they are 1/4, -+1/2, +-1/2 and -+1/4.
 Within limits low <= u_i <= high the priorities are met one after the other, by moving along these columns,
 each as far as the rotors allow (`_feasible_range`):
 
-1. roll and pitch, first together: shortened to what is possible with some thrust; then each by itself towards
-   its demand, as far as the rotors still allow;
+1. roll and pitch, first together: shortened to what is possible with some thrust, no greater than what is
+   demanded or the weight of vehicle and load; then each by itself towards its demand, as far as the rotors
+   still allow. With any thrust, moments that go from limit to limit would give half of the greatest thrust on
+   average, which lifts the vehicle;
 2. thrust: limited to what is possible beside them; yaw is moved to make room;
 3. yaw: limited to what is left.
 
@@ -129,27 +131,65 @@ def _yaw_effect(table: Array, thrust: float, roll: float, pitch: float) -> float
 
 
 @kernel
-def _fit_by_priority(
-    rotors: Array, table: Array, thrust: float, roll: float, pitch: float, yaw: float, low: float, high: float
-) -> None:
-    """Write the efforts within their limits, by priority, into the row EFFORT."""
-    _combine_columns(rotors, table, EFFORT, 0.0, 0.0, 0.0, 0.0)
+def _feasible_level_moments(
+    rotors: Array,
+    table: Array,
+    thrust: float,
+    roll: float,
+    pitch: float,
+    free_column: int,
+    low: float,
+    high: float,
+) -> tuple[float, float]:
+    """The parts of roll and pitch that are possible beside this thrust and any amount of the free column:
+    first together, then each by itself."""
+    _combine_columns(rotors, table, EFFORT, thrust, 0.0, 0.0, 0.0)
     _combine_columns(rotors, table, DIRECTION, 0.0, roll, pitch, 0.0)
-    share = clamp(_feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0)
+    share = clamp(_feasible_range(rotors, table, free_column, low, high)[1], 0.0, 1.0)
     if share < 1.0:
         rest_roll, rest_pitch = (1.0 - share) * roll, (1.0 - share) * pitch
         roll, pitch = share * roll, share * pitch
-        _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        _combine_columns(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
         _combine_columns(rotors, table, DIRECTION, 0.0, rest_roll, 0.0, 0.0)
-        roll = roll + rest_roll * clamp(_feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0)
-        _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        roll = roll + rest_roll * clamp(_feasible_range(rotors, table, free_column, low, high)[1], 0.0, 1.0)
+        _combine_columns(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
         _combine_columns(rotors, table, DIRECTION, 0.0, 0.0, rest_pitch, 0.0)
         pitch = pitch + rest_pitch * clamp(
-            _feasible_range(rotors, table, FROM_THRUST, low, high)[1], 0.0, 1.0
+            _feasible_range(rotors, table, free_column, low, high)[1], 0.0, 1.0
         )
+    return roll, pitch
+
+
+@kernel
+def _feasible_thrusts(
+    rotors: Array, table: Array, roll: float, pitch: float, low: float, high: float
+) -> tuple[float, float]:
+    """The lowest and the highest thrust beside this roll and pitch, with any yaw."""
     _combine_columns(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
     _combine_columns(rotors, table, DIRECTION, 1.0, 0.0, 0.0, 0.0)
-    lowest, highest = _feasible_range(rotors, table, FROM_YAW, low, high)
+    return _feasible_range(rotors, table, FROM_YAW, low, high)
+
+
+@kernel
+def _fit_by_priority(
+    rotors: Array,
+    table: Array,
+    thrust: float,
+    roll: float,
+    pitch: float,
+    yaw: float,
+    weight: float,
+    low: float,
+    high: float,
+) -> None:
+    """Write the efforts within their limits, by priority, into the row EFFORT; `weight` (N) is that of
+    vehicle and load."""
+    roll, pitch = _feasible_level_moments(rotors, table, 0.0, roll, pitch, FROM_THRUST, low, high)
+    lowest, highest = _feasible_thrusts(rotors, table, roll, pitch, low, high)
+    ceiling = max(thrust, weight)
+    if lowest > ceiling and ceiling < _feasible_thrusts(rotors, table, 0.0, 0.0, low, high)[1]:
+        roll, pitch = _feasible_level_moments(rotors, table, ceiling, roll, pitch, FROM_YAW, low, high)
+        lowest, highest = _feasible_thrusts(rotors, table, roll, pitch, low, high)
     thrust = clamp(thrust, lowest, highest)
     _combine_columns(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
     _combine_columns(rotors, table, DIRECTION, 0.0, 0.0, 0.0, 1.0)
@@ -185,7 +225,8 @@ def mix(
     if not valid:
         saturated = (1 << count) - 1
     if saturated != 0 and limited != 0.0:
-        _fit_by_priority(rotors, table, thrust, roll, pitch, yaw, low, high)
+        weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+        _fit_by_priority(rotors, table, thrust, roll, pitch, yaw, weight, low, high)
     for i in range(count):
         rotors[FORCE, i] = table[i, STRENGTH] * rotors[EFFORT, i]
     achieved_thrust, achieved_moment = thrust_and_moment(rotors, vehicle, table)
