@@ -70,6 +70,8 @@ LIFTING_S, LIFTING_PULL = 4.0, 0.8
 # m above where it lay, at which a tracked load is off the ground. Until then no pull is missing: a long cable
 # counts as taut many seconds before it is.
 LIFTED_HEIGHT = 0.05
+# s and m/s: a tracked load that is this slow after this time without a pull of its cable lies somewhere
+RESTED_S, RESTING_SPEED = 2.0, 0.2
 REJECTIONS_UNLOADED = 4.0  # rejected readings in a row that show the same
 # The taut cable of a tracked load does not carry, whatever its length, if its measured pull is less than this
 # share of the pendulum's.
@@ -139,6 +141,14 @@ def _is_above_ground(load: LoadEstimate, history: History, height: float, tuning
     """Whether a load without a tracker is above the ground by this height (m) and some deviations."""
     height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
     return load.x_load[2] - tuning.load_height > height + HELD_SIGMAS * height_std
+
+
+@kernel
+def _has_rested(load: LoadEstimate) -> bool:
+    """Whether a tracked load on a slack cable lies still, at whatever height: in the air it would fall."""
+    return bool(
+        load.source == TRACKER and load.tautness_age_s > RESTED_S and norm(load.v_load) < RESTING_SPEED
+    )
 
 
 @kernel
@@ -278,7 +288,7 @@ def tauten(
 ) -> LoadEstimate:
     """The load on a taut cable: direction and rate of the cable replace its own position and velocity."""
     P = history.covariance
-    is_in_air = _is_above_ground(load, history, IN_AIR_HEIGHT, tuning)
+    is_in_air = _is_above_ground(load, history, IN_AIR_HEIGHT, tuning) and not _has_rested(load)
     load = with_field(load, "laid_height", NOT_LAID if is_in_air else load.x_load[2])
     zero_covariance(P, DIRECTION, 5)
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std

@@ -27,6 +27,8 @@ from autopilot.estimation.records import (
 from autopilot.estimation.tautness import (
     LIFT_OFF_SPEED_STD,
     LIFTED_HEIGHT,
+    RESTED_S,
+    RESTING_SPEED,
     averaged_missing_pull,
     cable_is_unloaded,
     detect_tautness,
@@ -263,3 +265,24 @@ def test_no_pull_of_a_tracked_load_is_missing_before_it_was_lifted() -> None:
     lifted = after(lifted, 0.3, 0.0, 1.0, DT)
     assert lifted.laid_height == NOT_LAID
     assert missed(lifted._replace(pull=0.3 * WEIGHT), 0.0, 1.0, 10.0) == pytest.approx(0.7, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "slack_s", "speed", "lies"),
+    [
+        (0.0, 0.1, 0.0, True),
+        (0.3, 2.0 * RESTED_S, 0.0, True),  # on something that is higher than home
+        (0.3, 0.5 * RESTED_S, 0.0, False),  # a vehicle that is found in flight
+        (0.3, 2.0 * RESTED_S, 2.0 * RESTING_SPEED, False),  # it falls
+    ],
+)
+def test_a_tracked_load_that_has_been_still_on_a_slack_cable_lies_at_whatever_height(
+    height_m: float, slack_s: float, speed: float, lies: bool
+) -> None:
+    height_m += TUNING.load_height
+    load = laid(height_m)._replace(source=TRACKER, tautness_age_s=slack_s, v_load=(0.0, 0.0, -speed))
+    taut = tauten(load, blank_state().vehicle, new_history(), TUNING, LENGTH)
+    assert taut.laid_height == (height_m if lies else NOT_LAID)
+    seen = laid(height_m)._replace(tautness_age_s=slack_s)
+    seen_taut = tauten(seen, blank_state().vehicle, new_history(), TUNING, LENGTH)
+    assert (seen_taut.laid_height == NOT_LAID) == (height_m > TUNING.load_height), "only a tracker shows it"
