@@ -21,11 +21,12 @@ LONGEST_CABLE_M = 100.0
 MAX_TERMS = 32  # of signals
 MAX_FACTORS = 3  # of a term
 MAX_POINTS = 1000  # of a trajectory
+FARTHEST_POINT_M = 1000.0  # of a trajectory, from its first point
 
 # of a file only: a value beyond them is probably a typing mistake
 LONGEST_S = 3600.0
 LONGEST_PERIOD_S = 2000.0
-FARTHEST_M = 1000.0
+FARTHEST_M = 10_000.0
 FASTEST_M_S = 20.0
 SLOWEST_REEL_M_S = 0.01
 FINEST_TOLERANCE_M, COARSEST_TOLERANCE_M = 1e-4, 1.0  # within which a trajectory passes rows

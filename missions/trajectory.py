@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from missions.errors import Error, PathError
 from missions.limits import (
     COARSEST_TOLERANCE_M,
-    FARTHEST_M,
+    FARTHEST_POINT_M,
     FINEST_TOLERANCE_M,
     LONGEST_S,
     MAX_POINTS,
@@ -118,8 +118,8 @@ def _checked(rows: Any) -> tuple[Array, Vec3]:
     duration_s = table[-1, 0]
     if not SHORTEST_POINT_S <= duration_s <= LONGEST_S:
         raise PathError(f"lasts {duration_s:g} s; must be {SHORTEST_POINT_S:g} ... {LONGEST_S:g} s")
-    if np.abs(table[:, 1:]).max() > FARTHEST_M:
-        raise PathError(f"leads further than {FARTHEST_M:g} m from the first")
+    if np.abs(table[:, 1:]).max() > FARTHEST_POINT_M:
+        raise PathError(f"leads further than {FARTHEST_POINT_M:g} m from the first")
     return table, (east, north, altitude)
 
 

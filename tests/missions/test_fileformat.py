@@ -88,13 +88,15 @@ def test_every_kind_of_item_becomes_its_step() -> None:
 
 BAD = {
     WAYPOINT.replace("3.0", "-2.0"): (
-        "items[1].altitude_m = -2.0; must be >= 0.01 and <= 1000 (height of the load above home)"
+        "items[1].altitude_m = -2.0; must be >= 0.01 and <= 10000 (height of the load above home)"
     ),
     WAYPOINT.replace("3.0", "nan"): (
         "items[1].altitude_m = nan; must be a finite number (height of the load above home)"
     ),
     WAYPOINT.replace("1.0", "inf"): "items[1].east_m = inf; must be a finite number (east of home)",
-    WAYPOINT.replace("1.0", "2e3"): "items[1].east_m = 2000.0; must be >= -1000 and <= 1000 (east of home)",
+    WAYPOINT.replace("1.0", "2e4"): (
+        "items[1].east_m = 20000.0; must be >= -10000 and <= 10000 (east of home)"
+    ),
     WAYPOINT.replace("altitude_m", "altitude_ft"): (
         "items[1].altitude_ft: unknown key; write altitude_m (in metres)"
     ),

@@ -130,7 +130,7 @@ def test_a_term_has_the_defaults_of_a_file() -> None:
 WRONG: dict[str, tuple[Any, str]] = {
     "value": (
         lambda: Mission("m", [Takeoff(1.0), Waypoint(0.0, 0.0, -1.0), Land()]),
-        "m: items[1].altitude_m = -1.0; must be >= 0.01 and <= 1000 (height of the load above home)",
+        "m: items[1].altitude_m = -1.0; must be >= 0.01 and <= 10000 (height of the load above home)",
     ),
     "type": (lambda: Mission("m", [Takeoff("1"), Land()]), 'items[0].altitude_m = "1"; must be a number'),  # type: ignore[arg-type]
     "no step": (lambda: Mission("m", [Takeoff(1.0), "land", Land()]), 'items[1].type = "str"; must be one'),  # type: ignore[list-item]
