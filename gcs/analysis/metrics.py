@@ -234,6 +234,20 @@ def snap_numbers(telemetry: Telemetry) -> Numbers:
     }
 
 
+def battery_numbers(telemetry: Telemetry) -> Numbers:
+    """The state of a simulated battery at the end of the log, and its least voltage; all None without one."""
+    battery = telemetry.battery
+
+    def last(values: Floats) -> float | None:
+        return _statistic(values, lambda known: float(known[-1]))
+
+    return {
+        "battery_left_pct": last(battery.left_pct),
+        "battery_used_mah": last(battery.used_mah),
+        "battery_voltage_min_v": _statistic(battery.voltage_v, np.min),
+    }
+
+
 def estimator_numbers(samples: Samples) -> Numbers:
     """Estimated minus true load position over the mission window."""
     norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.carried], axis=1)

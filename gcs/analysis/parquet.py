@@ -45,6 +45,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     acceleration = linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
     acceleration[np.isnan(samples.desired_m).any(axis=1)] = np.nan  # zero is sent where there is no path
     began_s = as_of(setpoint.time_s, setpoint.time_s - setpoint.elapsed_s, t)
+    battery = telemetry.battery
     wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 
     def interpolated(values: Floats) -> Floats:
@@ -52,6 +53,9 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
 
     def latest(values: Any) -> Floats:
         return as_of(commanded.time_s, values.astype(np.float64), t)
+
+    def battery_at(values: Floats) -> Floats:
+        return as_of(battery.time_s, values, t, max_gap_s=battery.GAP_S)
 
     cable = ("phi", "theta")
     return {
@@ -110,6 +114,10 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_component_columns("e_Omega", "rad_s", interpolated(cascade.e_Omega)),
         "psi_R": interpolated(cascade.psi_R),
         "psi_q": interpolated(cascade.psi_q),
+        "battery_voltage_v": battery_at(battery.voltage_v),
+        "battery_current_a": battery_at(battery.current_a),
+        "battery_used_mah": battery_at(battery.used_mah),
+        "battery_left_pct": battery_at(battery.left_pct),
     }
 
 

@@ -71,6 +71,7 @@ def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | Non
         **metrics.snap_numbers(telemetry),
         **metrics.gust_numbers(telemetry, samples),
         **metrics.rotor_numbers(telemetry),
+        **metrics.battery_numbers(telemetry),
         **metrics.estimator_numbers(samples),
         **metrics.clock_numbers(telemetry),
         **metrics.coverage_numbers(samples),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.wire.codec import Received
+from autopilot.wire.convert.battery import BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.statustext import TextReader
@@ -19,6 +20,7 @@ from gcs.analysis.columns import Columns
 from gcs.analysis.observed import observed_setpoint
 from gcs.analysis.tracks import (
     AttitudeTrack,
+    BatteryTrack,
     CascadeTrack,
     FilterTrack,
     HeartbeatTrack,
@@ -38,6 +40,8 @@ from gcs.analysis.vehicle_setup import SETUP_MESSAGES, VEHICLE_SYSTEM, VehicleSe
 LogRecord = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
 
 AUTOPILOT_COMPONENT = 1
+_BATTERY_STATUS = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
+_SIMULATED_BATTERY = "SIM_BATTERY"  # 0: what is reported is calculated, of a battery that never gets empty
 _MICRO = 1e-6
 
 
@@ -74,6 +78,7 @@ def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
     frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_STAMPED, *_UNSTAMPED)}
     stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
     texts: list[tuple[int, Any]] = []
+    readings: list[tuple[int, BatteryReading]] = []
     setup = VehicleSetup()
     for unix_us, received in records:
         if received.id in SETUP_MESSAGES:
@@ -83,6 +88,8 @@ def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
         if received.id not in frames:
             if received.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
                 texts.append((unix_us, received.message))
+            elif received.id == _BATTERY_STATUS and received.component == AUTOPILOT_COMPONENT:
+                readings.append((unix_us, read_battery_status(received.message)))
         elif received.component == AUTOPILOT_COMPONENT or received.id not in _UNSTAMPED:
             frames[received.id].append(received.frame)
             stamps[received.id].append(unix_us)
@@ -104,7 +111,8 @@ def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
         message_id: (np.array(stamps[message_id], dtype=np.float64) - boot_us) * _MICRO
         for message_id in _UNSTAMPED
     }
-    telemetry = _assemble(columns, received_at_us, _texts(texts, boot_us), setup)
+    battery = _battery(readings if setup.parameters.get(_SIMULATED_BATTERY) else [], boot_us)
+    telemetry = _assemble(columns, received_at_us, _texts(texts, boot_us), battery, setup)
     if len(telemetry.setpoint.time_s) or not (len(telemetry.load_truth.time_s) and telemetry.mission):
         return telemetry
     # an autopilot that knows of no load; its home is where the vehicle stood, not the load
@@ -263,6 +271,12 @@ def _snaps(c: Columns) -> SnapTrack:
     return _sorted(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
 
 
+def _battery(readings: list[tuple[int, BatteryReading]], boot_us: int) -> BatteryTrack:
+    rows = [(r.voltage, r.current, r.used_mah, 100.0 * r.remaining) for _, r in readings]
+    times_us = np.array([unix_us - boot_us for unix_us, _ in readings], dtype=np.float64)
+    return _sorted(BatteryTrack(times_us * _MICRO, *np.array(rows, dtype=np.float64).reshape(-1, 4).T))
+
+
 def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
     """The texts at the times at which they began, also those whose last chunks are not in the log."""
     reader = TextReader()
@@ -279,7 +293,11 @@ def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]
 
 
 def _assemble(
-    columns: dict[int, Columns], times: dict[int, Floats], texts: tuple[StatusText, ...], setup: VehicleSetup
+    columns: dict[int, Columns],
+    times: dict[int, Floats],
+    texts: tuple[StatusText, ...],
+    battery: BatteryTrack,
+    setup: VehicleSetup,
 ) -> Telemetry:
     load = columns[mavlink.MAVLINK_MSG_ID_LOAD_STATE]
     rotors = columns[mavlink.MAVLINK_MSG_ID_ROTOR_STATE]
@@ -319,6 +337,7 @@ def _assemble(
         simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
         wind=_wind(columns[mavlink.MAVLINK_MSG_ID_WIND_STATE]),
         snaps=_snaps(columns[mavlink.MAVLINK_MSG_ID_CABLE_SNAP]),
+        battery=battery,
         texts=texts,
         mission=setup.mission,
         parameters=setup.parameters,

@@ -182,6 +182,19 @@ class SnapTrack:
     impulse_n_s: Floats  # (n,)
 
 
+@dataclass(frozen=True)
+class BatteryTrack:
+    """BATTERY_STATUS of a simulated battery, NaN for what is unknown; time stamps of the capture."""
+
+    GAP_S = 2.5  # a value holds for this long: one message of each second may be missing
+
+    time_s: Floats  # (n,)
+    voltage_v: Floats  # (n,)
+    current_a: Floats  # (n,)
+    used_mah: Floats  # (n,) since the beginning
+    left_pct: Floats  # (n,) of the charge of the full battery
+
+
 class StatusText(NamedTuple):
     """One whole STATUSTEXT, its chunks joined; time stamp of the capture."""
 
@@ -210,6 +223,7 @@ class Telemetry:
     simulation: SimulationTrack
     wind: WindTrack
     snaps: SnapTrack
+    battery: BatteryTrack  # empty unless the log says that a battery is simulated
     texts: tuple[StatusText, ...]
     mission: tuple[WireItem, ...]  # the last transferred mission, if all of it is in the log
     parameters: dict[str, float]  # the last values that the vehicle reported

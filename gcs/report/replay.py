@@ -42,6 +42,7 @@ MAX_ROWS = 30_000  # four minutes at 125 Hz
 _DEFAULT_VEHICLE = "bebop"  # drawn if it is not known which vehicle flew
 # steps to which numbers are rounded
 _POSITION_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
+_VOLTAGE_V, _CHARGE_PCT = 1e-3, 1.0
 
 Json = dict[str, Any]
 
@@ -176,6 +177,7 @@ def _columns(
     """The columns, with a row without numbers within each gap, and the number of rows."""
     t, truth = samples.time_s, telemetry.load_truth
     rotors, commanded, cascade = telemetry.rotors_truth, telemetry.rotors_commanded, telemetry.cascade
+    battery = telemetry.battery
     found = [
         *_xyz("load", samples.actual_m, _POSITION_M),
         *_xyz("vehicle", samples.vehicle_m, _POSITION_M),
@@ -193,6 +195,8 @@ def _columns(
         ),
         Column("psi_R", linear(cascade.time_s, cascade.psi_R, t), _PSI),
         Column("psi_q", linear(cascade.time_s, cascade.psi_q, t), _PSI),
+        Column("voltage", as_of(battery.time_s, battery.voltage_v, t, battery.GAP_S), _VOLTAGE_V),
+        Column("charge", as_of(battery.time_s, battery.left_pct, t, battery.GAP_S), _CHARGE_PCT),
         Column("taut", (truth.taut == 1).astype(np.float64), 1.0),
         Column("attached", samples.attached.astype(np.float64), 1.0),
         Column("scored", samples.position_tracked.astype(np.float64), 1.0),

@@ -40,12 +40,6 @@
       series: [...lines(AXES, speed), ...lines(AXES, asked, { dash: true, color: "faint", quiet: true })] };
   }
 
-  function tension(flight) {
-    const values = flight.column("tension");
-    return values && { title: "Cable tension", unit: "N", digits: 2, least: 0.1, zero: true,
-      series: [{ name: "tension", values, color: 3 }] };
-  }
-
   function rotors(flight, name, title) {
     const names = flight.rotors.map(String);
     const forces = columns(flight, name, names);
@@ -62,6 +56,11 @@
     return vector && { title, unit: "°", digits: 1, least: 1, series: lines(names, vector) };
   }
 
+  function single(flight, name, title, unit, digits, color, more) {
+    const values = flight.column(name);
+    return values && Object.assign({ title, unit, digits, series: [{ name, values, color }] }, more);
+  }
+
   function wind(flight) {
     if (!flight.wind.length) return null;
     const rows = Array.from(flight.time, (t) => flight.windAt(t));
@@ -74,7 +73,7 @@
     return [
       lengths("Load error", flight.error, AXES, 2, flight.distance),
       position(flight),
-      tension(flight),
+      single(flight, "tension", "Cable tension", "N", 2, 3, { least: 0.1, zero: true }),
       rotors(flight, "rotor", "Rotor forces"),
       velocity(flight),
       lengths("Error of the estimate (load)", flight.difference("believed", "load"), AXES, 2),
@@ -82,6 +81,8 @@
       angles("Vehicle attitude", flight.angles(), ["roll", "pitch", "yaw"]),
       rotors(flight, "command", "Rotor commands"),
       psi.length === 2 ? { title: "Error functions of the cascade", digits: null, series: lines(["Ψ_R", "Ψ_q"], psi), zero: true } : null,
+      single(flight, "voltage", "Battery voltage", "V", 2, 1, { least: 0.1 }),
+      single(flight, "charge", "Battery charge", "% of the full battery", 0, 2, { least: 1, zero: true }),
       wind(flight),
     ].filter(Boolean);
   };
