@@ -22,6 +22,7 @@ _RESTING_REACH = 0.75**0.5
 # Distance of the feet from the centre of mass, in radii of gyration. The push of the ground on the feet turns
 # lighter bodies so fast that sub-steps of 0.5 ms cannot resolve it: vehicles tumbled from 17 on.
 _MAX_FEET_RADII = 15.0
+_BATTERY_KEYS = ("battery_cells", "battery_capacity_mah", "battery_resistance_ohm", "battery_hover_w")
 
 # sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are similar
 ARM_RATIOS = {
@@ -247,12 +248,17 @@ class Vehicle(BaseModel):
         False,
         description="whether a speed controller holds the speed as the voltage falls, as far as it allows",
     )
-    battery: bool = Field(False, description="whether voltage and charge of the battery limit the rotors")
+    battery: bool = Field(
+        False,
+        description="whether voltage and charge of the battery limit the rotors; if true, the next four keys "
+        "are required",
+    )
+    # the defaults are a Bebop's: what the autopilot reports where no battery is simulated, and limits nothing
     battery_cells: int = Field(3, ge=1, le=24, description="lithium cells in series")
     battery_capacity_mah: float = _quantity("mAh", 10.0, 1e6, "charge of the full battery", 1200.0)
     battery_resistance_ohm: float = _quantity("ohm", 0.0, 10.0, "internal resistance of the battery", 0.06)
     battery_hover_w: float = _quantity("W", 0.1, 1e5, "electrical power in hover without the load", 65.0)
-    battery_charge: float = _quantity("", 0.0, 1.0, "share of the charge at the beginning", 1.0)
+    battery_charge: float = _quantity("", 0.0, 1.0, "share of the charge at the beginning, 0.25: 25 %", 1.0)
 
     @property
     def layout(self) -> Layout:
@@ -326,6 +332,12 @@ class Vehicle(BaseModel):
             raise ValueError(
                 f"rotor_max_n = {self.rotor_max_n:g}; must be finite, because battery, esc_steps or "
                 "thrust_curve say what becomes of a share of it"
+            )
+        missing = [key for key in _BATTERY_KEYS if key not in self.model_fields_set] if self.battery else []
+        if missing:
+            raise ValueError(
+                f"battery = true; needs {', '.join(missing)} too (their defaults are those of a "
+                "Bebop, 0.4 kg)"
             )
         if not self.esc_steps.is_integer():
             raise ValueError(f"esc_steps = {self.esc_steps:g}; must be a whole number")

@@ -60,15 +60,20 @@ def check_flight_inputs(
 
 def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
     """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
-    in milliseconds, which was probably meant in seconds."""
+    in milliseconds, which was probably meant in seconds, and one up to one of a parameter in percent, which
+    was probably meant as a share. Parameters whose default is that small are left out."""
     found, believed = load_truth_and_belief(vehicle)
     tables = sim_parameters(truth_of(found)), autopilot_parameters(believed)
-    units = {name: table.describe(name).unit for table in tables for name in table.names}
-    return [
-        f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant"
-        for name, value in settings
-        if units.get(name) == "ms" and 0.0 < abs(value) < 1.0
-    ]
+    own = {name: (table.describe(name).unit, table[name]) for table in tables for name in table.names}
+    lines = []
+    for name, value in settings:
+        unit, default = own.get(name, ("", 0.0))
+        if unit == "ms" and 0.0 < abs(value) < 1.0:
+            lines.append(f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant")
+        elif unit == "%" and 0.0 < value <= 1.0 < default:
+            meant = f"{value * 1e2:g} if a share of {value:g} is meant"
+            lines.append(f"{name} = {value:g} is in percent; {meant}")
+    return lines
 
 
 def vehicle_warnings(vehicle: str) -> list[str]:

@@ -156,6 +156,22 @@ def test_of_a_time_that_may_be_meant_in_seconds_the_unit_is_told(name, value, me
 
 
 @pytest.mark.parametrize(
+    ("name", "value", "meant"),
+    [
+        ("SIM_BAT_CHARGE", 0.25, "25 if a share of 0.25 is meant"),
+        ("SIM_BAT_CHARGE", 1.0, "100 if a share of 1 is meant"),
+        ("MIS_ROTOR_MARG", 0.3, "30 if a share of 0.3 is meant"),
+        ("SIM_BAT_CHARGE", 0.0, ""),
+        ("SIM_BAT_CHARGE", 2.0, ""),
+        ("SIM_LOSS_PCT", 0.5, ""),
+    ],
+)
+def test_of_a_percentage_that_may_be_meant_as_a_share_the_unit_is_told(name, value, meant):
+    told = [f"{name} = {value:g} is in percent; {meant}"] if meant else []
+    assert setting_warnings("bebop", [(name, value)]) == told
+
+
+@pytest.mark.parametrize(
     ("words", "told"),
     [
         ("fly hover --set SIM_ACT_DELAY_MS=0.072", ["--set SIM_ACT_DELAY_MS = 0.072"]),

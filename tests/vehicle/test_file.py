@@ -445,6 +445,23 @@ def test_what_becomes_of_a_share_of_the_greatest_force_wants_one(tmp_path):
         assert said.startswith("rotor_max_n = inf; must be finite"), line
 
 
+def test_a_battery_needs_its_numbers(tmp_path):
+    said = broken(tmp_path, "rotor_max_n = 1.96", "rotor_max_n = 1.96\nbattery = true\nbattery_cells = 4")
+    assert said == (
+        "battery = true; needs battery_capacity_mah, battery_resistance_ohm, battery_hover_w too "
+        "(their defaults are those of a Bebop, 0.4 kg)"
+    )
+
+
+def test_the_battery_of_the_believed_vehicle_is_that_of_its_truth(tmp_path):
+    (tmp_path / "own.toml").write_text(
+        BEBOP
+        + "battery = true\nbattery_cells = 4\nbattery_capacity_mah = 900.0\n"
+        + "battery_resistance_ohm = 0.03\nbattery_hover_w = 90.0\n"
+    )
+    assert loaded(tmp_path, 'believed = "own.toml"\nbattery_charge = 0.5\n').battery_hover_w == 90.0
+
+
 @pytest.mark.parametrize(("name", "named"), [("heavy", ["heavy"]), ("heavy-real", ["heavy-real", "heavy"])])
 def test_truth_and_belief_are_those_of_two_calls_and_each_file_is_read_once(monkeypatch, name, named):
     expected = (load_vehicle(name), load_belief(name))
