@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.trajectory.timeline import VerticalSpeeds, expected_duration_s
+from autopilot.trajectory.timeline import TimelineEntry, VerticalSpeeds, expected_timeline
 from autopilot.wire.parameter_table import ParameterTable
 from missions.model import Mission
 
@@ -12,8 +12,13 @@ TIME_MARGIN_S = 60.0  # plus this margin
 
 def expected_flight_s(mission: Mission, table: ParameterTable) -> float:
     """Expected seconds from arming to the end of the mission, by the autopilot's parameters."""
+    return sum(entry.duration_s for entry in expected_entries(mission, table))
+
+
+def expected_entries(mission: Mission, table: ParameterTable) -> tuple[TimelineEntry, ...]:
+    """The steps with their expected durations, by the autopilot's parameters."""
     tauten_m_s = min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"])
-    return expected_duration_s(
+    return expected_timeline(
         mission,
         table["MIS_SPEED"],
         table["MIS_ACCEL"],

@@ -251,6 +251,16 @@ def expected_duration_s(
     vertical: VerticalSpeeds = USUAL_SPEEDS,
 ) -> float:
     """Expected seconds from arming to the end of the mission: the sum over its steps."""
+    return sum(entry.duration_s for entry in expected_timeline(mission, speed, accel, cable_m, vertical))
+
+
+def expected_timeline(
+    mission: Mission,
+    speed: float = SPEED_M_S,
+    accel: float = ACCEL_M_S2,
+    cable_m: float | None = None,
+    vertical: VerticalSpeeds = USUAL_SPEEDS,
+) -> tuple[TimelineEntry, ...]:
+    """The timeline of a mission that begins at home."""
     start = MissionState(speed_m_s=speed, usual_speed_m_s=speed, cable_m=cable_m)
-    entries = timeline(mission.steps, start, accel_m_s2=accel, vertical=vertical)
-    return sum(entry.duration_s for entry in entries)
+    return tuple(timeline(mission.steps, start, accel_m_s2=accel, vertical=vertical))

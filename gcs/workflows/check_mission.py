@@ -7,11 +7,12 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
+from math import dist
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters, shapes_paths
@@ -19,7 +20,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
 from gcs.errors import GcsError
-from gcs.expected_flight import expected_flight_s, time_limit_s
+from gcs.expected_flight import expected_entries, expected_flight_s, limit_text, time_limit_s
 from gcs.foreign_mission import ForeignMission, home_text
 from gcs.mission_files import read
 from gcs.mission_items import (
@@ -34,13 +35,24 @@ from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import violations
 from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits, with_settings
-from missions.model import AttitudeRun, LoadPath, Mission, Release, Waypoint, Winch
+from missions.model import (
+    AttitudeRun,
+    LoadPath,
+    Mission,
+    Release,
+    ReturnHome,
+    Speed,
+    Takeoff,
+    Waypoint,
+    Winch,
+)
 
 # Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
 # one: slower rotors, a sagging battery and a cable off the centre take a part of it, wind another.
 # `heavy-real` loses Case C with 15 % and completes it with 35 %; with 40 % also in wind of 5 m/s with gusts
 # of 1 m/s (docs/realism.md).
 MIN_CONTROL_SHARE = 0.25
+MIN_REACHED_SHARE = 0.9  # of a speed that the mission sets: a way that stays below it is reported
 MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
@@ -102,6 +114,48 @@ def slowness_notes(reports: Sequence[PathReport]) -> Iterator[str]:
             )
 
 
+def unreached_speed_notes(
+    mission: Mission, reports: Sequence[PathReport], table: AutopilotParameters
+) -> Iterator[str]:
+    """A line about each speed that the mission sets and that no way comes near until it sets the next."""
+    peaks_m_s: dict[int, float] = {}
+    slow = set()  # these have a note already
+    for report in reports:
+        peaks_m_s[report.item] = max(report.speed_m_s, peaks_m_s.get(report.item, 0.0))
+        slow |= {report.item} if report.asked_m_s else set()
+    for asked_m_s, ways in _ways_by_set_speed(expected_entries(mission, table)):
+        reached_m_s = max(peaks_m_s.get(way.item, _transfer_peak_m_s(way)) for way in ways)
+        if reached_m_s >= MIN_REACHED_SHARE * asked_m_s or any(way.item in slow for way in ways):
+            continue
+        length_m, accel_m_s2 = sum(dist(way.begin, way.end) for way in ways), table["MIS_ACCEL"]
+        straight_m_s = PEAK_SPEED * length_m / transfer_duration(length_m, asked_m_s, accel_m_s2)
+        limits = f"MIS_ACCEL {accel_m_s2:g} m/s^2"
+        is_too_short = straight_m_s < MIN_REACHED_SHARE * asked_m_s
+        why = f"too short at {limits}" if is_too_short else f"held back by turns, {limits}, rotors or tilt"
+        items = dict.fromkeys(f"items[{way.item}]" for way in (ways[0], ways[-1]))
+        reach = "reaches" if len(items) == 1 else "reach"
+        yield f"note: {' to '.join(items)}: {reach} {reached_m_s:.1f} of the {asked_m_s:g} m/s asked: {why}"
+
+
+def _ways_by_set_speed(entries: Iterable[TimelineEntry]) -> Iterator[tuple[float, list[TimelineEntry]]]:
+    """Each speed that the mission sets, and the ways until it sets the next, if there are any."""
+    asked_m_s: float | None = None
+    ways: list[TimelineEntry] = []
+    for entry in entries:
+        if isinstance(entry.step, Speed):
+            if asked_m_s and ways:
+                yield asked_m_s, ways
+            asked_m_s, ways = entry.step.speed_m_s, []
+        elif isinstance(entry.step, Waypoint | ReturnHome) and entry.transfer_s > 0.0:
+            ways.append(entry)
+    if asked_m_s and ways:
+        yield asked_m_s, ways
+
+
+def _transfer_peak_m_s(way: TimelineEntry) -> float:
+    return PEAK_SPEED * dist(way.begin, way.end) / way.transfer_s
+
+
 def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle) -> Iterator[str]:
     """A line for each path that leaves little for control, if the true vehicle is not the assumed one,
     `belief`."""
@@ -120,18 +174,24 @@ def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle
             )
 
 
+def flown_s(mission: Mission, reports: Sequence[PathReport], table: AutopilotParameters) -> float:
+    """Expected seconds from arming to the end of the mission, along these paths."""
+    entries = expected_entries(mission, table)
+    # the lift keeps to a speed of its own, which path reports do not know
+    moves_s = {entry.item: _move_s(entry) for entry in entries if not isinstance(entry.step, Takeoff)}
+    longer_s = sum(report.duration_s - moves_s[report.item] for report in reports if report.item in moves_s)
+    return sum(entry.duration_s for entry in entries) + longer_s
+
+
 def timeout_warnings(
     mission: Mission, reports: Sequence[PathReport], table: AutopilotParameters
 ) -> Iterator[str]:
     """A line if the paths take so much longer than the mission asks for that `gcs fly` would give up."""
-    expected_s = expected_flight_s(mission, table)
-    limit_s = time_limit_s(expected_s)
-    moves_s = {entry.item: _move_s(entry) for entry in timeline(mission.steps, _start(table))}
-    flown_s = expected_s + sum(report.duration_s - moves_s[report.item] for report in reports)
-    if flown_s > limit_s:
+    expected_s, limit_s = flown_s(mission, reports, table), time_limit_s(expected_flight_s(mission, table))
+    if expected_s > limit_s:
         yield (
-            f"warning: along these paths the flight takes about {flown_s:.0f} s, and gcs fly gives up after "
-            f"{limit_s:.0f} s: add --timeout {time_limit_s(flown_s):.0f}"
+            f"warning: along these paths the flight takes about {expected_s:.0f} s, and gcs fly gives up "
+            f"after {limit_s:.0f} s: add --timeout {time_limit_s(expected_s):.0f}"
         )
 
 
@@ -167,13 +227,17 @@ def winch_notes(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
             )
 
 
-def notes_after_release(mission: Mission) -> Iterator[str]:
+def notes_after_release(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
     """A line about the items after a release, which path reports do not include."""
-    released = [i for i, step in enumerate(mission.steps) if isinstance(step, Release)]
-    if released and released[0] + 1 < len(mission.steps):
-        rest = [f"items[{i}]" for i in (released[0] + 1, len(mission.steps) - 1)]
-        items = " to ".join(dict.fromkeys(rest))
-        yield f"note: {items}: flown without the load, slower where the rotors ask for it; no path to report"
+    entries = expected_entries(mission, table)
+    released = [entry.item for entry in entries if isinstance(entry.step, Release)]
+    if released and released[0] + 1 < len(entries):
+        rest = entries[released[0] + 1 :]
+        items = " to ".join(dict.fromkeys(f"items[{entry.item}]" for entry in (rest[0], rest[-1])))
+        yield (
+            f"note: {items}: about {sum(entry.duration_s for entry in rest):.0f} s, flown without the load, "
+            "slower where the rotors ask for it; estimated from distances and speeds, no path to report"
+        )
 
 
 @dataclass(frozen=True)
@@ -187,6 +251,8 @@ class CheckResult:
     paths: tuple[PathReport, ...]
     warnings: tuple[str, ...] = ()
     refusals: tuple[str, ...] = ()
+    expected_s: float | None = None  # from arming to the end; None if it cannot be flown
+    time_limit_s: float | None = None  # after which gcs fly gives up
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -198,7 +264,14 @@ class CheckResult:
         if self.problems:
             return self.problems
         can_fly = f"{self.mission}: vehicle {self.vehicle} can fly it"
-        return (can_fly, *_path_lines(self.paths), *self.warnings)
+        return (can_fly, *_path_lines(self.paths), *self._duration_lines(), *self.warnings)
+
+    def _duration_lines(self) -> Iterator[str]:
+        if self.expected_s is not None and self.time_limit_s is not None:
+            yield (
+                f"in all: about {limit_text(self.expected_s)} from arming to the end; gcs fly gives up after "
+                f"{limit_text(self.time_limit_s)}"
+            )
 
 
 def _path_lines(reports: Iterable[PathReport]) -> Iterator[str]:
@@ -256,6 +329,7 @@ def check_mission(
     warnings = (
         *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
+        *unreached_speed_notes(mission, reports, table),
         *margin_warnings(reports, vehicle, limits.vehicle),
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
         *timeout_warnings(mission, reports, table),
@@ -267,10 +341,13 @@ def check_mission(
         )
     warnings += (
         *winch_notes(mission, table),
-        *notes_after_release(mission),
+        *notes_after_release(mission, table),
         *parameter_notes(limits.vehicle, table.names),
     )
     if planner is not None and (unused := unused_planner_text(mission)):
         warnings += (f"the planner {unused}",)
     result = CheckResult(mission.name, vehicle, tuple(found), tuple(reports), warnings, answer.refusals)
+    if not result.problems:
+        limit_s = time_limit_s(expected_flight_s(mission, table))
+        result = replace(result, expected_s=flown_s(mission, reports, table), time_limit_s=limit_s)
     return _in_file_terms(result, mission, notes)

@@ -20,23 +20,26 @@ from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE, GcsError, InputError
+from gcs.expected_flight import expected_entries, expected_flight_s, time_limit_s
 from gcs.mission_files import load
 from gcs.workflows import flyable
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
+    flown_s,
     margin_warnings,
     notes_after_release,
     path_reports,
     slowness_notes,
     timeout_warnings,
+    unreached_speed_notes,
     winch_notes,
     winch_violations,
 )
 from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import parse_setting
-from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
+from gcs.workflows.vehicle_limits import load_limits, with_settings
+from missions.model import Land, Mission, Release, Speed, Step, Takeoff, Waypoint, Winch
 
 HEAVY, BEBOP_LIMITS = load_belief("heavy-real"), load_limits("bebop")
 BEBOP = autopilot_parameters(BEBOP_LIMITS.vehicle)
@@ -134,12 +137,58 @@ def test_attitude_runs_tell_of_no_speed() -> None:
 
 def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:
     steps = (Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 2.0), Land())
-    (note,) = notes_after_release(Mission("m", "M", "", (), steps))
-    assert note.startswith("note: items[2] to items[3]: flown without the load")
-    (note,) = notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Release(), Land())))
-    assert note.startswith("note: items[2]: flown without the load")
-    assert list(notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Land())))) == []
-    assert list(notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Release())))) == []
+    mission = Mission("m", "M", "", (), steps)
+    (note,) = notes_after_release(mission, BEBOP)
+    *_, way, landing = expected_entries(mission, BEBOP)
+    both_s = way.duration_s + landing.duration_s
+    assert note.startswith(f"note: items[2] to items[3]: about {both_s:.0f} s, flown without the load")
+    (note,) = notes_after_release(Mission("m", "M", "", (), (Takeoff(2.0), Release(), Land())), BEBOP)
+    assert note.startswith("note: items[2]: about ")
+    for nothing_behind in ((Takeoff(2.0), Land()), (Takeoff(2.0), Release())):
+        assert list(notes_after_release(Mission("m", "M", "", (), nothing_behind), BEBOP)) == []
+
+
+def test_the_whole_duration_is_told_with_the_time_limit_of_a_flight() -> None:
+    found = check_mission("square", "bebop", False)
+    mission = load("square")
+    assert found.time_limit_s == time_limit_s(expected_flight_s(mission, BEBOP))
+    assert found.expected_s == pytest.approx(flown_s(mission, found.paths, BEBOP))
+    told = f"in all: about {found.expected_s:.0f} s from arming to the end; gcs fly gives up after "
+    assert found.lines()[len(found.paths) + 1].startswith(told)
+    refused = check_mission("case-c", "bebop", False, settings=[("MIS_ROTOR_MARG", 45.0)])
+    assert refused.problems and refused.expected_s is None
+
+
+def test_a_lift_at_another_speed_is_in_the_whole_duration() -> None:
+    slow = with_settings(autopilot_parameters(BEBOP_LIMITS.vehicle), [("MIS_LIFT_SPEED", 0.2)])
+    mission = Mission("up", "Up", "", (), (Takeoff(2.0), Land()))
+    reports = path_reports(mission, BEBOP_LIMITS)
+    assert flown_s(mission, reports, slow) == pytest.approx(expected_flight_s(mission, slow))
+
+
+def test_a_speed_that_no_way_reaches_is_told() -> None:
+    def notes(*steps: Step) -> list[str]:
+        mission = Mission("m", "M", "", (), (Takeoff(2.0), *steps, Land()))
+        return list(unreached_speed_notes(mission, path_reports(mission, BEBOP_LIMITS), BEBOP))
+
+    near, far = Waypoint(8.0, 0.0, 2.0, hold_s=1.0), Waypoint(30.0, 0.0, 2.0, hold_s=1.0)
+    (note,) = notes(Speed(9.0), near)
+    reached = path_reports(Mission("m", "M", "", (), (Takeoff(2.0), Speed(9.0), near)), BEBOP_LIMITS)[-1]
+    reaches = f"items[2]: reaches {reached.speed_m_s:.1f} of the 9 m/s asked"
+    assert note == f"note: {reaches}: too short at MIS_ACCEL 1.5 m/s^2"
+    assert notes(Speed(4.0), near, far) == []  # one of the ways reaches it
+    assert notes(near) == notes(Waypoint(0.1, 0.0, 2.0)) == []  # the usual speed is not the mission's
+    assert notes(Speed(9.0), Speed(2.0), near) == []  # nothing is flown at the first
+    (note,) = notes(Speed(9.0), near, Release(), Waypoint(0.0, 0.0, 2.0))
+    assert note.startswith("note: items[2] to items[4]: reach ")
+
+
+def test_a_speed_that_turns_prevent_is_told() -> None:
+    zigzag = [Waypoint(3.0 * (i // 2), 3.0 * (i % 2), 2.0) for i in range(1, 9)]
+    mission = Mission("m", "M", "", (), (Takeoff(2.0), Speed(5.0), *zigzag, Land()))
+    reports = path_reports(mission, BEBOP_LIMITS)
+    (note,) = [*unreached_speed_notes(mission, reports, BEBOP), *slowness_notes(reports)]
+    assert "turns" in note
 
 
 def test_a_cable_that_is_reeled_is_told_with_its_duration() -> None:
