@@ -167,6 +167,13 @@ def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() ->
     )
 
 
+def test_placing_the_load_is_refused_with_what_sets_it_down_and_what_flies_on_from_there() -> None:
+    """Behind the landing that was advised nothing is flown."""
+    (line,) = mission_of(read_plan(plan_text(TAKEOFF, simple(94, 2), simple(21))), HOME, "").left_out
+    assert "NAV_PAYLOAD_PLACE (94): cannot be flown; release the load (DO_GRIPPER) at a waypoint" in line
+    assert line.endswith("fly on without it by a second mission (docs/missions.md)")
+
+
 def test_items_behind_the_first_landing_are_named() -> None:
     again = read_plan(plan_text(TAKEOFF, simple(208, 2), WAYPOINTS[0], simple(21), TAKEOFF, simple(21)))
     assert list(mission_of(again, HOME, "").notes) == [
