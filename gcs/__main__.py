@@ -5,8 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-
-from gcs.cli import gcs
+import sys
 
 
 def main() -> None:
@@ -17,6 +16,13 @@ def main() -> None:
     os.environ.setdefault("PYTHONSAFEPATH", "1")
     gc.set_threshold(100_000, 20, 20)  # most objects are modules and tables, which stay until the end
     atexit.register(gc.freeze)  # otherwise Python would search all of them at exit, which takes 0.3 s
+    try:
+        from gcs.cli import gcs
+    except KeyboardInterrupt:  # from here on the command itself answers it
+        from gcs.errors import EXIT_INTERRUPTED
+
+        sys.stderr.write("gcs: stopped\n")
+        sys.exit(EXIT_INTERRUPTED)
     gcs(prog_name="gcs")
 
 

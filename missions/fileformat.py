@@ -80,7 +80,7 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
         at = f"items[{index}]"
         kind = item.get("type")
         if not isinstance(kind, str) or kind not in ITEMS:
-            errors.append(f"{locations[index]}: {at}.type {_kind_problem(item)}")
+            errors.append(f"{locations[index]}: {at}.{_kind_problem(item)}")
             continue
         try:
             spec = ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"})
@@ -131,13 +131,15 @@ def _item_locations(text: str, where: str, count: int) -> list[str]:
 
 
 def _kind_problem(table: Mapping[str, Any]) -> str:
+    """What is wrong with the type of an item that has no known one, from the name of the key on."""
     allowed = ", ".join(ITEMS)
     if "type" not in table:
-        return f"is missing; must be one of {allowed}"
+        meant = next((key for key in table if key.isprintable() and nearest(key, ("type",))), "")
+        return f"{meant}: unknown key; write type" if meant else f"type is missing; must be one of {allowed}"
     kind = table["type"]
     near = nearest(str(kind), ITEMS)
     hint = f" (did you mean {near}?)" if near else ""
-    return f"= {format_value(kind)}; must be one of {allowed}{hint}"
+    return f"type = {format_value(kind)}; must be one of {allowed}{hint}"
 
 
 def _order_problems(kinds: Sequence[str], locations: Sequence[str]) -> list[str]:

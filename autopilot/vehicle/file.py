@@ -51,8 +51,7 @@ def load_truth_and_belief(name_or_path: str | PathLike[str]) -> tuple[Vehicle, V
 
 def _vehicle(table: dict[str, Any], where: str, reference: Reference | None) -> Vehicle:
     """The vehicle of a table, completed by that of the assumed vehicle if it names one."""
-    completed = table if reference is None else {**reference.table, **table}
-    found = VEHICLES.record(Vehicle, completed, where, written=table)
+    found = VEHICLES.record(Vehicle, _completed(table, where, reference), where, written=table)
     problems = [f"{where}: parameters.{line}" for line in _parameter_problems(found)]
     if problems:
         raise VehicleFileError(problems)
@@ -104,7 +103,12 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
     messages about it begin."""
     table, where = _table(name_or_path)
     reference = _reference(table, where, name_or_path)
-    return (table if reference is None else {**reference.table, **table}), where
+    return _completed(table, where, reference), where
+
+
+def _completed(table: dict[str, Any], where: str, reference: Reference | None) -> dict[str, Any]:
+    """The table with the keys that it leaves out: those of the assumed vehicle, and the name of the file."""
+    return {**(reference.table if reference else {}), "name": Path(where).stem, **table}
 
 
 def _reference(table: dict[str, Any], where: str, name_or_path: str | PathLike[str]) -> Reference | None:
@@ -122,7 +126,7 @@ def _reference(table: dict[str, Any], where: str, name_or_path: str | PathLike[s
 
 def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
     found = VEHICLES.read(name_or_path)
-    return {"name": found.name, **VEHICLES.table(found.text, found.where)}, found.where
+    return VEHICLES.table(found.text, found.where), found.where
 
 
 @contextmanager

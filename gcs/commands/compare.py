@@ -14,7 +14,7 @@ from gcs.commands.options import OUTPUT_FILE, json_option, print_json
 @click.option(
     "--out",
     type=OUTPUT_FILE,
-    help="Path of the page; an existing file is replaced.  [default: comparisons/RUN-RUN.html]",
+    help="Path of the page, .html; an existing file is replaced.  [default: comparisons/RUN-RUN.html]",
 )
 @json_option
 @click.option("--quiet", is_flag=True, help="Print no table.")

@@ -7,7 +7,6 @@ of the ground station are known beforehand: the two instants at which it arms an
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import inf, nan, sqrt
@@ -51,7 +50,6 @@ TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NO_PATH = np.zeros((1, COLUMNS))  # requested path of a mission step in which the load follows none
 _NEVER = 2**62
-_OF_A_PATH = re.compile(r"\bitem \d+[^:;]*: ")  # in the refusal of a path that the vehicle cannot follow
 _TICK, _NOW = field_offset(World, "tick"), field_offset(World, "now_us")
 _RESPONSE = field_offset(Figures, "response")
 _SLACK_EVENTS = field_offset(World, "plant") + field_offset(PlantState, "slack_events")
@@ -105,15 +103,18 @@ class _NoLog:
 def start_times(mission: Mission, conditions: Conditions) -> StartTimes:
     """The times at which the real ground station arms and starts: from a flight over the wire to then."""
     times: dict[Phase, int] = {}
+    path_problem = ""
 
     def watch(onboard: Onboard, _: HilSimulator) -> bool:
+        nonlocal path_problem
+        path_problem = onboard.core.flight.mission.plan.prepared.refusal.partition(": ")[2]
         times.setdefault(onboard.phase, onboard.now_us)
         return onboard.phase not in IN_AIR
 
     outcome = fly_with_wire(mission, conditions, _NoLog(), watch)
     if Phase.TAUTEN not in times:
         hint = ""
-        if _OF_A_PATH.search(outcome.reason):
+        if path_problem and path_problem in outcome.reason:
             hint = " (MIS_INFEASIBLE says what becomes of a path that cannot be flown: 0 as asked, 1 slower)"
         raise ValueError(
             f"{mission.name} does not start under the conditions of the sweep: {outcome.reason}{hint}"

@@ -15,6 +15,7 @@ from gcs.errors import EXIT_USAGE, GcsError
 
 MAX_FLIGHTS = 10_000_000
 MAX_VALUES = 10_000  # of a varied parameter
+_FORMS = "NAME=LOW:HIGH:COUNT or NAME=A,B,C"
 _MAX_SEED_DIGITS = len(str(MAX_SEED))
 
 
@@ -54,9 +55,7 @@ def parse_varied(text: str, sampled: bool) -> VariedParameter:
     name, *others = [one.strip().upper() for one in texts] or [""]
     followers = tuple(others)
     if not all([name, *others]) or not values.strip():
-        raise PlanError(
-            f"--vary {text}: must be NAME=LOW:HIGH:COUNT or NAME=A,B,C, e.g. SIM_ACT_DELAY_MS=0:60:7"
-        )
+        raise PlanError(f"--vary {text}: must be {_FORMS}, e.g. SIM_ACT_DELAY_MS=0:60:7")
     if ":" not in values:
         listed = tuple(_parse_number(text, one) for one in values.split(","))
         duplicate = next((one for i, one in enumerate(listed) if one in listed[:i]), None)
@@ -144,5 +143,7 @@ def _parse_number(text: str, number: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise PlanError(f"--vary {text}: {number.strip() or 'nothing'!r} is no finite number")
+        raise PlanError(
+            f"--vary {text}: {number.strip() or 'nothing'!r} is no finite number; must be {_FORMS}"
+        )
     return value

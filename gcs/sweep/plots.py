@@ -100,8 +100,6 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
 
 def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, units: dict[str, str]) -> None:
     """Draw the share of success and the error over one parameter, for all laws."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     with style():
         figure = new_figure(11.0, 3.7)
         left, right = figure.subplots(1, 2, sharex=True)
@@ -118,14 +116,24 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
         left.set_title("completed (%)")
         right.set_title("greatest load error (mm)")
         right.set_yscale("log")
-        right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        right.yaxis.set_major_formatter("{x:g}")
-        right.yaxis.set_minor_formatter(NullFormatter())
+        label_errors(right)
         for ax in (left, right):
             ax.set_xlabel(_label(name, units))
             draw_legend(ax)
         figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
         save(figure, path)
+
+
+def label_errors(ax: Any) -> None:
+    """Label the logarithmic axis of the errors: at 1, 2 and 5 of each decade, and over less than a decade,
+    where few of these lie, at round numbers an equal distance apart."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+    low, high = ax.get_ylim()
+    evenly = MaxNLocator(nbins=8, steps=(1, 2, 2.5, 5, 10))
+    ax.yaxis.set_major_locator(evenly if high < 10.0 * low else LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def law_colours(laws: list[str]) -> list[str]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MAX_NAME_LENGTH = 100  # of a page, in characters
 MAX_RUNS = 12  # so that lines remain distinguishable, on a page of some megabytes
 COMPARISONS_FOLDER = Path("comparisons")
+_ENDINGS = (".html", ".htm")  # of pages; a page without one gets the first
 
 
 class CompareError(GcsError):
@@ -44,7 +45,9 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
     for source, run in zip(sources, runs, strict=True):
         if run.record["outcome"] == "no telemetry":
             raise CompareError(f"{source}: holds no telemetry of a Plumbline vehicle")
-    page = out or COMPARISONS_FOLDER / f"{_page_name(names, logs)}.html"
+    page = out or COMPARISONS_FOLDER / f"{_page_name(names, logs)}{_ENDINGS[0]}"
+    if page.suffix.lower() not in _ENDINGS:  # a browser would show its text
+        page = page.with_name(page.name + _ENDINGS[0])
     text = comparison_page(runs)
     try:
         page.parent.mkdir(parents=True, exist_ok=True)

@@ -333,6 +333,8 @@ def test_check_says_that_it_can_be_flown():
     assert all(
         0.9 < path["tension_low_n"] < 1.0 and 3.0 < path["duration_s"] < 10.0 for path in told.pop("paths")
     )
+    assert 60.0 < told.pop("expected_s") < 75.0  # it takes 63 s
+    assert told.pop("time_limit_s") > 150.0
     assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": [], "refusals": []}
 
 
@@ -898,6 +900,20 @@ def test_a_vehicle_that_released_its_load_before_is_told_of(live, tmp_path, monk
     vehicle.on_command_long = answer
     result = run("fly", "hover", "--connect", port, "--out", str(tmp_path / "out"))
     assert ("released its load before: it flies the mission without it" in result.stderr) == released
+
+
+def test_a_command_that_is_stopped_while_it_is_loaded_says_so_in_one_line():
+    stopped = """
+import sys
+class Loading:
+    def __getattr__(self, name):
+        raise KeyboardInterrupt
+sys.modules["gcs.cli"] = Loading()
+from gcs.__main__ import main
+main()
+"""
+    found = subprocess.run([sys.executable, "-c", stopped], check=False, capture_output=True, text=True)
+    assert (found.returncode, found.stdout, found.stderr) == (EXIT_INTERRUPTED, "", "gcs: stopped\n")
 
 
 def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(

@@ -120,6 +120,7 @@ BAD = {
         f'items[1].type = "waypiont"; must be one of {KINDS} (did you mean waypoint?)'
     ),
     "[[items]]\nduration_s = 1.0": (f"items[1].type is missing; must be one of {KINDS}"),
+    '[[items]]\ntpe = "waypoint"': "items[1].tpe: unknown key; write type",
     "[[items]]\ntype = 3": (f"items[1].type = 3; must be one of {KINDS}"),
     SIGNALS: "items[1].terms is missing",
     SIGNALS + "terms = []": "items[1].terms = []; must be a list of at least 1",

@@ -252,6 +252,7 @@ BROKEN = [
         "quad_drag: unknown key; write quad_drag_n_s_m (in newtons per metre per",
     ),
     ('name = "bebop"', "wings = 2", f"wings: unknown key; allowed: {KNOWN}"),
+    ('name = "bebop"', 'nme = "mine"', "nme: unknown key; write name"),
     ("load_mass_kg = 0.1", "load_mass_kg = ", "7:16: not TOML: Invalid value"),
 ]
 

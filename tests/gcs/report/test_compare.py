@@ -279,6 +279,18 @@ def test_the_pages_of_many_flights_have_names_of_their_own(
     assert all("/case-b-20260301-100000-and-9-more-" in page for page in pages)
 
 
+@pytest.mark.parametrize(
+    ("named", "written"),
+    [("page", "page.html"), ("page-0.1", "page-0.1.html"), ("page.HTML", "page.HTML"), ("a.htm", "a.htm")],
+)
+def test_a_page_has_the_ending_by_which_a_browser_shows_it(
+    runs: list[Path], tmp_path: Path, named: str, written: str
+) -> None:
+    code, out, _ = called(*runs[:2], "--quiet", "--out", tmp_path / named)
+    assert (code, out) == (0, f"comparison: {tmp_path / written}\n")
+    assert [path.name for path in tmp_path.iterdir()] == [written]
+
+
 @pytest.mark.parametrize("width", [390, 1100])
 def test_names_and_buttons_do_not_lie_over_each_other(
     browser: Browser, runs: list[Path], tmp_path: Path, width: int

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from gcs.closed_loop import fly as fly_with_wire
 from gcs.mission_files import load
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
+from missions.model import Takeoff
 from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
 from tests.gcs import tolerances
@@ -264,5 +265,8 @@ def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
         start_times(mission, fenced)
     assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST" in str(refusal.value)
     assert "MIS_INFEASIBLE" not in str(refusal.value), "which says nothing of fences"
+    low = replace(mission, steps=(Takeoff(0.05), *mission.steps[1:]))
+    with pytest.raises(ValueError, match=r"item 0: load height 0\.05 m, min 0\.3 m$"):
+        start_times(low, Conditions())
     with pytest.raises(ValueError, match="MIS_INFEASIBLE says what becomes of a path"):
         start_times(load_mission("case-a"), Conditions(settings={"CTL_LAW": PLUMBLINE, "VEH_ROTOR_MAX": 1.4}))

@@ -60,6 +60,11 @@ def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
     assert caught.value.exit_code == 2
 
 
+def test_a_range_that_is_written_in_another_form_is_answered_with_its_form() -> None:
+    with pytest.raises(PlanError, match="'0-4' is no finite number; must be NAME=LOW:HIGH:COUNT or NAME=A,"):
+        parse_varied("SIM_WIND_E=0-4", False)
+
+
 def test_a_count_where_values_are_drawn_is_refused_with_what_to_give() -> None:
     with pytest.raises(PlanError, match=r"without a count; give SIM_WIND_E=0:4$") as caught:
         parse_varied("SIM_WIND_E=0:4:3", True)
