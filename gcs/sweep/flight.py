@@ -90,6 +90,7 @@ class FlightResult:
     tension_max_n: float = nan
     rotor_force_min_n: float = nan
     rotor_force_max_n: float = nan
+    battery_left_pct: float = nan
     texts: list[str] = field(default_factory=list)
 
 
@@ -266,12 +267,15 @@ class SweepFlight:
         if step is not None:
             pack(response_to(step), self.figures, _RESPONSE)
 
+    @property
+    def _share_left(self) -> float:
+        """The share of its charge that the simulated battery has left."""
+        return share_left(unpack(World, self.world.world, 0).supply, self.cell.truth.drive)
+
     def _measure_battery(self) -> None:
         """What the autopilot learns of the battery, which the simulator sends it over the wire."""
-        drive = self.cell.truth.drive
-        if drive.battery > 0.0:
-            supply = unpack(World, self.world.world, 0).supply
-            reading = BatteryReading(remaining=share_left(supply, drive))
+        if self.cell.truth.drive.battery > 0.0:
+            reading = BatteryReading(remaining=self._share_left)
             self.core.replace_flight(with_battery(self.core.flight, reading))
 
     # ---- what the ground station does
@@ -367,6 +371,8 @@ class SweepFlight:
             result.saturated_fraction = f.saturated / f.ticks
             result.psi_R_max, result.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
             result.rotor_force_min_n, result.rotor_force_max_n = f.rotor_min, f.rotor_max
+        if self.cell.truth.drive.battery > 0.0:
+            result.battery_left_pct = 100.0 * self._share_left
         return result
 
 

@@ -173,6 +173,22 @@ def test_figures_of_a_released_load_are_those_of_the_record(delivery: str, tmp_p
     assert {name: found[name] for name in shared} == sampled
 
 
+def test_the_charge_left_is_that_of_the_record_without_its_rounding(short: str) -> None:
+    mission = load(short)
+    battery = {"SIM_BATTERY": 1.0, "SIM_BAT_CAP": 300.0, "SIM_BAT_CHARGE": 80.0}
+    conditions = Conditions(settings={"CTL_LAW": PLUMBLINE, **battery})
+    log = io.BytesIO()
+    fly_with_wire(mission, conditions, TlogWriter(log))
+    log.seek(0)
+    record = flight_record(telemetry_of(read_tlog(log)), FlightMeta())
+    found = fly(mission, conditions, start_times(mission, conditions))
+    assert found.outcome == "completed"
+    assert 50.0 < found.battery_left_pct < 75.0
+    assert found.battery_left_pct == pytest.approx(record["battery_left_pct"], abs=1.0)
+    none = Conditions(settings={"CTL_LAW": PLUMBLINE})
+    assert np.isnan(fly(mission, none, start_times(mission, none)).battery_left_pct)
+
+
 @pytest.mark.parametrize("name", ["stepped", "case-a"])
 def test_the_step_response_is_that_of_the_record(request: pytest.FixtureRequest, name: str) -> None:
     """The record has a sample every 8 ms, so it may find the start of the step that much later; in between,
