@@ -6,9 +6,10 @@ compiled by the first program that needs them (`autopilot.geometry.kernel`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from autopilot.geometry.machine_code import ROOT, is_ready, mark_ready
 from autopilot.vehicle.parameters import LAWS
@@ -16,6 +17,9 @@ from autopilot.vehicle.parameters import LAWS
 COMPILING_TEXT = (
     "compiling the flight software, once; it takes a minute or two (gcs warmup shows how far it is)"
 )
+
+# of what is compiled although all parts are ready: these have not every kernel for every vehicle and setting
+COMPILING_MORE_TEXT = "compiling, once, what the flight software needs besides for these options"
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Part:
 _ONBOARD = ROOT / "autopilot" / "shell" / "tick_loop.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
+
+CABLE = Part("the cable of links", "sitl.warmup", ("cable",), SIMULATOR.source, "cable", 14.0)
 
 
 ANY_OWN_LAW = "own"  # stands for any custom law: the autopilot is compiled once for all of them
@@ -73,16 +79,61 @@ def ready(parts: Iterable[Part]) -> bool:
 
 def print_compiled_kernels() -> None:
     """From now on print the name of each kernel as its compilation begins."""
+
+    def print_name(function: Any) -> None:
+        module = function.__module__  # functions that numba generates have none
+        if module and module.partition(".")[0] != "numba":
+            print(f"{module}.{function.__name__}", flush=True)
+
+    _call_at_compilation(print_name)
+
+
+class Compilation:
+    """The compilation with which a program begins. It is announced: at once if a part is missing, otherwise
+    as soon as any kernel has to be compiled."""
+
+    def __init__(self, parts: Iterable[Part], notify: Callable[[str], None]) -> None:
+        """`notify` prints a line."""
+        self._parts = tuple(parts)
+        self.was_needed = not ready(self._parts)
+        self._stop: Callable[[], None] = lambda: None
+        if self.was_needed:
+            notify(COMPILING_TEXT)
+            return
+
+        def announce(_: Any) -> None:
+            self._stop()
+            notify(COMPILING_MORE_TEXT)
+
+        self._stop = _call_at_compilation(announce)
+
+    def done(self) -> None:
+        """Everything is compiled: mark the parts, and announce nothing from now on."""
+        self._stop()
+        if self.was_needed:
+            for part in self._parts:
+                part.mark_done()
+
+
+def _call_at_compilation(handle: Callable[[Any], None]) -> Callable[[], None]:
+    """Call `handle` with the Python function of each kernel whose compilation begins, until the function that
+    is returned is called."""
     from numba.core import event
 
-    class Names(event.Listener):
-        def on_start(self, event: object) -> None:
-            function = event.data["dispatcher"].py_func  # type: ignore[attr-defined]
-            module = function.__module__  # functions that numba generates have none
-            if module and module.partition(".")[0] != "numba":
-                print(f"{module}.{function.__name__}", flush=True)
+    class Beginnings(event.Listener):
+        listens = True
 
-        def on_end(self, event: object) -> None:
+        def on_start(self, event: Any) -> None:
+            if self.listens:
+                handle(event.data["dispatcher"].py_func)
+
+        def on_end(self, event: Any) -> None:
             pass
 
-    event.register("numba:compile", Names())
+    beginnings = Beginnings()
+    event.register("numba:compile", beginnings)
+
+    def stop() -> None:
+        beginnings.listens = False  # numba may be walking through its listeners at this moment
+
+    return stop

@@ -33,7 +33,7 @@ from autopilot.services.records import (
     SimulatorParametersSaved,
 )
 from autopilot.shell.background_worker import BackgroundWorker
-from autopilot.shell.compiling import ANY_OWN_LAW, COMPILING_TEXT, autopilot_parts, ready
+from autopilot.shell.compiling import ANY_OWN_LAW, Compilation, autopilot_parts
 from autopilot.shell.ground import AutopilotError, GroundStations, LockstepGroundStation, listen, open_socket
 from autopilot.shell.options import (
     EXIT_ERROR,
@@ -508,11 +508,9 @@ def main(
         if any(own):
             with watched_calls():
                 try_all(own, table.values())
-        parts = autopilot_parts((*LAWS, ANY_OWN_LAW)[int(table["CTL_LAW"])])
-        compiled = ready(parts)
-        if not compiled:
+        compilation = Compilation(autopilot_parts((*LAWS, ANY_OWN_LAW)[int(table["CTL_LAW"])]), notify)
+        if compilation.was_needed:
             gc.enable()  # the compiler leaves much garbage
-            notify(COMPILING_TEXT)
         mission, problem = store.load_mission(origin)
         problems += [problem] if problem else []
         if signing_key is not None:
@@ -543,9 +541,7 @@ def main(
         program.report_problems(problems + unreadable)
         program.onboard.warm_up()
         warm_up(program.onboard)
-        if not compiled:
-            for part in parts:
-                part.mark_done()
+        compilation.done()
         reduce_latency(real_time=not lockstep)
         with StopRequest() as stop, watched_calls(not lockstep) if any(own) else nullcontext():
             program.run(stop)

@@ -29,12 +29,12 @@ from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
 from gcs.workflows.flight_meta import meta_of
-from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
+from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, parse_setting
 from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.too_slow import slowness_reason
 from gcs.workflows.vehicle_processes import LOGS, start_vehicle
-from gcs.workflows.warmup import flight_parts, warm_up
+from gcs.workflows.warmup import flight_parts, vehicle_parts, warm_up
 from missions.model import Mission
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ def fly(
     with FlightFolder(out, options.overwrite) as folder:
         if options.connect is None:
             laws = (options.law,) if options.firmware is None else ()
-            warm_up(flight_parts(laws), options.quiet)
+            settings = map(parse_setting, options.settings)
+            warm_up([*flight_parts(laws), *vehicle_parts(options.vehicle, settings)], options.quiet)
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
             _page(mission, options, view, stop) as page,

@@ -15,7 +15,7 @@ from gcs.workflows.before_flight import check_mission, check_options, mission_wa
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.refused_settings import with_blamed_settings
 from gcs.workflows.started_flight import flight_client
-from gcs.workflows.warmup import in_process_parts, warm_up
+from gcs.workflows.warmup import in_process_parts, vehicle_parts, warm_up
 from missions.model import Mission
 
 
@@ -33,7 +33,8 @@ def fly_in_process(
     """
     for line in (*check_options(options), *mission_warnings(options.planner, mission)):
         warn(line)
-    warm_up(in_process_parts((options.law,)), options.quiet)
+    of_the_vehicle = vehicle_parts(options.vehicle, map(parse_setting, options.settings))
+    warm_up([*in_process_parts((options.law,)), *of_the_vehicle], options.quiet)
     check_mission(mission, options)
     settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(parse_setting, options.settings))}
     client = flight_client(mission, options, home_of(mission))

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from autopilot.geometry.machine_code import ROOT, drop_unused, storage_problem
-from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
+from autopilot.shell.compiling import CABLE, SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
+from autopilot.vehicle.shipped import VEHICLES
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay, notify
 from gcs.shell.processes import Child, Processes
@@ -40,6 +41,16 @@ def flight_parts(laws: Sequence[str]) -> list[Part]:
     """What `gcs fly` needs for flights with these laws; without any, for a third-party autopilot."""
     own = autopilot_parts(*laws) if laws else ()
     return [*own, SIMULATOR, _CHECK, _REPORT]
+
+
+def vehicle_parts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[Part]:
+    """What flights of this vehicle need besides, with parameters that are set."""
+    links = dict(settings).get("SIM_CBL_LINKS")
+    if links is None and vehicle not in VEHICLES.names():  # no shipped vehicle has any
+        from autopilot.vehicle.file import load_vehicle
+
+        links = load_vehicle(vehicle).cable_links
+    return [CABLE] if links else []
 
 
 def in_process_parts(laws: Sequence[str]) -> list[Part]:

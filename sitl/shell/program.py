@@ -11,7 +11,7 @@ from pathlib import Path
 
 import click
 
-from autopilot.shell.compiling import COMPILING_TEXT, SIMULATOR
+from autopilot.shell.compiling import SIMULATOR, Compilation
 from autopilot.shell.options import (
     EXIT_ERROR,
     EXIT_USAGE,
@@ -228,9 +228,7 @@ def main(
                 log=log,
             )
 
-        compiled = SIMULATOR.ready
-        if not compiled:
-            notify(COMPILING_TEXT)
+        compilation = Compilation((SIMULATOR,), notify)
         warm = build()  # compiles, or loads, every kernel
         if kind.run is not None:
             _ = warm.frame  # FrameError if no third-party firmware flies the vehicle
@@ -238,8 +236,7 @@ def main(
         warm.truth_datagram()
         warm.receive(b"")
         warm.advance()
-        if not compiled:
-            SIMULATOR.mark_done()
+        compilation.done()
         simulator = build(None if log_sensors is None else SensorLog(_append_to(log_sensors)))
         if cpu is not None:
             _run_on(cpu)

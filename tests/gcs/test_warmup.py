@@ -14,7 +14,7 @@ from gcs.cli import gcs
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay
 from gcs.sweep.warmup import sweep_parts
-from gcs.workflows.warmup import flight_parts, warm_up
+from gcs.workflows.warmup import flight_parts, vehicle_parts, warm_up
 
 SOURCE = Path(__file__)
 
@@ -36,6 +36,15 @@ def test_a_flight_needs_its_law_alone():
     assert set(marks) == {"tick", "law-lqr", "messages", "paths", "world", "check", "report"}
     both = [part.mark for part in flight_parts(["lqr", "thesis"])]
     assert sorted(both) == sorted({*marks, "law-thesis"})
+
+
+def test_a_cable_of_links_is_compiled_before_its_flight(tmp_path):
+    assert vehicle_parts("bebop", [("SIM_WIND_E", 2.0)]) == []
+    assert [part.mark for part in vehicle_parts("bebop", [("SIM_CBL_LINKS", 10.0)])] == ["cable"]
+    made = tmp_path / "made.toml"
+    made.write_text('believed = "bebop"\ncable_links = 8\n')
+    assert [part.mark for part in vehicle_parts(str(made), [])] == ["cable"]
+    assert vehicle_parts(str(made), [("SIM_CBL_LINKS", 0.0)]) == []
 
 
 def test_a_sweep_needs_no_report_but_flights_of_its_own():
