@@ -24,6 +24,8 @@ from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 
+_MIN_HOVER_W_KG = 60.0  # rotors that are large for their load need 70, those of usual vehicles 100 to 250
+
 
 def check_flight_inputs(
     vehicle: str,
@@ -61,25 +63,38 @@ def check_flight_inputs(
 def setting_warnings(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
     """A line for each setting that can be flown but is probably unintended: a value below one of a parameter
     in milliseconds, which was probably meant in seconds, and one up to one of a parameter in percent, which
-    was probably meant as a share. Parameters whose default is that small are left out."""
+    was probably meant as a share (parameters whose default is that small are left out); and a battery that is
+    turned on with a power at which no vehicle of this mass hovers, such as that of the defaults."""
     found, believed = load_truth_and_belief(vehicle)
     tables = sim_parameters(truth_of(found)), autopilot_parameters(believed)
+    pairs = list(settings)  # in a sweep with several values of a parameter
+    given = dict(pairs)
     own = {name: (table.describe(name).unit, table[name]) for table in tables for name in table.names}
     lines = []
-    for name, value in settings:
+    for name, value in pairs:
         unit, default = own.get(name, ("", 0.0))
         if unit == "ms" and 0.0 < abs(value) < 1.0:
             lines.append(f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant")
         elif unit == "%" and 0.0 < value <= 1.0 < default:
             meant = f"{value * 1e2:g} if a share of {value:g} is meant"
             lines.append(f"{name} = {value:g} is in percent; {meant}")
+    hover_w, mass_kg = (given.get(name, tables[0][name]) for name in ("SIM_BAT_HOVER_W", "SIM_QUAD_MASS"))
+    if given.get("SIM_BATTERY") and hover_w < _MIN_HOVER_W_KG * mass_kg:
+        lines.append(
+            f"SIM_BATTERY = 1: {_too_little_power(hover_w, mass_kg)} (SIM_BAT_HOVER_W); set it, "
+            "SIM_BAT_CELLS, SIM_BAT_CAP and SIM_BAT_R to what this vehicle has"
+        )
     return lines
+
+
+def _too_little_power(hover_w: float, mass_kg: float) -> str:
+    return f"{hover_w:g} W to hover with {mass_kg:g} kg is less than any multirotor needs"
 
 
 def vehicle_warnings(vehicle: str) -> list[str]:
     """A line each if the file of the vehicle chooses a law (in flights of `gcs` that of `--law` flies), if
-    the vehicle is harder to turn than any body of its mass and size, and if its cable is shorter than its
-    arms."""
+    the vehicle is harder to turn than any body of its mass and size, if its cable is shorter than its arms,
+    and if no vehicle of its mass hovers with the power of its battery."""
     found, believed = load_truth_and_belief(vehicle)
     warnings = []
     if "CTL_LAW" in believed.parameters:
@@ -95,6 +110,11 @@ def vehicle_warnings(vehicle: str) -> list[str]:
             f"{vehicle}: cable_length_m = {found.cable_length_m:g} is less than arm_m, {found.arm_m:g}: the "
             "load lies under the vehicle, whose feet may strike the ground as it pulls the cable taut; use a "
             "longer cable"
+        )
+    if found.battery and found.battery_hover_w < _MIN_HOVER_W_KG * found.quad_mass_kg:
+        lacking = _too_little_power(found.battery_hover_w, found.quad_mass_kg)
+        warnings.append(
+            f"{vehicle}: battery_hover_w = {found.battery_hover_w:g}: {lacking}: it would fly too long"
         )
     return warnings
 

@@ -171,6 +171,24 @@ def test_of_a_percentage_that_may_be_meant_as_a_share_the_unit_is_told(name, val
     assert setting_warnings("bebop", [(name, value)]) == told
 
 
+def test_a_battery_with_which_no_vehicle_of_this_mass_hovers_is_told(tmp_path):
+    (line,) = setting_warnings("hexarotor", [("SIM_BATTERY", 1.0)])
+    assert line.startswith("SIM_BATTERY = 1: 65 W to hover with 5 kg is less than any multirotor needs")
+    assert setting_warnings("hexarotor", [("SIM_BATTERY", 1.0), ("SIM_BAT_HOVER_W", 700.0)]) == []
+    assert setting_warnings("hexarotor", [("SIM_BATTERY", 0.0)]) == []
+    assert setting_warnings("bebop", [("SIM_BATTERY", 1.0)]) == []
+    file = tmp_path / "mine.toml"
+    battery = {"battery": True, "battery_cells": 6, "battery_capacity_mah": 9000.0}
+    mine = plumbline.Vehicle.load("hexarotor").replace(
+        battery_resistance_ohm=0.02, battery_hover_w=70.0, **battery
+    )
+    mine.save(file)
+    (line,) = vehicle_warnings(str(file))
+    assert line.startswith(f"{file}: battery_hover_w = 70: 70 W to hover with 5 kg")
+    mine.replace(battery_hover_w=800.0).save(file)
+    assert vehicle_warnings(str(file)) == []
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
