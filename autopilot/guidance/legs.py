@@ -94,6 +94,11 @@ class LiftWait(Hold):
 
 
 @dataclass(frozen=True, slots=True)
+class LagWait(Hold):
+    """Load or vehicle is far from its path, which waits here until it comes near."""
+
+
+@dataclass(frozen=True, slots=True)
 class Transfer:
     """From rest to rest along a straight line."""
 

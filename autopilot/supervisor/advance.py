@@ -16,6 +16,7 @@ from autopilot.supervisor.state import CRITICAL, IN_AIR, INFO, Flight, Report, T
 from autopilot.supervisor.watches.failsafe import watch_failsafe, watch_missing_readings
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
+from autopilot.supervisor.watches.lag import watch_lag
 from autopilot.supervisor.watches.own import watch_estimator, watch_law
 from autopilot.supervisor.watches.recovery import watch_recovery
 from autopilot.supervisor.watches.rotors import watch_rotors
@@ -35,6 +36,7 @@ WATCHES: tuple[Watch, ...] = (
     watch_idle,
     watch_slack,
     watch_fence,
+    watch_lag,
     watch_tautening,
     watch_touchdown,
     watch_takeoff_setpoint,

@@ -22,6 +22,7 @@ from autopilot.guidance.legs import (
     QUAD_POSITION,
     CatchLoad,
     Creep,
+    LagWait,
     Leg,
     LevelHold,
     PathStop,
@@ -182,7 +183,7 @@ def _uncontrolled_end_us(flight: Flight, now_us: int) -> int:
 def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> bool:
     return bool(
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
-        or isinstance(leg, CatchLoad)
+        or isinstance(leg, CatchLoad | LagWait)
         or flight.cable.slack_since_us >= 0
         or flight.phase == Phase.GUIDED
         or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)

@@ -34,7 +34,7 @@ class MotionSettings:
 
 @dataclass(frozen=True, slots=True)
 class FailsafeSettings:
-    """Limits beyond which the flight is given up."""
+    """Limits beyond which a failsafe triggers."""
 
     load_error_limit_m: float
     tilt_limit_rad: float

@@ -73,6 +73,7 @@ class Event(Enum):
     RETURN = "return"
     LAND = "land"
     CAUGHT = "load caught"
+    CAUGHT_UP = "near the path again"
     RELEASED = "load released"
     LOAD_DOWN = "load on the ground"
     VEHICLE_DOWN = "vehicle on the ground"

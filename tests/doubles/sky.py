@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from autopilot.control.laws import build_law, chosen_law
-from autopilot.geometry.linear import ZERO, Vec3, add, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
@@ -18,7 +18,7 @@ from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.settings import Settings, settings_from
-from autopilot.supervisor.state import IN_AIR, Flight, MissionPlan, Phase, View
+from autopilot.supervisor.state import CARRYING, IN_AIR, Flight, MissionPlan, Phase, View
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
@@ -143,6 +143,28 @@ class Sky:
             v_load=(0.0, 0.3, 0.0),
             v_quad=(0.0, 0.3, 0.0),
         )
+
+
+class HeadWind(Sky):
+    """A sky in which load and vehicle come no faster than at `most_m_s` to where they should be."""
+
+    most_m_s = 2.0
+
+    def obey(self) -> View:
+        last, there = self.view, super().obey()
+        if self.flight.phase not in CARRYING:
+            return there
+        released = self.flight.cable.released
+        was, should = (last.x_quad, there.x_quad) if released else (last.x_load, there.x_load)
+        way = sub(should, was)
+        reach = self.most_m_s * STEP_US * 1e-6
+        if norm(way) <= reach:
+            return there
+        v = scale(self.most_m_s / norm(way), way)
+        x = add(was, scale(STEP_US * 1e-6, v))
+        if released:
+            return there._replace(x_quad=x, v_quad=v)
+        return hanging(self.now_us, x, v)
 
 
 @cache

@@ -1,4 +1,6 @@
-"""A gust throws the load off its path, and it returns: gains too high for large errors once lost it."""
+"""A gust throws the load off its path, or a head wind the vehicle: it returns, or it lands.
+
+Gains too high for large errors once lost it."""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import pytest
 
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import Delay, Land, Step, Takeoff, Winch
+from missions.model import Delay, Land, Release, Speed, Step, Takeoff, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
 
 # the load swings too slowly for as fast a loop as these rotors allow
@@ -78,3 +80,27 @@ def test_a_load_that_a_gust_throws_off_its_path_returns(
     assert 0.5 * greatest_m < craft.worst_error < greatest_m
     craft.run(at_phase(Phase.DISARMED))
     assert "Landed, disarmed" in craft.texts
+
+
+ALONE = (Takeoff(1.5), Release(), Waypoint(0.0, 0.0, 5.0), Speed(10.0), Waypoint(-60.0, 0.0, 5.0), Land())
+
+
+def test_a_vehicle_alone_that_is_too_weak_for_a_head_wind_completes_its_mission() -> None:
+    """10 m/s over the ground against a wind of 12 m/s is more than it can fly."""
+    craft = Craft(*ALONE, SIM_WIND_E=12.0)
+    craft.begin()
+    craft.run(at_phase(Phase.DISARMED), 120.0)
+    said = "".join(craft.texts)  # long ones are sent in parts
+    assert "Path waits: vehicle 5.0 m off its path" in said
+    assert craft.texts[-2:] == ["Near the path again, flying on at 7.0 m/s", "Landed, disarmed"]
+    assert craft.truth.x_quad[0] == pytest.approx(-60.0, abs=0.5)
+
+
+def test_a_vehicle_alone_that_a_gale_carries_off_lands() -> None:
+    craft = Craft(*ALONE, SIM_WIND_E=8.0, SIM_GUST_E=20.0, SIM_GUST_AT_S=28.0, SIM_GUST_FOR_S=60.0)
+    craft.begin()
+    craft.run(at_phase(Phase.DISARMED), 120.0)
+    said = "".join(craft.texts)  # long ones are sent in parts
+    assert "m off its path (FS_LOAD_ERR 5), landing" in said
+    assert craft.texts[-1] == "Landed, disarmed"
+    assert craft.truth.vehicle_on_ground == 1.0

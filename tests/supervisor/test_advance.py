@@ -39,7 +39,6 @@ from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.state import (
-    CARRYING,
     CRITICAL,
     IN_AIR,
     LANDING,
@@ -563,15 +562,6 @@ def test_a_landing_goes_on_while_readings_are_missing(phase: Phase) -> None:
     blind = hanging(STEP_US, HERE)._replace(estimate_problems=("no load position from a tracker",))
     after, report = advance(under_way(phase), blind, SETTINGS)
     assert (after.phase, report.texts) == (phase, ())
-
-
-@pytest.mark.parametrize("phase", sorted(CARRYING))
-def test_a_load_that_is_too_far_off_ends_the_flight(phase: Phase) -> None:
-    flight = under_way(phase)
-    off = hanging(STEP_US, x=(HERE[0] + SETTINGS.failsafe.load_error_limit_m + 0.1, 0.0, 2.0))
-    after, report = advance(flight, off, SETTINGS)
-    assert after.phase == Phase.FAILSAFE
-    assert "exceeds FS_LOAD_ERR 5.0 m" in report.texts[0][1]
 
 
 @pytest.mark.parametrize("phase", sorted(ON_GROUND))

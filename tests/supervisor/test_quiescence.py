@@ -50,7 +50,7 @@ from missions import model
 from missions.fileformat import load_mission, shipped
 from missions.model import AttitudeRun, Delay, Signals, Speed, Step, Takeoff, Term, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
-from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, HeadWind, Sky
 
 WEIGHT = SETTINGS.load_weight_n
 EVERY = 9  # all disturbances are tried once in this many ticks
@@ -341,6 +341,20 @@ def long_cable() -> Watched:
     return flown(sky)
 
 
+class Lagging(Watched, HeadWind):
+    """A sky with a head wind that is watched."""
+
+
+def lagging() -> Watched:
+    sky = Lagging(
+        Takeoff(3.0), Speed(5.0), Waypoint(60.0, 0.0, 3.0), model.Release(), Speed(5.0), model.ReturnHome()
+    )
+    flown(sky)
+    assert any(text.startswith("Path waits: load") for text in sky.texts)
+    assert any(text.startswith("Path waits: vehicle") for text in sky.texts)
+    return sky
+
+
 def given_up() -> Watched:
     sky = after(Watched(), Terminate(), wait_s=4.0)
     assert sky.flight.phase == Phase.DISARMED
@@ -369,6 +383,7 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
     offboard_rise: {Phase.DISARMED, Phase.HOLD, Phase.LOWER, Phase.SET_DOWN},
     fenced: {Phase.DISARMED, Phase.TAUTEN, Phase.SET_DOWN},
     never_taut: {Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED},
+    lagging: TO_GROUND | {Phase.TAUTEN, Phase.MISSION},
     long_cable: TO_GROUND | {Phase.TAUTEN, Phase.SET_DOWN},
     given_up: {Phase.FAILSAFE, Phase.HOLD, Phase.DISARMED},
     left_armed: {Phase.ARMED, Phase.DISARMED},

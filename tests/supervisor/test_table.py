@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.guidance.legs import CatchLoad
+from autopilot.guidance.legs import CatchLoad, LagWait
 from autopilot.guidance.setpoint_follower import PositionSetpoint, SetpointStream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
@@ -214,6 +214,11 @@ def caught(phase: Phase) -> Flight:
     return advance(catching(under_way(phase)), hanging(SECOND, HERE), SETTINGS)[0]
 
 
+def caught_up(phase: Phase) -> Flight:
+    waiting = replace(under_way(phase), legs=(LagWait(HERE),))
+    return advance(waiting, hanging(SECOND, HERE), SETTINGS)[0]
+
+
 def load_down(phase: Phase) -> Flight:
     """The load is set down by LOWER; in other phases, where nothing lowers it, it has fallen."""
     if phase == Phase.LOWER:
@@ -245,6 +250,7 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.RETURN: lambda phase: asked(under_way(phase), R.ReturnHome()),
     Event.LAND: lambda phase: asked(under_way(phase), R.Land()),
     Event.CAUGHT: caught,
+    Event.CAUGHT_UP: caught_up,
     Event.RELEASED: lambda phase: asked(under_way(phase), R.Release()),
     Event.LOAD_DOWN: load_down,
     Event.VEHICLE_DOWN: vehicle_down,

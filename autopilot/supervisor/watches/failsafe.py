@@ -1,11 +1,13 @@
 """Failsafe: the conditions under which the flight cannot continue. The vehicle lands by what remains of the
-estimate, as long as this gives the vertical and roughly the position; otherwise the rotors stop."""
+estimate, as long as this gives the vertical and roughly the position; otherwise the rotors stop. They also
+stop if vehicle or load is far off its path and out of control; `lag` cares for those that are controlled."""
 
 from __future__ import annotations
 
-from math import degrees, isfinite
+from math import cos, degrees, isfinite, radians
+from typing import NamedTuple
 
-from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.linear import Vec3, column, dot, norm, sub
 from autopilot.guidance.legs import LevelHold
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.settings import Settings
@@ -22,6 +24,26 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
+
+MAX_LEAN_COSINE = cos(radians(60.0))  # of a vehicle, or of its cable, that is controlled
+
+
+class PathError(NamedTuple):
+    """How far vehicle or load is off the position that it should have."""
+
+    body: str  # "vehicle" or "load"
+    offset: Vec3  # m, from where it should be
+    rate: Vec3  # m/s, of the offset
+
+    @property
+    def distance_m(self) -> float:
+        """Length of the offset."""
+        return norm(self.offset)
+
+    @property
+    def approach_m_s(self) -> float:
+        """Speed at which the offset becomes shorter."""
+        return -dot(self.offset, self.rate) / max(self.distance_m, 1e-9)
 
 
 def watch_failsafe(flight: Flight, view: View, settings: Settings) -> WatchResult:
@@ -56,10 +78,42 @@ def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
     if view.tilt_rad > limits.tilt_limit_rad:
         limit = degrees(limits.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.1f} deg exceeds FS_TILT_DEG {limit:.0f}"
-    if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == position_mode(flight):
-        jet = setpoint(flight, view.now_us)
-        what, place = ("vehicle", view.x_quad) if flight.cable.released else ("load", view.x_load)
-        error = norm(sub(place, jet[0])) if jet is not None else 0.0
-        if not error <= limits.load_error_limit_m:
-            return f"{what} error {error:.1f} m exceeds FS_LOAD_ERR {limits.load_error_limit_m:.1f} m"
+    error = path_error(flight, view)
+    if (
+        error is not None
+        and not error.distance_m <= limits.load_error_limit_m
+        and not is_controlled(flight, view, error)
+    ):
+        return f"{off_path_text(error, settings)}, out of control"
     return ""
+
+
+def path_error(flight: Flight, view: View) -> PathError | None:
+    """How far the load is off its position, or the vehicle that has released it; None if no position is
+    controlled."""
+    if flight.phase not in CARRYING or not flight.legs:
+        return None
+    jet = setpoint(flight, view.now_us)
+    if jet is None or flight.legs[0].control_mode != position_mode(flight):
+        return None
+    if flight.cable.released:
+        return PathError("vehicle", sub(view.x_quad, jet[0]), sub(view.v_quad, jet[1]))
+    return PathError("load", sub(view.x_load, jet[0]), sub(view.v_load, jet[1]))
+
+
+def off_path_text(error: PathError, settings: Settings) -> str:
+    """How far it is off, and the limit."""
+    limit_m = settings.failsafe.load_error_limit_m
+    return f"{error.body} {error.distance_m:.1f} m off its path (FS_LOAD_ERR {limit_m:g})"
+
+
+def is_controlled(flight: Flight, view: View, error: PathError) -> bool:
+    """Whether a vehicle that is far off is controlled nevertheless, and only too weak for the wind or its
+    path: vehicle and cable are roughly upright, and it does not push itself farther away."""
+    upward, cable = column(view.attitude, 2), sub(view.x_quad, view.x_load)
+    if not cos(view.tilt_rad) >= MAX_LEAN_COSINE:
+        return False
+    if not flight.cable.released and not cable[2] >= MAX_LEAN_COSINE * norm(cable):
+        return False
+    pushes_away = upward[0] * error.offset[0] + upward[1] * error.offset[1] > 0.0
+    return error.approach_m_s >= 0.0 or not pushes_away

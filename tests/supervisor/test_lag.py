@@ -1,0 +1,163 @@
+"""A vehicle or load far off its path: out of control, too weak for its path, or too weak for the wind."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, add, norm, scale, sub
+from autopilot.guidance.legs import LagWait
+from autopilot.services.requests import Pause, Release, Reposition
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.state import CARRYING, Flight, MissionPlan, MissionProgress, Phase
+from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
+from missions import model
+from missions.model import Signals, Sine, Speed, Step, Takeoff, Term, Waypoint
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, HeadWind, Sky, entered, hanging
+from tests.supervisor.test_advance import start
+
+HERE = (1.0, 0.0, 2.0)
+LIMIT_M = SETTINGS.failsafe.load_error_limit_m
+OUTWARD = (1.0, 0.0, 0.0)  # m/s
+FAR = (HERE[0] + LIMIT_M + 0.1, HERE[1], HERE[2])
+AT_REST = (Phase.LIFT, Phase.HOLD, Phase.MISSION)
+
+
+def at_rest(phase: Phase = Phase.HOLD) -> Flight:
+    """A flight in which the load should rest at HERE."""
+    plan = MissionPlan((Takeoff(2.0), model.Delay(9.0)), (0, 1), 2)
+    progress = MissionProgress(plan=plan, step=1, active=True, takeoff_altitude_m=HERE[2], speed_m_s=1.0)
+    return entered(Flight(phase=phase, mission=progress), phase, hanging(x=HERE), SETTINGS)
+
+
+def leaning(x: float) -> Mat3:
+    """Attitude of a vehicle whose thrust leans 0.5 rad, eastward for x = 1 and westward for x = -1."""
+    c, s = math.cos(0.5), x * math.sin(0.5)
+    return ((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c))
+
+
+@pytest.mark.parametrize("phase", AT_REST)
+def test_one_that_is_carried_off_where_it_should_rest_lands(phase: Phase) -> None:
+    after, report = advance(at_rest(phase), hanging(STEP_US, FAR, OUTWARD), SETTINGS)
+    assert after.phase == Phase.LOWER
+    assert not after.mission.active
+    assert after.is_failsafe
+    assert report.texts == (
+        (MAV_SEVERITY_ERROR, "Failsafe: load 5.1 m off its path (FS_LOAD_ERR 5), landing"),
+    )
+    assert after.legs[0].jet(0.0)[:2] == (FAR, OUTWARD), "from where it is, as it moves"
+    on, report = advance(after, hanging(2 * STEP_US, add(FAR, scale(9.0, OUTWARD)), OUTWARD), SETTINGS)
+    assert (on.phase, report.texts) == (Phase.LOWER, ()), "the landing continues"
+
+
+def test_one_that_comes_back_is_waited_for() -> None:
+    flight = at_rest()
+    after, report = advance(flight, hanging(STEP_US, FAR, (-1.0, 0.0, 0.0)), SETTINGS)
+    assert (after, report.texts) == (flight, ())
+
+
+LOST: dict[str, dict[str, object]] = {
+    "tilted": {"tilt_rad": math.radians(61.0)},
+    "the load flies beside it": {"x_quad": (FAR[0] + 1.0, 0.0, FAR[2] + 0.5)},
+    "the load flies above it": {"x_quad": (FAR[0], 0.0, FAR[2] - 1.0)},
+    "it pushes itself away": {"attitude": leaning(1.0)},
+}
+
+
+@pytest.mark.parametrize("how", LOST)
+@pytest.mark.parametrize("phase", sorted(CARRYING - {Phase.GUIDED}))
+def test_one_that_is_out_of_control_is_given_up(phase: Phase, how: str) -> None:
+    seen = hanging(STEP_US, FAR, OUTWARD)._replace(**LOST[how])
+    after, report = advance(at_rest(phase), seen, SETTINGS)
+    assert after.phase == Phase.FAILSAFE
+    text = "Flight given up: load 5.1 m off its path (FS_LOAD_ERR 5), out of control"
+    assert report.texts == ((MAV_SEVERITY_EMERGENCY, text),)
+
+
+@pytest.mark.parametrize("attitude", [IDENTITY, leaning(-1.0)])
+def test_one_that_pushes_back_is_controlled(attitude: Mat3) -> None:
+    seen = hanging(STEP_US, FAR, OUTWARD, attitude=attitude, tilt_rad=math.radians(45.0))
+    assert advance(at_rest(), seen, SETTINGS)[0].phase == Phase.LOWER
+
+
+def head_wind(*steps: Step, most_m_s: float = 2.0) -> HeadWind:
+    """One that lifts its load and flies these steps."""
+    sky = HeadWind(*steps)
+    sky.flight = start(*steps).flight
+    sky.most_m_s = most_m_s
+    return sky
+
+
+FAST = (Takeoff(3.0), Speed(5.0), Waypoint(60.0, 0.0, 3.0), Waypoint(60.0, 30.0, 3.0))
+SWING = Signals(40.0, (Term("x", 20.0, 0.5, 0.5, 39.0, 0.5, (Sine(20.0),)),))
+WAITING = {
+    "waypoints": (*FAST, model.Land()),
+    "return": (*FAST, model.ReturnHome(), model.Land()),
+    "released": (Takeoff(3.0), model.Release(), *FAST[1:], model.ReturnHome(), model.Land()),
+    "signals": (Takeoff(3.0), SWING, model.Land()),
+}
+
+
+@pytest.mark.parametrize("name", WAITING)
+def test_a_path_waits_for_one_that_is_too_slow_for_it(name: str) -> None:
+    sky = head_wind(*WAITING[name])
+    furthest = 0.0
+    while sky.flight.phase != Phase.DISARMED:
+        sky.tick()
+        assert sky.now_us < 500_000_000, sky.texts
+        if sky.flight.legs and sky.flight.phase == Phase.MISSION:
+            place = sky.view.x_quad if sky.flight.cable.released else sky.view.x_load
+            furthest = max(furthest, norm(sub(place, sky.setpoints[-1][2][0])))
+    assert sky.reached == list(sky.flight.mission.plan.sequence)
+    body = "vehicle" if name == "released" else "load"
+    waits = [text for text in sky.texts if text.startswith(f"Path waits: {body} 5.0 m off its path")]
+    assert waits
+    assert sky.texts.count("Landed, disarmed") == 1
+    assert LIMIT_M < furthest < 5.0 * LIMIT_M
+
+
+def test_a_path_that_waited_is_flown_more_slowly() -> None:
+    sky = head_wind(*WAITING["waypoints"])
+    sky.run(lambda s: s.flight.legs != () and isinstance(s.flight.legs[0], LagWait))
+    sky.run(lambda s: s.flight.legs != () and not isinstance(s.flight.legs[0], LagWait))
+    assert sky.texts[-1] == "Near the path again, flying on at 3.5 m/s"
+    assert sky.flight.mission.speed_m_s == pytest.approx(3.5)
+    assert norm(sub(sky.view.x_load, sky.setpoints[-2][2][0])) <= 0.5 * LIMIT_M
+    assert sky.flight.mission.step == 2, "the same step"
+    jets = [jet for _, _, jet in sky.setpoints]
+    steps = [norm(sub(b[0], a[0])) for a, b in pairwise(jets)]
+    assert max(steps[-400:]) < 5.1 * STEP_US * 1e-6, "without a jump"
+
+
+def test_one_that_waits_can_be_paused() -> None:
+    sky = head_wind(*WAITING["waypoints"])
+    sky.run(lambda s: s.flight.legs != () and isinstance(s.flight.legs[0], LagWait))
+    sky.ask(Pause())
+    sky.run(lambda s: norm(sub(s.view.x_load, s.flight.legs[-1].jet(99.0)[0])) < 0.1)
+    assert sky.flight.phase == Phase.HOLD
+    assert not any(text.startswith("Near the path") for text in sky.texts)
+
+
+def test_a_place_that_was_requested_is_not_flown_to_any_more() -> None:
+    sky = HeadWind()
+    sky.take_off()
+    assert sky.ask(Reposition(60.0, 0.0, 3.0, True, speed_m_s=5.0)).result == ACCEPTED
+    sky.run(lambda s: any("Failsafe" in text for text in s.texts))
+    assert sky.texts[-1] == "Failsafe: load 5.0 m off its path (FS_LOAD_ERR 5), holding"
+    sky.wait(30.0)
+    assert sky.flight.phase == Phase.HOLD
+    assert sum("Failsafe" in text for text in sky.texts) == 1
+    assert sky.view.v_load == ZERO
+
+
+def test_a_vehicle_alone_is_judged_by_itself() -> None:
+    sky = Sky().airborne()
+    sky.ask(Release())
+    sky.wait(1.0)
+    x = sky.view.x_quad
+    off = sky.view._replace(x_quad=(x[0] + 5.1, x[1], x[2]), v_quad=OUTWARD, now_us=sky.now_us + STEP_US)
+    after, report = advance(sky.flight, off, SETTINGS)
+    assert after.phase == Phase.LOWER
+    assert report.texts[0][1] == "Failsafe: vehicle 5.1 m off its path (FS_LOAD_ERR 5), landing"
