@@ -548,6 +548,10 @@ class FlightCore:
         before, self.setup = self.setup, setup
         self._cable_m, self.settings = None, setup.settings
         self._dirty = True
+        mission = self.flight.mission
+        if mission.speed_m_s == before.settings.motion.speed_m_s:  # no other speed was requested
+            mission = replace(mission, speed_m_s=setup.settings.motion.speed_m_s)
+            self.flight = replace(self.flight, mission=mission)
         if self._estimator_slot is not None and setup.estimator is not None:
             self._estimator_slot.configure(setup.estimator.values)
         pack(self._constants(), self.rows.constants, 0)

@@ -41,7 +41,14 @@ from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
 from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, PacketLoss
-from autopilot.onboard.path_work import PathWork, begin_now, path_work, use_paths
+from autopilot.onboard.path_work import (
+    PathWork,
+    begin_now,
+    later_path_work,
+    path_work,
+    use_later_paths,
+    use_paths,
+)
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, SimulatorParameters
 from autopilot.onboard.snapshot import (
@@ -100,7 +107,7 @@ from autopilot.supervisor.state import (
     interrupt_mission,
     with_battery,
 )
-from autopilot.trajectory.prepare import PENDING, PathLimits, PreparedPaths, prepare
+from autopilot.trajectory.prepare import AT_HOME, PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
@@ -275,6 +282,7 @@ class Onboard:
         # values of our parameters that are in force, or will be, and the period of the ticks
         self._applied: tuple[dict[str, float], int] = ({}, 0)
         self._prepared_for = (self.core.setup.settings.limits, self.core.setup.planner)
+        self._prepared_from = AT_HOME
         self._batches = BatchBuilder(self._snapshot_source, self._battery_row, self._writer, options.lockstep)
         self._set_plan(self.endpoint.mission)
         self.has_log_data = False  # something was logged since the log was last taken
@@ -671,9 +679,7 @@ class Onboard:
     def _apply_setup(self, setup: Setup) -> None:
         """Fly with this setup from the next tick on."""
         self.core.use_setup(setup)
-        # a mission under way keeps the paths that it began with
-        requirements = (setup.settings.limits, setup.planner)
-        if requirements != self._prepared_for and not self.core.flight.mission.active:
+        if (setup.settings.limits, setup.planner) != self._prepared_for:
             self._prepare()
 
     # ---- ground
@@ -880,10 +886,15 @@ class Onboard:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def _prepare(self) -> None:
-        """Have the paths of the plan prepared: immediately if the clock waits, else as `work`."""
-        self._path_work = work = path_work(self.core, self.now_us)
-        self._prepared_for = work.limits, work.planner
-        use_paths(self.core, PENDING)
+        """Have the paths of the plan prepared: immediately if the clock waits, else as `work`. Meanwhile, a
+        mission under way keeps the paths that it has."""
+        if self.core.flight.mission.active:
+            work = later_path_work(self.core, self._prepared_from)
+        else:
+            work = path_work(self.core, self.now_us)
+            use_paths(self.core, PENDING)
+        self._path_work = work
+        self._prepared_for, self._prepared_from = (work.limits, work.planner), work.begin
         if self._options.clock_waits or not work.steps:
             self.finish(work, work.run())
 
@@ -904,6 +915,12 @@ class Onboard:
                 self._apply_setup(result)
         elif work is self._path_work:
             self._path_work = None
+            if self.core.flight.mission.active:
+                for note in result.notes:
+                    self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, note)
+                text = use_later_paths(self.core, result, self.now_us)
+                self.endpoint.send_text(mavlink.MAV_SEVERITY_INFO, text)
+                return
             self._set_paths(result)
             if self.core.flight.mission.waiting and begin_now(self.core, self.now_us) != work.begin:
                 self._prepare()  # it begins elsewhere by now, and waits for other paths
