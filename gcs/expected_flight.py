@@ -23,7 +23,7 @@ def expected_entries(mission: Mission, table: ParameterTable) -> tuple[TimelineE
         table["MIS_SPEED"],
         table["MIS_ACCEL"],
         table["VEH_CABLE_LEN"],
-        VerticalSpeeds(tauten_m_s, table["MIS_LIFT_SPEED"]),
+        VerticalSpeeds(tauten_m_s, table["MIS_LIFT_SPEED"], table["MPC_Z_V_AUTO_DN"]),
     )
 
 

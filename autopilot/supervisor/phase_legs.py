@@ -38,6 +38,7 @@ from autopilot.supervisor.state import (
     setpoint,
 )
 from autopilot.supervisor.step_legs import step_legs
+from autopilot.trajectory.descent import quick_way_m
 from autopilot.trajectory.slack_cable import (
     CLEARANCE,
     SET_DOWN_OFFSET,
@@ -155,19 +156,34 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
         return (
             *legs,
             carry(here, clear, flight.mission.speed_m_s, settings),
-            carry(clear, low, settings.motion.lift_speed_m_s, settings),
+            *_descent(clear, low, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
-    height_margin, speed_factor = HEIGHT_SIGMAS * view.height_std, 1.0
-    if view.estimate_problems:  # by inertial navigation, which drifts
-        height_margin, speed_factor = BLIND_HEIGHT_MARGIN, BLIND_SPEED_FACTOR
+    is_blind = bool(view.estimate_problems)  # then by inertial navigation, which drifts
+    height_margin = BLIND_HEIGHT_MARGIN if is_blind else HEIGHT_SIGMAS * view.height_std
     low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + height_margin))
-    speed, accel = speed_factor * settings.motion.lift_speed_m_s, speed_factor * settings.motion.accel_m_s2
-    return (
-        *legs,
-        carry_leg(here, low, speed, accel, settings.min_move_s),
-        Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
+    if is_blind:
+        motion = settings.motion
+        speed, accel = BLIND_SPEED_FACTOR * motion.lift_speed_m_s, BLIND_SPEED_FACTOR * motion.accel_m_s2
+        down: tuple[Leg, ...] = (carry_leg(here, low, speed, accel, settings.min_move_s),)
+    else:
+        down = _descent(here, low, settings)
+    return (*legs, *down, Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION))
+
+
+def _descent(begin: Vec3, low: Vec3, settings: Settings) -> tuple[Leg, ...]:
+    """Straight down, from rest to rest: quickly to a few metres above the end, if that is far below."""
+    motion = settings.motion
+    quick_m = quick_way_m(
+        begin[2] - low[2],
+        motion.descent_speed_m_s,
+        motion.lift_speed_m_s,
+        motion.accel_m_s2,
+        settings.min_move_s,
     )
+    near = (low[0], low[1], begin[2] - quick_m)
+    slow = carry(near, low, motion.lift_speed_m_s, settings)
+    return (carry(begin, near, motion.descent_speed_m_s, settings), slow) if quick_m > 0.0 else (slow,)
 
 
 def _clear_of_load(here: Vec3, view: View, settings: Settings) -> Vec3:

@@ -26,6 +26,7 @@ class MotionSettings:
     speed_m_s: float
     accel_m_s2: float
     lift_speed_m_s: float
+    descent_speed_m_s: float  # far above the ground
     taut_speed_m_s: float
     weight_lead_m: float  # of the setpoint over a vehicle whose taut cable pulls with the load's weight
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
@@ -146,6 +147,7 @@ def settings_from(
             speed_m_s=table["MIS_SPEED"],
             accel_m_s2=table["MIS_ACCEL"],
             lift_speed_m_s=table["MIS_LIFT_SPEED"],
+            descent_speed_m_s=table["MPC_Z_V_AUTO_DN"],
             taut_speed_m_s=min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"]),
             weight_lead_m=load_mass * gravity / table["QP_KZ"] if table["QP_KZ"] > 0.0 else 0.0,
             snap_speed_m_s=table["MIS_SNAP_SPEED"],

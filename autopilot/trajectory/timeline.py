@@ -14,6 +14,7 @@ from functools import lru_cache
 from math import dist, pi, sqrt
 
 from autopilot.geometry.linear import ZERO, Vec3, add, dot
+from autopilot.trajectory.descent import descent_pace
 from autopilot.trajectory.load_path import evaluate_load_path, path_tables
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
 from autopilot.trajectory.transfer import Pace, pace
@@ -71,11 +72,13 @@ def min_move_duration(cable_length: float, gravity: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class VerticalSpeeds:
-    """Speeds (m/s) at which the slack cable is pulled taut, and at which the load is lifted and lowered
-    unless the mission's speed is less; the defaults are those of MIS_TAUT_SPEED and MIS_LIFT_SPEED."""
+    """Speeds (m/s) at which the slack cable is pulled taut, at which the load is lifted and lowered unless
+    the mission's speed is less, and at which it is lowered far above the ground; the defaults are those of
+    MIS_TAUT_SPEED, MIS_LIFT_SPEED and MPC_Z_V_AUTO_DN."""
 
     tauten_m_s: float = 0.15
     lift_m_s: float = 0.8
+    descent_m_s: float = 1.5
 
 
 USUAL_SPEEDS = VerticalSpeeds()
@@ -240,6 +243,8 @@ def _travel_and_wait(
         return Pace(0.0), waiting
     distance = dist(before.expected, after.expected)
     min_move_s = 0.0 if isinstance(step, Winch) else min_move_duration(max(cable, 0.0), gravity)
+    if isinstance(step, Land):
+        return descent_pace(distance, vertical.descent_m_s, speed, accel, min_move_s), waiting
     return pace(distance, speed, accel, min_move_s), waiting
 
 

@@ -501,6 +501,25 @@ def test_a_vehicle_that_trembles_on_the_ground_has_landed() -> None:
     )
 
 
+@pytest.mark.parametrize("released", [False, True])
+def test_a_landing_from_high_above_is_quick_but_for_the_last_metres(released: bool) -> None:
+    steps = (Takeoff(2.0), *((model.Release(),) if released else ()), Speed(3.0), Waypoint(0.0, 0.0, 30.0))
+    sky = start(*steps, model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.LOWER)
+    began = len(sky.setpoints)
+    sky.run(lambda s: isinstance(s.flight.legs[0], Creep))
+    descent = [jet for _, _, jet in sky.setpoints[began:]]
+    assert len(descent) * STEP_US * 1e-6 < 36.0
+    high = [jet[1][2] for jet in descent if jet[0][2] > 4.0]
+    last = [jet[1][2] for jet in descent if jet[0][2] < 3.0]
+    assert min(high) == pytest.approx(-1.5)
+    assert -0.81 < min(last) < -0.7
+    heights = [jet[0][2] for jet in descent]
+    assert all(0.0 <= before - after < 1.51 * STEP_US * 1e-6 for before, after in pairwise(heights))
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.texts[-1] == "Landed, disarmed"
+
+
 # ---- what ends a flight
 
 HERE = (1.0, 0.0, 2.0)
