@@ -16,18 +16,20 @@ from gcs.errors import RefusedError
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
+MISSION_STATE_S = 1.5  # in which a vehicle reports whether it flies a mission, once a second
+
 
 def _send(address: Address, make: Callable[[Session], Operation], needs_arming: bool = False) -> None:
     """Send one command and print the answer. `needs_arming`: a disarmed vehicle executes it when armed."""
     with Session(address) as session:
         session.find()
         text = session.run(make(session)).text
-        arming_hint = (
-            "; it begins when the vehicle is armed: gcs arm"
-            if needs_arming and not session.view.armed
-            else ""
-        )
-        click.echo(text + arming_hint)
+        click.echo(text + (_arming_hint(session) if needs_arming else ""))
+
+
+def _arming_hint(session: Session) -> str:
+    """What a disarmed vehicle waits for."""
+    return "" if session.view.armed else "; it begins when the vehicle is armed: gcs arm"
 
 
 @click.command("arm")
@@ -67,9 +69,20 @@ def disarm_command(force: bool, address: Address) -> None:
 def start_command(address: Address) -> None:
     """Fly the mission on the vehicle from its first item.
 
-    A disarmed vehicle accepts the command and starts when it is armed.
+    A disarmed vehicle accepts the command and starts when it is armed. A mission under way begins again.
     """
-    _send(address, lambda session: command.start_mission(session.target), needs_arming=True)
+    with Session(address) as session:
+        session.find()
+        if session.view.armed:
+            session.watch(lambda: session.view.mission_state is not None, MISSION_STATE_S)
+        is_under_way = session.view.mission_state == "active"
+        text = session.run(command.start_mission(session.target)).text
+        restart_hint = (
+            "; it was under way, and begins again (gcs resume continues a paused mission)"
+            if is_under_way
+            else ""
+        )
+        click.echo(text + restart_hint + _arming_hint(session))
 
 
 @click.command("pause")

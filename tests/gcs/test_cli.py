@@ -413,6 +413,15 @@ def test_what_begins_when_the_vehicle_is_armed_says_so(live, words):
     assert run(*words, "--connect", port).stdout.endswith(": accepted\n")
 
 
+def test_a_start_of_a_mission_under_way_says_that_it_begins_again(live):
+    vehicle, port = live
+    vehicle.armed, vehicle.mission_state = True, mavlink.MISSION_STATE_ACTIVE
+    told = "start: accepted; it was under way, and begins again (gcs resume continues a paused mission)\n"
+    assert run("start", "--connect", port).stdout == told
+    vehicle.mission_state = mavlink.MISSION_STATE_PAUSED
+    assert run("start", "--connect", port).stdout == "start: accepted\n"
+
+
 @pytest.mark.parametrize(("words", "system"), [([], None), (["--sysid", "2"], 2)])
 def test_the_page_shows_all_vehicles_or_the_chosen_one(monkeypatch, words, system):
     def station(**options):

@@ -334,6 +334,27 @@ def test_a_phase_is_named_in_words() -> None:
     assert (verdict.result, verdict.text) == (LATER, "Reposition denied while the load is set down")
 
 
+@pytest.mark.parametrize(
+    ("request_", "name"), [(R.Pause(), "Hold"), (R.Orbit(2.0, 1.0, 0.0, 0.0, 3.0), "Orbit")]
+)
+def test_while_the_cable_is_tautened_a_refusal_says_what_is_possible(request_: object, name: str) -> None:
+    flight = flight_in(Phase.TAUTEN, False, PLAN)
+    text = f"{name} denied while the cable is tautened: land, or wait until the load is lifted"
+    assert decide(flight, request_, hanging(), SETTINGS) == (flight, Verdict(LATER, text))
+    assert decide(flight, R.Land(), hanging(), SETTINGS)[0].phase == Phase.SET_DOWN
+
+
+def test_a_start_during_a_mission_says_that_it_begins_again() -> None:
+    sky = Sky(model.Takeoff(2.0), model.Waypoint(1.0, 0.0, 2.0), model.Waypoint(3.0, 0.0, 2.0))
+    sky.ask(R.StartMission(0))
+    sky.ask(R.Arm(arm=True, force=False))
+    sky.run(lambda s: s.flight.mission.step == 2)
+    assert sky.ask(R.StartMission(None)) == Verdict(ACCEPTED), "it is being flown"
+    assert sky.flight.mission.step == 2
+    assert sky.ask(R.StartMission(0)) == Verdict(ACCEPTED, "Mission begins again at item 0")
+    assert sky.flight.mission.step == 0
+
+
 @pytest.mark.parametrize("place", [(2e5, 0.0, 2.0), (0.0, -2e5, 2.0), (0.0, 0.0, 2e5)])
 def test_a_reposition_that_is_far_off_is_a_mistake(place: tuple[float, float, float]) -> None:
     sky = Sky().airborne()

@@ -98,7 +98,9 @@ def start_mission(flight: Flight, request: StartMission, view: View, settings: S
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             return before, verdict
     if flight.mission.active and flight.phase not in ON_GROUND and flight.phase != Phase.HOLD:
-        return flight, ACCEPTED
+        if request.first is None:
+            return flight, ACCEPTED
+        return flight, ACCEPTED._replace(text=f"Mission begins again at item {request.first}")
     started, verdict = start_at_current_step(flight, view, settings)
     return (started if verdict.result == mavlink.MAV_RESULT_ACCEPTED else before), verdict
 

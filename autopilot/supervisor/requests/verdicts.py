@@ -41,4 +41,6 @@ def temporarily_denied(text: str) -> Verdict:
 def wrong_phase(flight: Flight, request_name: str, reason: str = "") -> Verdict:
     """The request is refused because it cannot be carried out in the present phase."""
     text = f"{request_name} denied while {_PHASE_TEXTS[flight.phase]}"
+    if flight.phase == Phase.TAUTEN and not reason:
+        reason = "land, or wait until the load is lifted"
     return temporarily_denied(f"{text}: {reason}" if reason else text)
