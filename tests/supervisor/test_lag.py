@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, add, norm, scale, sub
+from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, add, norm, scale, sub
 from autopilot.guidance.legs import LagWait
 from autopilot.services.requests import Pause, Release, Reposition
 from autopilot.supervisor.advance import advance
@@ -62,7 +62,6 @@ LOST: dict[str, dict[str, object]] = {
     "tilted": {"tilt_rad": math.radians(61.0)},
     "the load flies beside it": {"x_quad": (FAR[0] + 1.0, 0.0, FAR[2] + 0.5)},
     "the load flies above it": {"x_quad": (FAR[0], 0.0, FAR[2] - 1.0)},
-    "it pushes itself away": {"attitude": leaning(1.0)},
 }
 
 
@@ -76,10 +75,25 @@ def test_one_that_is_out_of_control_is_given_up(phase: Phase, how: str) -> None:
     assert report.texts == ((MAV_SEVERITY_EMERGENCY, text),)
 
 
-@pytest.mark.parametrize("attitude", [IDENTITY, leaning(-1.0)])
-def test_one_that_pushes_back_is_controlled(attitude: Mat3) -> None:
-    seen = hanging(STEP_US, FAR, OUTWARD, attitude=attitude, tilt_rad=math.radians(45.0))
-    assert advance(at_rest(), seen, SETTINGS)[0].phase == Phase.LOWER
+@pytest.mark.parametrize(
+    ("distance_m", "attitude", "v", "controlled"),
+    [
+        (10.1, leaning(1.0), OUTWARD, False),
+        (10.1, leaning(1.0), (-1.0, 0.0, 0.0), True),
+        (10.1, leaning(-1.0), OUTWARD, True),
+        (10.1, IDENTITY, OUTWARD, True),
+        (9.9, leaning(1.0), OUTWARD, True),
+    ],
+    ids=["pushes itself away", "brakes as it comes back", "pushes back", "level", "near"],
+)
+def test_one_that_pushes_itself_farther_and_farther_away_is_given_up(
+    distance_m: float, attitude: Mat3, v: Vec3, controlled: bool
+) -> None:
+    far = (HERE[0] + distance_m, HERE[1], HERE[2])
+    seen = hanging(STEP_US, far, v, attitude=attitude, tilt_rad=math.radians(45.0))
+    after, report = advance(at_rest(Phase.LOWER), seen, SETTINGS)
+    assert after.phase == (Phase.LOWER if controlled else Phase.FAILSAFE)
+    assert ("out of control" in str(report.texts)) is not controlled
 
 
 def head_wind(*steps: Step, most_m_s: float = 2.0) -> HeadWind:

@@ -542,6 +542,15 @@ def world_return() -> Witness:
     return witness
 
 
+def world_lag() -> Witness:
+    """A vehicle alone that is too weak for its speed against the wind."""
+    steps = (Takeoff(1.5), model.Release(), Speed(10.0), Waypoint(-60.0, 0.0, 5.0), model.Land())
+    witness = mission(*steps, SIM_WIND_E=12.0)
+    assert any(text.startswith("Path waits: vehicle") for text in witness.craft.texts)
+    assert witness.craft.flight.mission.done
+    return witness
+
+
 def world_catch() -> Witness:
     """A load that is struck upwards, and caught."""
     witness = witnessed(Takeoff(5.0), Delay(15.0), model.Land(), CTL_LAW=2.0)
@@ -610,6 +619,7 @@ def world_left_armed() -> Witness:
 WORLDS: dict[Callable[[], Witness], set[Phase]] = {
     world_delivery: WHOLE - {Phase.SET_DOWN},
     world_return: {Phase.HOLD, Phase.RETURN, Phase.LOWER, Phase.SET_DOWN},
+    world_lag: WHOLE - {Phase.SET_DOWN},
     world_catch: WHOLE,
     world_winch: TO_GROUND | {Phase.HOLD},
     world_fence: {Phase.DISARMED, Phase.TAUTEN},

@@ -26,6 +26,9 @@ from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
 
 MAX_LEAN_COSINE = cos(radians(60.0))  # of a vehicle, or of its cable, that is controlled
+# m, or the cable's length: nearer, a vehicle that is controlled may push away from where it should be, for
+# example when a gust ends or a swing is damped
+MIN_AWAY_M = 10.0
 
 
 class PathError(NamedTuple):
@@ -82,7 +85,7 @@ def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
     if (
         error is not None
         and not error.distance_m <= limits.load_error_limit_m
-        and not is_controlled(flight, view, error)
+        and not is_controlled(flight, view, error, settings)
     ):
         return f"{off_path_text(error, settings)}, out of control"
     return ""
@@ -107,13 +110,14 @@ def off_path_text(error: PathError, settings: Settings) -> str:
     return f"{error.body} {error.distance_m:.1f} m off its path (FS_LOAD_ERR {limit_m:g})"
 
 
-def is_controlled(flight: Flight, view: View, error: PathError) -> bool:
+def is_controlled(flight: Flight, view: View, error: PathError, settings: Settings) -> bool:
     """Whether a vehicle that is far off is controlled nevertheless, and only too weak for the wind or its
-    path: vehicle and cable are roughly upright, and it does not push itself farther away."""
+    path: vehicle and cable are roughly upright, and from far away it does not push itself farther."""
     upward, cable = column(view.attitude, 2), sub(view.x_quad, view.x_load)
     if not cos(view.tilt_rad) >= MAX_LEAN_COSINE:
         return False
     if not flight.cable.released and not cable[2] >= MAX_LEAN_COSINE * norm(cable):
         return False
-    pushes_away = upward[0] * error.offset[0] + upward[1] * error.offset[1] > 0.0
-    return error.approach_m_s >= 0.0 or not pushes_away
+    if error.distance_m <= max(MIN_AWAY_M, settings.cable_length_m) or error.approach_m_s >= 0.0:
+        return True
+    return upward[0] * error.offset[0] + upward[1] * error.offset[1] <= 0.0

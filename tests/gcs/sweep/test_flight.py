@@ -135,6 +135,16 @@ def test_same_bits_with_receiver_and_camera(short: str) -> None:
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
 
 
+def test_same_bits_where_a_path_waits(short: str) -> None:
+    settings = {"FS_LOAD_ERR": 0.05, "SIM_GUST_E": -10.0, "SIM_GUST_AT_S": 11.0, "SIM_GUST_FOR_S": 1.0}
+    waited, _ = flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+    settings["FS_LOAD_ERR"] = 5.0
+    not_waited, _ = flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+    assert waited.outcome == not_waited.outcome == "completed"
+    assert any(text.startswith("Path waits: load") for text in waited.texts)
+    assert waited.mission_s > not_waited.mission_s + 1.0
+
+
 def test_same_bits_with_readings_that_overtake_each_other_and_are_hidden(short: str) -> None:
     flown(short, Conditions(sensors="lab-real", seed=1, settings={"CTL_LAW": PLUMBLINE}))
 
