@@ -9,7 +9,9 @@ import pytest
 
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, add, norm, scale, sub
 from autopilot.guidance.legs import LagWait
-from autopilot.services.requests import Pause, Release, Reposition
+from autopilot.guidance.setpoint_follower import UNSPECIFIED
+from autopilot.services import identity
+from autopilot.services.requests import FollowSetpoint, Pause, Release, Reposition, SetMode
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.state import CARRYING, Flight, MissionPlan, MissionProgress, Phase
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
@@ -164,6 +166,21 @@ def test_a_place_that_was_requested_is_not_flown_to_any_more() -> None:
     assert sky.flight.phase == Phase.HOLD
     assert sum("Failsafe" in text for text in sky.texts) == 1
     assert sky.view.v_load == ZERO
+
+
+def test_setpoints_are_not_followed_any_more() -> None:
+    sky = HeadWind()
+    sky.take_off()
+    east = FollowSetpoint(UNSPECIFIED, (5.0, 0.0, 0.0), UNSPECIFIED, False)
+    assert sky.ask(east).result == ACCEPTED
+    assert sky.ask(SetMode(identity.OFFBOARD, 0)).result == ACCEPTED
+    while sky.flight.phase == Phase.GUIDED:
+        assert sky.now_us < 60_000_000
+        sky.ask(east)
+        sky.tick()
+    assert sky.texts[-1] == "Failsafe: load 5.0 m off its path (FS_LOAD_ERR 5), holding"
+    sky.wait(20.0)
+    assert (sky.flight.phase, sky.view.v_load) == (Phase.HOLD, ZERO)
 
 
 def test_a_vehicle_alone_is_judged_by_itself() -> None:
