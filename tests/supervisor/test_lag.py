@@ -131,6 +131,7 @@ def test_a_path_waits_for_one_that_is_too_slow_for_it(name: str) -> None:
     waits = [text for text in sky.texts if text.startswith(f"Path waits: {body} 5.0 m off its path")]
     assert waits
     assert sky.texts.count("Landed, disarmed") == 1
+    assert ("Near the path again, flying on" in sky.texts) == (name == "signals")
     assert LIMIT_M < furthest < 5.0 * LIMIT_M
 
 

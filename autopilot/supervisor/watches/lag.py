@@ -67,7 +67,10 @@ def _stopped(
 
 
 def _flying_on(flight: Flight) -> WatchResult:
-    """The flight that continues its path, more slowly."""
+    """The flight that continues its path; a transfer more slowly."""
+    in_run = flight.phase == Phase.MISSION and flight.mission.stopped_run is not None
+    if flight.phase == Phase.LIFT or in_run:
+        return WatchResult(flight, Event.CAUGHT_UP, ((INFO, "Near the path again, flying on"),))
     speed_m_s = flight.mission.speed_m_s
     speed_m_s = min(speed_m_s, max(MIN_SPEED, SLOWER * speed_m_s))
     flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
