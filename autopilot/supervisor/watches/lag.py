@@ -53,7 +53,7 @@ def _stopped(
         return WatchResult(flight, Event.HOLD, ((MAV_SEVERITY_ERROR, f"Failsafe: {text}, holding"),))
     if isinstance(flight.legs[-1], LagWait):
         return WatchResult(flight)
-    stopped_run = stopped_run_of(flight, view, settings)
+    stopped_run = stopped_run_of(flight, view, settings, legs)
     if stopped_run is None and isinstance(flight.legs[0], SignalRun | PathResume):  # it ends before it stops
         return WatchResult(flight)
     flight = replace(
