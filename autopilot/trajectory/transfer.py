@@ -13,7 +13,7 @@ ends. A long way is therefore flown at constant speed between two ramps, along w
 
 from __future__ import annotations
 
-from math import comb, sqrt
+from math import comb, isclose, sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
@@ -75,6 +75,11 @@ class Pace(NamedTuple):
 
     duration_s: float
     ramp_s: float = 0.0
+
+    @property
+    def evens_out(self) -> bool:
+        """Whether it is slower than its limits, so that no longer way takes less time."""
+        return isclose(self.ramp_s, _RAMP_SHARE * self.duration_s)
 
     def stretched(self, duration_s: float) -> Pace:
         """The same in at least so many seconds."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from math import dist
+from math import dist, sqrt
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -125,10 +125,11 @@ def unreached_speed_notes(
         slow |= {report.item} if report.asked_m_s else set()
     for asked_m_s, ways in _ways_by_set_speed(expected_entries(mission, table)):
         reached_m_s = max(peaks_m_s.get(way.item, _transfer_peak_m_s(way)) for way in ways)
-        if reached_m_s >= MIN_REACHED_SHARE * asked_m_s or any(way.item in slow for way in ways):
+        is_told = any(way.item in slow or way.transfer.evens_out for way in ways)
+        if is_told or reached_m_s >= MIN_REACHED_SHARE * asked_m_s:
             continue
         length_m, accel_m_s2 = sum(dist(way.begin, way.end) for way in ways), table["MIS_ACCEL"]
-        straight_m_s = PEAK_SPEED * length_m / transfer_duration(length_m, asked_m_s, accel_m_s2)
+        straight_m_s = sqrt(length_m * accel_m_s2 / PEAK_SPEED)
         limits = f"MIS_ACCEL {accel_m_s2:g} m/s^2"
         is_too_short = straight_m_s < MIN_REACHED_SHARE * asked_m_s
         why = f"too short at {limits}" if is_too_short else f"held back by turns, {limits}, rotors or tilt"
@@ -153,7 +154,9 @@ def _ways_by_set_speed(entries: Iterable[TimelineEntry]) -> Iterator[tuple[float
 
 
 def _transfer_peak_m_s(way: TimelineEntry) -> float:
-    return PEAK_SPEED * dist(way.begin, way.end) / way.transfer_s
+    duration_s, ramp_s = way.transfer
+    mean_m_s = dist(way.begin, way.end) / (duration_s - ramp_s)
+    return mean_m_s if ramp_s > 0.0 else PEAK_SPEED * mean_m_s
 
 
 def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle) -> Iterator[str]:

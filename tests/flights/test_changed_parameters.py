@@ -81,7 +81,7 @@ def test_a_speed_item_keeps_its_speed() -> None:
 
 
 def test_a_transfer_after_a_reset_of_the_speed_uses_them() -> None:
-    craft = begun(Takeoff(2.0), Waypoint(6.0, 0.0, 2.0, hold_s=0.5), Speed(None), ReturnHome(), Land())
+    craft = begun(Takeoff(2.0), Waypoint(9.0, 0.0, 2.0, hold_s=0.5), Speed(None), ReturnHome(), Land())
     set_parameter(craft, b"MIS_SPEED", 1.0)
     assert top_speeds(craft)[3] == pytest.approx(1.0, abs=0.01)
 

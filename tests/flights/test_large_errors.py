@@ -82,7 +82,7 @@ def test_a_load_that_a_gust_throws_off_its_path_returns(
     assert "Landed, disarmed" in craft.texts
 
 
-ALONE = (Takeoff(1.5), Release(), Waypoint(0.0, 0.0, 5.0), Speed(10.0), Waypoint(-60.0, 0.0, 5.0), Land())
+ALONE = (Takeoff(1.5), Release(), Waypoint(0.0, 0.0, 5.0), Speed(10.0), Waypoint(-200.0, 0.0, 5.0), Land())
 
 
 def test_a_vehicle_alone_that_is_too_weak_for_a_head_wind_completes_its_mission() -> None:
@@ -92,8 +92,9 @@ def test_a_vehicle_alone_that_is_too_weak_for_a_head_wind_completes_its_mission(
     craft.run(at_phase(Phase.DISARMED), 120.0)
     said = "".join(craft.texts)  # long ones are sent in parts
     assert "Path waits: vehicle 5.0 m off its path" in said
-    assert craft.texts[-2:] == ["Near the path again, flying on at 7.0 m/s", "Landed, disarmed"]
-    assert craft.truth.x_quad[0] == pytest.approx(-60.0, abs=0.5)
+    assert "Near the path again, flying on at 7.0 m/s" in craft.texts
+    assert craft.texts[-2:] == ["Near the path again, flying on at 4.9 m/s", "Landed, disarmed"]
+    assert craft.truth.x_quad[0] == pytest.approx(-200.0, abs=0.5)
 
 
 def test_a_vehicle_alone_that_a_gale_carries_off_lands() -> None:

@@ -171,7 +171,7 @@ def test_a_speed_that_no_way_reaches_is_told() -> None:
         mission = Mission("m", "M", "", (), (Takeoff(2.0), *steps, Land()))
         return list(unreached_speed_notes(mission, path_reports(mission, BEBOP_LIMITS), BEBOP))
 
-    near, far = Waypoint(8.0, 0.0, 2.0, hold_s=1.0), Waypoint(30.0, 0.0, 2.0, hold_s=1.0)
+    near, far = Waypoint(8.0, 0.0, 2.0, hold_s=1.0), Waypoint(60.0, 0.0, 2.0, hold_s=1.0)
     (note,) = notes(Speed(9.0), near)
     reached = path_reports(Mission("m", "M", "", (), (Takeoff(2.0), Speed(9.0), near)), BEBOP_LIMITS)[-1]
     reaches = f"items[2]: reaches {reached.speed_m_s:.1f} of the 9 m/s asked"
@@ -184,7 +184,7 @@ def test_a_speed_that_no_way_reaches_is_told() -> None:
 
 
 def test_a_speed_that_turns_prevent_is_told() -> None:
-    zigzag = [Waypoint(3.0 * (i // 2), 3.0 * (i % 2), 2.0) for i in range(1, 9)]
+    zigzag = [Waypoint(3.0 * (i // 2), 3.0 * (i % 2), 2.0) for i in range(1, 17)]
     mission = Mission("m", "M", "", (), (Takeoff(2.0), Speed(5.0), *zigzag, Land()))
     reports = path_reports(mission, BEBOP_LIMITS)
     (note,) = [*unreached_speed_notes(mission, reports, BEBOP), *slowness_notes(reports)]

@@ -513,9 +513,9 @@ def test_a_landing_from_high_above_is_quick_but_for_the_last_metres(released: bo
     high = [jet[1][2] for jet in descent if jet[0][2] > 4.0]
     last = [jet[1][2] for jet in descent if jet[0][2] < 3.0]
     assert min(high) == pytest.approx(-1.5)
-    assert -0.81 < min(last) < -0.7
+    assert min(last) == pytest.approx(-0.45)  # 3 m in 10 s, as slowly as ways without ramps take as long
     heights = [jet[0][2] for jet in descent]
-    assert all(0.0 <= before - after < 1.51 * STEP_US * 1e-6 for before, after in pairwise(heights))
+    assert all(-1e-9 <= before - after < 1.51 * STEP_US * 1e-6 for before, after in pairwise(heights))
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert sky.texts[-1] == "Landed, disarmed"
 

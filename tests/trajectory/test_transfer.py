@@ -128,6 +128,17 @@ def test_a_longer_way_takes_longer(speed: float, accel: float, min_move: float) 
     assert all(after <= 1.04 * before for before, after in pairwise(durations))
 
 
+def test_a_way_that_is_slower_so_that_longer_ones_take_no_less_time_says_so() -> None:
+    ways = {distance: pace(distance, 2.0, 1.5) for distance in (6.0, 8.0, 11.0, 14.0)}
+    assert {distance: way.evens_out for distance, way in ways.items()} == {
+        6.0: False,
+        8.0: True,
+        11.0: True,
+        14.0: False,
+    }
+    assert ways[8.0].duration_s == ways[11.0].duration_s == pytest.approx(10.0)
+
+
 def test_a_stretched_way_keeps_its_shape() -> None:
     usual = pace(300.0, 5.0, 1.5)
     slow = usual.stretched(2.0 * usual.duration_s)
