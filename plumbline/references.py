@@ -10,7 +10,7 @@ from pathlib import Path
 from autopilot.own.estimator import load_estimator
 from autopilot.own.law import load_law
 from autopilot.own.planner import load_planner
-from autopilot.own.saved_class import is_found_elsewhere, save_class
+from autopilot.own.saved_class import is_found_elsewhere, is_named, save_class
 from autopilot.own.set_attributes import attributes_set_since
 from autopilot.own.source import OwnError, local_reference
 from autopilot.vehicle.parameters import LAWS
@@ -62,7 +62,7 @@ def _reference(what: str, given: str | type, load: Callable[[str], object], fold
 
 def _place(kind: type) -> str:
     """Where a class is found again: in its file, or, for a class of a notebook, in this process only."""
-    if "<locals>" in kind.__qualname__:
+    if not is_named(kind):
         return local_reference(kind)
     if kind.__module__ == "__main__" and (place := getattr(sys.modules["__main__"], "__file__", None)):
         return f"{place}:{kind.__qualname__}"

@@ -64,7 +64,7 @@ _NAMED_CONDITIONS: dict[str, Condition] = {
     "ready": lambda state: state.ready_to_arm is True,
     "holding": lambda state: state.holding is True,
     "mission complete": lambda state: state.mission == "complete",
-    "landed": lambda state: state.armed is False,
+    "landed": lambda state: state.armed is False and state.landed != "in the air",
 }
 # messages that must be newer than the request to wait: one from before the last command may say that what
 # this command begins is already over

@@ -7,7 +7,6 @@ import io
 import pickle
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +16,26 @@ _TRACKER_ID = re.compile(rb"[0-9a-f]{32}")  # which cloudpickle draws for each c
 _files: dict[type, Path] = {}  # of the classes that were loaded
 
 
-def is_found_elsewhere(one: type | Callable[..., Any]) -> bool:
-    """Whether another process finds the class or function by its module and name."""
-    module = sys.modules.get(one.__module__)
-    return getattr(module, "__file__", None) is not None and "<locals>" not in one.__qualname__
+def is_found_elsewhere(kind: type) -> bool:
+    """Whether another process finds the class by its module and name."""
+    return getattr(sys.modules.get(kind.__module__), "__file__", None) is not None and is_named(kind)
+
+
+def is_named(kind: type) -> bool:
+    """Whether its module has the class under its name."""
+    found: Any = sys.modules.get(kind.__module__)
+    for name in kind.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found is kind
 
 
 def save_class(kind: type, folder: Path) -> Path:
-    """Save a class with all that its methods use; the same class as before keeps its file.
+    """Save a class with all that its methods use, except what they import from modules with a file; the same
+    class as before keeps its file.
 
-    The file is named by its content. `pickle.PicklingError` if something that the class uses cannot be
-    saved, OSError if the folder cannot be written.
+    The file is named by its content, and has the folders in which this process finds modules.
+    `pickle.PicklingError` if something that the class uses cannot be saved, OSError if the folder cannot be
+    written.
     """
     try:
         content = _pickled(kind)
@@ -37,7 +45,8 @@ def save_class(kind: type, folder: Path) -> Path:
     path = folder.resolve() / f"{kind.__name__}-{digest}{SUFFIX}"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        folders = [str(Path(folder).resolve()) for folder in sys.path]
+        path.write_bytes(pickle.dumps((folders, content)))
     return path
 
 
@@ -53,7 +62,7 @@ def _pickled(kind: type) -> bytes:
                 return super().reducer_override(obj)
             function = obj.py_func
             module = sys.modules.get(function.__module__)
-            if is_found_elsewhere(function) and getattr(module, function.__name__, None) is obj:
+            if getattr(module, "__file__", None) and getattr(module, function.__name__, None) is obj:
                 return function.__name__
             return kernel, (function,)
 
@@ -64,9 +73,12 @@ def _pickled(kind: type) -> bytes:
 
 def load_class(path: Path) -> type:
     """The class that `save_class` saved. ValueError if the file holds none; what its content raises."""
-    kind = pickle.loads(path.read_bytes())
-    if not isinstance(kind, type):
+    saved = pickle.loads(path.read_bytes())
+    if not isinstance(saved, tuple):
         raise ValueError("holds no class")
+    folders, content = saved
+    sys.path += [folder for folder in folders if folder not in sys.path]
+    kind: type = pickle.loads(content)
     _files[kind] = path
     return kind
 

@@ -20,7 +20,7 @@ _MAX_ASPECT = (
 )
 _MIN_SIDE_M = 1.2  # least side of the box
 _NEAR_GROUND = 0.25  # of the height of the box: a box that is closer to the ground extends to it
-_FAR_M = 1e3  # a flight that was lost may end anywhere; points farther away are not drawn
+_FAR_M = 2e4  # a flight that was lost may end anywhere; points farther away are not drawn
 _SIDE_MARGIN, _TOP_MARGIN, _BOTTOM_MARGIN = (
     0.07,
     0.03,

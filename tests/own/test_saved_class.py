@@ -52,6 +52,32 @@ print(law.path, instance.load_position(None, None))
 """
 
 
+NEIGHBOUR = """
+from plumbline.laws import force
+
+
+class Base:
+    def load_position(self, memory, now):
+        return memory, force((0.0, 0.0, 4.9))
+"""
+SCRIPT = """
+from pathlib import Path
+
+from autopilot.own.saved_class import save_class
+from neighbour_of_a_law import Base
+
+
+def make():
+    class Made(Base):
+        pass
+
+    return Made
+
+
+print(save_class(make(), Path("classes")))
+"""
+
+
 @pytest.mark.parametrize(("made", "arguments"), [(push, []), (compiled_push, ["4.9"])])
 def test_another_process_loads_it(
     made: Callable[[float], type], arguments: list[str], tmp_path: Path
@@ -63,6 +89,23 @@ def test_another_process_loads_it(
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
     asked = kind(*map(float, arguments)).load_position(None, None)
     assert done.stdout == f"{path} {asked}\n"
+
+
+def test_what_it_imports_from_a_module_beside_the_script_is_found(tmp_path: Path) -> None:
+    (tmp_path / "neighbour_of_a_law.py").write_text(NEIGHBOUR)
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    told = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True, cwd=tmp_path)
+    path = told.stdout.strip()
+    command = [sys.executable, "-c", READER, path]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
+    assert done.stdout.startswith(f"{path} (")
+
+
+def test_a_class_that_no_module_has_is_not_found_elsewhere() -> None:
+    made = type("Made", (push(4.9),), {})
+    assert made.__module__ == __name__ and not is_found_elsewhere(made)
+    assert is_found_elsewhere(Up)
 
 
 def test_its_file_is_named_by_its_content(tmp_path: Path) -> None:
