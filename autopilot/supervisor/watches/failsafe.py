@@ -25,7 +25,7 @@ from autopilot.supervisor.state import (
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
 
-MAX_LEAN_COSINE = cos(radians(60.0))  # of a vehicle, or of its cable, that is controlled
+MAX_LEAN_COSINE = cos(radians(75.0))  # of a vehicle, or of its cable, that is controlled
 # m, or the cable's length: nearer, a vehicle that is controlled may push away from where it should be, for
 # example when a gust ends or a swing is damped
 MIN_AWAY_M = 10.0
