@@ -15,7 +15,7 @@ from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import ShapedSignals
 from autopilot.trajectory.slack_cable import slack_pace
 from autopilot.trajectory.swing import swing_direction
-from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, Pace, pace, transfer
+from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, Pace, pace, reachable_speed, transfer
 from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -495,8 +495,7 @@ def reel_leg(begin: Vec3, length: float, target_length: float, speed: float, acc
     """The winch makes a cable of `length` m `target_length` m long within the speed and acceleration given;
     the load hangs at `begin`, the vehicle stays."""
     length_change = abs(target_length - length)
-    # a ramp takes PEAK_SPEED rate / accel, at half the rate on average; short ways do not reach the rate
-    rate = min(speed, sqrt(length_change * accel / PEAK_SPEED))
+    rate = reachable_speed(length_change, speed, accel)
     ramp = max(PEAK_SPEED * rate / accel, MIN_RAMP_S)
     rate = min(rate, length_change / ramp)
     sign = 1.0 if target_length > length else -1.0
@@ -516,5 +515,4 @@ def carry_leg(
     """A transfer of the load within the limits given, and no quicker than `min_duration_s` unless the
     distance is zero; see `autopilot.trajectory.transfer.pace`."""
     distance = norm(sub(end, begin))
-    way = pace(distance, speed, accel, min_move_s)
-    return Transfer(begin, end, way.stretched(min_duration_s) if distance > 0.0 else way)
+    return Transfer(begin, end, pace(distance, speed, accel, min_move_s).stretched(min_duration_s))

@@ -81,11 +81,23 @@ class Pace(NamedTuple):
         """Whether it is slower than its limits, so that no longer way takes less time."""
         return isclose(self.ramp_s, _RAMP_SHARE * self.duration_s)
 
+    def peak_speed(self, distance: float) -> float:
+        """The peak speed (m/s) over a distance (m) that it takes some time to fly."""
+        mean = distance / (self.duration_s - self.ramp_s)  # with ramps, this is the constant speed
+        return mean if self.ramp_s > 0.0 else PEAK_SPEED * mean
+
     def stretched(self, duration_s: float) -> Pace:
-        """The same in at least so many seconds."""
-        if duration_s <= self.duration_s:
+        """The same in at least so many seconds; no way still takes none."""
+        if self.duration_s == 0.0 or duration_s <= self.duration_s:
             return self
         return Pace(duration_s, self.ramp_s * duration_s / self.duration_s)
+
+
+def reachable_speed(distance: float, speed_max: float, accel_max: float) -> float:
+    """The greatest speed (m/s), up to speed_max, to which two ramps over a distance (m) lead with peak
+    acceleration <= accel_max (m/s^2): a ramp takes PEAK_SPEED speed / accel_max, at half the speed on
+    average."""
+    return min(speed_max, sqrt(distance * accel_max / PEAK_SPEED))
 
 
 def pace(distance: float, speed_max: float, accel_max: float, min_move_s: float = 0.0) -> Pace:
@@ -101,10 +113,7 @@ def pace(distance: float, speed_max: float, accel_max: float, min_move_s: float 
     least_s = max(CRUISE_AFTER_S, min_move_s / _RAMP_SHARE)
     if duration <= least_s:
         return Pace(duration)
-    # either ramp covers half the way that its time would at full speed
-    speed = min(
-        speed_max, sqrt(distance * accel_max / PEAK_SPEED), distance / ((1.0 - _RAMP_SHARE) * least_s)
-    )
+    speed = min(reachable_speed(distance, speed_max, accel_max), distance / ((1.0 - _RAMP_SHARE) * least_s))
     ramp = max(PEAK_SPEED * speed / accel_max, min_move_s, least_s - distance / speed)
     return Pace(ramp + distance / speed, ramp)
 

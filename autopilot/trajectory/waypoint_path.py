@@ -39,7 +39,7 @@ from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
 from autopilot.trajectory.signals import Jet
 from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
-from autopilot.trajectory.transfer import PEAK_SPEED, transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, reachable_speed, transfer_duration
 
 Indices = NDArray[np.int64]
 
@@ -239,7 +239,7 @@ def ride(length: float, speed: float, accel: float) -> tuple[float, float, float
     """A ride over `length` m: its greatest speed (m/s), in how many seconds it is reached, and the time (s)
     of the ride."""
     ramp_accel = _RIDE_ACCEL_SHARE * accel
-    cruise = min(speed, sqrt(length * ramp_accel / PEAK_SPEED))
+    cruise = reachable_speed(length, speed, ramp_accel)
     ramp_s = PEAK_SPEED * cruise / ramp_accel
     return cruise, ramp_s, ramp_s + length / cruise
 

@@ -7,12 +7,12 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from math import dist, sqrt
+from math import dist
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
-from autopilot.trajectory.transfer import PEAK_SPEED, transfer_duration
+from autopilot.trajectory.transfer import reachable_speed, transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters, shapes_paths
@@ -124,12 +124,14 @@ def unreached_speed_notes(
         peaks_m_s[report.item] = max(report.speed_m_s, peaks_m_s.get(report.item, 0.0))
         slow |= {report.item} if report.asked_m_s else set()
     for asked_m_s, ways in _ways_by_set_speed(expected_entries(mission, table)):
-        reached_m_s = max(peaks_m_s.get(way.item, _transfer_peak_m_s(way)) for way in ways)
+        reached_m_s = max(
+            peaks_m_s.get(way.item, way.transfer.peak_speed(dist(way.begin, way.end))) for way in ways
+        )
         is_told = any(way.item in slow or way.transfer.evens_out for way in ways)
         if is_told or reached_m_s >= MIN_REACHED_SHARE * asked_m_s:
             continue
         length_m, accel_m_s2 = sum(dist(way.begin, way.end) for way in ways), table["MIS_ACCEL"]
-        straight_m_s = sqrt(length_m * accel_m_s2 / PEAK_SPEED)
+        straight_m_s = reachable_speed(length_m, asked_m_s, accel_m_s2)
         limits = f"MIS_ACCEL {accel_m_s2:g} m/s^2"
         is_too_short = straight_m_s < MIN_REACHED_SHARE * asked_m_s
         why = f"too short at {limits}" if is_too_short else f"held back by turns, {limits}, rotors or tilt"
@@ -151,12 +153,6 @@ def _ways_by_set_speed(entries: Iterable[TimelineEntry]) -> Iterator[tuple[float
             ways.append(entry)
     if asked_m_s and ways:
         yield asked_m_s, ways
-
-
-def _transfer_peak_m_s(way: TimelineEntry) -> float:
-    duration_s, ramp_s = way.transfer
-    mean_m_s = dist(way.begin, way.end) / (duration_s - ramp_s)
-    return mean_m_s if ramp_s > 0.0 else PEAK_SPEED * mean_m_s
 
 
 def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle) -> Iterator[str]:

@@ -15,6 +15,7 @@ from autopilot.trajectory.reeling import straight_way
 from autopilot.trajectory.transfer import (
     PEAK_ACCELERATION,
     PEAK_SPEED,
+    Pace,
     pace,
     transfer,
     transfer_duration,
@@ -106,6 +107,7 @@ def test_a_paced_way_keeps_to_its_limits(
     times = np.concatenate([ramp * share, duration - ramp * share]) if ramp > 0.0 else duration * share
     jets = [straight_way(ZERO, way, duration, ramp, t) for t in times.tolist()]
     assert max(norm(jet[1]) for jet in jets) <= speed * (1.0 + 1e-9)
+    assert max(norm(jet[1]) for jet in jets) == pytest.approx(Pace(duration, ramp).peak_speed(distance))
     assert max(norm(jet[2]) for jet in jets) <= accel * (1.0 + 1e-9)
     assert straight_way(ZERO, way, duration, ramp, duration)[0] == way
     assert (
@@ -142,6 +144,7 @@ def test_a_way_that_is_slower_so_that_longer_ones_take_no_less_time_says_so() ->
 def test_a_stretched_way_keeps_its_shape() -> None:
     usual = pace(300.0, 5.0, 1.5)
     slow = usual.stretched(2.0 * usual.duration_s)
+    assert Pace(0.0).stretched(5.0) == Pace(0.0), "no way takes no time"
     assert usual.stretched(1.0) == usual and slow.ramp_s == pytest.approx(2.0 * usual.ramp_s)
     for share in (0.05, 0.3, 0.8):
         at = [straight_way(P0, P1, *one, share * one.duration_s)[0] for one in (usual, slow)]
