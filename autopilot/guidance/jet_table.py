@@ -24,9 +24,8 @@ from autopilot.trajectory.load_path import PathTables
 from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import evaluate_requested, evaluate_shaped
 from autopilot.trajectory.signals import Jet
-from autopilot.trajectory.splines import PieceTable
+from autopilot.trajectory.splines import PieceTable, evaluate_path
 from autopilot.trajectory.transfer import transfer
-from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives

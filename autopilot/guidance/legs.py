@@ -14,9 +14,10 @@ from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
 from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import ShapedSignals
 from autopilot.trajectory.slack_cable import slack_pace
+from autopilot.trajectory.splines import evaluate_path
 from autopilot.trajectory.swing import swing_direction
 from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, Pace, pace, reachable_speed, transfer
-from autopilot.trajectory.waypoint_path import PathSegment, evaluate_path
+from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.wire.dialect import plumbline as mavlink
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE

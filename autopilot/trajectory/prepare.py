@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.load_path import slower_step
+from autopilot.trajectory.minimum_snap import NoPathError
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
 from autopilot.trajectory.rotor_demand import Bounds, gentler_bounds
 from autopilot.trajectory.route import PlanError, Planner, Route, bound_violation, path_segments
@@ -26,7 +27,6 @@ from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import (
     MAX_POINTS,
     MIN_WAYPOINT_DISTANCE_M,
-    NoPathError,
     PathSegment,
     plan_waypoint_path,
     ride,
@@ -207,7 +207,7 @@ def _waypoint_segments(
         if planned is None:
             continue
         table, times, lowest_m = planned
-        if lowest_m + points[0][2] > 0.0:
+        if lowest_m > 0.0:
             for i in range(len(points) - 1):
                 segments[first + i] = PathSegment(table, times[i], times[i + 1], points[0])
             length = sum(dist(a, b) for a, b in pairwise(points))
@@ -221,7 +221,7 @@ def _waypoint_segments(
 def _planned_path(
     points: tuple[Vec3, ...], speed: float, limits: PathLimits
 ) -> tuple[PieceTable, tuple[float, ...], float] | None:
-    """The path through the points as a table, the times at them, and its lowest place relative to the first;
+    """The path through the points as a table, the times at them, and its lowest place (m);
     None if stops are quicker.
 
     Cached, as `shaped_path`: planning takes up to a second, and one process flies the same path often,
@@ -233,7 +233,7 @@ def _planned_path(
         )
     except NoPathError:
         return None
-    return path.table(), tuple(times.tolist()), float(path.jets()[1][0, :, 2].min())
+    return path.table(), tuple(times.tolist()), path.lowest_m()
 
 
 def _slowness_note(path: SlowPath, sequence: Sequence[int]) -> str:

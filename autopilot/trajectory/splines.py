@@ -149,3 +149,17 @@ def evaluate_piece(table: PieceTable, row: int, t: float) -> Jet:
         (120.0 * d5[0], 120.0 * d5[1], 120.0 * d5[2]),
         (720.0 * d6[0], 720.0 * d6[1], 720.0 * d6[2]),
     )
+
+
+@kernel
+def evaluate_path(table: PieceTable, t: float) -> Jet:
+    """The path at t (s), at rest before its beginning and after its end."""
+    row = find_piece(table, t)
+    if row >= 0:
+        return evaluate_piece(table, row, t)
+    if t < table[0, 0]:
+        x = (table[0, 2], table[0, 12], table[0, 22])
+    else:
+        last = table.shape[0] - 1
+        x = evaluate_piece(table, last, table[last, 1])[0]
+    return x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO

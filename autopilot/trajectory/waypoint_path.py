@@ -1,14 +1,10 @@
 """Minimum-snap flight of the load through waypoints: from rest, past each in turn without a stop, to rest.
 
-The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint exactly and minimises
-
-    integral of |x''''|^2 + tau^4 |x^(6)|^2
-
-x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
-matters: with the snap alone the path would leave rest with a jump of the moment. The times at the waypoints
-follow from a ride along the straight lines between them that is slow in turns (`ride_through`), or, where
-that is quicker, are those of the least integral for a given total time (`optimal_time_shares`). The total
-follows from the form that was requested:
+A path at a given speed follows the straight lines between the waypoints, at a steady speed on each
+(`autopilot.trajectory.steady_lines`), unless one smoothest path (`autopilot.trajectory.minimum_snap`) as a
+whole is much quicker, as it is between short lines. The times at its waypoints are those of a ride along the
+lines that is slow in turns (`ride_through`). A time-optimal path is the quicker of such a ride and of the
+path whose times have the least integral (`optimal_time_shares`). The total follows from the form requested:
 
 * at a given speed: as short as the peak speed and peak acceleration allow,
 * time-optimal: as short as the bounds on rotors, cable and tilt allow.
@@ -18,48 +14,40 @@ In either form the bounds hold along the whole path, drag of the vehicle include
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
-from math import acos, ceil, dist, inf, sqrt, tan
+from math import acos, dist, inf, sqrt, tan
 from operator import itemgetter
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.trajectory.convex import band_jets, excess
+from autopilot.geometry.linear import Vec3
+from autopilot.trajectory.convex import excess
+from autopilot.trajectory.minimum_snap import REST, JoinedPath, MinimumSnap, NoPathError, Section, on_clock
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import Bounds, demand
-from autopilot.trajectory.signals import Jet
-from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
-from autopilot.trajectory.transfer import PEAK_SPEED, reachable_speed, transfer_duration
+from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
+from autopilot.trajectory.steady_lines import SteadyLines
+from autopilot.trajectory.timeline import min_move_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, pace, reachable_speed, transfer_duration
 
 Indices = NDArray[np.int64]
 
-ROTATION_TIME_S = 0.25  # tau
 MIN_WAYPOINT_DISTANCE_M = 0.05  # waypoints closer to each other than this are flown from rest to rest
 MAX_POINTS = 40  # of one path
-_PER_SEGMENT = 8  # intervals to the shortest segment, up to _MAX_INTERVALS
-_MAX_INTERVALS = 400
-# the least of them, up to _MOST_INTERVALS: with fewer some points would have no interval of their own
-_MIN_PER_SEGMENT = 2
-_MOST_INTERVALS = 2000
-_SAMPLES = 4  # to an interval, of the integral
-_FINE_S = 0.01
-# 50 to an interval: a flight of hours needs no more memory than one of minutes
-_MAX_FINE_SAMPLES = 20_000
 _TIME_SHARE_ITERATIONS = 6
-# most segments for which the integral is also minimised over the times
+# most segments for which the integral is minimised over the times
 _MAX_OPTIMISED_SEGMENTS = 8
 _SCALING_ROUNDS = 8
 _LENGTHENING = 1.15
+_CLOSE = 1e-3  # of a factor of the time
+# what flying beside the lines must gain: how many times as long the path along the lines takes
+_DETOUR_GAIN = 1.1
 _RIDE_ACCEL_SHARE = 2.0 / 3.0  # of the peak acceleration, for speeding up; the rest is left for turns
 _RIDE_TURN_SHARE = sqrt(1.0 - _RIDE_ACCEL_SHARE**2)
 # of the speed that is reached over half of the shorter line beside it: a ride never turns more slowly
@@ -71,7 +59,6 @@ _DIVIDED_FROM, _DIVISION_GROWTH = 3.0, 1.2
 _TURN_TIMES = (2.0, 8.0)
 _STRETCHING_ROUNDS = 5
 _STRETCHING, _MIN_STRETCH, _MAX_STRETCH = 0.7, 0.6, 1.6  # exponent, and limits of its base
-_BAND = DEGREE + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +69,6 @@ class PathSegment:
     begin_s: float
     end_s: float
     start: Vec3  # where the whole path begins
-
-
-@kernel
-def evaluate_path(table: PieceTable, t: float) -> Jet:
-    """The path at t (s), at rest before its beginning and after its end."""
-    row = find_piece(table, t)
-    if row >= 0:
-        return evaluate_piece(table, row, t)
-    if t < table[0, 0]:
-        x = (table[0, 2], table[0, 12], table[0, 22])
-    else:
-        last = table.shape[0] - 1
-        x = evaluate_piece(table, last, table[last, 1])[0]
-    return x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
 
 
 @kernel
@@ -112,91 +85,6 @@ def sample_path(table: PieceTable, times: Array) -> Array:
     out = np.empty((7, times.size, 3))
     _fill(table, times, out)
     return out
-
-
-class NoPathError(ValueError):
-    """There is no useful path through the points without a stop; the text says why."""
-
-
-class _Grid:
-    """The spline of a path of `total_s` seconds in `intervals` parts, and the integral as a quadratic form of
-    its coefficients, whatever points the path passes."""
-
-    def __init__(self, total_s: float, intervals: int) -> None:
-        self.basis = basis = Basis(0.0, total_s, intervals)
-        times = np.linspace(0.0, total_s, _SAMPLES * intervals + 1)
-        values, first = basis.band(times, 7)
-        self.spacing = spacing = float(times[1])
-        four, six = (self.matrix(values[order], first) for order in (4, 6))
-        self.snap, self.turn = four, six
-        self.hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
-        free = slice(basis.free.start, basis.free.stop)
-        hessian = self.hessian[free, free]
-        # the scale keeps the two kinds of rows comparable in size for pivoting
-        self.scale = float(np.median(hessian.diagonal()))
-        self.scaled_hessian = hessian / self.scale
-
-    def matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
-        """(n, count) matrix of one derivative at n times by the coefficients of one axis."""
-        n = len(values)
-        columns = first[:, None] + np.arange(_BAND)
-        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
-        return sparse.csr_matrix(
-            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
-        )
-
-
-# the times at the points are searched with the same total: nearly all paths that are compared have one grid
-_grid = lru_cache(maxsize=4)(_Grid)
-
-
-class MinimumSnap:
-    """The smoothest path from rest at the first point, past others at their times, to rest at the last."""
-
-    def __init__(self, points: Array, times: Array) -> None:
-        """NoPathError if the shortest segment is too short beside the total time."""
-        shortest_share = float(np.diff(times).min() / times[-1])
-        count = int(np.clip(ceil(_PER_SEGMENT / shortest_share), 2 * ORDERS, _MAX_INTERVALS))
-        count = max(count, ceil(_MIN_PER_SEGMENT / shortest_share))
-        if count > _MOST_INTERVALS:
-            raise NoPathError(f"a segment takes {shortest_share:.2g} of the whole time")
-        grid = _grid(float(times[-1]), count)
-        self.basis = basis = grid.basis
-        self.origin: Array = points[0]
-        ends = np.zeros((2, ORDERS, 3))
-        ends[1, 0] = points[-1] - self.origin
-        fixed = basis.end_coefficients(ends[0], ends[1])
-        values, first = basis.band(times[1:-1], 1)
-        passing = grid.matrix(values[0], first)
-        free = slice(basis.free.start, basis.free.stop)
-        A = passing[:, free]
-        n = A.shape[1]
-        system = sparse.bmat([[grid.scaled_hessian, A.T], [A, None]], format="csc")
-        right_side = np.vstack(
-            [
-                -(grid.hessian @ fixed)[free] / grid.scale,
-                (points[1:-1] - self.origin) - passing @ fixed,
-            ]
-        )
-        self.coefficients: Array = fixed.copy()
-        factor = splu(system)
-        solved = factor.solve(right_side)
-        # one step of refinement with the residual: the least integral is small compared with its terms
-        solved += factor.solve(right_side - system @ solved)
-        self.coefficients[free] = solved[:n]
-        snap, turn = grid.snap @ self.coefficients, grid.turn @ self.coefficients
-        self.cost = grid.spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
-
-    def jets(self) -> tuple[Array, Array]:
-        """Times (n,) and jets (7, n, 3) along the path, relative to its first point."""
-        total_s = float(self.basis.breaks[-1])
-        times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
-        values, first = self.basis.band(times, 7)
-        return times, band_jets(values, first, self.coefficients)
-
-    def table(self) -> PieceTable:
-        """The path as a table, as it is flown."""
-        return self.basis.pieces(self.coefficients, self.origin)
 
 
 def approximate_time_shares(points: Array) -> Array:
@@ -222,7 +110,8 @@ def optimal_time_shares(points: Array, total_s: float) -> Array:
         return np.asarray(scaled / scaled.sum())
 
     def cost(x: Array) -> float:
-        return float(np.log(MinimumSnap(points, _point_times(shares(x), total_s)).cost))
+        times = on_clock(_times_after(shares(x)) * total_s)
+        return float(np.log(MinimumSnap(Section(points, times, REST)).cost))
 
     bounds = [(value - 0.7, value + 0.7) for value in begin]
     result = scipy.optimize.minimize(
@@ -341,7 +230,7 @@ def quick_times(ride: TimedPoints, speed: float, accel: float) -> tuple[TimedPoi
     (s): where the path is too fast or turns too hard it gets more time, elsewhere less."""
     best, best_s = ride, inf
     for _ in range(_STRETCHING_ROUNDS):
-        fine, jets = MinimumSnap(ride.points, ride.times).jets()
+        fine, jets = MinimumSnap(Section(ride.points, ride.times, REST)).jets()
         use = limits_used(jets, speed, accel)
         duration_s = float(ride.times[-1] * use.max())
         if not duration_s < best_s:
@@ -371,10 +260,13 @@ def _times_after(durations: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(durations)])
 
 
-def _point_times(shares: Array, total_s: float) -> Array:
-    """Times at the points, in whole microseconds, so that stretches join exactly on the vehicle's clock."""
-    times = _times_after(shares) * total_s
-    return np.asarray(np.round(times * 1e6) * 1e-6)
+@dataclass(frozen=True, slots=True)
+class _Planned:
+    """Sections of a path, and which times of the path of these sections, or a slower one, are those at its
+    waypoints."""
+
+    sections: Sequence[Section]
+    passes: Callable[[JoinedPath], Array]
 
 
 def plan_waypoint_path(
@@ -384,77 +276,116 @@ def plan_waypoint_path(
     body: Body,
     bounds: Bounds,
     time_optimal: bool,
-) -> tuple[MinimumSnap, Array]:
+) -> tuple[JoinedPath, Array]:
     """The path through the points and the times at them.
 
     `speed` (m/s) and `accel` (m/s^2) are peaks; if `time_optimal`, only the bounds apply. NoPathError if
     there is no path that is quicker than flying from point to point with a stop at each.
     """
     places = np.array(points)
+    least_s = min_move_duration(body.cable_length, body.gravity)
     distances = [dist(a, b) for a, b in pairwise(points)]
-    length = float(sum(distances))
-    stops_s = sum(transfer_duration(distance, speed, accel) for distance in distances)
+    stops_s = sum(pace(distance, speed, accel, least_s).duration_s for distance in distances)
+    found: list[tuple[JoinedPath, Array]] = []
 
-    def planned(begin: TimedPoints) -> tuple[MinimumSnap, Array]:
-        path, times = _scaled_path(begin, speed, accel, body, bounds, time_optimal)
-        if times[-1] > stops_s:
-            raise NoPathError("the path is slower than stops at its points")
-        return path, times[begin.waypoints]
+    def consider(planned: _Planned) -> None:
+        path = _scaled_path(planned.sections, speed, accel, body, bounds, time_optimal)
+        times = planned.passes(path)
+        if times[-1] <= stops_s:
+            found.append((path, times))
 
-    found = []
-    with suppress(NoPathError):
-        found.append(planned(quickest_ride(places, speed, accel)[0]))
-    if len(distances) <= _MAX_OPTIMISED_SEGMENTS:
-        total_s = transfer_duration(length, speed, accel)
+    if time_optimal:
+        total_s = transfer_duration(float(sum(distances)), speed, accel)
+        if len(distances) <= _MAX_OPTIMISED_SEGMENTS:
+            with suppress(NoPathError):
+                times = _times_after(optimal_time_shares(places, total_s)) * total_s
+                consider(_one_section(TimedPoints(places, times, np.arange(len(places)))))
+    else:
         with suppress(NoPathError):
-            times = _times_after(optimal_time_shares(places, total_s)) * total_s
-            found.append(planned(TimedPoints(places, times, np.arange(len(places)))))
+            lines = _steady_lines(places, speed, accel, least_s, body, bounds)
+            consider(_Planned(lines.sections, lines.passes))
+            if found and lines.is_steady:
+                return found[0]
+    with suppress(NoPathError):
+        consider(_one_section(quickest_ride(places, speed, accel)[0]))
     if not found:
         raise NoPathError("flights with a stop at each point are quicker")
-    return min(found, key=lambda plan: float(plan[1][-1]))
+    first, last = found[0], found[-1]
+    gain = 1.0 if time_optimal else _DETOUR_GAIN
+    return first if first[1][-1] <= gain * last[1][-1] else last
+
+
+def _one_section(ride: TimedPoints) -> _Planned:
+    section = Section(ride.points, ride.times, REST)
+    return _Planned([section], lambda path: path.splines[0].section.times[ride.waypoints])
+
+
+def _steady_lines(
+    places: Array, speed: float, accel: float, least_s: float, body: Body, bounds: Bounds
+) -> SteadyLines:
+    """Lines whose ramps and turns are as gentle as the bounds demand."""
+    gentle = accel
+    lines = SteadyLines(places, speed, gentle, least_s)
+    for _ in range(_SCALING_ROUNDS):
+        moving = [section for section in lines.sections if not section.is_steady]
+        factor = _slowing(JoinedPath(moving), speed, accel, body, bounds, time_optimal=False)
+        if factor <= 1.0 + _CLOSE:
+            break
+        gentle /= min(factor, _LENGTHENING) ** 2
+        lines = SteadyLines(places, speed, gentle, least_s)
+    return lines
+
+
+def _slowing(
+    path: JoinedPath, speed: float, accel: float, body: Body, bounds: Bounds, time_optimal: bool
+) -> float:
+    """How many times as long a path should take (up to 1: no longer)."""
+    factor = 0.0
+    for fine, jets in path.jets():
+        if not time_optimal:
+            factor = max(factor, float(limits_used(jets, speed, accel).max()))
+        over = float(excess(demand(jets, body), float(fine[1] - fine[0]), bounds).max())
+        if over > 0.0:
+            factor = max(factor, 1.0 + over)
+    return factor
 
 
 def _scaled_path(
-    begin: TimedPoints,
+    sections: Sequence[Section],
     speed: float,
     accel: float,
     body: Body,
     bounds: Bounds,
     time_optimal: bool,
-) -> tuple[MinimumSnap, Array]:
-    """The path through the points and the times at them, in the same proportion as at first."""
-    total_s = float(begin.times[-1])
-    shares = np.diff(begin.times) / total_s
+) -> JoinedPath:
+    """The path of the sections, all as many times as long as the limits demand."""
+    total_s = begin_s = float(sections[-1].times[-1])
 
-    def evaluate(seconds: float) -> tuple[MinimumSnap, Array, float]:
-        """The same for `seconds` in total, and how many times as long it should take (up to 1: no longer)."""
-        times = _point_times(shares, seconds)
-        path = MinimumSnap(begin.points, times)
-        fine, jets = path.jets()
-        over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
-        min_factor = 0.0 if time_optimal else float(limits_used(jets, speed, accel).max())
-        return path, times, max(min_factor, 1.0 + over if over > 0.0 else 0.0)
+    def evaluate(seconds: float) -> tuple[JoinedPath, float]:
+        """The path in `seconds` in total, and how many times as long it should take."""
+        path = JoinedPath([section.slowed(seconds / begin_s) for section in sections])
+        return path, _slowing(path, speed, accel, body, bounds, time_optimal)
 
-    path, times, factor = evaluate(total_s)
+    path, factor = evaluate(total_s)
     if not time_optimal:
         # peaks scale with time almost exactly: two rounds are accurate to one part in a thousand
         for _ in range(2):
             total_s *= min(factor, 2.0)
-            path, times, factor = evaluate(total_s)
+            path, factor = evaluate(total_s)
     for _ in range(4 * _SCALING_ROUNDS):
-        if factor <= 1.0 + 1e-3:
+        if factor <= 1.0 + _CLOSE:
             break
         total_s *= _LENGTHENING if factor > 1.05 else 1.01
-        path, times, factor = evaluate(total_s)
+        path, factor = evaluate(total_s)
     if time_optimal:
         low, high = 0.0, total_s
-        best = path, times
+        best = path
         for _ in range(_SCALING_ROUNDS):
             middle = 0.5 * (low + high) if low > 0.0 else 0.7 * high
-            path, times, factor = evaluate(middle)
-            if factor <= 1.0 + 1e-3:
-                best, high = (path, times), middle
+            path, factor = evaluate(middle)
+            if factor <= 1.0 + _CLOSE:
+                best, high = path, middle
             else:
                 low = middle
-        path, times = best
-    return path, times
+        path = best
+    return path

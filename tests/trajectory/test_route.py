@@ -20,7 +20,8 @@ from autopilot.trajectory.route import (
     slower,
     use,
 )
-from autopilot.trajectory.waypoint_path import evaluate_path, sample_path
+from autopilot.trajectory.splines import evaluate_path
+from autopilot.trajectory.waypoint_path import sample_path
 from autopilot.vehicle.file import load_vehicle
 
 LIMITS = VehicleLimits(load_vehicle("bebop")).shaping

@@ -1,0 +1,209 @@
+"""The smoothest path past points at given times: sections of least snap that join without a jump.
+
+A section is a spline (`autopilot.trajectory.splines`) that passes each of its points exactly and minimises
+
+    integral of |x''''|^2 + tau^4 |x^(6)|^2
+
+x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
+matters: with the snap alone the path would leave rest with a jump of the moment. At its two ends the load
+moves steadily or rests: it has a velocity, and derivatives 2 to 6 are zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from autopilot.trajectory.convex import band_jets
+from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, power_table
+
+Indices = NDArray[np.int64]
+
+ROTATION_TIME_S = 0.25  # tau
+_PER_SEGMENT = 8  # intervals to the shortest segment, up to _MAX_INTERVALS
+_MAX_INTERVALS = 400
+# the least of them, up to _MOST_INTERVALS: with fewer some points would have no interval of their own
+_MIN_PER_SEGMENT = 2
+_MOST_INTERVALS = 2000
+_SAMPLES = 4  # to an interval, of the integral
+_FINE_S = 0.01
+# 50 to an interval: a flight of hours needs no more memory than one of minutes
+_MAX_FINE_SAMPLES = 20_000
+_BAND = DEGREE + 1
+REST = np.zeros((2, 3))
+
+
+class NoPathError(ValueError):
+    """There is no useful path through the points without a stop; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Points that a path is to pass and the times at them, and the velocities of the load at the first and at
+    the last of them."""
+
+    points: Array  # (n, 3), m
+    times: Array  # (n,), s, on the clock of the whole path
+    velocities: Array  # (2, 3), m/s
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is flown at constant velocity."""
+        return len(self.points) == 2 and np.array_equal(*self.velocities)
+
+    def slowed(self, factor: float) -> Section:
+        """The same in so many times the time."""
+        return Section(self.points, self.times * factor, self.velocities / factor)
+
+
+class _Grid:
+    """The spline of a path of `total_s` seconds in `intervals` parts, and the integral as a quadratic form of
+    its coefficients, whatever points the path passes."""
+
+    def __init__(self, total_s: float, intervals: int) -> None:
+        self.basis = basis = Basis(0.0, total_s, intervals)
+        times = np.linspace(0.0, total_s, _SAMPLES * intervals + 1)
+        values, first = basis.band(times, 7)
+        self.spacing = spacing = float(times[1])
+        four, six = (self.matrix(values[order], first) for order in (4, 6))
+        self.snap, self.turn = four, six
+        self.hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
+        free = slice(basis.free.start, basis.free.stop)
+        hessian = self.hessian[free, free]
+        # the scale keeps the two kinds of rows comparable in size for pivoting
+        self.scale = float(np.median(hessian.diagonal()))
+        self.scaled_hessian = hessian / self.scale
+
+    def matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
+        """(n, count) matrix of one derivative at n times by the coefficients of one axis."""
+        n = len(values)
+        columns = first[:, None] + np.arange(_BAND)
+        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+        return sparse.csr_matrix(
+            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
+        )
+
+
+# the times at the points are searched with the same total: nearly all paths that are compared have one grid
+_grid = lru_cache(maxsize=4)(_Grid)
+
+
+class MinimumSnap:
+    """The smoothest path of one section."""
+
+    def __init__(self, section: Section) -> None:
+        """NoPathError if the shortest segment is too short beside the total time."""
+        points, times = section.points, section.times - section.times[0]
+        shortest_share = float(np.diff(times).min() / times[-1])
+        count = int(np.clip(ceil(_PER_SEGMENT / shortest_share), 2 * ORDERS, _MAX_INTERVALS))
+        count = max(count, ceil(_MIN_PER_SEGMENT / shortest_share))
+        if count > _MOST_INTERVALS:
+            raise NoPathError(f"a segment takes {shortest_share:.2g} of the whole time")
+        grid = _grid(float(times[-1]), count)
+        self.section = section
+        self.basis = basis = grid.basis
+        self.origin: Array = points[0]
+        ends = np.zeros((2, ORDERS, 3))
+        ends[1, 0] = points[-1] - self.origin
+        ends[:, 1] = section.velocities
+        fixed = basis.end_coefficients(ends[0], ends[1])
+        values, first = basis.band(times[1:-1], 1)
+        passing = grid.matrix(values[0], first)
+        free = slice(basis.free.start, basis.free.stop)
+        A = passing[:, free]
+        n = A.shape[1]
+        system = sparse.bmat([[grid.scaled_hessian, A.T], [A, None]], format="csc")
+        right_side = np.vstack(
+            [
+                -(grid.hessian @ fixed)[free] / grid.scale,
+                (points[1:-1] - self.origin) - passing @ fixed,
+            ]
+        )
+        self.coefficients: Array = fixed.copy()
+        factor = splu(system)
+        solved = factor.solve(right_side)
+        # one step of refinement with the residual: the least integral is small compared with its terms
+        solved += factor.solve(right_side - system @ solved)
+        self.coefficients[free] = solved[:n]
+        snap, turn = grid.snap @ self.coefficients, grid.turn @ self.coefficients
+        self.cost = grid.spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
+
+    def jets(self) -> tuple[Array, Array]:
+        """Times (n,) from its beginning and jets (7, n, 3) along the path, relative to its first point."""
+        total_s = float(self.basis.breaks[-1])
+        times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
+        values, first = self.basis.band(times, 7)
+        return times, band_jets(values, first, self.coefficients)
+
+    def table(self) -> PieceTable:
+        """The path as a table, as it is flown."""
+        table = self.basis.pieces(self.coefficients, self.origin)
+        begin, end = self.section.times[0], self.section.times[-1]
+        table[:, :2] += begin
+        table[-1, 1] = end  # sections leave no gap
+        return table
+
+
+def on_clock(times: Array) -> Array:
+    """Times (s) in whole microseconds: the stretches of a path join exactly on the vehicle's clock."""
+    return np.asarray(np.round(times * 1e6) * 1e-6)
+
+
+class SteadyMotion:
+    """The path of a section at constant velocity."""
+
+    def __init__(self, section: Section) -> None:
+        self.section = section
+        self.origin: Array = section.points[0]
+
+    def jets(self) -> tuple[Array, Array]:
+        """As those of `MinimumSnap`."""
+        times = self.section.times - self.section.times[0]
+        jets = np.zeros((ORDERS, len(times), 3))
+        jets[0] = self.section.points - self.origin
+        jets[1] = self.section.velocities
+        return times, jets
+
+    def table(self) -> PieceTable:
+        """The path as a table, as it is flown."""
+        powers = np.stack([self.origin, self.section.velocities[0]])
+        return power_table(self.section.times, powers[None])
+
+
+class JoinedPath:
+    """Sections that follow each other: each begins where, when and as the one before it ends.
+
+    The load passes the points within the sections, and the last one, at times in whole microseconds.
+    """
+
+    def __init__(self, sections: Sequence[Section]) -> None:
+        """NoPathError if a section is not possible."""
+        splines: list[MinimumSnap | SteadyMotion] = []
+        for section in sections:
+            if section.is_steady:
+                splines.append(SteadyMotion(section))
+                continue
+            times = section.times.copy()
+            end = None if section is sections[-1] else -1
+            times[1:end] = on_clock(times[1:end])
+            splines.append(MinimumSnap(replace(section, times=times)))
+        self.splines = tuple(splines)
+
+    def jets(self) -> Iterator[tuple[Array, Array]]:
+        """Times (n,) from its beginning and jets (7, n, 3) of each section, relative to its first point."""
+        return (spline.jets() for spline in self.splines)
+
+    def lowest_m(self) -> float:
+        """The lowest place of the load (m), up from home."""
+        return min(float(spline.jets()[1][0, :, 2].min() + spline.origin[2]) for spline in self.splines)
+
+    def table(self) -> PieceTable:
+        """The path as a table, as it is flown."""
+        return np.vstack([spline.table() for spline in self.splines])
