@@ -156,6 +156,7 @@ def _order_problems(kinds: Sequence[str], locations: Sequence[str]) -> list[str]
             errors.append(at + 'must be "land": a mission ends on the ground')
         elif index < last and kind == "land":
             errors.append(at + "only the last item may be a landing")
-        if kind in ("signals", "trajectory", "attitude", "winch") and "release" in kinds[:index]:
+        released = any(before in ("release", "place") for before in kinds[:index])
+        if kind in ("signals", "trajectory", "attitude", "winch", "place") and released:
             errors.append(at + "needs the load, which an item before it has released")
     return errors

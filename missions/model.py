@@ -63,6 +63,11 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceLoad(Release):
+    """Lower the load to the ground below it and release it there."""
+
+
+@dataclass(frozen=True, slots=True)
 class Winch:
     """Make the cable longer by `length_m` (negative: shorter): the vehicle stays, the load sinks or rises.
 
@@ -203,7 +208,19 @@ class LookAt:
 
 HeadingCommand = TurnHeading | LookAt  # items between steps, which take effect as the next step begins
 LoadPath = Signals | Trajectory  # steps that give the load's place as a function of time
-Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | LoadPath | AttitudeRun
+Step = (
+    Takeoff
+    | Waypoint
+    | Speed
+    | Delay
+    | ReturnHome
+    | Land
+    | Release
+    | PlaceLoad
+    | Winch
+    | LoadPath
+    | AttitudeRun
+)
 KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",
     Waypoint: "waypoint",
@@ -214,6 +231,7 @@ KINDS: dict[type[Step], str] = {  # their names in files
     AttitudeRun: "attitude",
     ReturnHome: "return",
     Release: "release",
+    PlaceLoad: "place",
     Winch: "winch",
     Land: "land",
 }

@@ -90,6 +90,11 @@ class ReleaseItem(Item):
         return model.Release()
 
 
+class PlaceItem(Item):
+    def step(self) -> model.Step:
+        return model.PlaceLoad()
+
+
 class WinchItem(Item):
     length_m: float = Field(
         ge=-limits.LONGEST_CABLE_M,
@@ -223,6 +228,7 @@ ITEMS: dict[str, type[Item]] = {
     "attitude": AttitudeItem,
     "return": ReturnItem,
     "release": ReleaseItem,
+    "place": PlaceItem,
     "winch": WinchItem,
     "land": LandItem,
 }

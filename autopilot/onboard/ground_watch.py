@@ -6,7 +6,7 @@ from typing import Any
 
 from autopilot.services.requests import Land, Pause, ReturnHome
 from autopilot.services.streams import NEVER_US
-from autopilot.supervisor.state import IN_AIR, LANDING, Phase
+from autopilot.supervisor.state import IN_AIR, Flight, Phase, is_landing
 from autopilot.wire.parameter_table import ParameterTable
 
 LOST_TEXT, BACK_TEXT = "Ground station lost: {}", "Ground station heard again"
@@ -39,7 +39,7 @@ class GroundWatch:
         """When it counts as silent if nothing is heard meanwhile; never if it is already lost."""
         return NEVER_US if self.lost else heartbeat_us + self._timeout_us + 1
 
-    def request(self, phase: Phase) -> tuple[Any, str] | None:
-        """The request to the vehicle, and the word for it; None in a phase that needs no reaction."""
-        homing = phase in LANDING or phase == Phase.RETURN
-        return None if phase not in IN_AIR or homing else _ACTIONS[self._action]
+    def request(self, flight: Flight) -> tuple[Any, str] | None:
+        """The request to the vehicle, and the word for it; None in a flight that needs no reaction."""
+        homing = is_landing(flight) or flight.phase == Phase.RETURN
+        return None if flight.phase not in IN_AIR or homing else _ACTIONS[self._action]

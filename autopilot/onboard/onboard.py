@@ -520,7 +520,7 @@ class Onboard:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
             return
         self._set_ground_missing(True)
-        reaction = self._ground.request(self.phase)
+        reaction = self._ground.request(self.core.flight)
         if (
             reaction is not None
             and self.core.handle_request(reaction[0], self.now_us).result == mavlink.MAV_RESULT_ACCEPTED

@@ -59,6 +59,7 @@ from autopilot.supervisor.state import (
     SetpointSource,
     View,
     has_fence,
+    is_placing,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.convert.battery import NO_READING, BatteryReading
@@ -144,6 +145,8 @@ def landed_state(flight: Flight) -> int:
     """MAV_LANDED_STATE of the flight."""
     if flight.phase in UNARMED:
         return _FALL_STATES[flight.fall]
+    if is_placing(flight):
+        return int(mavlink.MAV_LANDED_STATE_IN_AIR)
     return _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR)
 
 

@@ -42,7 +42,18 @@ from autopilot.supervisor.step_legs import (
 from autopilot.supervisor.watches.slack import NOT_LIFTED_TEXT
 from autopilot.trajectory.timeline import MissionState, state_after
 from autopilot.trajectory.waypoint_path import PathSegment
-from missions.model import AttitudeRun, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint, Winch
+from missions.model import (
+    AttitudeRun,
+    Land,
+    PlaceLoad,
+    Release,
+    ReturnHome,
+    Speed,
+    Step,
+    Takeoff,
+    Waypoint,
+    Winch,
+)
 
 SETTLE_S = 3.0  # hold after an attitude run
 MIN_LIFT_SHARE = 0.5
@@ -77,8 +88,13 @@ def present_item(flight: Flight) -> int:
 
 def step_event(flight: Flight) -> Event:
     """The event that begins the present step while the mission is flown."""
+    return Event.LAND_STEP if is_lowering_step(flight) else Event.STEP
+
+
+def is_lowering_step(flight: Flight) -> bool:
+    """Whether the present step begins with lowering: a landing, or placing a load that is not released."""
     step = flight.mission.plan.steps[flight.mission.step]
-    return Event.LAND_STEP if isinstance(step, Land) else Event.STEP
+    return isinstance(step, Land) or (isinstance(step, PlaceLoad) and not flight.cable.released)
 
 
 def with_speed(flight: Flight, step: Speed, settings: Settings) -> Flight:
@@ -92,7 +108,7 @@ def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
     step = flight.mission.plan.steps[flight.mission.step]
     if isinstance(step, Speed):
         flight = with_speed(flight, step, settings)
-    if isinstance(step, Land):
+    if is_lowering_step(flight):
         return transition(flight, event, view, settings)
     if isinstance(step, Winch) and flight.cable.reel_target_m is None:
         here = stopping_legs(flight, view, settings)[1]

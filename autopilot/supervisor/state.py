@@ -22,7 +22,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence, read_fence, read_rally
 from autopilot.wire.items import Visit, WireItem
-from missions.model import HeadingCommand, Step
+from missions.model import HeadingCommand, PlaceLoad, Step
 
 
 class Phase(IntEnum):
@@ -65,7 +65,7 @@ class Event(Enum):
     NOT_LIFTED = "cable slack, load not lifted"
     DONE = "legs done"
     STEP = "mission step"
-    LAND_STEP = "mission step: land"
+    LAND_STEP = "mission step: land, or place the load"
     HOLD = "hold"
     MISSION = "fly the mission"
     GUIDE = "follow setpoints"
@@ -76,6 +76,7 @@ class Event(Enum):
     CAUGHT_UP = "near the path again"
     RELEASED = "load released"
     LOAD_DOWN = "load on the ground"
+    LOAD_PLACED = "load on the ground, to stay there"
     VEHICLE_DOWN = "vehicle on the ground"
     FAIL = "give up"
     FOUND_IN_FLIGHT = "found in flight"
@@ -275,6 +276,22 @@ class Report(NamedTuple):
 
     texts: tuple[Text, ...] = ()
     reached: tuple[int, ...] = ()
+
+
+def is_placing(flight: Flight) -> bool:
+    """Whether the load is lowered to be released on the ground, behind which the mission continues."""
+    mission, steps = flight.mission, flight.mission.plan.steps
+    return (
+        flight.phase == Phase.LOWER
+        and mission.active
+        and not flight.cable.released
+        and isinstance(steps[mission.step], PlaceLoad)
+    )
+
+
+def is_landing(flight: Flight) -> bool:
+    """Whether the flight ends with what it does now."""
+    return flight.phase in LANDING and not is_placing(flight)
 
 
 def interrupt_mission(flight: Flight) -> Flight:

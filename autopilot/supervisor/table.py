@@ -75,7 +75,9 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.LOWER, E.GUIDE): P.GUIDED,
     (P.LOWER, E.RETURN): P.RETURN,
     (P.LOWER, E.CAUGHT): P.LOWER,
+    (P.LOWER, E.LAND): P.LOWER,  # the load is placed no longer, and the flight ends
     (P.LOWER, E.LOAD_DOWN): P.SET_DOWN,
+    (P.LOWER, E.LOAD_PLACED): P.MISSION,
     (P.LOWER, E.VEHICLE_DOWN): P.DISARMED,  # without a load
     (P.LOWER, E.RELEASED): P.LOWER,
     (P.SET_DOWN, E.VEHICLE_DOWN): P.DISARMED,

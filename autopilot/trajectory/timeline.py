@@ -23,6 +23,7 @@ from missions.model import (
     Delay,
     Land,
     Mission,
+    PlaceLoad,
     Release,
     ReturnHome,
     Signals,
@@ -183,7 +184,8 @@ def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionS
         case Release():
             if before.released:
                 return before
-            above = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
+            low = 0.0 if here is None or isinstance(step, PlaceLoad) else here[2]
+            above = here if here is None else (here[0], here[1], low + (before.cable_m or 0.0))
             return replace(before, expected=above, unknown_after="a release", released=True)
         case Trajectory():
             return replace(before, expected=there)
@@ -235,6 +237,11 @@ def _travel_and_wait(
             waiting = hold
         case Winch(speed_m_s=rate):
             speed = min(speed, rate or REEL_M_S)
+        case PlaceLoad() if before.position is not None and not before.released:
+            low = min(speed, vertical.lift_m_s)
+            min_move_s = min_move_duration(max(cable, 0.0), gravity)
+            lowering = descent_pace(before.position[2], vertical.descent_m_s, low, accel, min_move_s)
+            return lowering, DETECTION_S + RELEASE_S
         case Release():
             return Pace(0.0), RELEASE_S
         case Delay() | AttitudeRun() | Signals() | Trajectory():

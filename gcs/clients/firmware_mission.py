@@ -13,7 +13,7 @@ from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE
-from missions.model import Delay, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint
+from missions.model import Delay, Land, PlaceLoad, Release, ReturnHome, Speed, Step, Takeoff, Waypoint
 
 SLACK_FRACTION = 0.6  # of the cable's length: height of the vehicle above the load that lies on the ground
 SETTLE_S = 2.0  # hold time above the load on the ground, and again once it hangs
@@ -25,6 +25,7 @@ _NAMES = {
     "Signals": "signals (paths given by formulas)",
     "Trajectory": "a trajectory (a path given by timed points)",
     "AttitudeRun": "an attitude of vehicle or load",
+    "PlaceLoad": "a load to be placed on the ground",
 }
 
 
@@ -86,7 +87,7 @@ def firmware_items(
                         mavlink.MAV_CMD_NAV_LOITER_TIME, step.duration_s, place=vehicle_position(), home=home
                     )
                 )
-            case Release():
+            case Release() if not isinstance(step, PlaceLoad):
                 items.append(_item(mavlink.MAV_CMD_DO_GRIPPER, 1.0, float(mavlink.GRIPPER_ACTION_RELEASE)))
                 above_load = 0.0
             case Land():

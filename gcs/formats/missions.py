@@ -184,8 +184,4 @@ _ALTERNATIVES = {
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "use NAV_TAKEOFF",
     mavlink.MAV_CMD_NAV_VTOL_LAND: "use NAV_LAND",
     **{number: COMMAND[number].text for number in AREA_COMMANDS},
-    mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: (
-        "release the load (DO_GRIPPER) at a waypoint 0.3 m above the ground, or end with NAV_LAND, which "
-        "sets it down, and fly on without it by a second mission (docs/missions.md)"
-    ),
 }

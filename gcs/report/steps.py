@@ -15,6 +15,7 @@ from missions.model import (
     HeadingCommand,
     Land,
     LookAt,
+    PlaceLoad,
     Release,
     ReturnHome,
     Signals,
@@ -71,6 +72,8 @@ def describe(step: Step, released: bool) -> str:
             return "Return to home"
         case Land():
             return "Land" if released else "Set the load down and land"
+        case PlaceLoad() if not released:
+            return "Lower the load to the ground and release it"
         case Release():
             return "Release the load"
         case Winch():

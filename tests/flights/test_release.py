@@ -6,14 +6,16 @@ import math
 
 import pytest
 
+from autopilot.onboard.snapshot import landed_state, sub_mode
+from autopilot.services.identity import AUTO_MISSION
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import Delay, Land, Speed, Takeoff, Waypoint
+from missions.model import Delay, Land, PlaceLoad, Speed, Takeoff, Waypoint
 from missions.model import Release as ReleaseStep
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED
 
-GRIPPER, TAKEOFF, ARM = 211, 22, 400
+GRIPPER, TAKEOFF, ARM, PAUSE_CONTINUE, RETURN, LAND = 211, 22, 400, 193, 20, 21
 DENIED = mavlink.MAV_RESULT_DENIED
 # The load's weight, a fifth of the total, vanishes in an instant; measured: 3 mm, and 6 mm
 JUMP_M = 0.01
@@ -147,6 +149,62 @@ def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     assert sorted(set(reached)) == [0, 1, 2, 3, 4, 5]
     assert craft.texts.count("Load released") == 1
+
+
+PLACING = (
+    Takeoff(1.0),
+    Waypoint(1.0, 0.5, 1.0),
+    PlaceLoad(),
+    Waypoint(1.0, 0.5, 2.0),
+    Land(),
+)
+
+
+@pytest.mark.parametrize("sensors", ["lab", "gps", "lab-blind"])
+def test_a_mission_places_its_load_on_the_ground_and_flies_on(sensors: str) -> None:
+    craft = Craft(*PLACING, sensors=sensors)
+    craft.begin()
+    craft.run(at_phase(Phase.LOWER), 60.0)
+    assert sub_mode(craft.flight) == AUTO_MISSION
+    assert landed_state(craft.flight) == mavlink.MAV_LANDED_STATE_IN_AIR
+    craft.run(lambda c: c.flight.cable.released, 60.0)
+    assert craft.truth.load_on_ground == 1.0
+    assert math.hypot(*craft.truth.v_load) < 0.02, "it lies before it is released"
+    placed = craft.truth.x_load
+    craft.run(at_phase(Phase.DISARMED), 90.0)
+    assert craft.flight.mission.done
+    assert math.dist(craft.truth.x_load, placed) < 0.01
+    reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
+    assert sorted(set(reached)) == [0, 1, 2, 3, 4]
+    assert [text for text in craft.texts if text.startswith("Load")] == [
+        "Load on the ground",
+        "Load released",
+    ]
+
+
+def test_placing_is_paused_and_continued_and_given_up_for_a_return() -> None:
+    craft = Craft(*PLACING)
+    craft.begin()
+    craft.run(at_phase(Phase.LOWER), 60.0)
+    craft.wait(1.0)
+    for request, phase in ((0.0, Phase.HOLD), (1.0, Phase.LOWER)):
+        assert craft.command(PAUSE_CONTINUE, request) == ACCEPTED
+        craft.wait(2.0)
+        assert craft.flight.phase == phase
+    assert craft.command(RETURN) == ACCEPTED
+    craft.run(at_phase(Phase.DISARMED), 90.0)
+    assert not craft.flight.cable.released
+    assert math.hypot(*craft.truth.x_load[:2]) < 0.05, "it came home"
+
+
+def test_a_landing_asked_for_while_the_load_is_placed_ends_the_flight_beside_it() -> None:
+    craft = Craft(*PLACING)
+    craft.begin()
+    craft.run(at_phase(Phase.LOWER), 60.0)
+    assert craft.command(LAND) == ACCEPTED
+    craft.run(at_phase(Phase.DISARMED), 90.0)
+    assert not craft.flight.cable.released
+    assert math.dist(craft.truth.x_load[:2], (1.0, 0.5)) < 0.05
 
 
 def test_a_delivered_load_stays_where_it_was_seen_best() -> None:

@@ -34,7 +34,7 @@ from autopilot.supervisor.state import (
     interrupt_mission,
 )
 from autopilot.supervisor.table import TRANSITIONS, markdown
-from missions.model import Land, Step, Takeoff, Waypoint
+from missions.model import Land, PlaceLoad, Step, Takeoff, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, entered, hanging, view
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -226,6 +226,15 @@ def load_down(phase: Phase) -> Flight:
     return advance(catching(under_way(phase)), hanging(SECOND, (1.0, 0.0, 0.02)), SETTINGS)[0]
 
 
+def placing() -> Flight:
+    return under_way(Phase.LOWER, Takeoff(2.0), PlaceLoad(), Land(), step=1, active=True)
+
+
+def landing_asked(phase: Phase) -> Flight:
+    """Of a landing that has begun nothing begins again; a load that is only placed is landed with."""
+    return asked(placing() if phase == Phase.LOWER else under_way(phase), R.Land())
+
+
 def vehicle_down(phase: Phase) -> Flight:
     if phase == Phase.SET_DOWN:
         return landed(under_way(phase))
@@ -248,11 +257,12 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.GUIDE: lambda phase: asked(under_way(phase), R.Orbit(2.0, 0.5, None, None, None)),
     Event.OTHER_SETPOINT: other_setpoint,
     Event.RETURN: lambda phase: asked(under_way(phase), R.ReturnHome()),
-    Event.LAND: lambda phase: asked(under_way(phase), R.Land()),
+    Event.LAND: landing_asked,
     Event.CAUGHT: caught,
     Event.CAUGHT_UP: caught_up,
     Event.RELEASED: lambda phase: asked(under_way(phase), R.Release()),
     Event.LOAD_DOWN: load_down,
+    Event.LOAD_PLACED: lambda phase: landed(placing()),
     Event.VEHICLE_DOWN: vehicle_down,
     Event.FOUND_IN_FLIGHT: lambda phase: resume_flight(
         under_way(phase), RestartState(5.0, 0.0, False), hanging(SECOND), SETTINGS

@@ -194,6 +194,7 @@ def test_each_step_knows_its_items() -> None:
     assert [len(term.factors) for term in located[1].step.terms] == [1, 0]  # type: ignore[union-attr]
 
 
+THERE: Any = {"frame": 6, "x": 473977420, "y": 85455940, "z": 5.0}
 REFUSALS = [
     # items, item that is refused, MAV_MISSION_RESULT, part of the text
     ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
@@ -210,6 +211,19 @@ REFUSALS = [
         "it belongs in the list of rally points",
     ),
     ([item(211, 2.0, 0.0)], 0, "INVALID_PARAM1", "gripper = 2"),
+    (
+        [item(94, 2.0, frame=6, x=473977420, y=85455940, z=5.0)],
+        0,
+        "INVALID_PARAM1",
+        "2 m at most does not reach",
+    ),
+    (
+        [item(94, -1.0, frame=6, x=473977420, y=85455940, z=5.0)],
+        0,
+        "INVALID_PARAM1",
+        "greatest descent = -1 m",
+    ),
+    ([item(211, 1.0, 0.0), item(94, 0.0)], 1, "INVALID", "needs the load"),
     ([item(211, 1.0, 3.0)], 0, "INVALID_PARAM2", "gripper action = 3; must be one of 0 release, 1 grab,"),
     ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
     ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),

@@ -9,7 +9,13 @@ from autopilot.services.records import Verdict
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
 from autopilot.supervisor.heading import with_step_heading_aims
 from autopilot.supervisor.machine import transition
-from autopilot.supervisor.mission import present_item, start_step, step_event, with_current_step
+from autopilot.supervisor.mission import (
+    is_lowering_step,
+    present_item,
+    start_step,
+    step_event,
+    with_current_step,
+)
 from autopilot.supervisor.requests.mission_checks import (
     is_prepared_from_here,
     is_taking_off,
@@ -58,7 +64,7 @@ def start_at_current_step(flight: Flight, view: View, settings: Settings) -> Dec
         return flight, denied(f"Mission denied: {problem}")
     if flight.phase == Phase.DISARMED:
         return replace(flight, action_when_armed=ActionWhenArmed.MISSION), ACCEPTED
-    event = Event.LAND if isinstance(plan.steps[flight.mission.step], model.Land) else Event.MISSION
+    event = Event.LAND if is_lowering_step(flight) else Event.MISSION
     if flight.phase != Phase.ARMED and (flight.phase, event) not in TRANSITIONS:
         return flight, wrong_phase(flight, "Mission")
     if not prepared:

@@ -26,6 +26,7 @@ from autopilot.supervisor.state import (
     SetpointSource,
     View,
     interrupt_mission,
+    is_landing,
 )
 
 MAX_HOME_HEIGHT_M = 1.0
@@ -53,7 +54,7 @@ def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
     if flight.phase in ON_GROUND:
         return hold(flight, request, view, settings)
     not_returning = replace(flight, returning=False)
-    if flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+    if is_landing(flight):
         return not_returning, ACCEPTED
     after = try_transition(interrupt_mission(not_returning), Event.LAND, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Landing"))

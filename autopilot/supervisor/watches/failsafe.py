@@ -15,11 +15,11 @@ from autopilot.supervisor.state import (
     CARRYING,
     CRITICAL,
     IN_AIR,
-    LANDING,
     Event,
     Flight,
     View,
     interrupt_mission,
+    is_landing,
     setpoint,
 )
 from autopilot.supervisor.watches.watch_result import WatchResult
@@ -57,7 +57,7 @@ def watch_failsafe(flight: Flight, view: View, settings: Settings) -> WatchResul
 
 def watch_missing_readings(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Land when readings that the flight requires are missing, whatever is being flown."""
-    in_air = flight.phase in IN_AIR and flight.phase not in LANDING
+    in_air = flight.phase in IN_AIR and not is_landing(flight)
     if not view.estimate_problems or not in_air or isinstance(flight.legs[0], LevelHold):
         return WatchResult(flight)
     text = f"Failsafe: {view.estimate_problems[0]}, landing"

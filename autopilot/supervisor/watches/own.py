@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CRITICAL, IN_AIR, LANDING, Event, Flight, View, interrupt_mission
+from autopilot.supervisor.state import CRITICAL, IN_AIR, Event, Flight, View, interrupt_mission, is_landing
 from autopilot.supervisor.watches.watch_result import WatchResult
 
 
@@ -28,6 +28,6 @@ def _watch(flight: Flight, source: str, fault: str, instead: str) -> WatchResult
     if flight.phase not in IN_AIR:
         return WatchResult(flight, None, ((CRITICAL, fault),))
     texts = ((CRITICAL, f"{fault}; {instead}"),)
-    if flight.phase in LANDING:
+    if is_landing(flight):
         return WatchResult(flight, None, texts)
     return WatchResult(interrupt_mission(flight), Event.LAND, texts)

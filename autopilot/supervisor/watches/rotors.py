@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, LANDING, Event, Flight, Phase, View, interrupt_mission
+from autopilot.supervisor.state import IN_AIR, Event, Flight, Phase, View, interrupt_mission, is_landing
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
 
@@ -26,7 +26,7 @@ def watch_rotors(flight: Flight, view: View, settings: Settings) -> WatchResult:
     loss_text = rotor_names + " lost"
     if not settings.rotors.can_hold_heading_without(lost):
         loss_text += ", heading given up"
-    if flight.phase not in IN_AIR or flight.phase in LANDING:
+    if flight.phase not in IN_AIR or is_landing(flight):
         return WatchResult(flight, None, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}"),))
     return WatchResult(
         interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}, landing"),)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import inf
 
 from autopilot.guidance.legs import LOAD_POSITION, Creep
+from autopilot.supervisor.mission import RELEASED_TEXT
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     INFO,
@@ -14,6 +15,7 @@ from autopilot.supervisor.state import (
     Phase,
     View,
     has_lasted,
+    is_placing,
     leg_time_s,
     with_condition,
 )
@@ -38,6 +40,10 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResu
     still = has_lasted(flight.condition_since_us, STILL_US, view.now_us)
     if not still and not has_lasted(flight.stopped_since_us, STOPPED_US, view.now_us):
         return WatchResult(flight)
+    if is_placing(flight):
+        texts = (INFO, "Load on the ground"), (INFO, RELEASED_TEXT)
+        cable = replace(flight.cable, released=True, slack_since_us=-1)
+        return WatchResult(replace(flight, cable=cable, legs=()), Event.LOAD_PLACED, texts)
     if flight.phase == Phase.LOWER and not flight.cable.released:
         return WatchResult(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
     return _landed(flight)

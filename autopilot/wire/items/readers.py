@@ -19,7 +19,7 @@ from autopilot.wire.items.limits import (
     TURN_ACCEL_M_S2,
 )
 from autopilot.wire.items.records import ABSOLUTE_FRAMES
-from missions.model import Axis, Land, Release, Signals, Sine, Speed, Step, Term, Waypoint, Winch
+from missions.model import Axis, Land, PlaceLoad, Release, Signals, Sine, Speed, Step, Term, Waypoint, Winch
 
 
 def waypoint(context: ItemContext) -> Iterator[Step]:
@@ -94,6 +94,18 @@ def gripper(context: ItemContext) -> Iterator[Step]:
     elif action == "grab" and context.state.released:
         text = "the load, released before, can be taken on the ground only and not by a mission"
         raise context.refusal(text, mavlink.MAV_MISSION_INVALID_PARAM2)
+
+
+def payload_place(context: ItemContext) -> Iterator[Step]:
+    """Placing the load on the ground; at a place that is named, the load is carried there first."""
+    context.expect_load()
+    if context.has_position():
+        descent_m, height_m = context["descent_m"], context["altitude_m"]
+        if 0.0 < descent_m < height_m:
+            text = f"a descent of {descent_m:g} m at most does not reach the ground, {height_m:g} m below"
+            raise context.refusal(f"{text}; 0: as far as it is", mavlink.MAV_MISSION_INVALID_PARAM1)
+        yield Waypoint(context["east_m"], context["north_m"], height_m)
+    yield PlaceLoad()
 
 
 def winch(context: ItemContext) -> Iterator[Step]:

@@ -24,6 +24,7 @@ from autopilot.wire.items.fields import (
     Place,
 )
 from autopilot.wire.items.limits import (
+    FARTHEST_M,
     FASTEST_M_S,
     FASTEST_REEL_M_S,
     LARGEST_PHASE_RAD,
@@ -44,6 +45,7 @@ from missions.model import (
     AttitudeRun,
     Delay,
     Land,
+    PlaceLoad,
     Release,
     ReturnHome,
     Signals,
@@ -240,6 +242,16 @@ COMMANDS: tuple[Command, ...] = (
         Land,
         is_default=True,
         read_steps=readers.land,
+    ),
+    Command(
+        m.MAV_CMD_NAV_PAYLOAD_PLACE,
+        "the load is carried there, lowered until it lies on the ground, and released; the vehicle flies on "
+        "without it. Without a place (x and y 0): where the load hangs. A descent other than 0 that does not "
+        "reach the ground at the height of home is refused",
+        (Number(1, "descent_m", "greatest descent", "m", 0.0, FARTHEST_M), *_POINT),
+        PlaceLoad,
+        is_default=True,
+        read_steps=readers.payload_place,
     ),
     Command(
         m.PLUMBLINE_LOAD_SIGNAL_TERM,

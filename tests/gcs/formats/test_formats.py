@@ -15,7 +15,7 @@ from pymavlink import mavwp
 
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.items import WireItem, encode_mission
+from autopilot.wire.items import WireItem, decode_items, encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
 from gcs.formats.items import NO_COORDINATE, FormatError
@@ -24,6 +24,7 @@ from gcs.formats.params import parameter_lines, qgc_parameters
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import read_waypoints, write_waypoints
 from missions.fileformat import load_mission, shipped
+from missions.model import Land, PlaceLoad, Takeoff, Waypoint
 
 HOME = Home()
 
@@ -167,11 +168,11 @@ def test_fence_items_within_the_mission_are_left_out_with_where_they_belong() ->
     )
 
 
-def test_placing_the_load_is_refused_with_what_sets_it_down_and_what_flies_on_from_there() -> None:
-    """Behind the landing that was advised nothing is flown."""
-    (line,) = mission_of(read_plan(plan_text(TAKEOFF, simple(94, 2), simple(21))), HOME, "").left_out
-    assert "NAV_PAYLOAD_PLACE (94): cannot be flown; release the load (DO_GRIPPER) at a waypoint" in line
-    assert line.endswith("fly on without it by a second mission (docs/missions.md)")
+def test_a_load_is_placed_where_the_plan_says_and_the_vehicle_flies_on() -> None:
+    judged = mission_of(read_plan(plan_text(TAKEOFF, simple(94), WAYPOINTS[0], simple(21))), HOME, "")
+    assert not judged.left_out
+    kinds = [type(step) for step in decode_items(judged.items, HOME)]
+    assert kinds == [Takeoff, Waypoint, PlaceLoad, Waypoint, Land]
 
 
 def test_items_behind_the_first_landing_are_named() -> None:
