@@ -208,19 +208,9 @@ class LookAt:
 
 HeadingCommand = TurnHeading | LookAt  # items between steps, which take effect as the next step begins
 LoadPath = Signals | Trajectory  # steps that give the load's place as a function of time
-Step = (
-    Takeoff
-    | Waypoint
-    | Speed
-    | Delay
-    | ReturnHome
-    | Land
-    | Release
-    | PlaceLoad
-    | Winch
-    | LoadPath
-    | AttitudeRun
-)
+MotionStep = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land
+PayloadStep = Release | PlaceLoad | Winch
+Step = MotionStep | PayloadStep | LoadPath | AttitudeRun
 KINDS: dict[type[Step], str] = {  # their names in files
     Takeoff: "takeoff",
     Waypoint: "waypoint",

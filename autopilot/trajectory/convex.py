@@ -14,6 +14,7 @@ to an interval. Solver: Clarabel, an interior point method, single-threaded and 
 
 from __future__ import annotations
 
+from math import acos, cos, radians
 from typing import NamedTuple
 
 import clarabel
@@ -42,8 +43,11 @@ _EXCESS_WEIGHT = 3e4  # of a rotor's range for one second; a distance of d costs
 _CONSTRAINT_WEIGHT = 1e5  # of one metre
 _HALVINGS = 7
 _CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
-# an excess of the cosine, or of the squared rate, counts as much as so many ranges of a rotor
+# an excess of the cosine, or of the squared rate, counts as much as so many ranges of a rotor, ...
 _COS_RANGES, _TURN_RANGES = 1.5, 0.015
+# ... or that of the cosine as more, so that so many ranges are no more than this excess of the tilt (rad), or
+# than this share of its limit: near zero the cosine hardly changes with the tilt
+_TILT_RANGES, _TILT_EXCESS, _TILT_SHARE = 0.035, radians(1.9), 0.3
 _START_EXCESS = 0.035  # ranges of a rotor: largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
 _HOPELESS_EXCESS = 10.0  # times the range of a rotor: no round leads back from there
@@ -397,7 +401,9 @@ def excess(path_demand: Array, spacing: float, bounds: Bounds) -> Array:
 
 def _newtons(bounds: Bounds) -> tuple[float, float]:
     """The newtons of a rotor as which an excess of the cosine counts, and of the squared rate."""
-    return _COS_RANGES * bounds.rotor_range, _TURN_RANGES * bounds.rotor_range
+    limit = acos(max(bounds.cos_tilt, -1.0))
+    beyond = bounds.cos_tilt - cos(limit + min(_TILT_EXCESS, _TILT_SHARE * limit))
+    return max(_COS_RANGES, _TILT_RANGES / beyond) * bounds.rotor_range, _TURN_RANGES * bounds.rotor_range
 
 
 def _lag_matrix(n: int, spacing: float, tau: float) -> sparse.csr_matrix:

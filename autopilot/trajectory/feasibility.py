@@ -81,7 +81,8 @@ class VehicleLimits:
     is the share of each rotor's range kept free at either limit, `min_tension_share` the least cable tension
     as a share of the load's weight, `max_shaping_m` the greatest distance from the requested path.
     `speed_m_s` (until the mission sets its own) and `accel_m_s2` are the peaks of transfers;
-    `when_infeasible` says what happens to a path that is impossible.
+    `when_infeasible` says what happens to a path that is impossible; `time_optimal`: paths through waypoints
+    have no other limits than the vehicle.
     """
 
     vehicle: Vehicle
@@ -93,6 +94,7 @@ class VehicleLimits:
     max_shaping_m: float = MAX_SHAPING_M
     rotor_margin: float = ROTOR_MARGIN
     when_infeasible: int = REFUSE
+    time_optimal: bool = False
 
     @property
     def body(self) -> Body:
@@ -146,7 +148,7 @@ class VehicleLimits:
             self.when_infeasible,
             self.speed_m_s,
             self.accel_m_s2,
-            time_optimal=False,
+            self.time_optimal,
         )
 
 

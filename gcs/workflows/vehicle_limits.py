@@ -32,6 +32,7 @@ def load_limits(name_or_path: str, settings: Settings = ()) -> VehicleLimits:
         max_shaping_m=table["MIS_SHAPE_ERR"],
         rotor_margin=0.01 * table["MIS_ROTOR_MARG"],
         when_infeasible=int(table["MIS_INFEASIBLE"]),
+        time_optimal=table["MIS_TIME_OPT"] != 0.0,
     )
 
 

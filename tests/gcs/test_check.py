@@ -221,7 +221,7 @@ def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_me
 def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     given = {"MIS_TILT_DEG": 5, "MIS_SPEED": 1.0, "MIS_ACCEL": 0.5, "MIS_TENSION": 40, "MIS_SHAPE_ERR": 0.1}
-    given |= {"MIS_ROTOR_MARG": 30, "MIS_INFEASIBLE": 1}
+    given |= {"MIS_ROTOR_MARG": 30, "MIS_INFEASIBLE": 1, "MIS_TIME_OPT": 1}
     lines = "\n".join(f"{name} = {value}" for name, value in given.items())
     file.write_text(f'believed = "bebop"\n[parameters]\n{lines}\n', encoding="utf-8")
     found = load_limits(str(file))

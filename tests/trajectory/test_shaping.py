@@ -107,6 +107,16 @@ def test_shipped_signals_keep_within_the_bounds_near_the_asked_path(name: str) -
     assert shaped.distance_m < (0.013 if name == "case-a" else 0.001)
 
 
+@pytest.mark.parametrize(("limit_deg", "flies"), [(2.0, False), (3.0, False), (5.0, True), (8.0, True)])
+def test_a_small_limit_of_the_tilt_holds_or_the_path_is_refused(limit_deg: float, flies: bool) -> None:
+    """Near zero the cosine hardly changes: Case A was flown with 8 degrees where 2 were allowed."""
+    shaped = shape(signals_of("case-a"), BODY, BOUNDS._replace(cos_tilt=cos(radians(limit_deg))))
+    assert (shaped.reason == "") == flies
+    if flies:
+        tilt = np.arccos(demand(along(shaped)[1], BODY)[:, COS_TILT].min())
+        assert np.degrees(tilt) <= 1.3 * limit_deg
+
+
 def test_the_distance_told_is_the_greatest_there_is() -> None:
     shaped = shape(signals_of("case-a"), BODY, BOUNDS)
     _, jets, asked = along(shaped)
