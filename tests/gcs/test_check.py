@@ -123,11 +123,11 @@ def test_waypoints_that_are_too_close_for_their_speed_are_told() -> None:
 
 def test_a_path_that_leaves_the_lines_between_its_waypoints_tells_how_far() -> None:
     """At a speed that its lines are too short for."""
-    round_trip = (Waypoint(4.0, 0.0, 2.0), Waypoint(4.0, 4.0, 2.0), Waypoint(0.0, 4.0, 2.0))
-    corner = (Takeoff(2.0), Speed(5.0), *round_trip, Land())
+    round_trip = [Waypoint(20.0 * x, 20.0 * y, 9.0) for x, y in ((1, 0), (1, 1), (0, 1), (0, 0))]
+    corner = (Takeoff(9.0), Speed(5.0), *round_trip, Land())
     up, *beside = path_reports(Mission("corner", "", "", (), corner), BEBOP_LIMITS)
     assert up.beside_m == 0.0
-    assert 0.3 < (widest := max(beside, key=attrgetter("beside_m"))).beside_m < 2.0
+    assert 0.3 < (widest := max(beside, key=attrgetter("beside_m"))).beside_m < 6.0
     assert f" s, up to {widest.beside_m:.1f} m beside the straight line; load to " in str(widest)
     single = Mission("single", "", "", (), (Takeoff(2.0), round_trip[0], Land()))
     assert "beside" not in str(path_reports(single, BEBOP_LIMITS)[-1])
