@@ -7,9 +7,9 @@ motion, so that the parts join without a jump of any rotor force:
   and its peak acceleration is a constant, found by `_ramp_ratio`, times |v - u| / duration;
 * a turn past a waypoint, from a place before it to another at the same distance behind it, at the same speed
   v at both. The two distances together are v times the duration times a share: the less it is, the slower is
-  the load in the middle of the turn, and the shorter its way. For a slight turn it is nearly 1, for a sharp
-  one about 0.7, and never so great that the load would be faster than v. The peak acceleration is a ratio
-  that depends on the angle alone times v / duration.
+  the load at the waypoint, and the shorter its way. It is as great as the lines have room for, and as the
+  load is nowhere faster than v: nearly 1 for a slight turn, 0.8 for one of 90 degrees. The peak acceleration
+  is a ratio that depends on angle and share alone times v / duration.
 
 Along lines that are long beside speed^2 / acceleration this is the quickest path but for a few per cent, and
 it does not leave the lines but in turns. Between short lines another is quicker
@@ -22,6 +22,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from itertools import pairwise
 from math import ceil, cos, radians, sin
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,9 +31,8 @@ from autopilot.trajectory.minimum_snap import REST, JoinedPath, MinimumSnap, Sec
 from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 
 _BISECTIONS = 40
-_SHARES = tuple(0.65 + 0.05 * i for i in range(8))
+_SHARES = tuple(1.0 - 0.025 * i for i in range(15))
 _FASTER = 1.0005  # how many times as fast the load may be in a turn as at its ends
-# of a share, in seconds lost for each second that the turn's way to the corner takes
 _WAY_COST = 0.25
 # of a shape, so long that the time over which the turning of the vehicle matters does not
 _LONG_S = 30.0
@@ -54,21 +55,31 @@ def _ramp_ratio() -> float:
     return _shape(np.vstack([REST[0], end]), velocities)[1] * _LONG_S / 2.0
 
 
+class _Turn(NamedTuple):
+    """The shape of a turn: its share, and its peak acceleration times its duration over its speed."""
+
+    share: float
+    ratio: float
+
+    @property
+    def cost(self) -> float:
+        """The time lost at the corner, and `_WAY_COST` of the time of its way: a short one can be fast."""
+        return self.ratio * (1.0 - self.share + _WAY_COST * 0.5 * self.share)
+
+
 @lru_cache(maxsize=256)
-def _turn_shape(angle_deg: int) -> tuple[float, float]:
-    """The share of a turn, and its peak acceleration times its duration over its speed."""
+def _turn_shapes(angle_deg: int) -> tuple[_Turn, ...]:
+    """The shapes of turns by an angle: the greater the share, the faster is the load at the corner."""
     angle = radians(angle_deg)
     before, after = np.array([1.0, 0.0, 0.0]), np.array([cos(angle), sin(angle), 0.0])
     velocities = np.vstack([before, after])
-
     found = []
     for share in _SHARES:
         half_m = 0.5 * share * _LONG_S
         peak_m_s, peak_m_s2 = _shape(np.vstack([-half_m * before, REST[0], half_m * after]), velocities)
         if peak_m_s <= _FASTER:
-            ratio = peak_m_s2 * _LONG_S
-            found.append((ratio * (1.0 - share + _WAY_COST * 0.5 * share), share, ratio))
-    return min(found)[1:]
+            found.append(_Turn(share, peak_m_s2 * _LONG_S))
+    return tuple(found)
 
 
 def _greatest(holds: Callable[[float], bool], low: float, high: float) -> float:
@@ -96,16 +107,13 @@ class SteadyLines:
         turning = np.concatenate([[True], angles > _STRAIGHT_DEG, [True]])
         self.corners = np.flatnonzero(turning)  # which of the points are no points on a straight line
         self._points = points[self.corners]
-        # upwards: a turn is no sharper than the one whose shape it takes
-        self._turns = [
-            (1.0, 0.0),
-            *(_turn_shape(ceil(angles[i - 1])) for i in self.corners[1:-1]),
-            (1.0, 0.0),
-        ]
         # a turn leaves the points beside it on the line, and a half of the line to the turn there
         share = np.where(turning[:-1] & turning[1:], 0.5, 1.0)
         rooms = share * lengths
-        self._rooms = [0.0, *(min(rooms[i - 1], rooms[i]) for i in self.corners[1:-1]), 0.0]
+        self._rooms = [0.0, *(float(min(rooms[i - 1], rooms[i])) for i in self.corners[1:-1]), 0.0]
+        self._turns = [_Turn(1.0, 0.0)] * len(self.corners)
+        for corner, i in enumerate(self.corners[1:-1], 1):
+            self._turns[corner] = self._best_turn(corner, angles[i - 1], speed)
         lines = np.diff(self._points, axis=0)
         self._lengths = np.linalg.norm(lines, axis=1)
         self._directions = lines / self._lengths[:, None]
@@ -117,6 +125,13 @@ class SteadyLines:
             self._add_line(i, speed)
             if i + 1 < len(lines):
                 self._add_turn(i + 1)
+
+    def _best_turn(self, corner: int, angle_deg: float, speed: float) -> _Turn:
+        """The turn that is fastest at its corner of those that fit, or the one for a slower corner."""
+        # upwards: a turn is no sharper than the one whose shape it takes
+        shapes = _turn_shapes(ceil(angle_deg))
+        fitting = (shape for shape in shapes if self._way(shape, speed) <= self._rooms[corner])
+        return next(fitting, None) or min(shapes, key=attrgetter("cost"))
 
     def _add_line(self, i: int, speed: float) -> None:
         start, direction, length = self._points[i], self._directions[i], float(self._lengths[i])
@@ -141,7 +156,7 @@ class SteadyLines:
         way = self._turn_way(i, speed)
         self._turn_sections.append(len(self.sections))
         places = corner - way * before, corner, corner + way * after
-        self._add(places, self._turn_s(i, speed), (speed * before, speed * after))
+        self._add(places, self._turn_s(self._turns[i], speed), (speed * before, speed * after))
 
     def _add(self, places: Sequence[Array], duration_s: float, velocities: Sequence[Array]) -> None:
         points, now = np.array(places), 0.0
@@ -203,15 +218,15 @@ class SteadyLines:
         turns = self._turn_way(line, begin) + self._turn_way(line + 1, end)
         return turns + self._ramp_way(begin, steady) + self._ramp_way(steady, end)
 
-    def _turn_s(self, point: int, speed: float) -> float:
-        ratio = self._turns[point][1]
-        return max(ratio * speed / self._accel, self._least_s)
+    def _turn_s(self, turn: _Turn, speed: float) -> float:
+        return max(turn.ratio * speed / self._accel, self._least_s)
 
-    def _turn_way(self, point: int, speed: float) -> float:
-        """From a place on the line where the turn begins to the point (m)."""
-        if speed == 0.0:
-            return 0.0
-        return 0.5 * self._turns[point][0] * speed * self._turn_s(point, speed)
+    def _way(self, turn: _Turn, speed: float) -> float:
+        """From the beginning of a turn to its corner (m)."""
+        return 0.5 * turn.share * speed * self._turn_s(turn, speed) if speed > 0.0 else 0.0
+
+    def _turn_way(self, corner: int, speed: float) -> float:
+        return self._way(self._turns[corner], speed)
 
     def _ramp_s(self, begin: float, end: float) -> float:
         return max(_ramp_ratio() * abs(end - begin) / self._accel, self._least_s)

@@ -18,7 +18,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Status, Target
-from missions.model import Delay, Land, Signals, Takeoff, Term, Waypoint
+from missions.model import Delay, Land, Signals, Speed, Takeoff, Term, Waypoint
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
 PLUMBLINE = 2.0  # CTL_LAW
@@ -28,7 +28,7 @@ PX4_MISSION, PX4_RTL, PX4_LAND = (
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 
 
-def upload(craft: Craft, *steps: Takeoff | Delay | Signals | Waypoint | Land) -> None:
+def upload(craft: Craft, *steps: Takeoff | Speed | Delay | Signals | Waypoint | Land) -> None:
     """Upload a mission, item by item as a ground station does."""
     operation = MissionUpload(Target(1, 1), encode_steps(steps, Home()))
     heard = len(craft.heard)
@@ -210,10 +210,10 @@ def test_a_mission_that_is_deleted_while_it_waits_no_longer_does(in_air: bool) -
 
 @pytest.mark.parametrize("outside", [True, False])
 def test_a_curve_beyond_the_fence_is_told_after_the_upload(outside: bool) -> None:
-    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=8.6 if outside else 12.0)
+    craft = Craft(CTL_LAW=PLUMBLINE, GF_MAX_HOR_DIST=8.5 if outside else 12.0)
     craft.wait(1.0)
     corner = (Waypoint(6.0, 0.0, 2.0), Waypoint(6.0, 6.0, 2.0), Waypoint(-6.0, 6.0, 2.0))
-    upload(craft, Takeoff(2.0), *corner, Land())
+    upload(craft, Takeoff(2.0), Speed(3.0), *corner, Land())
     craft.wait(0.1)
     told = [text for text in craft.texts if text.startswith("Mission will not start: the curve to item ")]
     assert len(told) == outside

@@ -20,7 +20,7 @@ from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence, Polygon
 from missions import model
-from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
+from missions.model import Delay, Signals, Speed, Step, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -30,6 +30,7 @@ ROUND = (
     Waypoint(3.0, 3.0, 2.5),
     Waypoint(0.0, 3.0, 2.0, hold_s=1.0),
 )
+PASSING_M_S = 0.15  # round corners of 90 degrees between lines of 3 m at up to 1.5 m/s
 # error of the trapezoid rule over a tick, at a jerk of a few m/s^3
 TRAPEZOID_M = 1e-5
 LIMITS = SETTINGS.limits._replace(shape_paths=True)
@@ -127,13 +128,14 @@ def test_waypoints_in_a_row_are_passed_without_a_stop_and_reported() -> None:
             known = len(sky.reached)
             passed.append((sky.reached[-1], float(np.linalg.norm(sky.setpoints[-1][2][1]))))
             if sky.reached[-1] in (1, 2):
-                point = ROUND[sky.reached[-1] - 1]
+                point = sky.flight.mission.plan.steps[sky.reached[-1]]
+                assert isinstance(point, Waypoint)
                 there = (point.east_m, point.north_m, point.altitude_m)
-                # at most a tick late, at the speed of passing
-                assert norm(sub(sky.setpoints[-1][2][0], there)) <= 1e-6 * STEP_US * passed[-1][1] * 1.01
+                # at most a tick late, at the speed of passing, which is the least there is
+                assert norm(sub(sky.setpoints[-1][2][0], there)) <= 1e-6 * STEP_US * passed[-1][1] * 1.02
     assert [item for item, _ in passed] == [0, 1, 2, 3]
-    assert passed[1][1] > 0.5
-    assert passed[2][1] > 0.5
+    assert passed[1][1] > PASSING_M_S
+    assert passed[2][1] > PASSING_M_S
     assert passed[3][1] == pytest.approx(0.0, abs=1e-9)
     assert worst_jump(sky, 0) < TRAPEZOID_M
     assert worst_jump(sky, 1) < TRAPEZOID_M / (STEP_US * 1e-6)
@@ -159,7 +161,7 @@ def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     sky.wait(4.0)
     start_prepared(sky)
     sky.run(lambda s: s.reached[-1] == 2)
-    assert norm(sky.setpoints[-1][2][1]) > 0.5, "flown through"
+    assert norm(sky.setpoints[-1][2][1]) > PASSING_M_S, "flown through"
     sky.run(lambda s: s.flight.phase == Phase.LOWER)
     assert sky.reached == [0, 1, 2, 3]
     assert worst_jump(sky, 0) < TRAPEZOID_M
@@ -228,7 +230,7 @@ def test_a_mission_that_begins_elsewhere_in_the_air_is_flown_through_as_well(
         sky.tick()
         if len(sky.reached) > known:
             passed.append(norm(sky.setpoints[-1][2][1]))
-    assert min(passed[len(takeoff) : -1]) > 0.5
+    assert min(passed[len(takeoff) : -1]) > PASSING_M_S
     assert len(passed) == len(takeoff) + 3
     assert worst_jump(sky, 0) < TRAPEZOID_M
 
@@ -243,7 +245,8 @@ def test_a_jump_in_flight_is_flown_through_the_remaining_waypoints_as_well() -> 
     start_prepared(sky)
     sky.reached.clear()
     sky.run(lambda s: s.reached == [1])
-    assert norm(sky.setpoints[-1][2][1]) > 0.5
+    assert isinstance(sky.flight.legs[0], PathStretch)
+    assert norm(sky.setpoints[-1][2][1]) > 0.0, "a sharp turn is slow"
     assert sky.ask(SetCurrent(3)).result == ACCEPTED
     assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.MISSION, False)
     sky.run(lambda s: s.flight.phase == Phase.LOWER)
@@ -258,20 +261,21 @@ def test_a_load_that_stands_elsewhere_is_flown_through_the_waypoints_as_well() -
     assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.ARMED, True)
     start_prepared(sky)
     sky.run(lambda s: s.reached[-1:] == [1])
-    assert norm(sky.setpoints[-1][2][1]) > 0.5
+    assert norm(sky.setpoints[-1][2][1]) > PASSING_M_S
 
 
 @pytest.mark.parametrize(
     ("fence", "item"),
     [
-        (Fence((Polygon(True, ((-9.0, -9.0), (3.2, -9.0), (3.2, 9.0), (-9.0, 9.0))),)), 2),
-        (Fence((Disc(False, (1.5, 3.4), 0.2),)), 3),
+        (Fence((Polygon(True, ((-9.0, -9.0), (3.006, -9.0), (3.006, 9.0), (-9.0, 9.0))),)), 2),
+        (Fence((Disc(False, (2.935, 3.045), 0.042),)), 3),
         (Fence((Disc(False, (1.5, -3.4), 0.2),)), None),
     ],
     ids=["out of a zone", "into a zone", "far from a zone"],
 )
 def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> None:
-    """All waypoints are within the fence, and so are the straight lines between them."""
+    """All waypoints are within the fence, and so are the straight lines between them: the load leaves them by
+    14 mm in its turns."""
     sky = prepared_sky(Takeoff(2.0), *ROUND)
     sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence))
     verdict = sky.ask(StartMission(None))
@@ -289,11 +293,11 @@ def test_a_curve_beyond_the_fence_is_refused(fence: Fence, item: int | None) -> 
 def test_a_mission_waits_for_paths_only_once() -> None:
     """A curve that would touch the ground between its waypoints is not flown, wherever it begins."""
     low = (Waypoint(3.0, 0.0, 0.3), Waypoint(9.0, 0.0, 0.3), Waypoint(9.5, 0.0, 9.0))
-    sky = prepared_sky(Takeoff(2.0), *low).airborne()
+    sky = prepared_sky(Takeoff(2.0), Speed(10.0), *low).airborne()
     assert sky.ask(Reposition(-2.0, 1.0, 2.0, None)).result == ACCEPTED
     sky.wait(20.0)
     start_prepared(sky)
-    assert sky.flight.mission.plan.prepared.paths == (None,) * 4
+    assert sky.flight.mission.plan.prepared.paths == (None,) * 5
 
 
 @pytest.mark.parametrize("wish", [Pause(), Land(), ReturnHome(), TakeOff(None)], ids=type)

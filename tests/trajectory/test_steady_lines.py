@@ -56,16 +56,16 @@ def test_a_path_through_far_points_is_smooth_and_never_slower_than_stops(
 
 @pytest.mark.parametrize(("side_m", "speed"), [(10.0, 2.0), (100.0, 5.0), (1000.0, 5.0), (5000.0, 15.0)])
 def test_each_turn_of_a_square_costs_less_than_the_ramps_at_its_ends(side_m: float, speed: float) -> None:
-    """A turn of 90 degrees takes 0.86 speed / accel longer than the lines to and from its corner, and the two
-    ramps together 2.03 of them."""
+    """A turn of 90 degrees takes 0.78 speed / accel longer than the lines to and from its corner, and the two
+    ramps together 2.04 of them."""
     points = [(x * side_m, y * side_m, 6.0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))]
     table, times = planned(points, speed)
     unit = speed / ACCEL
-    assert times[-1] == pytest.approx(4.0 * side_m / speed + (2.03 + 3.0 * 0.86) * unit, abs=unit)
+    assert times[-1] == pytest.approx(4.0 * side_m / speed + (2.04 + 3.0 * 0.78) * unit, abs=unit)
     flown = sample_path(table, np.linspace(0.0, times[-1], 20_000))[0]
     low, high = flown[:, :2].min(axis=0), flown[:, :2].max(axis=0)
     beside = np.minimum(np.abs(flown[:, :2] - low), np.abs(flown[:, :2] - high)).min(axis=1).max()
-    assert beside < 0.06 * speed * unit, "it hardly leaves the lines"
+    assert beside < 0.075 * speed * unit, "it hardly leaves the lines"
 
 
 def test_lines_are_flown_at_a_steady_speed() -> None:

@@ -199,7 +199,7 @@ ROUTES = {
 FLOWN = {
     "a long way to a zigzag": ((0.1, 1.15), (0.15, 1.7)),
     "lines of a survey": ((0.1, 1.2), (0.8, 1.7)),
-    "a zigzag": ((0.1, 1.25), (0.1, 2.6)),
+    "a zigzag": ((0.13, 1.25), (2.0, 2.4)),
     "a straight line": ((1e-5, 1.1), (1e-5, 0.95)),
     "a circle": ((0.1, 1.15), (0.3, 1.1)),
 }
