@@ -65,7 +65,8 @@ class Craft:
         self.simulator: HilSimulator = build_simulator(conditions, Home(), lockstep)
         self.onboard.add_link(GCS)
         self._writer = FrameWriter(255, 190)
-        self.heard: list[Any] = []
+        self._heard: list[Any] = []
+        self._undecoded: list[bytes] = []  # what the ground station received since `heard` was last read
         self.answers: list[bytes] = []
         self.worst_error = 0.0  # of the load, from the position where it is held, m
 
@@ -84,6 +85,14 @@ class Craft:
     @property
     def flight(self) -> Flight:
         return self.onboard.core.flight
+
+    @property
+    def heard(self) -> list[Any]:
+        """The messages of the kinds in _HEARD that the ground station received; decoded as they are read."""
+        for datagram in self._undecoded:
+            self._heard += [r.message for r in decode(datagram)[0] if r.id in _HEARD]
+        self._undecoded.clear()
+        return self._heard
 
     @property
     def texts(self) -> list[str]:
@@ -105,8 +114,7 @@ class Craft:
 
     def tick(self) -> None:
         answer = self.onboard.receive_sensors(self.simulator.sensor_datagram())
-        for _, datagram in self.onboard.ground_datagrams():
-            self.heard += [r.message for r in decode(datagram)[0] if r.message.get_msgId() in _HEARD]
+        self._undecoded += [datagram for _, datagram in self.onboard.ground_datagrams()]
         assert answer is not None
         self.answers.append(answer)
         if self.flight.legs and isinstance(self.flight.legs[0], Hold):

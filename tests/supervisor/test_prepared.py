@@ -168,7 +168,7 @@ def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
 
 
 def test_what_cannot_be_flown_is_refused_with_the_item_and_the_reason() -> None:
-    hasty = Signals(3.0, (Term("y", 0.5, 0.0, 0.5, None, 0.0),))
+    hasty = Signals(3.0, (Term("z", 0.3, 0.0, 0.3, None, 0.0),))  # shaped quickly
     sky = prepared_sky(Takeoff(2.0), hasty, model.Land(), limits=LIMITS._replace(when_infeasible=REFUSE))
     verdict = sky.ask(StartMission(None))
     assert verdict.result == DENIED

@@ -56,7 +56,7 @@ BETWEEN_N = 0.06
 BETWEEN_RATE2 = 3.0  # (rad/s)^2, the same of the squared rate of turn
 
 
-HASTY = 1.0, 0.7  # m, s: a step that no vehicle flies
+HASTY = 0.3, 0.3, "z"  # m, s: a step that no vehicle flies; upwards, which is shaped quickly
 
 
 def shape(step: Signals, body: Body, bounds: Bounds) -> ShapedSignals:
@@ -216,8 +216,8 @@ def test_slowing_down_is_no_slower_than_it_must_be() -> None:
     assert slowed is not None
     assert shaping_problem(slowed, LIMITS) == ""
     # the search ends within a few percent
-    height, rise = HASTY
-    quicker = edge(height, rise * slowed.duration_factor * 0.93)
+    height, rise, axis = HASTY
+    quicker = edge(height, rise * slowed.duration_factor * 0.93, axis)
     assert shaping_problem(shape(quicker, BODY, BOUNDS), LIMITS) != ""
 
 
