@@ -75,13 +75,13 @@ def lagrangian():
     momenta = sp.Matrix([kinetic]).jacobian(v).T
     mass = momenta.jacobian(v)
     force = virtual + sp.Matrix([kinetic - potential]).jacobian(s).T - momenta.jacobian(s) * v
-    function = sp.lambdify(
-        [coordinates, speeds, forces, list(wind), parameters], [mass, force], modules="numpy", cse=True
-    )
+    # of single numbers, for which `math` is quicker than numpy
+    arguments = [coordinates, speeds, forces, list(wind), parameters]
+    function = sp.lambdify(arguments, [*mass, *force], modules="math", cse=True)
 
     def accelerations(at, speed, rotor, values):
-        inertia, generalised = function(at, speed, rotor, WIND, values)
-        return np.linalg.solve(inertia, np.ravel(generalised))
+        found = np.array(function(at.tolist(), speed.tolist(), rotor.tolist(), WIND, values))
+        return np.linalg.solve(found[:64].reshape(8, 8), found[64:])
 
     return accelerations
 
