@@ -50,6 +50,15 @@ def aside() -> Iterator[BackgroundWorker]:
     assert not multiprocessing.active_children()
 
 
+@pytest.fixture
+def forked(aside: BackgroundWorker, monkeypatch: pytest.MonkeyPatch) -> BackgroundWorker:
+    """With a process that has branched off: it is ready at once, without a second of loading."""
+    monkeypatch.setattr("threading.active_count", lambda: 1)  # the threads of the tests hold no lock of ours
+    aside.fork()
+    aside.start(Waiting().warmup_work)
+    return aside
+
+
 def attend(aside: BackgroundWorker, onboard: Any, until: Callable[[], bool]) -> None:
     """Attend as often as a loop of 200 Hz does, and leave the processor to the process in between."""
     end = time.monotonic() + LIMIT_S
@@ -70,21 +79,16 @@ def test_one_process_does_one_work_after_the_other(aside: BackgroundWorker) -> N
     assert multiprocessing.active_children() == [process]
 
 
-def test_one_that_branched_off_does_the_same(
-    aside: BackgroundWorker, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("threading.active_count", lambda: 1)  # the threads of the tests hold no lock of ours
+def test_one_that_branched_off_does_the_same(forked: BackgroundWorker) -> None:
     onboard = Waiting()
-    aside.fork()
     (process,) = multiprocessing.active_children()
-    aside.start(onboard.warmup_work)
     work = onboard.ask(1.0)
-    attend(aside, onboard, lambda: onboard.work is None)
+    attend(forked, onboard, lambda: onboard.work is None)
     assert onboard.finished == [(work, work.run())]
     assert multiprocessing.active_children() == [process]
 
 
-def test_a_planner_that_hangs_is_broken_off_and_named(aside: BackgroundWorker, tmp_path: Path) -> None:
+def test_a_planner_that_hangs_is_broken_off_and_named(forked: BackgroundWorker, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("""
 import time
 
@@ -95,18 +99,18 @@ class Hangs:
     onboard = Waiting()
     work = onboard.ask(1.0)
     onboard.work = work = work._replace(planner=OwnSetup(f"{tmp_path}/mine.py:Hangs", {}))
-    attend(aside, onboard, lambda: onboard.work is None)
+    attend(forked, onboard, lambda: onboard.work is None)
     ((done, prepared),) = onboard.finished
     assert done is work
     assert "Planner Hangs failed: TooSlow: no answer in time (mine.py:6)" in prepared.refusal
 
 
-def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: BackgroundWorker) -> None:
+def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(forked: BackgroundWorker) -> None:
     onboard = Waiting()
     first = onboard.ask(1.0)
-    aside.update(onboard)  # type: ignore[arg-type]
+    forked.update(onboard)  # type: ignore[arg-type]
     later = onboard.ask(2.0)
-    attend(aside, onboard, lambda: onboard.work is None)
+    attend(forked, onboard, lambda: onboard.work is None)
     assert [work for work, _ in onboard.finished] == [first, later]
 
 
@@ -127,23 +131,23 @@ def test_on_the_ground_no_process_is_started_where_there_was_none(aside: Backgro
     assert onboard.finished == [(work, work.run())]
 
 
-def test_what_takes_long_and_is_of_no_use_any_more_is_given_up(aside: BackgroundWorker) -> None:
+def test_what_takes_long_and_is_of_no_use_any_more_is_given_up(forked: BackgroundWorker) -> None:
     onboard = Waiting()
     places = tuple(Waypoint(float(i % 7), float(i % 5), 2.0) for i in range(400))
     onboard.work = PathWork(places, tuple(range(400)), onboard.warmup_work.paths.limits)
-    aside.update(onboard)  # type: ignore[arg-type]
+    forked.update(onboard)  # type: ignore[arg-type]
     later = onboard.ask(2.0)
-    attend(aside, onboard, lambda: onboard.work is None)
+    attend(forked, onboard, lambda: onboard.work is None)
     assert [work for work, _ in onboard.finished] == [later]
 
 
-def test_a_process_that_dies_at_its_work_is_a_refusal(aside: BackgroundWorker) -> None:
+def test_a_process_that_dies_at_its_work_is_a_refusal(forked: BackgroundWorker) -> None:
     onboard = Waiting()
     work = onboard.ask(1.0)
-    aside.update(onboard)  # type: ignore[arg-type]
+    forked.update(onboard)  # type: ignore[arg-type]
     (process,) = multiprocessing.active_children()
     process.kill()
-    attend(aside, onboard, lambda: onboard.work is None)
+    attend(forked, onboard, lambda: onboard.work is None)
     ((done, prepared),) = onboard.finished
     assert done is work
     assert prepared.refusal == "the process that prepares paths has died"
