@@ -50,7 +50,8 @@ def test_the_truth_of_another_simulator_is_refused(start: Callable[..., Any], tm
     at = free_port()
     boot = mavlink.MAVLink_sim_boot_message(0, 1, [0.0] * 4, 0.0, 0, 0)
     status = mavlink.MAVLink_sim_status_message(0, 1.0, 111.0, 0, 0, 0, 0, 1, 1)
-    words = ("hover", "--connect", port, "--truth", str(at), "--out", "out", "--quiet")
+    OUT_AND_DOWN.save(tmp_path / "out.toml")
+    words = ("out.toml", "--connect", port, "--truth", str(at), "--out", "out", "--quiet")
     flight = start("gcs", "fly", *words)
     with closing(UdpSocket()) as other:
         while flight.process.poll() is None:

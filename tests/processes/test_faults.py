@@ -16,6 +16,7 @@ import pytest
 from gcs.shell.link import LOOPBACK, free_port, parse_address
 from gcs.shell.session import Session
 from gcs.workflows.status import status_record
+from plumbline import Land, Mission, Takeoff, Waypoint
 from tests.doubles.ports import ground_port
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ TOLD = (
     "mission_items",
     "time_s",
 )  # known in a complete status
+MISSION = Mission("over there", [Takeoff(2.0), Waypoint(6.0, 0.0, 2.0), Land()])
 # paced as without options: the world waits for all programs, but its seconds are shorter
 QUICK = ("--speed", "4")
 
@@ -86,7 +88,9 @@ class Flight:
         self.until(lambda status: status["load_up_m"] > 0.5)
 
     def into_the_mission(self) -> None:
-        for command in (("upload", "square"), ("start",), ("arm",)):
+        mission = self._storage.with_name("over-there.toml")
+        MISSION.save(mission)
+        for command in (("upload", str(mission)), ("start",), ("arm",)):
             self.do(*command)
         self.until(lambda status: status["phase"] == "mission" and status["load_up_m"] > 1.0)
 
