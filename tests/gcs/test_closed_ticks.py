@@ -13,8 +13,7 @@ from gcs import closed_loop
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions
 from gcs.closed_ticks import ClosedTicks, FlownTicks
-from gcs.mission_files import load
-from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
+from missions.model import Delay, Land, Mission, Release, Takeoff, Waypoint, Winch
 from plumbline.examples.load_pid import LoadPid
 
 ERRAND = Mission(
@@ -24,6 +23,7 @@ ERRAND = Mission(
     (),
     (Takeoff(1.2), Winch(0.8, None), Waypoint(1.0, 0.5, 1.2, hold_s=0.5), Release(), Land()),
 )
+HOVER = Mission("hover", "Hover", "", (), (Takeoff(1.0), Delay(2.0), Land()))
 GUSTS = {"SIM_WIND_E": 3.0, "SIM_GUST_STD": 1.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 9.0}
 
 
@@ -54,12 +54,12 @@ def flown(mission: Mission, conditions: Conditions, **how: Any) -> tuple[Outcome
 @pytest.mark.parametrize(
     ("mission", "conditions"),
     [
-        (load("hover"), Conditions()),
+        (HOVER, Conditions()),
         (ERRAND, Conditions(sensors="rtk", seed=2)),
-        (load("hover"), Conditions("heavy-real", "field", 3, GUSTS)),
-        (load("hover"), Conditions(settings={"SIM_CBL_LINKS": 3.0, "SIM_RATE_HZ": 500.0})),
-        (load("hover"), Conditions(own=OwnCode("plumbline.examples.load_pid:LoadPid"))),
-        (load("hover"), Conditions(own=OwnCode(f"{__name__}:Fails"))),
+        (HOVER, Conditions("heavy-real", "field", 3, GUSTS)),
+        (HOVER, Conditions(settings={"SIM_CBL_LINKS": 3.0, "SIM_RATE_HZ": 500.0})),
+        (HOVER, Conditions(own=OwnCode("plumbline.examples.load_pid:LoadPid"))),
+        (HOVER, Conditions(own=OwnCode(f"{__name__}:Fails"))),
     ],
     ids=["hover", "errand", "field", "links", "own law", "own law that fails"],
 )
@@ -91,6 +91,6 @@ def test_the_ground_station_has_its_turn_at_each_window() -> None:
         nonlocal turns
         turns += 1
 
-    _, log = flown(load("hover"), Conditions(sensors="ideal"), on_turn=shown)
+    _, log = flown(HOVER, Conditions(sensors="ideal"), on_turn=shown)
     seconds = (log[-1][0] - log[0][0]) * 1e-6
     assert turns == pytest.approx(seconds / 0.02, rel=0.01)

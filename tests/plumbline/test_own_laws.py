@@ -191,23 +191,24 @@ def heavier_by(factor: float) -> type:
 
 def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """And it flies each as `fly` does, also one that only this process has."""
+    short = plumbline.Mission("short", [Takeoff(0.5), Delay(1.0), Land()])
     path = tmp_path / "mine.py"
     path.write_text(SAYS)
     laws = (heavier_by(1.02), f"{path}:Fails")
     out = tmp_path / "out"
-    rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
+    rows = plumbline.sweep(short, laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
     assert capfd.readouterr() == ("", "said by a worker\n")
     assert [(row["law"], row["outcome"]) for row in rows] == [("heavier", "completed"), ("Fails", "diverged")]
-    error_m = plumbline.fly("hover", law=Heavier, quiet=True).summary["load_error_max_m"]
+    error_m = plumbline.fly(short, law=Heavier, quiet=True).summary["load_error_max_m"]
     assert rows[0]["load_error_max_m"] == pytest.approx(error_m, rel=1e-3)
     plan = json.loads((out / "plan.json").read_text())
     (saved,) = (out / "classes").iterdir()
     assert plan["origin"]["settings"]["plan"]["laws"] == [str(saved), laws[1]]
-    flown_again = plumbline.fly("hover", law=str(saved), quiet=True)
-    assert flown_again.tlog == plumbline.fly("hover", law=laws[0], quiet=True).tlog
+    flown_again = plumbline.fly(short, law=str(saved), quiet=True)
+    assert flown_again.tlog == plumbline.fly(short, law=laws[0], quiet=True).tlog
     path.write_text(FAILS.replace("3.0", "2.0"))
     with pytest.raises(plumbline.Error, match="holds another sweep"):
-        plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True)
+        plumbline.sweep(short, laws=laws, jobs=1, out=out, quiet=True)
 
 
 def test_a_class_whose_attributes_were_set_is_not_swept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -544,7 +544,7 @@ def world_return() -> Witness:
 
 def world_lag() -> Witness:
     """A vehicle alone that is too weak for its speed against the wind."""
-    steps = (Takeoff(1.5), model.Release(), Speed(10.0), Waypoint(-200.0, 0.0, 5.0), model.Land())
+    steps = (Takeoff(1.5), model.Release(), Speed(10.0), Waypoint(-100.0, 0.0, 5.0), model.Land())
     witness = mission(*steps, SIM_WIND_E=12.0)
     assert any(text.startswith("Path waits: vehicle") for text in witness.craft.texts)
     assert witness.craft.flight.mission.done

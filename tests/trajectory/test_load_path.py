@@ -82,8 +82,9 @@ def test_the_check_says_what_is_wrong_with_a_trajectory() -> None:
     hasty = slower_step(LOOP, 0.2)
     assert isinstance(hasty, Trajectory)
     for shaped in (True, False):
-        assert any("items[1] (trajectory): at" in line for line in found(hasty, shaped))
-        assert all("give its points later times" in line for line in found(hasty, shaped))
+        told = found(hasty, shaped)
+        assert any("items[1] (trajectory): at" in line for line in told)
+        assert all("give its points later times" in line for line in told)
     deep = Trajectory([(0.0, 0.0, 0.0, 0.0), (5.0, 0.0, 0.0, -0.9), (10.0, 0.0, 0.0, 0.0)])
     (line,) = found(deep, shaped=True)
     assert "the load would be 0.10 m above the ground; it must be at least 0.3 m above" in line
