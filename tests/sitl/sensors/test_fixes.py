@@ -46,11 +46,11 @@ def test_fixes_float_as_often_and_as_long_as_stated(core) -> None:
 
 
 def test_a_lost_fix_comes_back_floating(core) -> None:
-    flown = core("rtk", SIM_GPS_LOST=6.0, SIM_GPS_LOST_S=1.0, SIM_GPS_FLT_S=2.0, SIM_RATE_HZ=100)
-    quality, _ = qualities(flown, 1300.0)
+    flown = core("rtk", SIM_GPS_LOST=20.0, SIM_GPS_LOST_S=1.0, SIM_GPS_FLT_S=2.0, SIM_RATE_HZ=100)
+    quality, _ = qualities(flown, 472.0)
     lost = spells(quality == LOST)
-    # every 10 s of a fix, floating or not, for 1 s
-    assert len(lost) == pytest.approx(1300.0 / 11.0, abs=SIGMAS * sqrt(118))
+    # every 3 s of a fix, floating or not, for 1 s
+    assert len(lost) == pytest.approx(472.0 / 4.0, abs=SIGMAS * sqrt(118))
     assert lost.mean() * 0.1 == pytest.approx(1.05, abs=SIGMAS / sqrt(len(lost)))
     after = quality[1:][(quality[:-1] == LOST) & (quality[1:] != LOST)]
     # unless it takes less than a period to settle
