@@ -178,15 +178,19 @@ def test_a_pickled_copy_goes_on_where_its_original_is(options: dict[str, Any]) -
         one.close()
 
 
-@pytest.mark.parametrize("observation", ["truth", "estimate"])
-def test_another_process_goes_on_with_a_pickled_environment(observation: str, tmp_path: Path) -> None:
-    env = gymnasium.make(HOVER, observation=observation)
-    env.reset(seed=3)
-    path = tmp_path / "env"
-    path.write_bytes(pickle.dumps(env))
-    program = f"import pickle; env = pickle.load(open({str(path)!r}, 'rb')); print(env.step({[0.1] * 4})[0])"
+def test_another_process_goes_on_with_pickled_environments(tmp_path: Path) -> None:
+    envs = [gymnasium.make(HOVER, observation=observation) for observation in ("truth", "estimate")]
+    for env in envs:
+        env.reset(seed=3)
+    path = tmp_path / "envs"
+    path.write_bytes(pickle.dumps(envs))
+    program = f"""
+import pickle
+for env in pickle.load(open({str(path)!r}, "rb")):
+    print(env.step({[0.1] * 4})[0])
+"""
     told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-    assert told.stdout.strip() == str(env.step(np.full(4, 0.1))[0])
+    assert told.stdout == "".join(f"{env.step(np.full(4, 0.1))[0]}\n" for env in envs)
 
 
 def test_statistics_of_gymnasium_count_episodes() -> None:
