@@ -67,10 +67,12 @@ def _at_pace(path: Jet, rates: tuple[float, ...]) -> Jet:
     )
     later = []
     for row in weights:
-        total = ZERO
-        for weight, derivative in zip(row, y, strict=False):
-            total = axpy(weight, derivative, total)
-        later.append(total)
+        east = north = up = 0.0
+        for weight, (along_east, along_north, along_up) in zip(row, y, strict=False):
+            east += weight * along_east
+            north += weight * along_north
+            up += weight * along_up
+        later.append((east, north, up))
     return (x, later[0], later[1], later[2], later[3], later[4], later[5])
 
 
