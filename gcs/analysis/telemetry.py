@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,11 +36,15 @@ from gcs.analysis.tracks import (
     VelocityTrack,
     WindTrack,
 )
-from gcs.analysis.vehicle_setup import SETUP_MESSAGES, VEHICLE_SYSTEM, VehicleSetup
+from gcs.analysis.vehicle_setup import SETUP_MESSAGES, VehicleSetup
+from gcs.clients.connection import is_vehicle
 
 LogRecord = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
 
 AUTOPILOT_COMPONENT = 1
+_SIMULATOR_SYSTEM = 1  # of the messages of sitl, whatever the system id of the vehicle
+_SIMULATOR_COMPONENTS = (26, 27)  # no vehicle sends as one of them
+_DEFAULT_SYSTEM = 1  # of the vehicle in a log without its heartbeat
 _BATTERY_STATUS = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
 _SIMULATED_BATTERY = "SIM_BATTERY"  # 0: what is reported is calculated, of a battery that never gets empty
 _MICRO = 1e-6
@@ -74,16 +79,18 @@ _UNSTAMPED = (
 
 
 def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
-    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
+    """The flight of the vehicle whose heartbeat comes first in the log, with the truth of its simulator; what
+    other systems sent (ground stations, the load, other vehicles) is left out."""
+    vehicle, records = _vehicle_system(records)
     frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_STAMPED, *_UNSTAMPED)}
     stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
     texts: list[tuple[int, Any]] = []
     readings: list[tuple[int, BatteryReading]] = []
-    setup = VehicleSetup()
+    setup = VehicleSetup(vehicle)
     for unix_us, received in records:
         if received.id in SETUP_MESSAGES:
             setup.receive(received)
-        if received.system != VEHICLE_SYSTEM:
+        if received.system != vehicle and not _is_of_simulator(received):
             continue
         if received.id not in frames:
             if received.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -121,6 +128,23 @@ def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
         telemetry.load_truth, telemetry.rotors_truth, telemetry.mission_current, telemetry.mission, home
     )
     return replace(telemetry, setpoint=setpoint, home=home)
+
+
+def _vehicle_system(records: Iterable[LogRecord]) -> tuple[int, Iterable[LogRecord]]:
+    """The system id of the first vehicle whose heartbeat is in the log, and all records of the log."""
+    rest = iter(records)
+    before: list[LogRecord] = []
+    for record in rest:
+        before.append(record)
+        received = record[1]
+        is_heartbeat = received.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+        if is_heartbeat and received.component == AUTOPILOT_COMPONENT and is_vehicle(received.message):
+            return received.system, chain(before, rest)
+    return _DEFAULT_SYSTEM, before
+
+
+def _is_of_simulator(received: Received) -> bool:
+    return received.system == _SIMULATOR_SYSTEM and received.component in _SIMULATOR_COMPONENTS
 
 
 def _origin(hil: Columns, load: LoadTrack) -> Home | None:

@@ -10,7 +10,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.records import WireItem
 from autopilot.wire.parameter_encoding import decode_parameter_value
 
-VEHICLE_SYSTEM = 1
 SETUP_MESSAGES = (
     mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
@@ -20,9 +19,11 @@ SETUP_MESSAGES = (
 
 
 class VehicleSetup:
-    """Collects messages of the kinds `SETUP_MESSAGES` from all senders, in the order of the log."""
+    """Collects messages of the kinds `SETUP_MESSAGES` from all senders, in the order of the log; `system`:
+    the system id of the vehicle."""
 
-    def __init__(self) -> None:
+    def __init__(self, system: int) -> None:
+        self._system = system
         self.parameters: dict[str, float] = {}
         self.home = Home()  # the reference of the items' positions
         self._items: dict[int, WireItem] = {}
@@ -34,10 +35,10 @@ class VehicleSetup:
         message = received.message
         if received.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             value = decode_parameter_value(message.param_value, message.param_type)
-            if received.system == VEHICLE_SYSTEM and math.isfinite(value):
+            if received.system == self._system and math.isfinite(value):
                 self.parameters[message.param_id] = value
         elif received.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
-            if received.system == VEHICLE_SYSTEM:
+            if received.system == self._system:
                 self.home = Home(1e-7 * message.latitude, 1e-7 * message.longitude, 1e-3 * message.altitude)
         elif message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION:
             self._receive_mission(received)

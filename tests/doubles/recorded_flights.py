@@ -99,13 +99,14 @@ class Flight:
     winds: list[tuple[float, tuple]] = field(default_factory=list)  # time of the beginning, gust pulse, ENU
     snaps: list[tuple[float, float, float]] = field(default_factory=list)  # time, speed, impulse
     drop: Callable[[int, str], bool] = lambda i, kind: False
+    system: int = 1  # of the vehicle; its simulator is always 1
 
     @property
     def mission(self) -> np.ndarray:
         return self.phase == mavlink.PLUMBLINE_PHASE_MISSION
 
     def records(self) -> Iterator[tuple[int, bytes]]:
-        truth, common, dialect = FrameWriter(1, 26), FrameWriter(1, 1), FrameWriter(1, 25)
+        truth, common, dialect = FrameWriter(1, 26), FrameWriter(self.system, 1), FrameWriter(self.system, 25)
         ground, load = FrameWriter(255, 190), FrameWriter(2, 35)
         texts = sorted(self.texts)
         for t, gust in self.winds:

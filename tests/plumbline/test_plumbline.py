@@ -61,6 +61,15 @@ def test_the_same_seed_is_the_same_flight(flight: plumbline.Flight) -> None:
     assert plumbline.fly(SHORT, sensors="ideal", seed=2, quiet=True).tlog != flight.tlog
 
 
+def test_the_figures_do_not_depend_on_the_system_id_of_the_vehicle(flight: plumbline.Flight) -> None:
+    settings = {"SIM_ACT_DELAY_MS": 4, "MAV_SYS_ID": 3}
+    third = plumbline.fly(SHORT, sensors="ideal", seed=2, settings=settings, quiet=True)
+    timing = {"wall_s", "real_time_factor", "settings"}
+    figures, expected = ({k: v for k, v in f.summary.items() if k not in timing} for f in (third, flight))
+    assert figures == expected
+    assert third.telemetry("arrow").equals(flight.telemetry("arrow"))
+
+
 def test_telemetry_comes_as_what_is_asked_for(flight: plumbline.Flight) -> None:
     frames = [flight.telemetry(), flight.telemetry("polars"), flight.telemetry("arrow")]
     assert [type(frame) for frame in frames] == [pandas.DataFrame, polars.DataFrame, pyarrow.Table]

@@ -2,6 +2,7 @@
 
 import io
 import struct
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,45 @@ def test_other_systems_are_left_out(telemetry):
     assert np.abs(telemetry.attitude_estimated.omega_body).max() == 0.0
     assert (telemetry.heartbeat.custom_mode == 0).all()
     assert (telemetry.heartbeat.base_mode == 128).all()
+
+
+_TRACKS = (
+    "load_truth",
+    "load_estimated",
+    "setpoint",
+    "cascade",
+    "rotors_truth",
+    "heartbeat",
+    "mission_current",
+)
+
+
+def test_a_vehicle_and_its_simulator_are_found_whatever_the_system_id_of_the_vehicle(made, telemetry):
+    found = replace(made, system=3).telemetry()
+    for name in _TRACKS:
+        for column, expected in zip(
+            astuple(getattr(found, name)), astuple(getattr(telemetry, name)), strict=True
+        ):
+            np.testing.assert_array_equal(column, expected, err_msg=name)
+    assert found.texts == telemetry.texts
+
+
+def test_of_several_vehicles_in_a_log_the_one_whose_heartbeat_comes_first_is_reported(made, telemetry):
+    records = [(us, decode(frame)[0][0]) for us, frame in replace(made, system=3).records()]
+    first = next(i for i, (_, one) in enumerate(records) if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+    autopilot, dialect = FrameWriter(1, 1), FrameWriter(1, 25)  # of the other vehicle
+    frames = (
+        autopilot.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 5, 4, 3)),
+        autopilot.frame(mavlink.MAVLink_param_value_message(b"SIM_BATTERY", 1.0, 9, 1, 0)),
+        dialect.frame(
+            mavlink.MAVLink_cascade_errors_message(9, *[[9.0] * 3] * 6, 9.0, 9.0, 9.0, [9.0] * 3, 1)
+        ),
+    )
+    other = [(records[first][0], decode(frame)[0][0]) for frame in frames]
+    found = telemetry_of([*records[: first + 1], *other, *records[first + 1 :]])
+    np.testing.assert_array_equal(found.heartbeat.custom_mode, telemetry.heartbeat.custom_mode)
+    np.testing.assert_array_equal(found.cascade.time_s, telemetry.cascade.time_s)
+    assert not found.parameters
 
 
 def test_what_bears_no_stamp_is_put_on_the_vehicles_clock(made, telemetry):
