@@ -272,10 +272,12 @@ class Flight:
         """Write the files of `gcs fly`, without the logs of its programs, into the directory `out`; returns
         the path of the page. With `pictures` also write the pictures that `gcs fly --pictures` draws.
 
-        `Error` if the directory holds another flight, unless `overwrite=True`, which replaces that flight.
-        The same flight may be written again.
+        `Error` if the directory holds another flight, unless `overwrite=True`, which replaces that flight
+        and deletes all its files. The same flight may be written again; its logs, and the files that were
+        made on demand, are kept.
         """
         from gcs.analysis.readings import write_readings
+        from gcs.report.build import write_meta
         from gcs.workflows.report import make_report
         from gcs.workflows.vehicle_processes import LOGS
 
@@ -283,15 +285,21 @@ class Flight:
         with errors_for_python():
             make_folder(folder)
             check_no_other_results(folder, TLOG_FILE)
-            if not overwrite and _holds_another(folder / TLOG_FILE, self.tlog):
+            earlier = _log_in(folder)
+            if earlier not in (b"", self.tlog) and not overwrite:
                 raise GcsError(
                     f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
                 )
             readings = self._kept_readings  # read before their files may be replaced
-            for name in LOGS:  # of another flight
-                (folder / name).unlink(missing_ok=True)
-            write_atomically(folder / TLOG_FILE, self.tlog)
-            make_report(folder / TLOG_FILE, folder, self._meta, quiet, pictures="png" if pictures else None)
+            new_meta: FlightMeta | None = self._meta
+            if earlier == self.tlog:
+                write_meta(folder, self._meta)
+                new_meta = None
+            else:
+                for name in LOGS:  # of the flight that is replaced
+                    (folder / name).unlink(missing_ok=True)
+                write_atomically(folder / TLOG_FILE, self.tlog)
+            make_report(folder / TLOG_FILE, folder, new_meta, quiet, pictures="png" if pictures else None)
             if readings is not None:
                 write_readings(folder / SENSORS_FOLDER, readings)
         return folder / PAGE_FILE
@@ -318,10 +326,11 @@ class Flight:
         return self.plot().png
 
 
-def _holds_another(file: Path, tlog: bytes) -> bool:
-    """Whether the file exists, is not empty, and holds other telemetry than this."""
+def _log_in(folder: Path) -> bytes:
+    """The telemetry of the flight that a folder holds; empty if it holds none."""
+    file = folder / TLOG_FILE
     try:
-        return file.exists() and file.read_bytes() not in (b"", tlog)
+        return file.read_bytes() if file.exists() else b""
     except OSError as error:
         raise write_error(error, file, option="") from None
 

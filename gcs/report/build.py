@@ -90,7 +90,7 @@ def build_report(
         if check is not None:
             check(record)
         record["report_dir"] = str(out_dir)
-        _write_json(out_dir / META_FILE, meta.to_json())
+        write_meta(out_dir, meta)
         _write_json(out_dir / SUMMARY_FILE, record)
         done(remaining[0])
         if figures is not None:
@@ -150,6 +150,11 @@ def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -
     path = out_dir / MCAP_FILE
     write_mcap(path, telemetry, samples_of(telemetry), Layout(rotor_positions, layout["load_radius"]))
     return path
+
+
+def write_meta(directory: Path, meta: FlightMeta) -> None:
+    """Write meta.json of a flight into the directory of its report."""
+    _write_json(directory / META_FILE, meta.to_json())
 
 
 def _write_json(path: Path, values: Record) -> None:

@@ -183,6 +183,22 @@ def test_a_report_replaces_another_flight_only_when_asked(flight: plumbline.Flig
     assert log.read_bytes() == flight.tlog
 
 
+def test_a_report_of_the_same_flight_keeps_every_file_of_it_and_one_of_another_none(
+    flight: plumbline.Flight, tmp_path: Path
+) -> None:
+    flight.report(tmp_path, pictures=True)
+    kept = ("flight.ulg", "autopilot.log", "sitl.log", "flight.mcap", "flight.common.tlog", "error.png")
+    for name in kept:
+        (tmp_path / name).write_bytes(b"of this flight")
+    plumbline.Flight.load(tmp_path).report(tmp_path)
+    assert {(tmp_path / name).read_bytes() for name in kept} == {b"of this flight"}
+
+    other = plumbline.fly(SHORT, sensors="ideal", seed=3, quiet=True)
+    other.report(tmp_path, overwrite=True)
+    assert not [name for name in kept if (tmp_path / name).exists()]
+    assert plumbline.Flight.load(tmp_path).tlog == other.tlog
+
+
 def test_a_report_where_the_log_is_a_folder(flight: plumbline.Flight, tmp_path: Path) -> None:
     (tmp_path / "flight.tlog").mkdir()
     with pytest.raises(plumbline.Error, match=r"flight\.tlog: Is a directory; name another folder$"):
