@@ -12,7 +12,12 @@ from autopilot.trajectory.rotor_demand import bounds_along_paths
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.vehicle.layout import MAX_ROTOR_FORCE_N, Layout
 from autopilot.vehicle.parameters import AutopilotParameters, shapes_paths
-from autopilot.vehicle.rotors import allocation_columns, control_authority
+from autopilot.vehicle.rotors import (
+    allocation_columns,
+    control_authority,
+    mixer_table,
+    thrust_and_moment_per_force,
+)
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
 MIN_AUTHORITY = 0.1  # least authority over moments to fly with, as a share of that of all rotors
@@ -84,6 +89,11 @@ class RotorSettings:
     min_effort_n: float  # least effort of a rotor
     max_effort_n: float  # greatest effort of a rotor
     hover_thrust_n: float  # carries vehicle and load
+
+    @property
+    def greatest_thrust_n(self) -> float:
+        """Thrust (N) at which the first rotor reaches its limit."""
+        return thrust_and_moment_per_force(mixer_table(self.layout))[0] * self.max_effort_n
 
     def can_fly_without(self, lost: int) -> bool:
         """Whether the remaining rotors can keep vehicle and load in the air and level."""

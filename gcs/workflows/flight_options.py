@@ -81,8 +81,10 @@ class FlightOptions:
 
     @property
     def mission_settings(self) -> tuple[tuple[str, float], ...]:
-        """The settings that determine which paths the autopilot flies (MIS_), the last of each name."""
-        return tuple(dict(map(parse_setting, (s for s in self.settings if s.startswith("MIS_")))).items())
+        """The settings that determine which paths the autopilot flies (MIS_) and the vehicle that it assumes
+        (VEH_), the last of each name."""
+        named = (s for s in self.settings if s.startswith(("MIS_", "VEH_")))
+        return tuple(dict(map(parse_setting, named)).items())
 
     @property
     def allows_infeasible(self) -> bool:

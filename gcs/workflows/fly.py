@@ -223,10 +223,6 @@ def _finish(
     outcome = client.outcome or Outcome("interrupted")
     if options.firmware is None:  # a firmware counts items in its own way
         outcome = outcome.in_mission_terms(mission)
-    if options.firmware is None and options.connect is None:
-        from gcs.workflows.refused_settings import with_blamed_settings
-
-        outcome = with_blamed_settings(outcome, options)
     tlog = out / TLOG_FILE
     if tlog.stat().st_size == 0:
         if stop:

@@ -46,9 +46,12 @@ def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
 def require_flyable(
     mission: Mission, vehicle: str, follows_shaped: bool = True, settings: Settings = ()
 ) -> None:
-    """GcsError unless the vehicle can fly the mission, with these parameters of missions (MIS_)."""
+    """GcsError unless the vehicle can fly the mission, with these parameters of missions (MIS_) and of the
+    assumed vehicle (VEH_)."""
     found = violations(mission, vehicle, load_limits(vehicle, settings), follows_shaped, settings)
     if found:
-        summary = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
+        changed = ", ".join(f"{name}={value:g}" for name, value in settings if name.startswith("VEH_"))
+        which = f"{vehicle} with {changed}" if changed else vehicle
+        summary = f"{mission.name} cannot be flown by vehicle {which}; --force tries:"
         texts = [in_file_terms(str(one), mission) for one in found]
         raise GcsError(*([f"{summary} {texts[0]}"] if len(texts) == 1 else [summary, *texts]))

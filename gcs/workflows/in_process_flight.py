@@ -13,7 +13,6 @@ from gcs.foreign_mission import home_of
 from gcs.shell.display import FlightDisplay
 from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
-from gcs.workflows.refused_settings import with_blamed_settings
 from gcs.workflows.started_flight import flight_client
 from gcs.workflows.warmup import in_process_parts, vehicle_parts, warm_up
 from missions.model import Mission
@@ -52,5 +51,4 @@ def fly_in_process(
             options.own,
             ignored=frozenset(options.ignored),
         )
-        outcome = fly(mission, conditions, log, client=client, on_turn=show, log_sensors=log_sensors)
-    return with_blamed_settings(outcome, options)
+        return fly(mission, conditions, log, client=client, on_turn=show, log_sensors=log_sensors)

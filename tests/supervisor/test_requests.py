@@ -16,6 +16,7 @@ from autopilot.supervisor.advance import advance
 from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as YES
+from autopilot.supervisor.settings import Settings, settings_from
 from autopilot.supervisor.state import (
     IN_AIR,
     ON_GROUND,
@@ -25,6 +26,8 @@ from autopilot.supervisor.state import (
     MissionProgress,
     Phase,
 )
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, hanging, view
@@ -187,6 +190,23 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
     assert (told.result, told.text, told.warns) == (ACCEPTED, why, True)
     forced, verdict = decide(Flight(), R.Arm(True, True), seen, SETTINGS)
     assert (forced.phase, verdict) == (Phase.ARMED, YES)
+
+
+def settings_with(**parameters: float) -> Settings:
+    table = autopilot_parameters(load_vehicle("bebop"))
+    for name, value in parameters.items():
+        table.set(name, value)
+    return settings_from(table, 0.0, supports_reeling=True, follows_shaped=True)
+
+
+def test_a_vehicle_whose_assumed_weight_exceeds_its_thrust_is_not_armed() -> None:
+    heavy = settings_with(VEH_LOAD_MASS=0.5)
+    why = "cannot hover, weighs 8.83 N, rotors give 7.84 N"
+    assert arming_problems(Flight(), view(), heavy) == (why,)
+    released = replace(Flight(), cable=replace(Flight().cable, released=True))
+    assert arming_problems(released, view(), heavy) == ()
+    assert arming_problems(Flight(), view(), settings_with(VEH_LOAD_MASS=0.5, VEH_ROTOR_MAX=2.3)) == ()
+    assert arming_problems(Flight(), view(), settings_with(VEH_LOAD_MASS=0.5, VEH_ROTOR_LIM=0.0)) == ()
 
 
 def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:

@@ -49,6 +49,11 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
         problems.append(f"moving at {norm(view.v_quad):.1f} m/s")
     if flight.empty_battery_percent is not None:
         problems.append(f"battery nearly empty, {flight.empty_battery_percent} % left")
+    weight_n = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
+    if weight_n >= settings.rotors.greatest_thrust_n:
+        problems.append(
+            f"cannot hover, weighs {weight_n:.2f} N, rotors give {settings.rotors.greatest_thrust_n:.2f} N"
+        )
     here = view.x_quad if flight.cable.released else view.x_load
     fence_reason = fence_problem(flight, here, settings)
     if fence_reason:
