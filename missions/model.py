@@ -10,12 +10,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from missions.named_arguments import names_its_arguments
 from missions.path_rows import path_rows
 
 Axis = Literal["x", "y", "z"]
 Controlled = Literal["vehicle", "load"]
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Takeoff:
     """Pull the cable taut above the load and lift it straight up, to `altitude_m` above home."""
@@ -23,6 +25,7 @@ class Takeoff:
     altitude_m: float
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Waypoint:
     """Carry the load to a point, from rest to rest, and hold it there for `hold_s` seconds."""
@@ -33,6 +36,7 @@ class Waypoint:
     hold_s: float = 0.0
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Speed:
     """Peak speed of the load on the transfers that follow; None: that for which the vehicle is configured."""
@@ -40,6 +44,7 @@ class Speed:
     speed_m_s: float | None = None
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Delay:
     """Hold the load where it hangs."""
@@ -67,6 +72,7 @@ class PlaceLoad(Release):
     """Lower the load to the ground below it and release it there."""
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Winch:
     """Make the cable longer by `length_m` (negative: shorter): the vehicle stays, the load sinks or rises.
@@ -78,6 +84,7 @@ class Winch:
     speed_m_s: float | None = None
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Sine:
     """sin(2 pi (t - start_s) / period_s + phase_rad), t in seconds since the signals began."""
@@ -92,6 +99,7 @@ def _no_rise() -> float:
     raise TypeError("Term() misses the argument 'rise_s'")
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Term:
     """amplitude_m * envelope(t) * product of factors, added to one axis of the load's path.
@@ -114,6 +122,7 @@ class Term:
     rise_90_by_s: float | None = None
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class Signals:
     """Fly the sum of the terms for `duration_s`, from where the load's setpoint is when the step begins."""
@@ -172,6 +181,7 @@ class Trajectory:
         return self.points[-1].t_s
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class AttitudeRun:
     """Swing an attitude out and back: angle(t) = tilt * sin^2(pi t / duration_s), t from 0 to `duration_s`.
@@ -187,6 +197,7 @@ class AttitudeRun:
     duration_s: float
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class TurnHeading:
     """Turn to a heading, from east to north, or by an angle (`relative`). `sense`: 1 counter-clockwise seen
@@ -198,6 +209,7 @@ class TurnHeading:
     rate_rad_s: float | None = None
 
 
+@names_its_arguments
 @dataclass(frozen=True, slots=True)
 class LookAt:
     """Keep the heading towards a place, ENU from home; None: stop doing so."""
