@@ -10,7 +10,7 @@ import struct
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-_MAGIC = b"ULog\x01\x12\x35"
+MAGIC = b"ULog\x01\x12\x35"
 _VERSION = 1
 _HEAD = struct.Struct("<HB")  # size of what follows, kind
 _TIME = struct.Struct("<Q")
@@ -88,7 +88,7 @@ class UlogWriter:
         defaults: Mapping[str, float],
     ) -> bytes:
         """Header, definitions and subscriptions; `defaults` are those that differ from the parameters."""
-        parts = [_MAGIC + bytes((_VERSION,)) + _TIME.pack(time_us), _message(b"B", _FLAGS)]
+        parts = [MAGIC + bytes((_VERSION,)) + _TIME.pack(time_us), _message(b"B", _FLAGS)]
         parts += [_info(name, value) for name, value in info.items()]
         parts += [_message(b"F", topic.format.encode()) for topic in self._topics]
         parts += [parameter(name, value) for name, value in parameters.items()]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
+from autopilot.wire.ulog import MAGIC
 from gcs.errors import GcsError, InputError, disk_problem, write_error
 from gcs.folders import (
     PAGE_FILE,
@@ -85,7 +86,12 @@ def find_log(source: Path) -> Path:
     if not tlog.is_file():
         raise InputError(f"{tlog}: {'not a file' if tlog.exists() else 'no such file'}; {allowed}")
     if next(read_tlog(tlog), None) is None:
-        raise InputError(f"{tlog}: holds no telemetry; {allowed}")
+        with tlog.open("rb") as file:
+            is_ulog = file.read(len(MAGIC)) == MAGIC
+        if is_ulog and (tlog.parent / TLOG_FILE).is_file():
+            allowed = f"give {tlog.parent / TLOG_FILE}"
+        found = "is a ULog, which holds no telemetry" if is_ulog else "holds no telemetry"
+        raise InputError(f"{tlog}: {found}; {allowed}")
     return tlog
 
 

@@ -191,6 +191,13 @@ def test_what_holds_no_telemetry_makes_no_report(tmp_path):
     source.write_bytes(b"PAR1" + bytes(range(256)) * 50)
     assert "holds no telemetry" in one_line(run("report", str(source)), EXIT_USAGE)
     assert [path.name for path in tmp_path.iterdir()] == ["flight.parquet"]
+    onboard = tmp_path / "flight.ulg"
+    onboard.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(100))
+    line = one_line(run("report", str(onboard)), EXIT_USAGE)
+    assert "is a ULog, which holds no telemetry; must be a .tlog" in line
+    (tmp_path / "flight.tlog").touch()
+    line = one_line(run("report", str(onboard)), EXIT_USAGE)
+    assert line.endswith(f"is a ULog, which holds no telemetry; give {tmp_path / 'flight.tlog'}")
 
 
 def test_no_flight_is_reported_of_a_folder_of_a_sweep(tmp_path: Path) -> None:
