@@ -39,6 +39,7 @@ from autopilot.supervisor.state import (
     ActionWhenArmed,
     Flight,
     Phase,
+    can_fly,
     has_fence,
     leg_time_s,
     needs_load_estimate,
@@ -185,6 +186,8 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
         or isinstance(leg, CatchLoad | LagWait)
         or flight.cable.slack_since_us >= 0
+        or flight.out_of_control_since_us >= 0
+        or not can_fly(flight, settings)
         or flight.phase == Phase.GUIDED
         or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)
         or not flight.heading.is_settled

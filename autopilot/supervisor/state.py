@@ -234,6 +234,7 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
+    out_of_control_since_us: int = -1  # since when it is off its path and not controlled, -1: it is not
     fall: Fall = Fall.NONE
     # per cent of the charge that a measured battery has left if it is too empty to fly; None: it is not
     empty_battery_percent: int | None = None
@@ -306,6 +307,18 @@ def with_battery(flight: Flight, reading: BatteryReading) -> Flight:
     return (
         flight if percent == flight.empty_battery_percent else replace(flight, empty_battery_percent=percent)
     )
+
+
+def can_fly(flight: Flight, settings: Settings) -> bool:
+    """Whether the rotors that are not lost can fly the vehicle."""
+    return not flight.rotors_lost or settings.rotors.can_fly_without(flight.rotors_lost)
+
+
+def lost_rotors_text(flight: Flight) -> str:
+    """The rotors that are lost, by their numbers."""
+    lost = flight.rotors_lost
+    numbers = [str(i + 1) for i in range(lost.bit_length()) if lost >> i & 1]
+    return f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
 
 
 def takeoff_event(flight: Flight) -> Event:

@@ -534,11 +534,16 @@ def test_a_ground_station_is_not_missed_unless_that_is_asked_for() -> None:
 @pytest.mark.parametrize("rotor", [1, 3])
 def test_a_rotor_that_fails_ends_the_flight(rotor: int) -> None:
     craft = under_way()
+    told = len(craft.texts)
     set_parameter(craft, "SIM_ENGINE_FAIL", 1 << (rotor - 1))
-    craft.run(at_phase(Phase.DISARMED), 10.0)
+    craft.run(at_phase(Phase.FAILSAFE), 3.0)
     craft.tick()
-    assert craft.texts[-1] in ("Disarmed after termination", "Landed, disarmed")
     assert not any(craft.world.command)
+    craft.run(at_phase(Phase.DISARMED), 5.0)
+    first, *given_up, last = craft.texts[told:]
+    assert first == f"Failsafe: rotor {rotor} lost, the others cannot fly it"
+    assert "".join(given_up).startswith("Flight given up: ")
+    assert last == "Disarmed after termination"
 
 
 def test_a_load_that_is_lost_leaves_the_vehicle_holding() -> None:

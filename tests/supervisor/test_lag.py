@@ -13,7 +13,8 @@ from autopilot.guidance.setpoint_follower import UNSPECIFIED
 from autopilot.services import identity
 from autopilot.services.requests import FollowSetpoint, Pause, Release, Reposition, SetMode
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.state import CARRYING, Flight, MissionPlan, MissionProgress, Phase
+from autopilot.supervisor.state import CARRYING, Flight, MissionPlan, MissionProgress, Phase, Report, View
+from autopilot.supervisor.watches.failsafe import OUT_OF_CONTROL_US
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
 from missions import model
 from missions.model import Signals, Sine, Speed, Step, Takeoff, Term, Waypoint
@@ -60,6 +61,14 @@ def test_one_that_comes_back_is_waited_for() -> None:
     assert (after, report.texts) == (flight, ())
 
 
+def advance_for(time_us: int, flight: Flight, seen: View) -> tuple[Flight, Report]:
+    """Advance with the same view until `time_us` after it; nothing is told before the last tick."""
+    for now_us in range(seen.now_us, seen.now_us + time_us, STEP_US):
+        flight, report = advance(flight, seen._replace(now_us=now_us), SETTINGS)
+        assert report.texts == ()
+    return advance(flight, seen._replace(now_us=seen.now_us + time_us), SETTINGS)
+
+
 LOST: dict[str, dict[str, object]] = {
     "tilted": {"tilt_rad": math.radians(76.0)},
     "the load flies beside it": {"x_quad": (FAR[0] + 1.0, 0.0, FAR[2] + 0.2)},
@@ -71,10 +80,21 @@ LOST: dict[str, dict[str, object]] = {
 @pytest.mark.parametrize("phase", sorted(CARRYING - {Phase.GUIDED}))
 def test_one_that_is_out_of_control_is_given_up(phase: Phase, how: str) -> None:
     seen = hanging(STEP_US, FAR, OUTWARD)._replace(**LOST[how])
-    after, report = advance(at_rest(phase), seen, SETTINGS)
+    after, report = advance_for(OUT_OF_CONTROL_US, at_rest(phase), seen)
     assert after.phase == Phase.FAILSAFE
     text = "Flight given up: load 5.1 m off its path (FS_LOAD_ERR 5), out of control"
     assert report.texts == ((MAV_SEVERITY_EMERGENCY, text),)
+
+
+@pytest.mark.parametrize("how", LOST)
+def test_one_that_is_out_of_control_for_a_moment_only_is_not_given_up(how: str) -> None:
+    """Again and again for 50 ms, as in a gust."""
+    flight, calm = at_rest(), hanging(STEP_US, FAR, (-1.0, 0.0, 0.0))
+    for _ in range(10):
+        flight, report = advance_for(50_000, flight, calm._replace(**LOST[how]))
+        assert (flight.phase, report.texts) == (Phase.HOLD, ())
+        flight, report = advance_for(50_000, flight, calm)
+        assert (flight.phase, report.texts) == (Phase.HOLD, ())
 
 
 def test_one_that_leans_far_against_a_strong_wind_is_not() -> None:
@@ -100,7 +120,7 @@ def test_one_that_pushes_itself_farther_and_farther_away_is_given_up(
 ) -> None:
     far = (HERE[0] + distance_m, HERE[1], HERE[2])
     seen = hanging(STEP_US, far, v, attitude=attitude, tilt_rad=math.radians(45.0))
-    after, report = advance(at_rest(Phase.LOWER), seen, SETTINGS)
+    after, report = advance_for(OUT_OF_CONTROL_US, at_rest(Phase.LOWER), seen)
     assert after.phase == (Phase.LOWER if controlled else Phase.FAILSAFE)
     assert ("out of control" in str(report.texts)) is not controlled
 

@@ -63,7 +63,7 @@ def asks(flight: Flight, stretch: Stretch, seen: View) -> bool:
     state = State(seen.x_load, seen.v_load, (0.0, 0.0, -1.0), ZERO, seen.x_quad, seen.v_quad, IDENTITY, ZERO)
     target = ZERO if jet is None else jet[0]
     known = not seen.estimate_problems
-    return may_need_decision(
+    return seen.rotors_lost != stretch.rotors_lost or may_need_decision(
         stretch,
         seen.now_us,
         state,
@@ -355,6 +355,38 @@ def lagging() -> Watched:
     return sky
 
 
+class Shaken(Watched):
+    """A sky in which a gust throws vehicle and load about for a fifth of each second."""
+
+    def obey(self) -> View:
+        seen = super().obey()
+        if self.flight.phase != Phase.HOLD or seen.now_us % 1_000_000 >= 200_000:
+            return seen
+        return DISTURBANCES["both far off"](seen)._replace(tilt_rad=math.radians(80.0))
+
+
+def shaken() -> Watched:
+    sky = after(Shaken(), wait_s=5.0)
+    sky.wait(5.0)
+    assert not any("given up" in text for text in sky.texts)
+    return landed(sky)
+
+
+class Crippled(Watched):
+    """A sky in which a rotor is lost while the load is held, and the vehicle lands nevertheless."""
+
+    def obey(self) -> View:
+        lost = 0 if self.flight.phase in (Phase.DISARMED, Phase.TAUTEN, Phase.LIFT) else 1
+        return super().obey()._replace(rotors_lost=lost)
+
+
+def crippled() -> Watched:
+    sky = Crippled(Takeoff(2.0))
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    return ended(sky)
+
+
 def given_up() -> Watched:
     sky = after(Watched(), Terminate(), wait_s=4.0)
     assert sky.flight.phase == Phase.DISARMED
@@ -385,6 +417,8 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
     never_taut: {Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED},
     lagging: TO_GROUND | {Phase.TAUTEN, Phase.MISSION},
     long_cable: TO_GROUND | {Phase.TAUTEN, Phase.SET_DOWN},
+    shaken: TO_GROUND | {Phase.HOLD},
+    crippled: {Phase.LIFT, Phase.TAUTEN, Phase.DISARMED},
     given_up: {Phase.FAILSAFE, Phase.HOLD, Phase.DISARMED},
     left_armed: {Phase.ARMED, Phase.DISARMED},
 }

@@ -1,9 +1,11 @@
 """Failsafe: the conditions under which the flight cannot continue. The vehicle lands by what remains of the
 estimate, as long as this gives the vertical and roughly the position; otherwise the rotors stop. They also
-stop if vehicle or load is far off its path and out of control; `lag` cares for those that are controlled."""
+stop if vehicle or load is far off its path and has been out of control for a while; `lag` cares for those
+that are controlled."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, degrees, isfinite, radians
 from typing import NamedTuple
 
@@ -18,8 +20,11 @@ from autopilot.supervisor.state import (
     Event,
     Flight,
     View,
+    can_fly,
+    has_lasted,
     interrupt_mission,
     is_landing,
+    lost_rotors_text,
     setpoint,
 )
 from autopilot.supervisor.watches.watch_result import WatchResult
@@ -29,6 +34,10 @@ MAX_LEAN_COSINE = cos(radians(75.0))  # of a vehicle, or of its cable, that is c
 # m, or the cable's length: nearer, a vehicle that is controlled may push away from where it should be, for
 # example when a gust ends or a swing is damped
 MIN_AWAY_M = 10.0
+# time for which it must be out of control, as in PX4's failure detector: a shorter one may be a gust
+OUT_OF_CONTROL_US = 300_000
+# m below its path, and m/s: a vehicle that its rotors cannot fly, and that sinks no more, lies on the ground
+FALLEN_M, SINK_SPEED = 0.5, 0.3
 
 
 class PathError(NamedTuple):
@@ -51,7 +60,11 @@ class PathError(NamedTuple):
 
 def watch_failsafe(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Give the flight up when it cannot continue."""
-    why = failure_reason(flight, view, settings) if flight.phase in IN_AIR else ""
+    in_air = flight.phase in IN_AIR
+    out_of_control = in_air and is_out_of_control(flight, view, settings)
+    if out_of_control != (flight.out_of_control_since_us >= 0):
+        flight = replace(flight, out_of_control_since_us=view.now_us if out_of_control else -1)
+    why = failure_reason(flight, view, settings) if in_air else ""
     return give_up_flight(flight, why) if why else WatchResult(flight)
 
 
@@ -82,13 +95,22 @@ def failure_reason(flight: Flight, view: View, settings: Settings) -> str:
         limit = degrees(limits.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.1f} deg exceeds FS_TILT_DEG {limit:.0f}"
     error = path_error(flight, view)
-    if (
-        error is not None
-        and not error.distance_m <= limits.load_error_limit_m
-        and not is_controlled(flight, view, error, settings)
-    ):
-        return f"{off_path_text(error, settings)}, out of control"
-    return ""
+    if error is None or not has_lasted(flight.out_of_control_since_us, OUT_OF_CONTROL_US, view.now_us):
+        return ""
+    if not can_fly(flight, settings):
+        return f"{lost_rotors_text(flight)} lost, {error.body} {error.distance_m:.1f} m off its path"
+    return f"{off_path_text(error, settings)}, out of control"
+
+
+def is_out_of_control(flight: Flight, view: View, settings: Settings) -> bool:
+    """Whether vehicle or load is off its path and not controlled any more, as far as this moment shows."""
+    error = path_error(flight, view)
+    if error is None:
+        return False
+    is_far_off = not error.distance_m <= settings.failsafe.load_error_limit_m
+    if not can_fly(flight, settings):
+        return is_far_off or (error.offset[2] < -FALLEN_M and abs(view.v_quad[2]) < SINK_SPEED)
+    return is_far_off and not is_controlled(flight, view, error, settings)
 
 
 def path_error(flight: Flight, view: View) -> PathError | None:

@@ -21,9 +21,9 @@ MIN_SPEED = 1.0  # m/s, below which that speed is not reduced
 
 def watch_lag(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Let the path wait for a vehicle or load that is farther off than FS_LOAD_ERR, hold, or land. A landing
-    that has begun continues."""
+    that has begun continues, and one that seems out of control is left to `failsafe`."""
     error = path_error(flight, view)
-    if error is None or flight.phase == Phase.LOWER:
+    if error is None or flight.phase == Phase.LOWER or flight.out_of_control_since_us >= 0:
         return WatchResult(flight)
     limit_m, comes_nearer = settings.failsafe.load_error_limit_m, error.approach_m_s >= MIN_APPROACH
     if error.distance_m <= limit_m:

@@ -1,11 +1,21 @@
-"""Rotors that are lost: the vehicle lands on the others if these can keep it level."""
+"""Rotors that are lost: the vehicle lands on the others, as far as these can fly it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, Event, Flight, Phase, View, interrupt_mission, is_landing
+from autopilot.supervisor.state import (
+    IN_AIR,
+    Event,
+    Flight,
+    Phase,
+    View,
+    can_fly,
+    interrupt_mission,
+    is_landing,
+    lost_rotors_text,
+)
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY, MAV_SEVERITY_ERROR
 
@@ -18,16 +28,18 @@ def watch_rotors(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if lost == flight.rotors_lost:
         return WatchResult(flight)
     flight = replace(flight, rotors_lost=lost)
-    numbers = [str(i + 1) for i in range(lost.bit_length()) if lost >> i & 1]
-    rotor_names = f"rotor{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
-    if not settings.rotors.can_fly_without(lost):
-        text = f"Failsafe: {rotor_names} lost, the others cannot fly it"
-        return WatchResult(replace(flight, is_failsafe=True), None, ((MAV_SEVERITY_EMERGENCY, text),))
-    loss_text = rotor_names + " lost"
-    if not settings.rotors.can_hold_heading_without(lost):
-        loss_text += ", heading given up"
-    if flight.phase not in IN_AIR or is_landing(flight):
-        return WatchResult(flight, None, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}"),))
-    return WatchResult(
-        interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, f"Failsafe: {loss_text}, landing"),)
-    )
+    lands = flight.phase in IN_AIR and not is_landing(flight)
+    text = f"Failsafe: {lost_rotors_text(flight)} lost"
+    if not can_fly(flight, settings):
+        severity = MAV_SEVERITY_EMERGENCY
+        text += ", the others cannot fly it"
+        flight = replace(flight, is_failsafe=True)
+    else:
+        severity = MAV_SEVERITY_ERROR
+        if not settings.rotors.can_hold_heading_without(lost):
+            text += ", heading given up"
+        if lands:
+            text += ", landing"
+    if not lands:
+        return WatchResult(flight, None, ((severity, text),))
+    return WatchResult(interrupt_mission(flight), Event.LAND, ((severity, text),))

@@ -17,6 +17,7 @@ from autopilot.supervisor.state import (
     Flight,
     Phase,
     View,
+    can_fly,
     interrupt_mission,
     leg_time_s,
 )
@@ -35,6 +36,8 @@ SLACK_US = 20_000  # time for which this must be the case
 def watch_slack(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Catch a load that falls freely; begin the phase again when it hangs on the cable."""
     if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], LevelHold):
+        return WatchResult(flight)
+    if not can_fly(flight, settings) and not isinstance(flight.legs[0], CatchLoad):  # it falls anyway
         return WatchResult(flight)
     flight = _note_slack(flight, view, settings)
     if isinstance(flight.legs[0], CatchLoad) and _is_down(flight, view):
