@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from itertools import chain
+from math import nan
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert.battery import BatteryReading, read_battery_status
+from autopilot.wire.convert.battery import BatteryReading, percent_by_used, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.statustext import TextReader
@@ -46,6 +47,7 @@ _SIMULATOR_SYSTEM = 1  # of the messages of sitl, whatever the system id of the 
 _SIMULATOR_COMPONENTS = (26, 27)  # no vehicle sends as one of them
 _DEFAULT_SYSTEM = 1  # of the vehicle in a log without its heartbeat
 _BATTERY_STATUS = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
+_CHARGE, _CAPACITY = "SIM_BAT_CHARGE", "SIM_BAT_CAP"  # per cent, and mAh, of the battery at the beginning
 _SIMULATED_BATTERY = "SIM_BATTERY"  # 0: what is reported is calculated, of a battery that never gets empty
 _MICRO = 1e-6
 
@@ -118,7 +120,7 @@ def telemetry_of(records: Iterable[LogRecord]) -> Telemetry:
         message_id: (np.array(stamps[message_id], dtype=np.float64) - boot_us) * _MICRO
         for message_id in _UNSTAMPED
     }
-    battery = _battery(readings if setup.parameters.get(_SIMULATED_BATTERY) else [], boot_us)
+    battery = _battery(readings, setup.parameters, boot_us)
     telemetry = _assemble(columns, received_at_us, _texts(texts, boot_us), battery, setup)
     if len(telemetry.setpoint.time_s) or not (len(telemetry.load_truth.time_s) and telemetry.mission):
         return telemetry
@@ -295,8 +297,13 @@ def _snaps(c: Columns) -> SnapTrack:
     return _sorted(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
 
 
-def _battery(readings: list[tuple[int, BatteryReading]], boot_us: int) -> BatteryTrack:
-    rows = [(r.voltage, r.current, r.used_mah, 100.0 * r.remaining) for _, r in readings]
+def _battery(
+    readings: list[tuple[int, BatteryReading]], parameters: Mapping[str, float], boot_us: int
+) -> BatteryTrack:
+    if not parameters.get(_SIMULATED_BATTERY):
+        readings = []
+    charge = parameters.get(_CHARGE, nan), parameters.get(_CAPACITY, nan)
+    rows = [(r.voltage, r.current, r.used_mah, percent_by_used(r, *charge)) for _, r in readings]
     times_us = np.array([unix_us - boot_us for unix_us, _ in readings], dtype=np.float64)
     return _sorted(BatteryTrack(times_us * _MICRO, *np.array(rows, dtype=np.float64).reshape(-1, 4).T))
 

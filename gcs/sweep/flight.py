@@ -27,7 +27,12 @@ from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.arming import arming_problems
 from autopilot.supervisor.state import IN_AIR, Phase, with_battery
-from autopilot.wire.convert.battery import BatteryReading
+from autopilot.wire.convert.battery import (
+    BatteryReading,
+    battery_status_message,
+    percent_by_used,
+    read_battery_status,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
@@ -272,6 +277,13 @@ class SweepFlight:
         """The share of its charge that the simulated battery has left."""
         return share_left(unpack(World, self.world.world, 0).supply, self.cell.truth.drive)
 
+    @property
+    def _percent_left(self) -> float:
+        """The same in per cent, as the record of a flight has it: by the charge used as it is reported."""
+        drive, used_as = self.cell.truth.drive, unpack(World, self.world.world, 0).supply.used_as
+        sent = battery_status_message(BatteryReading(used_mah=used_as / 3.6, remaining=self._share_left))
+        return percent_by_used(read_battery_status(sent), 100.0 * drive.charge, drive.capacity_as / 3.6)
+
     def _measure_battery(self) -> None:
         """What the autopilot learns of the battery, which the simulator sends it over the wire."""
         if self.cell.truth.drive.battery > 0.0:
@@ -372,7 +384,7 @@ class SweepFlight:
             result.psi_R_max, result.psi_q_max = f.psi_R_max or nan, f.psi_q_max or nan  # 0: not defined
             result.rotor_force_min_n, result.rotor_force_max_n = f.rotor_min, f.rotor_max
         if self.cell.truth.drive.battery > 0.0:
-            result.battery_left_pct = 100.0 * self._share_left
+            result.battery_left_pct = self._percent_left
         return result
 
 

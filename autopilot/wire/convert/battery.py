@@ -46,6 +46,14 @@ def battery_percent(reading: BatteryReading) -> int:
     return -1 if isnan(reading.remaining) else saturated(reading.remaining * 100.0, 0, 100)
 
 
+def percent_by_used(reading: BatteryReading, full_percent: float, capacity_mah: float) -> float:
+    """The remaining charge in per cent by the charge that was used of `full_percent`, which is reported in
+    finer steps; where the two disagree by more than their steps, the charge as reported."""
+    stated = 100.0 * reading.remaining
+    percent = max(0.0, full_percent - 100.0 * reading.used_mah / capacity_mah)
+    return percent if abs(percent - stated) <= 0.5 + 100.0 / capacity_mah else stated
+
+
 def charge_state(reading: BatteryReading) -> int:
     """MAV_BATTERY_CHARGE_STATE of the remaining charge in per cent; UNDEFINED if that is unknown."""
     if isnan(reading.remaining):

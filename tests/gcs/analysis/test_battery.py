@@ -21,9 +21,9 @@ USED_MAH = (0.0, 120.0, 250.0)
 LEFT = (1.0, 0.88, 0.75)
 
 
-def with_battery(simulated: float | None) -> Telemetry:
+def with_battery(simulated: float | None, **parameters: float) -> Telemetry:
     """A flight in which the battery is reported after 1 s, 2 s and 3 s; `simulated`: SIM_BATTERY, if the log
-    has it."""
+    has it; `parameters`: others that it has."""
     vehicle, other = FrameWriter(1, 1), FrameWriter(9, 1)
     records = list(flights.flight(4.0, flights.still).records())
     for second, reading in enumerate(zip(VOLTS, (30.0, 31.0, 29.0), USED_MAH, LEFT, strict=True), 1):
@@ -32,8 +32,10 @@ def with_battery(simulated: float | None) -> Telemetry:
         strange = BatteryReading(3.0, 0.1, 900.0, 0.01)
         records.append((at_us, other.frame(battery_status_message(strange))))
     if simulated is not None:
+        parameters["SIM_BATTERY"] = simulated
+    for name, value in parameters.items():
         kind = mavlink.MAV_PARAM_TYPE_REAL32
-        said = mavlink.MAVLink_param_value_message(b"SIM_BATTERY", simulated, kind, 1, 0)
+        said = mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
         records.append((flights.BOOT_US, vehicle.frame(said)))
     return telemetry_of((us, decode(frame)[0][0]) for us, frame in records)
 
@@ -43,6 +45,15 @@ def test_the_record_has_what_a_simulated_battery_gave() -> None:
     assert record["battery_left_pct"] == pytest.approx(75.0)
     assert record["battery_used_mah"] == pytest.approx(250.0)
     assert record["battery_voltage_min_v"] == pytest.approx(22.5)
+
+
+def test_the_charge_left_is_counted_by_the_charge_used_where_the_capacity_is_known() -> None:
+    known = {"SIM_BAT_CHARGE": 100.0, "SIM_BAT_CAP": 1005.0}
+    assert flight_record(with_battery(1.0, **known), FlightMeta())["battery_left_pct"] == pytest.approx(
+        100.0 - 25000.0 / 1005.0
+    )
+    other = flight_record(with_battery(1.0, **known | {"SIM_BAT_CAP": 2000.0}), FlightMeta())
+    assert other["battery_left_pct"] == pytest.approx(75.0), "another capacity than that of the battery"
 
 
 @pytest.mark.parametrize("simulated", [0.0, None])
