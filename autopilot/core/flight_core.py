@@ -549,9 +549,9 @@ class FlightCore:
         self._cable_m, self.settings = None, setup.settings
         self._dirty = True
         mission = self.flight.mission
-        if mission.speed_m_s == before.settings.motion.speed_m_s:  # no other speed was requested
-            mission = replace(mission, speed_m_s=setup.settings.motion.speed_m_s)
-            self.flight = replace(self.flight, mission=mission)
+        usual_m_s, new_m_s = before.settings.motion.speed_m_s, setup.settings.motion.speed_m_s
+        if mission.requested_speed_m_s == usual_m_s != new_m_s:  # no other speed was requested
+            self.flight = replace(self.flight, mission=mission.at_speed(new_m_s))
         if self._estimator_slot is not None and setup.estimator is not None:
             self._estimator_slot.configure(setup.estimator.values)
         pack(self._constants(), self.rows.constants, 0)

@@ -100,7 +100,7 @@ def is_lowering_step(flight: Flight) -> bool:
 def with_speed(flight: Flight, step: Speed, settings: Settings) -> Flight:
     """The flight with the speed of transfers that the step sets."""
     speed_m_s = settings.motion.speed_m_s if step.speed_m_s is None else step.speed_m_s
-    return replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
+    return replace(flight, mission=flight.mission.at_speed(speed_m_s))
 
 
 def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> Flight:

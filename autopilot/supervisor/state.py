@@ -151,6 +151,17 @@ class MissionProgress:
     stopped_run: PathResume | None = None  # how signals or a trajectory continue that were interrupted
     takeoff_altitude_m: float = 0.0
     speed_m_s: float = 0.0  # of transfers
+    # the same before paths had to wait; None: they have not waited since it was set
+    speed_before_waits_m_s: float | None = None
+
+    def at_speed(self, speed_m_s: float) -> MissionProgress:
+        """The mission with this speed of transfers, whether or not paths have waited."""
+        return replace(self, speed_m_s=speed_m_s, speed_before_waits_m_s=None)
+
+    @property
+    def requested_speed_m_s(self) -> float:
+        """The speed of transfers that was last set."""
+        return self.speed_m_s if self.speed_before_waits_m_s is None else self.speed_before_waits_m_s
 
     @property
     def done(self) -> bool:

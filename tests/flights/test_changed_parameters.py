@@ -86,6 +86,19 @@ def test_a_transfer_after_a_reset_of_the_speed_uses_them() -> None:
     assert top_speeds(craft)[3] == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "later_m_s"), [(b"MIS_SPEED", 1.3, 1.3), (b"FS_LOAD_ERR", 4.0, 0.7)]
+)
+def test_a_transfer_after_a_path_that_waited_uses_a_new_speed(
+    name: bytes, value: float, later_m_s: float
+) -> None:
+    craft = begun(Takeoff(2.0), Waypoint(9.0, 0.0, 2.0, hold_s=0.5), ReturnHome(), Land(), MIS_SPEED=1.0)
+    waited = replace(craft.flight.mission, speed_m_s=0.7, speed_before_waits_m_s=1.0)
+    craft.onboard.core.replace_flight(replace(craft.flight, mission=waited))
+    set_parameter(craft, name, value)
+    assert top_speeds(craft)[2] == pytest.approx(later_m_s, abs=0.01)
+
+
 def test_on_the_last_path_they_apply_to_the_next_mission() -> None:
     craft = begun(Takeoff(2.0), Waypoint(6.0, 0.0, 2.0))
     set_parameter(craft, b"MIS_SPEED", 2.5)

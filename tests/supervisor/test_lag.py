@@ -55,6 +55,26 @@ def test_one_that_is_carried_off_where_it_should_rest_lands(phase: Phase) -> Non
     assert (on.phase, report.texts) == (Phase.LOWER, ()), "the landing continues"
 
 
+@pytest.mark.parametrize(("climb_m_s", "lands"), [(-4.0, True), (-1.0, False)])
+def test_one_that_sinks_far_below_its_path_lands_before_the_path_has_stopped(
+    climb_m_s: float, lands: bool
+) -> None:
+    plan = MissionPlan((Takeoff(20.0), Waypoint(90.0, 0.0, 20.0)), (0, 1), 2)
+    progress = MissionProgress(plan=plan, step=1, active=True, takeoff_altitude_m=20.0, speed_m_s=5.0)
+    begun = hanging(x=(0.0, 0.0, 20.0))
+    flight = entered(Flight(phase=Phase.MISSION, mission=progress), Phase.MISSION, begun, SETTINGS)
+    x, v = flight.legs[0].jet(10.0)[:2]
+    below = (x[0] - 1.0, x[1], x[2] - LIMIT_M - 0.1)
+    after, report = advance(flight, hanging(10_000_000, below, add(v, (0.0, 0.0, climb_m_s))), SETTINGS)
+    (text,) = (text for _, text in report.texts)
+    if lands:
+        assert after.phase == Phase.LOWER
+        assert text == "Failsafe: load 5.2 m off its path (FS_LOAD_ERR 5), sinking, landing"
+    else:
+        assert after.phase == Phase.MISSION
+        assert text == "Path waits: load 5.2 m off its path (FS_LOAD_ERR 5)"
+
+
 def test_one_that_comes_back_is_waited_for() -> None:
     flight = at_rest()
     after, report = advance(flight, hanging(STEP_US, FAR, (-1.0, 0.0, 0.0)), SETTINGS)
@@ -168,6 +188,7 @@ def test_a_path_that_waited_is_flown_more_slowly() -> None:
     sky.run(lambda s: s.flight.legs != () and not isinstance(s.flight.legs[0], LagWait))
     assert sky.texts[-1] == "Near the path again, flying on at 3.5 m/s"
     assert sky.flight.mission.speed_m_s == pytest.approx(3.5)
+    assert sky.flight.mission.requested_speed_m_s == pytest.approx(5.0)
     assert norm(sub(sky.view.x_load, sky.setpoints[-2][2][0])) <= 0.5 * LIMIT_M
     assert sky.flight.mission.step == 2, "the same step"
     jets = [jet for _, _, jet in sky.setpoints]

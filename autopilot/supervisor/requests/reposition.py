@@ -82,4 +82,4 @@ def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Set
         return flight, denied(
             f"Speed {speed_m_s:.2f} m/s denied; must be {MIN_SPEED_M_S:g} ... {MAX_SPEED_M_S:g} m/s"
         )
-    return replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s)), ACCEPTED
+    return replace(flight, mission=flight.mission.at_speed(speed_m_s)), ACCEPTED

@@ -21,7 +21,7 @@ from autopilot.supervisor.state import (
 
 def start_takeoff(flight: Flight, view: View, settings: Settings) -> Flight:
     """The armed flight, taking off."""
-    at_speed = replace(flight, mission=replace(flight.mission, speed_m_s=settings.motion.speed_m_s))
+    at_speed = replace(flight, mission=flight.mission.at_speed(settings.motion.speed_m_s))
     return transition(at_speed, takeoff_event(flight), view, settings)
 
 

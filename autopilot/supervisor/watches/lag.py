@@ -1,5 +1,5 @@
 """A vehicle that is controlled, but too weak for the wind or its path: its path waits for it until it is near
-again, and is continued more slowly. If it cannot even stay where it should rest, it lands."""
+again, and is continued more slowly. If it cannot stay where it should rest, or keep its height, it lands."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
 RESUME_SHARE = 0.5  # of FS_LOAD_ERR: so near to where it should be, the path is continued
 MIN_APPROACH = 0.3  # m/s, below which it does not come nearer any more
 SLOWER = 0.7  # factor of the speed of transfers each time that a path has waited
+SINKING_S = 5.0  # one that sinks far below its path, and would be at the height of home by then, lands
 MIN_SPEED = 1.0  # m/s, below which that speed is not reduced
 
 
@@ -31,14 +32,16 @@ def watch_lag(flight: Flight, view: View, settings: Settings) -> WatchResult:
         if waits and not (comes_nearer and error.distance_m > RESUME_SHARE * limit_m):
             return _flying_on(flight)
         return WatchResult(flight)
+    x, v = (view.x_quad, view.v_quad) if flight.cable.released else (view.x_load, view.v_load)
+    sinks = error.offset[2] < -limit_m and x[2] + SINKING_S * v[2] < 0.0
     stopping, here = stopping_legs(flight, view, settings)
-    if stopping:
+    if stopping and not sinks:
         return _stopped(flight, error, (*stopping, LagWait(here)), view, settings)
-    if comes_nearer:
+    if comes_nearer and not sinks:
         return WatchResult(flight)
     # from where it is, as it moves
     flight = replace(interrupt_mission(flight), legs=())
-    text = f"Failsafe: {off_path_text(error, settings)}, landing"
+    text = f"Failsafe: {off_path_text(error, settings)}, {'sinking, ' * sinks}landing"
     return WatchResult(flight, Event.LAND, ((MAV_SEVERITY_ERROR, text),))
 
 
@@ -71,8 +74,9 @@ def _flying_on(flight: Flight) -> WatchResult:
     in_run = flight.phase == Phase.MISSION and flight.mission.stopped_run is not None
     if flight.phase == Phase.LIFT or in_run:
         return WatchResult(flight, Event.CAUGHT_UP, ((INFO, "Near the path again, flying on"),))
-    speed_m_s = flight.mission.speed_m_s
-    speed_m_s = min(speed_m_s, max(MIN_SPEED, SLOWER * speed_m_s))
-    flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
+    mission = flight.mission
+    speed_m_s = min(mission.speed_m_s, max(MIN_SPEED, SLOWER * mission.speed_m_s))
+    mission = replace(mission, speed_m_s=speed_m_s, speed_before_waits_m_s=mission.requested_speed_m_s)
+    flight = replace(flight, mission=mission)
     text = f"Near the path again, flying on at {speed_m_s:.1f} m/s"
     return WatchResult(flight, Event.CAUGHT_UP, ((INFO, text),))

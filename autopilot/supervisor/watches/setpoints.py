@@ -42,8 +42,8 @@ def watch_takeoff_setpoint(flight: Flight, view: View, settings: Settings) -> Wa
         if not setpoint.velocity[2] > 0.0:
             return WatchResult(flight)
         height = MIN_LOAD_HEIGHT
-    speed = settings.motion.speed_m_s
-    mission = replace(flight.mission, speed_m_s=speed, takeoff_altitude_m=height, active=False)
+    at_speed = flight.mission.at_speed(settings.motion.speed_m_s)
+    mission = replace(at_speed, takeoff_altitude_m=height, active=False)
     return WatchResult(replace(flight, mission=mission), takeoff_event(flight))
 
 
