@@ -14,6 +14,12 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.estimation.air import air_walk, predict_air
+from autopilot.estimation.cable_pull import (
+    force_beyond_thrust,
+    learned_frame_share,
+    measured_pull,
+    without_climb_drag,
+)
 from autopilot.estimation.clipping import add_impact_noise, update_clipping
 from autopilot.estimation.covariance import PropagationInputs, propagate_covariance
 from autopilot.estimation.history import store_state
@@ -43,6 +49,7 @@ from autopilot.estimation.tautness import (
     averaged_missing_pull,
     cable_is_unloaded,
     detect_tautness,
+    is_pull_known,
     orthogonal_axis,
 )
 from autopilot.estimation.vibration import accel_noise, gyro_noise, update_vibration
@@ -304,8 +311,15 @@ def predict(
         predicted_load = predict_taut(load, vehicle, air, tuning, dt)
     else:
         predicted_load = predict_slack(load, vehicle, history, dt)
-    load = detect_tautness(predicted_load, vehicle, history, imu, thrust, state.missing_pull, tuning, dt)
+    frame_share = state.frame_share
+    force = without_climb_drag(
+        force_beyond_thrust(vehicle, imu, thrust, tuning), predicted_load, vehicle, frame_share, tuning
+    )
+    measured = measured_pull(force, predicted_load, vehicle, frame_share)
+    load = detect_tautness(predicted_load, vehicle, history, measured, state.missing_pull, tuning, dt)
     add_snatch_uncertainty(load, state.load.pull, history, tuning)
+    if is_pull_known(load, vehicle, history, state.missing_pull, tuning):
+        frame_share = learned_frame_share(force, load, vehicle, frame_share, tuning, dt)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
@@ -330,6 +344,7 @@ def predict(
         vibration,
         clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
+        frame_share,
         state.resets,
         state.memory_s,
         (state.head + 1) % RING_LENGTH,

@@ -282,6 +282,7 @@ class EstimatorState(NamedTuple):
     vibration: Vibration
     clipping: Clipping
     missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
+    frame_share: float  # of the air's force on the vehicle across the rotors' axis: see `cable_pull`
     resets: float
     memory_s: float  # s, age of the oldest reading so far: corrections go back this far in the ring
     head: int  # row of the ring that holds this state
@@ -345,6 +346,7 @@ def blank_state() -> EstimatorState:
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
+        frame_share=0.0,
         resets=0.0,
         memory_s=0.0,
         head=0,

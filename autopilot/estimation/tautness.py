@@ -2,8 +2,7 @@
 
 While the cable is taut, the load is at its end, and the load's error is that of vehicle and cable. While it
 is slack, the load is tracked separately or stays where it is on the ground. The distance of a
-tracked load decides; without a tracker, the pull decides: the force along the cable that the vehicle's
-acceleration shows beyond the assumed thrust, m_Q (R a) - f R e3.
+tracked load decides; without a tracker, the pull decides, as `cable_pull` measures it.
 """
 
 from __future__ import annotations
@@ -27,14 +26,13 @@ from autopilot.estimation.records import (
     Array,
     EstimatorTuning,
     History,
-    ImuReading,
     LoadEstimate,
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, axpy, column, cross, norm, sub
+from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, axpy, cross, norm, sub
 from autopilot.geometry.packed import with_field
-from autopilot.geometry.s2 import force_along_cable, normalise, tangent
+from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length above which a tracked load's slack cable counts as taut
@@ -77,6 +75,10 @@ REJECTIONS_UNLOADED = 4.0  # rejected readings in a row that show the same
 # share of the pendulum's.
 UNLOADED_PULL = 0.4
 MISSING_PULL_TIME_S = 2.0  # time constant with which the missing part of the pull is learned
+# of the pendulum's tension: a pull above it is that of a load that hangs
+CERTAIN_PULL = 0.5
+# of the cable's length above a load on the ground: higher up, the vehicle is off the ground
+MIN_FLOWN_HEIGHT = 0.2
 # A cable that begins to pull, at SNATCH_PULL of the load's weight, stops vehicle and load along it at once;
 # before, its ends moved apart at about SNATCH_SPEED (m/s). This happens between two samples of the
 # accelerometer.
@@ -105,17 +107,6 @@ def orthogonal_axis(q: Vec3, across: Vec3) -> Vec3:
     if norm(flat) < 0.1:
         flat = tangent(q, (1.0, 0.0, 0.0) if q[0] * q[0] < 0.5 else (0.0, 1.0, 0.0))
     return normalise(flat)
-
-
-@kernel
-def measured_pull(
-    load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, quad_mass: float
-) -> float:
-    """Force of the cable on the vehicle along q, N, from one sample, by its component along the rotors' axis:
-    across this axis, the drag of rotors and frame can be as large as the load's weight."""
-    axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
-    cable_force = quad_mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
-    return force_along_cable(cable_force, load.q_cable, axis)
 
 
 @kernel
@@ -207,6 +198,24 @@ def averaged_missing_pull(
     elif load.tautness_age_s <= LIFTING_S:
         return before
     return before + dt / MISSING_PULL_TIME_S * (load.tension - load.pull - before)
+
+
+@kernel
+def is_pull_known(
+    load: LoadEstimate,
+    vehicle: VehicleEstimate,
+    history: History,
+    missing_pull: float,
+    tuning: EstimatorTuning,
+) -> bool:
+    """Whether the true pull is known, so that the force of the air on the vehicle is: it is that of the
+    pendulum while the load hangs, and none while the vehicle flies with a cable that is slack."""
+    if load.taut == 0.0:
+        height = vehicle.x_quad[2] - load.x_load[2]
+        in_air = height > MIN_FLOWN_HEIGHT * tuning.cable_length
+        return load.source != TRACKER and in_air and not _may_pull(load, vehicle, history, tuning)
+    hangs = load.laid_height <= NOT_LAID if load.source == TRACKER else load.tautness_age_s > LIFTING_S
+    return hangs and load.pull + min(missing_pull, 0.0) > CERTAIN_PULL * load.tension
 
 
 @kernel
@@ -367,18 +376,16 @@ def detect_tautness(
     load: LoadEstimate,
     vehicle: VehicleEstimate,
     history: History,
-    imu: ImuReading,
-    thrust: float,
+    measured: float,
     missing_pull: float,
     tuning: EstimatorTuning,
     dt: float,
 ) -> LoadEstimate:
     """The load after the decision whether its cable is taut or slack.
 
-    `missing_pull` (N) is from `averaged_missing_pull`.
+    `measured` (N) is the pull by this sample, `missing_pull` (N) is from `averaged_missing_pull`.
     """
     share = dt / (PULL_TIME_S + dt)
-    measured = measured_pull(load, vehicle, imu, thrust, tuning.quad_mass)
     pull = load.pull + share * (measured - load.pull)
     if load.source == TRACKER:
         distance = norm(sub(load.x_load, vehicle.x_quad))

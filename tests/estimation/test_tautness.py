@@ -19,7 +19,6 @@ from autopilot.estimation.records import (
     SIZE,
     TRACKER,
     VELOCITY,
-    ImuReading,
     LoadEstimate,
     blank_state,
     new_history,
@@ -32,6 +31,7 @@ from autopilot.estimation.tautness import (
     averaged_missing_pull,
     cable_is_unloaded,
     detect_tautness,
+    is_pull_known,
     tauten,
 )
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross
@@ -103,7 +103,6 @@ def test_a_tracked_direction_has_the_error_of_both_positions() -> None:
 DT = 0.004
 TUNING = bebop_tuning()
 WEIGHT = TUNING.load_mass * TUNING.gravity
-THRUST = 4.0
 HEIGHT_STD = 0.01
 
 
@@ -120,10 +119,8 @@ def after(
     history = new_history()
     history.covariance[POSITION + 2, POSITION + 2] = height_std**2
     vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
-    specific_force = (THRUST - pull * WEIGHT) / TUNING.quad_mass
-    imu = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, specific_force))
     for _ in range(round(seconds / DT)):
-        load = detect_tautness(load, vehicle, history, imu, THRUST, missing * WEIGHT, TUNING, DT)
+        load = detect_tautness(load, vehicle, history, pull * WEIGHT, missing * WEIGHT, TUNING, DT)
     return load
 
 
@@ -286,3 +283,35 @@ def test_a_tracked_load_that_has_been_still_on_a_slack_cable_lies_at_whatever_he
     seen = laid(height_m)._replace(tautness_age_s=slack_s)
     seen_taut = tauten(seen, blank_state().vehicle, new_history(), TUNING, LENGTH)
     assert (seen_taut.laid_height == NOT_LAID) == (height_m > TUNING.load_height), "only a tracker shows it"
+
+
+@pytest.mark.parametrize(
+    ("changes", "pull", "missing", "known"),
+    [
+        ({"taut": 1.0}, 0.6, 0.0, True),
+        ({"taut": 1.0}, 0.4, 0.0, False),  # it may be lost: what is missing of its pull is no drag
+        ({"taut": 1.0}, 1.2, -0.8, False),
+        ({"taut": 1.0, "tautness_age_s": 3.0}, 1.0, 0.0, False),  # it may still be on the ground
+        ({"taut": 1.0, "source": TRACKER, "laid_height": TUNING.load_height}, 1.0, 0.0, False),
+        ({"taut": 1.0, "source": TRACKER}, 1.0, 0.0, True),
+        ({}, 0.0, 0.0, True),
+        ({"source": TRACKER}, 0.0, 0.0, False),
+    ],
+)
+def test_the_drag_is_learned_where_the_true_pull_is_known(
+    changes: dict[str, float], pull: float, missing: float, known: bool
+) -> None:
+    tension = WEIGHT if changes.get("taut") else 0.0
+    load = laid()._replace(pull=pull * WEIGHT, tension=tension, tautness_age_s=9.0)._replace(**changes)
+    above = load.x_load[2] + 0.6 * TUNING.cable_length
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, above))
+    assert is_pull_known(load, vehicle, new_history(), missing * WEIGHT, TUNING) == known
+
+
+@pytest.mark.parametrize(("height", "known"), [(0.0, False), (0.6, True), (0.99, False)])
+def test_a_slack_cable_pulls_at_nothing_while_the_vehicle_flies_near_the_load(
+    height: float, known: bool
+) -> None:
+    load = laid()
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
+    assert is_pull_known(load, vehicle, new_history(), 0.0, TUNING) == known

@@ -38,7 +38,7 @@ from autopilot.estimation.records import (
     EstimatorTuning,
     History,
 )
-from autopilot.estimation.tautness import is_never_observed
+from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT, is_never_observed
 from autopilot.estimation.vibration import accel_noise
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, axpy, column, cross, dot, scale, sub
@@ -46,7 +46,6 @@ from autopilot.geometry.so3 import rotation_from_quat
 
 # of the load's weight: a stronger pull shows the cable's direction; a weaker one is none
 FIRM_PULL, NO_PULL = 0.3, 0.05
-MIN_HEIGHT = 0.2  # of the cable's length above the load: higher up, the vehicle is off the ground
 SLANT_STD = 0.005  # rad, between the rotors' force and the body's axis
 
 
@@ -79,7 +78,7 @@ def correct_pull(
         is_informative = load.pull > FIRM_PULL * weight
     else:
         height = state.vehicle.x_quad[2] - load.x_load[2]
-        is_informative = abs(load.pull) < NO_PULL * weight and height > MIN_HEIGHT * tuning.cable_length
+        is_informative = abs(load.pull) < NO_PULL * weight and height > MIN_FLOWN_HEIGHT * tuning.cable_length
     if not is_informative:
         return state
     n = state.size
