@@ -1,10 +1,12 @@
-"""Wind that pushes the vehicle harder than its load pulls: nothing of it is taken for the load."""
+"""Wind that pushes the vehicle harder than its load pulls: nothing of it is taken for the load, and a vehicle
+that it slides over the ground is not armed."""
 
 from __future__ import annotations
 
 import pytest
 
 from autopilot.supervisor.state import Phase
+from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions
 from gcs.sweep.flight import fly, start_times
 from missions.model import Delay, Land, Mission, Speed, Takeoff, Waypoint
@@ -39,3 +41,25 @@ def test_a_load_that_is_lost_is_noticed_in_any_wind(wind: float) -> None:
     craft.world.tick = lambda forces, _, reel_rate: tick(forces, True, reel_rate)  # type: ignore[method-assign]
     craft.run(at_phase(Phase.SET_DOWN), 5.5)  # in view: 5 s
     assert "Cable without pull, load lost: landing" in craft.texts
+
+
+@pytest.mark.parametrize("sensors", ["lab", "rtk", "gps"])
+def test_a_vehicle_that_wind_slides_over_the_ground_is_not_armed(sensors: str) -> None:
+    craft = Craft(sensors=sensors, SIM_WIND_E=18.0)
+    craft.wait(0.5)
+    while craft.onboard.now_us < 3_000_000:
+        assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_DENIED
+        craft.wait(0.05)
+    assert craft.truth.v_quad[0] > 3.0
+    told = "".join(craft.texts[-2:])  # it takes two messages
+    assert told.startswith("Arming denied: moving at ")
+    assert told.endswith("m/s (at most 0.3): hold it still, or wait for less wind")
+
+
+@pytest.mark.parametrize("sensors", ["lab", "rtk", "gps"])
+def test_a_vehicle_that_its_load_holds_in_the_wind_takes_off(sensors: str) -> None:
+    """It slides to the end of its cable first."""
+    mission = Mission("up", "", "", (), (Takeoff(3.0), Land()))
+    conditions = Conditions("heavy", sensors, settings={"SIM_WIND_E": 18.0})
+    flown = fly(mission, conditions, start_times(mission, conditions))
+    assert flown.outcome == "completed", flown.texts

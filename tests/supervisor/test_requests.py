@@ -170,12 +170,13 @@ def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothi
 
 # ---- arming
 
+STILL = "(at most 0.3): hold it still, or wait for less wind"
 COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
     "sensors": ({"estimate_problems": ("no vehicle pose from a tracker",)}, "no vehicle pose from a tracker"),
     "tilt": ({"tilt_rad": math.radians(25.0)}, "tilted by 25 deg"),
     "tilt is no number": ({"tilt_rad": math.nan}, "tilted by nan deg"),
-    "motion": ({"v_quad": (0.5, 0.0, 0.0)}, "moving at 0.5 m/s"),
-    "motion is no number": ({"v_quad": (math.nan, 0.0, 0.0)}, "moving at nan m/s"),
+    "motion": ({"v_quad": (0.5, 0.0, 0.0)}, f"moving at 0.5 m/s {STILL}"),
+    "motion is no number": ({"v_quad": (math.nan, 0.0, 0.0)}, f"moving at nan m/s {STILL}"),
 }
 
 

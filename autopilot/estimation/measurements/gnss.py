@@ -33,6 +33,7 @@ from autopilot.estimation.covariance import (
 from autopilot.estimation.history import reset_past_states
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import set_initial_covariance
+from autopilot.estimation.measurements.zero_velocity import slides
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -219,7 +220,8 @@ def start_from_fix(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
     """The state with the vehicle started by the fix, except for its exact position, which the ordinary
-    correction gives. `thrust` in N."""
+    correction gives; also of a vehicle that slides over the ground, whose acceleration looked like a tilt as
+    long as it was assumed to rest. `thrust` in N."""
     old, accel, g = state.vehicle, state.last_imu.accel, tuning.gravity
     airborne = thrust > AIRBORNE_THRUST_SHARE * tuning.quad_mass * g
     speed_var = AIRBORNE_SPEED_STD * AIRBORNE_SPEED_STD if airborne else INITIAL_SPEED_STD * INITIAL_SPEED_STD
@@ -242,7 +244,8 @@ def start_from_fix(
     state = restart_slow_error(state, history)
     x_quad, v_quad = fix.position, fix.velocity
     if not airborne:
-        x_quad, v_quad = (x_quad[0], x_quad[1], tuning.gear_height), ZERO
+        x_quad = (x_quad[0], x_quad[1], old.x_quad[2] if old.source == RECEIVER else tuning.gear_height)
+        v_quad = (v_quad[0], v_quad[1], 0.0) if old.source == RECEIVER else ZERO
     vehicle = VehicleEstimate(
         x_quad,
         v_quad,
@@ -300,7 +303,8 @@ def correct_gnss(
     state = with_capacity(state, fix.age_s, SIZE)
     n = state.size
     share = tuning.rtk_white if fix.rtk > PLAIN else tuning.gnss_white
-    starting = state.vehicle.source == NO_SENSOR
+    speed_std = tuning.rtk_speed_std if fix.rtk > PLAIN else tuning.gnss_speed_std
+    starting = state.vehicle.source == NO_SENSOR or slides(state, tuning, thrust, fix.velocity, speed_std)
     # the error of a float fix is not that of the fixes before, and stays the same until the carrier is fixed
     # again: all readings within EST_GPS_TAU together count as one
     is_float = fix.rtk == RTK_FLOAT and not starting
@@ -334,7 +338,6 @@ def correct_gnss(
     innovation = sub(fix.position, add(past.x_quad, state.sensor_errors.gnss))
     difference = sub(fix.velocity, past.v_quad)
     horizontal_std, vertical_std = new_share * fix.horizontal_std, new_share * fix.vertical_std
-    speed_std = tuning.rtk_speed_std if fix.rtk > PLAIN else tuning.gnss_speed_std
     climb_std = CLIMB_STD_RATIO * speed_std
     position_var = (
         horizontal_std * horizontal_std,

@@ -1,6 +1,11 @@
-"""Correction of a vehicle on the ground: no velocity, no rate. It gives tilt and the gyroscope's bias."""
+"""Correction of a vehicle on the ground: no velocity, no rate. It gives tilt and the gyroscope's bias.
+
+A vehicle that wind slides over the ground does not rest there: its fixes show it.
+"""
 
 from __future__ import annotations
+
+from math import sqrt
 
 from autopilot.estimation.correction import inject_error
 from autopilot.estimation.covariance import (
@@ -20,24 +25,39 @@ from autopilot.estimation.records import (
     History,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import norm
+from autopilot.geometry.linear import Vec3, norm, sub
 
 IDLE_SHARE = 0.3  # of the vehicle's weight: with less thrust it is on the ground, unless it falls
 STILL_RATE, STILL_FORCE = 0.1, 1.0  # rad/s, m/s^2 about gravity: above these, the vehicle does not stand
-STILL_SPEED = 0.5  # m/s, estimated
+STILL_SPEED = 0.2  # m/s, estimated
+STANDING_SHARE = 0.05  # of the vehicle's weight: with less thrust its rotors stand or idle
 SPEED_STD = 0.02  # m/s
 
 
 @kernel
-def is_on_ground(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> bool:
-    """Whether the vehicle rests on the ground, by thrust and IMU."""
+def is_carried_by_ground(
+    state: EstimatorState, tuning: EstimatorTuning, thrust: float, max_share: float
+) -> bool:
+    """Whether the vehicle is on the ground, by its IMU and a thrust below this share of its weight."""
     vehicle, imu = state.vehicle, state.last_imu
     return (
         vehicle.source == RECEIVER
-        and thrust < IDLE_SHARE * tuning.quad_mass * tuning.gravity
+        and thrust < max_share * tuning.quad_mass * tuning.gravity
         and norm(imu.gyro) < STILL_RATE
         and abs(norm(imu.accel) - tuning.gravity) < STILL_FORCE
-        and norm(vehicle.v_quad) < STILL_SPEED
+    )
+
+
+@kernel
+def slides(
+    state: EstimatorState, tuning: EstimatorTuning, thrust: float, velocity: Vec3, speed_std: float
+) -> bool:
+    """Whether a fix of this velocity (m/s, with this deviation) shows that wind slides a vehicle whose rotors
+    stand over the ground, faster or slower than estimated."""
+    difference = sub(velocity, state.vehicle.v_quad)
+    level = sqrt(difference[0] * difference[0] + difference[1] * difference[1])
+    return is_carried_by_ground(state, tuning, thrust, STANDING_SHARE) and level > max(
+        STILL_SPEED, tuning.gate_sigma * speed_std
     )
 
 
@@ -46,7 +66,9 @@ def correct_zero_velocity(
     state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
     """The state of a vehicle that rests on the ground, corrected; otherwise the state unchanged."""
-    if not is_on_ground(state, tuning, thrust):
+    if not (
+        is_carried_by_ground(state, tuning, thrust, IDLE_SHARE) and norm(state.vehicle.v_quad) < STILL_SPEED
+    ):
         return state
     n, vehicle, imu = state.size, state.vehicle, state.last_imu
     start_correction(history)

@@ -46,7 +46,8 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         problems.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
-        problems.append(f"moving at {norm(view.v_quad):.1f} m/s")
+        found = f"moving at {norm(view.v_quad):.1f} m/s (at most {GROUND_SPEED_M_S})"
+        problems.append(f"{found}: hold it still, or wait for less wind")
     if flight.empty_battery_percent is not None:
         problems.append(f"battery nearly empty, {flight.empty_battery_percent} % left")
     weight_n = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
