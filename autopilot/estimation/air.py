@@ -73,14 +73,15 @@ def predict_air(
     before: LoadEstimate,
     load: LoadEstimate,
     P: Array,
+    growth: float,
     tuning: EstimatorTuning,
     dt: float,
 ) -> AirEstimate:
     """The accelerations by the air dt seconds later; `load` is the load, and `P` the covariance, at that
-    time."""
+    time. That of the vehicle grows by the factor `growth` (`cable_pull.rotor_drag_growth`)."""
     load_decay, vehicle_decay = (
         decay_factor(tuning.air_std, tuning.air_walk, dt),
-        decay_factor(tuning.push_std, tuning.push_walk, dt),
+        growth * decay_factor(tuning.push_std, tuning.push_walk, dt),
     )
     vehicle_accel = (vehicle_decay * air.vehicle_accel[0], vehicle_decay * air.vehicle_accel[1])
     d = (load_decay * air.load_accel[0], load_decay * air.load_accel[1])

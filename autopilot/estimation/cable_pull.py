@@ -21,7 +21,7 @@ k (D_level + H) across b, and D_level level, b . D_level = k s. Hence, whatever 
     e = (1 - k) b + k e_3 / (b . e_3),     e . (D_level + H) = 0,     T = e . (r - D_z e_3) / (e . q).
 
 k is learned where T is known: by the pendulum while the load hangs, and T = 0 while the cable lies slack. It
-is the recursive fit of b . A to s, where A = r - T q - D_z e_3. Without it, e = b.
+is the recursive fit of b . A to s, where A = r - T q - D_z e_3, and begins with one half.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ FRAME_SHARE_TIME_S = 1.0  # time constant with which k is learned
 # of the load's weight: a drag along the axis that is as large teaches k half as fast as a large one
 LEARNING_FORCE = 0.2
 MIN_UPWARD = 0.25  # least upward part of b: a larger tilt counts as this one
+MIN_CARRYING_SHARE = 0.5  # of the vehicle's weight: below this thrust it stands, and H is not known by it
 _NO_DRAG = 1e-9  # N s/m, added to a denominator to avoid 0 / 0
 
 
@@ -72,12 +73,16 @@ def without_climb_drag(
 
 
 @kernel
+def air_free_direction(axis: Vec3, frame_share: float) -> Vec3:
+    """e, of the rotors' axis b."""
+    across, upward = 1.0 - frame_share, frame_share / max(axis[2], MIN_UPWARD)
+    return (across * axis[0], across * axis[1], across * axis[2] + upward)
+
+
+@kernel
 def measured_pull(force: Vec3, load: LoadEstimate, vehicle: VehicleEstimate, frame_share: float) -> float:
     """T, N; `force` is r - D_z e_3."""
-    axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
-    upward = frame_share / max(axis[2], MIN_UPWARD)
-    across = 1.0 - frame_share
-    direction = (across * axis[0], across * axis[1], across * axis[2] + upward)
+    direction = air_free_direction(column(rotation_from_quat(vehicle.quat_wxyz), 2), frame_share)
     return force_along_cable(dot(force, direction), load.q_cable, direction)
 
 
@@ -99,3 +104,11 @@ def learned_frame_share(
     least = LEARNING_FORCE * tuning.load_mass * tuning.gravity
     gain = dt / FRAME_SHARE_TIME_S * axial / (axial * axial + least * least)
     return min(1.0, max(0.0, frame_share + gain * (along - frame_share * axial)))
+
+
+@kernel
+def rotor_drag_growth(thrust: float, before: float, frame_share: float, tuning: EstimatorTuning) -> float:
+    """Factor by which the air's force across b grows where the thrust (N) was `before`: H is proportional to
+    it, D does not change."""
+    least = MIN_CARRYING_SHARE * tuning.quad_mass * tuning.gravity
+    return 1.0 + (1.0 - frame_share) * (max(thrust, least) / max(before, least) - 1.0)

@@ -18,6 +18,7 @@ from autopilot.estimation.cable_pull import (
     force_beyond_thrust,
     learned_frame_share,
     measured_pull,
+    rotor_drag_growth,
     without_climb_drag,
 )
 from autopilot.estimation.clipping import add_impact_noise, update_clipping
@@ -312,6 +313,7 @@ def predict(
     else:
         predicted_load = predict_slack(load, vehicle, history, dt)
     frame_share = state.frame_share
+    growth = rotor_drag_growth(thrust, state.last_thrust, frame_share, tuning)
     force = without_climb_drag(
         force_beyond_thrust(vehicle, imu, thrust, tuning), predicted_load, vehicle, frame_share, tuning
     )
@@ -338,13 +340,14 @@ def predict(
             sensor_errors.barometer_age + dt,
             sensor_errors.rejected,
         ),
-        predict_air(air, state.load, load, history.covariance, tuning, dt),
+        predict_air(air, state.load, load, history.covariance, growth, tuning, dt),
         state_uncertainty(history, load, state.size),
         imu,
         vibration,
         clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
         frame_share,
+        thrust,
         state.resets,
         state.memory_s,
         (state.head + 1) % RING_LENGTH,

@@ -283,6 +283,7 @@ class EstimatorState(NamedTuple):
     clipping: Clipping
     missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
     frame_share: float  # of the air's force on the vehicle across the rotors' axis: see `cable_pull`
+    last_thrust: float  # N, assumed at the last prediction
     resets: float
     memory_s: float  # s, age of the oldest reading so far: corrections go back this far in the ring
     head: int  # row of the ring that holds this state
@@ -346,7 +347,8 @@ def blank_state() -> EstimatorState:
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
-        frame_share=0.0,
+        frame_share=0.5,
+        last_thrust=0.0,
         resets=0.0,
         memory_s=0.0,
         head=0,

@@ -55,7 +55,7 @@ def learned_walk(gust_std: float, air_std: float = 0.0) -> float:
     for tick in range(round(600.0 / TICK_S)):
         gust += -share * gust + gust_std * sqrt(2.0 * share) * random.normal(size=2)
         blown = air._replace(load_accel=(WIND + gust[0], gust[1]))
-        air = predict_air(blown, TAUT, TAUT, P, TUNING, TICK_S)
+        air = predict_air(blown, TAUT, TAUT, P, 1.0, TUNING, TICK_S)
         if tick * TICK_S > 60.0:
             squares.append(air_walk(TAUT, air, ZERO, TUNING) ** 2)
     return sqrt(float(np.mean(squares)))
@@ -85,7 +85,7 @@ def test_wind_that_a_lifted_load_meets_is_no_gust() -> None:
     for tick in range(round(1.0 / TICK_S)):
         lifted = TAUT._replace(tautness_age_s=(tick + 1) * TICK_S)
         air = predict_air(
-            air._replace(load_accel=(WIND, 0.0)), lifted, lifted, covariance(0.0), TUNING, TICK_S
+            air._replace(load_accel=(WIND, 0.0)), lifted, lifted, covariance(0.0), 1.0, TUNING, TICK_S
         )
     assert air.mean_accel[0] == pytest.approx(WIND, rel=0.03)
     assert air_walk(TAUT, air, ZERO, TUNING) < 0.2 * GUST_RANDOM_WALK * WIND
@@ -100,3 +100,9 @@ def test_gusts_on_a_load_that_no_sensor_observed_are_not_learned() -> None:
     air = blank_state().air._replace(load_accel=(WIND, 0.0), gust_variance=1.0)
     unobserved = TAUT._replace(source=CAMERA, age_s=float("inf"))
     assert air_walk(unobserved, air, ZERO, TUNING) == TUNING.air_walk
+
+
+def test_the_push_on_the_vehicle_grows_with_the_drag_of_its_rotors() -> None:
+    air = blank_state().air._replace(vehicle_accel=(2.0, -1.0))
+    grown = predict_air(air, TAUT, TAUT, covariance(0.0), 1.25, TUNING, TICK_S)
+    assert grown.vehicle_accel == pytest.approx((2.5, -1.25), rel=1e-3)

@@ -13,8 +13,10 @@ from autopilot.estimation.cable_pull import (
     force_beyond_thrust,
     learned_frame_share,
     measured_pull,
+    rotor_drag_growth,
     without_climb_drag,
 )
+from autopilot.estimation.measurements.pull import cable_force
 from autopilot.estimation.records import ImuReading, LoadEstimate, VehicleEstimate, blank_state
 from autopilot.geometry.linear import Vec3, add, apply_transposed, axpy, column, dot, norm, scale
 from autopilot.geometry.s2 import normalise
@@ -105,3 +107,40 @@ def test_noise_in_calm_air_teaches_nothing() -> None:
     for _ in range(1000):
         share = learned_frame_share(force, shown.load, shown.vehicle, share, TUNING, DT)
     assert share == pytest.approx(0.4, abs=1e-6)
+
+
+@pytest.mark.parametrize("rotor_drag", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("wind", "tilt_deg"), [(10.0, 15.0), (15.0, -10.0), (27.0, 50.0)])
+def test_a_known_level_push_leaves_the_force_of_the_cable(
+    wind: float, tilt_deg: float, rotor_drag: float
+) -> None:
+    """Drag of the rotors of a leaning vehicle has a vertical part, which is no pull."""
+    shown = scene(wind, tilt_deg, rotor_drag=rotor_drag)
+    whole = force_beyond_thrust(shown.vehicle, shown.imu, shown.thrust, TUNING)
+    air_force = axpy(-WEIGHT, shown.load.q_cable, whole)
+    push = (air_force[0] / TUNING.quad_mass, air_force[1] / TUNING.quad_mass)
+    blank = blank_state()
+    state = blank._replace(
+        vehicle=shown.vehicle,
+        load=shown.load,
+        last_imu=shown.imu,
+        air=blank.air._replace(vehicle_accel=push),
+        frame_share=shown.share,
+    )
+    found = cable_force(state, TUNING, shown.thrust)
+    assert found == pytest.approx(scale(WEIGHT, shown.load.q_cable), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("thrust", "before", "share", "growth"),
+    [
+        (25.0, 20.0, 0.0, 1.25),
+        (25.0, 20.0, 1.0, 1.0),
+        (25.0, 20.0, 0.6, 1.1),
+        (0.1, 0.0, 0.0, 1.0),  # on the ground
+    ],
+)
+def test_the_drag_of_the_rotors_grows_with_their_thrust(
+    thrust: float, before: float, share: float, growth: float
+) -> None:
+    assert rotor_drag_growth(thrust, before, share, TUNING) == pytest.approx(growth)

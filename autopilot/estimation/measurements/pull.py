@@ -13,6 +13,7 @@ estimated while nothing pulled.
 from __future__ import annotations
 
 from autopilot.control.drag import drag_force
+from autopilot.estimation.cable_pull import air_free_direction
 from autopilot.estimation.correction import (
     add_attitude_jacobian,
     add_direction_jacobian,
@@ -55,8 +56,12 @@ def cable_force(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -
     vehicle, push = state.vehicle, state.air.vehicle_accel
     R = rotation_from_quat(vehicle.quat_wxyz)
     a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
-    known = axpy(thrust, column(R, 2), drag_force(vehicle.v_quad, tuning.drag))
-    return sub(scale(tuning.quad_mass, (a[0] - push[0], a[1] - push[1], a[2])), known)
+    axis, drag, m = column(R, 2), drag_force(vehicle.v_quad, tuning.drag), tuning.quad_mass
+    level = (m * push[0] + drag[0], m * push[1] + drag[1])
+    e = air_free_direction(axis, state.frame_share)
+    upward = drag[2] - (e[0] * level[0] + e[1] * level[1]) / e[2]
+    force = axpy(-thrust, axis, scale(m, a))
+    return sub(force, (level[0], level[1], upward))
 
 
 @kernel
