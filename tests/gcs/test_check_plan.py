@@ -118,7 +118,7 @@ def test_limits_among_the_parameters_of_the_vehicle_count_for_every_mission(tmp_
         ((*box(0.0, 0.0, 6.0), place(OUTSIDE, 1.0, 2.0, 1.1)), (Waypoint(4.0, 0.0, 2.0),), "item 1"),
         ((*box(0.0, 0.0, 6.0), place(OUTSIDE, 1.0, 2.0, 2.0)), (Waypoint(4.0, 0.0, 2.0),), ""),
         # the curve between the waypoints comes near
-        (box(0.0, 0.0, 6.3), CORNER, "the curve to item 2"),
+        (box(0.0, 0.0, 6.15), CORNER, "the curve to item 2"),
     ],
 )
 def test_a_path_near_the_fence_is_warned_of(
