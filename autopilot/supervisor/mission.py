@@ -31,6 +31,7 @@ from autopilot.supervisor.state import (
     SetpointSource,
     View,
     interrupt_mission,
+    without_load,
 )
 from autopilot.supervisor.step_legs import (
     destination,
@@ -116,7 +117,7 @@ def start_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
         reel_to = state_after(step, hanging).cable_m
         flight = replace(flight, cable=replace(flight.cable, reel_target_m=reel_to))
     if isinstance(step, Release) and not flight.cable.released:
-        flight = replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1), legs=())
+        flight = replace(without_load(flight), legs=())
     if flight.mission.step_anchor is None and not (flight.legs and tracks_attitude(flight.legs[0])):
         anchor = stopping_legs(flight, view, settings)[1]
         flight = replace(flight, mission=replace(flight.mission, step_anchor=anchor))

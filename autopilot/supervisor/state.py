@@ -311,6 +311,11 @@ def interrupt_mission(flight: Flight) -> Flight:
     return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
 
 
+def without_load(flight: Flight) -> Flight:
+    """The flight with its gripper open, which flies on as the vehicle alone."""
+    return replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1))
+
+
 def with_battery(flight: Flight, reading: BatteryReading) -> Flight:
     """The flight with a battery that measures this, NaN: nothing."""
     empty = charge_state(reading) == mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY

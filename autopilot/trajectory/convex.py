@@ -37,6 +37,7 @@ from autopilot.trajectory.rotor_demand import (
 from autopilot.trajectory.splines import DEGREE, Array, Basis
 
 SAMPLES = 4  # to an interval
+TOLERANCE = 0.035  # ranges of a rotor by which a path may exceed its bounds between the samples
 _BAND = DEGREE + 1
 _ROUNDS = 12
 _EXCESS_WEIGHT = 3e4  # of a rotor's range for one second; a distance of d costs 1 per second
@@ -45,9 +46,9 @@ _HALVINGS = 7
 _CONVERGENCE = 1e-3  # relative decrease of the cost below which the rounds end
 # an excess of the cosine, or of the squared rate, counts as much as so many ranges of a rotor, ...
 _COS_RANGES, _TURN_RANGES = 1.5, 0.015
-# ... or that of the cosine as more, so that so many ranges are no more than this excess of the tilt (rad), or
+# ... or that of the cosine as more, so that `TOLERANCE` is no more than this excess of the tilt (rad), or
 # than this share of its limit: near zero the cosine hardly changes with the tilt
-_TILT_RANGES, _TILT_EXCESS, _TILT_SHARE = 0.035, radians(1.9), 0.3
+_TILT_EXCESS, _TILT_SHARE = radians(1.9), 0.3
 _START_EXCESS = 0.035  # ranges of a rotor: largest excess with which the rounds may begin
 _SMOOTHING_FACTOR, _SMOOTHING_TRIES = 30.0, 8
 _HOPELESS_EXCESS = 10.0  # times the range of a rotor: no round leads back from there
@@ -403,7 +404,7 @@ def _newtons(bounds: Bounds) -> tuple[float, float]:
     """The newtons of a rotor as which an excess of the cosine counts, and of the squared rate."""
     limit = acos(max(bounds.cos_tilt, -1.0))
     beyond = bounds.cos_tilt - cos(limit + min(_TILT_EXCESS, _TILT_SHARE * limit))
-    return max(_COS_RANGES, _TILT_RANGES / beyond) * bounds.rotor_range, _TURN_RANGES * bounds.rotor_range
+    return max(_COS_RANGES, TOLERANCE / beyond) * bounds.rotor_range, _TURN_RANGES * bounds.rotor_range
 
 
 def _lag_matrix(n: int, spacing: float, tau: float) -> sparse.csr_matrix:

@@ -22,7 +22,15 @@ import numpy as np
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
-from autopilot.trajectory.convex import NO_CONSTRAINTS, SAMPLES, LinearConstraints, Objective, Problem, excess
+from autopilot.trajectory.convex import (
+    NO_CONSTRAINTS,
+    SAMPLES,
+    TOLERANCE,
+    LinearConstraints,
+    Objective,
+    Problem,
+    excess,
+)
 from autopilot.trajectory.load_path import (
     NO_PATH,
     NO_PIECES,
@@ -49,10 +57,8 @@ _LONG_WINDOW_S = 4.0
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _EXCESS_S = 0.001  # between samples of its excess: a path may begin with a peak of a millisecond
-# ranges of a rotor by which a shaped path may exceed its bounds between the samples, ...
-_TOLERANCE = 0.035
-_SAMPLE_MARGIN = 0.022  # ... and by which its samples must stay inside them; a greater excess, but less than
-_RIPPLE = 0.1  # this, is that of waves between the samples
+_SAMPLE_MARGIN = 0.022  # ranges of a rotor by which the samples of a path must stay inside its bounds
+_RIPPLE = 0.1  # ranges: an excess above `TOLERANCE`, but below this, is that of waves between the samples
 # in the cost, this distance counts as much as a sixth derivative that takes a quarter of a rotor's range: the
 # share `_SMOOTHNESS_SHARE` of `reference_sixth_derivative`
 _DISTANCE_M = 1e-3
@@ -197,7 +203,7 @@ def shape(step: LoadPath, body: Body, bounds: Bounds) -> ShapedSignals:
     times = _sample_times(-lead, duration + tail, _FINE_S)
     deviation = path_jets(shaped, times)[0] - requested_jets(tables, duration, times)[0]
     distance = float(np.sqrt(np.max(np.sum(deviation * deviation, axis=1))))
-    reason = "" if worst <= _TOLERANCE * bounds.rotor_range else _excess_reason(worst, bounds)
+    reason = "" if worst <= TOLERANCE * bounds.rotor_range else _excess_reason(worst, bounds)
     return ShapedSignals(tables, rows, duration, lead, tail, distance, worst, 1.0, reason)
 
 
@@ -224,7 +230,7 @@ def _solve_widening(
         for candidate in _candidates(step, tables, b, e, body, bounds):
             if best is None or candidate.excess_n < best.excess_n:
                 best = candidate
-        tolerance_n = _TOLERANCE * bounds.rotor_range
+        tolerance_n = TOLERANCE * bounds.rotor_range
         max_excess_n = bounds.rotor_range if e - b > _LONG_WINDOW_S else inf
         if best is not None and (best.excess_n <= tolerance_n or best.excess_n > max_excess_n):
             break
@@ -242,7 +248,7 @@ def _candidates(
     if window is None:
         return
     yield window
-    if _TOLERANCE * bounds.rotor_range < window.excess_n < _RIPPLE * bounds.rotor_range:
+    if TOLERANCE * bounds.rotor_range < window.excess_n < _RIPPLE * bounds.rotor_range:
         stricter = _solve(step, tables, begin, end, body, bounds, margin_n + window.excess_n)
         if stricter is not None:
             yield stricter

@@ -238,19 +238,19 @@ def _travel_and_wait(
         case Winch(speed_m_s=rate):
             speed = min(speed, rate or REEL_M_S)
         case PlaceLoad() if before.position is not None and not before.released:
-            low = min(speed, vertical.lift_m_s)
-            min_move_s = min_move_duration(max(cable, 0.0), gravity)
-            lowering = descent_pace(before.position[2], vertical.descent_m_s, low, accel, min_move_s)
-            return lowering, DETECTION_S + RELEASE_S
+            waiting = DETECTION_S + RELEASE_S
+            speed = min(speed, vertical.lift_m_s)
         case Release():
             return Pace(0.0), RELEASE_S
         case Delay() | AttitudeRun() | Signals() | Trajectory():
             return Pace(0.0), step.duration_s
     if before.expected is None or after.expected is None:
         return Pace(0.0), waiting
-    distance = dist(before.expected, after.expected)
+    # the vehicle stays above a load that is placed
+    lowered = isinstance(step, PlaceLoad)
+    distance = before.expected[2] if lowered else dist(before.expected, after.expected)
     min_move_s = 0.0 if isinstance(step, Winch) else min_move_duration(max(cable, 0.0), gravity)
-    if isinstance(step, Land):
+    if lowered or isinstance(step, Land):
         return descent_pace(distance, vertical.descent_m_s, speed, accel, min_move_s), waiting
     return pace(distance, speed, accel, min_move_s), waiting
 

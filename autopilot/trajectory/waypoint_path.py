@@ -295,8 +295,8 @@ def plan_waypoint_path(
             found.append((path, times))
 
     if time_optimal:
-        total_s = transfer_duration(float(sum(distances)), speed, accel)
         if len(distances) <= _MAX_OPTIMISED_SEGMENTS:
+            total_s = transfer_duration(float(sum(distances)), speed, accel)
             with suppress(NoPathError):
                 times = _times_after(optimal_time_shares(places, total_s)) * total_s
                 consider(_one_section(TimedPoints(places, times, np.arange(len(places)))))

@@ -13,7 +13,7 @@ estimated while nothing pulled.
 from __future__ import annotations
 
 from autopilot.control.drag import drag_force
-from autopilot.estimation.cable_pull import air_free_direction
+from autopilot.estimation.cable_pull import air_free_direction, force_beyond_thrust
 from autopilot.estimation.correction import (
     add_attitude_jacobian,
     add_direction_jacobian,
@@ -42,7 +42,7 @@ from autopilot.estimation.records import (
 from autopilot.estimation.tautness import MIN_FLOWN_HEIGHT, is_never_observed
 from autopilot.estimation.vibration import accel_noise
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, apply, apply_transposed, axpy, column, cross, dot, scale, sub
+from autopilot.geometry.linear import Vec3, apply_transposed, column, cross, dot, scale, sub
 from autopilot.geometry.so3 import rotation_from_quat
 
 # of the load's weight: a stronger pull shows the cable's direction; a weaker one is none
@@ -54,13 +54,11 @@ SLANT_STD = 0.005  # rad, between the rotors' force and the body's axis
 def cable_force(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Vec3:
     """Force of the cable on the vehicle, N, world, by the last sample of the accelerometer."""
     vehicle, push = state.vehicle, state.air.vehicle_accel
-    R = rotation_from_quat(vehicle.quat_wxyz)
-    a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
-    axis, drag, m = column(R, 2), drag_force(vehicle.v_quad, tuning.drag), tuning.quad_mass
+    drag, m = drag_force(vehicle.v_quad, tuning.drag), tuning.quad_mass
     level = (m * push[0] + drag[0], m * push[1] + drag[1])
-    e = air_free_direction(axis, state.frame_share)
+    e = air_free_direction(column(rotation_from_quat(vehicle.quat_wxyz), 2), state.frame_share)
     upward = drag[2] - (e[0] * level[0] + e[1] * level[1]) / e[2]
-    force = axpy(-thrust, axis, scale(m, a))
+    force = force_beyond_thrust(vehicle, state.last_imu, thrust, tuning)
     return sub(force, (level[0], level[1], upward))
 
 

@@ -25,6 +25,7 @@ from autopilot.supervisor.state import (
     Phase,
     View,
     interrupt_mission,
+    without_load,
 )
 from autopilot.trajectory.timeline import MIN_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
@@ -60,9 +61,7 @@ def grab(flight: Flight, request: Grab, view: View, settings: Settings) -> Decis
 
 def with_load_released(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight after a commanded release: the vehicle continues alone; instead of a mission it holds."""
-    alone = replace(
-        flight, cable=replace(flight.cable, released=True, slack_since_us=-1), condition_since_us=-1
-    )
+    alone = replace(without_load(flight), condition_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (Phase.SET_DOWN, Phase.FAILSAFE):
         return alone
     alone = interrupt_mission(alone)

@@ -18,6 +18,7 @@ from autopilot.supervisor.state import (
     is_placing,
     leg_time_s,
     with_condition,
+    without_load,
 )
 from autopilot.supervisor.watches.cable_pull import SLACK_PULL_SHARE, cable_pull_share
 from autopilot.supervisor.watches.watch_result import WatchResult
@@ -42,8 +43,7 @@ def watch_touchdown(flight: Flight, view: View, settings: Settings) -> WatchResu
         return WatchResult(flight)
     if is_placing(flight):
         texts = (INFO, "Load on the ground"), (INFO, RELEASED_TEXT)
-        cable = replace(flight.cable, released=True, slack_since_us=-1)
-        return WatchResult(replace(flight, cable=cable, legs=()), Event.LOAD_PLACED, texts)
+        return WatchResult(replace(without_load(flight), legs=()), Event.LOAD_PLACED, texts)
     if flight.phase == Phase.LOWER and not flight.cable.released:
         return WatchResult(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
     return _landed(flight)
