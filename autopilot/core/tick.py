@@ -400,6 +400,7 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         slowed_by_noise(constants.observer, control.observed, measured_accel_noise(estimator.vibration)),
         constants.drag,
         with_cable_length(vehicle, cable.length),
+        estimator.frame_share,
     )
     air = estimator.air
     load_accel = axpy(air.load_drag, state.v_load, (air.load_accel[0], air.load_accel[1], 0.0))

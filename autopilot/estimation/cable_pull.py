@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from autopilot.control.drag import Drag
+from autopilot.control.drag import MIN_UPWARD, Drag, air_free_direction
 from autopilot.estimation.records import EstimatorTuning, ImuReading, LoadEstimate, VehicleEstimate
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, apply, axpy, column, dot, scale, sub
@@ -38,7 +38,6 @@ from autopilot.geometry.so3 import rotation_from_quat
 FRAME_SHARE_TIME_S = 1.0  # time constant with which k is learned
 # of the load's weight: a drag along the axis that is as large teaches k half as fast as a large one
 LEARNING_FORCE = 0.2
-MIN_UPWARD = 0.25  # least upward part of b: a larger tilt counts as this one
 MIN_CARRYING_SHARE = 0.5  # of the vehicle's weight: below this thrust it stands, and H is not known by it
 _NO_DRAG = 1e-9  # N s/m, added to a denominator to avoid 0 / 0
 
@@ -70,13 +69,6 @@ def without_climb_drag(
     air = axpy(-load.tension, load.q_cable, force)
     level_drag = frame_share * sqrt(air[0] * air[0] + air[1] * air[1])
     return (force[0], force[1], force[2] - climb_drag(level_drag, vehicle.v_quad[2], tuning.drag))
-
-
-@kernel
-def air_free_direction(axis: Vec3, frame_share: float) -> Vec3:
-    """e, of the rotors' axis b."""
-    across, upward = 1.0 - frame_share, frame_share / max(axis[2], MIN_UPWARD)
-    return (across * axis[0], across * axis[1], across * axis[2] + upward)
 
 
 @kernel

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.control.drag import Drag
+from autopilot.control.drag import UNKNOWN_FRAME_SHARE, Drag
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 from autopilot.geometry.wide import aligned_zeros
@@ -347,7 +347,7 @@ def blank_state() -> EstimatorState:
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
-        frame_share=0.5,
+        frame_share=UNKNOWN_FRAME_SHARE,
         last_thrust=0.0,
         resets=0.0,
         memory_s=0.0,

@@ -11,6 +11,7 @@ from autopilot.control.actuators.disturbance_observer import nominal_in_flight, 
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.actuators.rotor_model import Actuation, queue_rows, steady_actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.drag import UNKNOWN_FRAME_SHARE
 from autopilot.control.laws.interface import law_of
 from autopilot.control.records import Cable, Reference
 from autopilot.geometry.linear import E1
@@ -93,6 +94,7 @@ class _LawPilot:
                 setup.observer,
                 setup.drag,
                 vehicle,
+                UNKNOWN_FRAME_SHARE,
             )
             actuation = actuate(actuation, mixed.achieved_thrust, mixed.achieved_moment, setup.actuation)
         self._actuation = actuation

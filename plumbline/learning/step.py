@@ -14,6 +14,7 @@ from autopilot.control.actuators.disturbance_observer import observe
 from autopilot.control.actuators.mixer import MixerResult, mix
 from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.drag import UNKNOWN_FRAME_SHARE
 from autopilot.control.records import Reference, State, with_cable_length
 from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
 from autopilot.core.tick import ControlMemory, CoreConstants, CoreRows, EstimateSummary, Winch
@@ -150,6 +151,7 @@ def _update_actuation(estimators: EstimatorRows, i: int, mixed: MixerResult) -> 
         constants.observer,
         constants.drag,
         with_cable_length(constants.vehicle, cable.length),
+        UNKNOWN_FRAME_SHARE,
     )
     actuation = Actuation(estimators.commands[i], control.thrust, control.moment)
     actuation = actuate(actuation, mixed.achieved_thrust, mixed.achieved_moment, constants.actuation)

@@ -7,8 +7,8 @@
 | D | air | I | N | assumed drag of the vehicle |
 | r | residual | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
 | w | pull | | m/s^2 | L q'.q' - q . (x_Q'' + g e_3) |
-| b | axis | I | | R e_3, axis of the rotors |
-| T | tension | | N | (r . b) / (q . b) |
+| e | direction | I | | in which the wind does not push, `autopilot.control.drag.air_free_direction` |
+| T | tension | | N | (r . e) / (q . e) |
 | m_L | load_mass | | kg | T / w |
 | P | push | I | N | p + k s |
 | p | steady_push | I | N | r - T q - k s, averaged |
@@ -17,9 +17,11 @@
 | c | prompt_push | I | N | as p, averaged over a shorter time where noise slows p |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
-and the wind's push. Wind drag on rotors and frame acts across the rotors' axis b; the push along b is assumed
-to be zero, so that r . b = T q . b. (It would be wrong to assume instead that the push acts across the cable:
-a vehicle that leans into a wind whose push is a third of the weight would then seem to carry half its load.)
+and the wind's push. The drag of the rotors acts in their plane and that of the frame along the wind, which is
+level; the estimator learns how they share the push, and hence the direction e in which there is none, so that
+r . e = T q . e. (It would be wrong to assume instead that the push acts across the cable: a vehicle that
+leans into a wind whose push is a third of the weight would then seem to carry half its load. With the rotors'
+axis for e, one with drag of its frame that leans by 50 deg would seem to carry four times its load.)
 The cable turns as a pendulum whose pivot moves with x_Q'', so that x_L'' + g e_3 = -w q whatever the mass of
 the load, hence T = m_L w. The mass is the least-squares fit of T to w with exponential forgetting. It is
 learned while the load hangs free: cable taut, load higher than where it lay while the cable was slack. The
@@ -52,7 +54,7 @@ from autopilot.control.actuators.torque_observer import (
     torque_constants,
     without_compensation,
 )
-from autopilot.control.drag import GUST_RANDOM_WALK, Drag, drag_force
+from autopilot.control.drag import GUST_RANDOM_WALK, Drag, air_free_direction, drag_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
@@ -245,9 +247,9 @@ def with_load_mass(vehicle: Vehicle, load_mass: float) -> Vehicle:
 
 
 @kernel
-def cable_force(force: Vec3, q: Vec3, axis: Vec3) -> float:
-    """The cable's part of a force on the vehicle, N along q; the rest acts across the rotors' axis."""
-    return force_along_cable(dot(force, axis), q, axis)
+def cable_force(force: Vec3, q: Vec3, direction: Vec3) -> float:
+    """The cable's part of a force on the vehicle, N along q; the rest acts across `direction`."""
+    return force_along_cable(dot(force, direction), q, direction)
 
 
 @kernel
@@ -260,9 +262,11 @@ def observe(
     constants: ObserverConstants,
     drag: Drag,
     vehicle: Vehicle,
+    frame_share: float,
 ) -> DisturbanceEstimate:
     """The estimates a period later. `thrust`, N, is what the rotors give now, `moment`, N m, that of rotors
-    and cable; `vehicle` is the nominal one."""
+    and cable; `vehicle` is the nominal one, `frame_share` the estimator's k of
+    `autopilot.estimation.cable_pull`."""
     q, a = state.q_cable, state.a_quad
     load_mass, steady_push, learned = observed.load_mass, observed.steady_push, observed.drag
     prompt_push = observed.prompt_push
@@ -282,11 +286,11 @@ def observe(
     may_stand = not taut > 0.0 and state.R[2][2] > _STANDING_COSINE
     ground_force += constants.contact * ((residual[2] if may_stand else 0.0) - ground_force)
     if taut > 0.0:
-        axis = column(state.R, 2)
-        tension = cable_force(residual, q, axis)
+        direction = air_free_direction(column(state.R, 2), frame_share)
+        tension = cable_force(residual, q, direction)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, specific_force)
         residual = axpy(-tension, q, residual)
-        shape_drag = axpy(-cable_force(shape_drag, q, axis), q, shape_drag)
+        shape_drag = axpy(-cable_force(shape_drag, q, direction), q, shape_drag)
         if not load_on_ground(observed, state) and pull > 0.0:
             mass_correlation += constants.mass * (tension * pull - mass_correlation)
             mass_square += constants.mass * (pull * pull - mass_square)

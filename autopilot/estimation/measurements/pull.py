@@ -12,8 +12,8 @@ estimated while nothing pulled.
 
 from __future__ import annotations
 
-from autopilot.control.drag import drag_force
-from autopilot.estimation.cable_pull import air_free_direction, force_beyond_thrust
+from autopilot.control.drag import air_free_direction, drag_force
+from autopilot.estimation.cable_pull import force_beyond_thrust
 from autopilot.estimation.correction import (
     add_attitude_jacobian,
     add_direction_jacobian,
