@@ -388,9 +388,9 @@ def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> A
     return np.asarray(np.einsum("oik,ikd->oid", values, nearby))
 
 
-def excess(path_demand: Array, spacing: float, bounds: Bounds) -> Array:
-    """(n,) excess of the demand (n, outputs) of equally spaced samples over the bounds, in N of a rotor;
-    >= 0."""
+def excess(path_demand: Array, spacing: float | Array, bounds: Bounds) -> Array:
+    """(n,) excess of the demand (n, outputs) over the bounds, in N of a rotor; >= 0. The samples are
+    `spacing` s apart, or at these n times (s)."""
     commands = rotor_commands(path_demand, spacing, bounds.rotor_tau)
     over = np.maximum(commands.max(axis=1) - bounds.rotor_high, bounds.rotor_low - commands.min(axis=1))
     over = np.maximum(over, bounds.tension_low - path_demand[:, TENSION])

@@ -2,11 +2,13 @@
 
 A section is a spline (`autopilot.trajectory.splines`) that passes each of its points exactly and minimises
 
-    integral of |x''''|^2 + tau^4 |x^(6)|^2
+    integral of |x''''|^2 + tau^4 (|x^(6)|^2 + sigma^2 |x^(7)|^2)
 
 x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau is the time over which that
-matters: with the snap alone the path would leave rest with a jump of the moment. At its two ends the load
-moves steadily or rests: it has a velocity, and derivatives 2 to 6 are zero.
+matters: with the snap alone the path would leave rest with a jump of the moment. x^(7) determines how fast
+the forces of the rotors change, and sigma is about their lag: without it the moment would rise within one
+interval of the spline, however short. At its two ends the load moves steadily or rests: it has a velocity,
+and derivatives 2 to 6 are zero.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,7 @@ from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTabl
 Indices = NDArray[np.int64]
 
 ROTATION_TIME_S = 0.25  # tau
+ROTOR_TIME_S = 0.02  # sigma
 _PER_SEGMENT = 8  # intervals to the shortest segment, up to _MAX_INTERVALS
 _MAX_INTERVALS = 400
 # the least of them, up to _MOST_INTERVALS: with fewer some points would have no interval of their own
@@ -34,6 +37,9 @@ _MIN_PER_SEGMENT = 2
 _MOST_INTERVALS = 2000
 _SAMPLES = 4  # to an interval, of the integral
 _FINE_S = 0.01
+# The slope of a rotor's force is a one-sided difference at the ends: next to each is one more sample, at this
+# share of the distance between samples.
+_END_SHARE = 0.1
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
 _MAX_FINE_SAMPLES = 20_000
 _BAND = DEGREE + 1
@@ -69,12 +75,15 @@ class _Grid:
 
     def __init__(self, total_s: float, intervals: int) -> None:
         self.basis = basis = Basis(0.0, total_s, intervals)
-        times = np.linspace(0.0, total_s, _SAMPLES * intervals + 1)
-        values, first = basis.band(times, 7)
-        self.spacing = spacing = float(times[1])
-        four, six = (self.matrix(values[order], first) for order in (4, 6))
-        self.snap, self.turn = four, six
-        self.hessian = spacing * (four.T @ four + ROTATION_TIME_S**4 * (six.T @ six))
+        samples = _SAMPLES * intervals
+        spacing = total_s / samples
+        values, first = basis.band(spacing * (np.arange(samples) + 0.5), 8)
+        weights = {4: 1.0, 6: ROTATION_TIME_S**4, 7: ROTATION_TIME_S**4 * ROTOR_TIME_S**2}
+        # rows whose squares sum to the integral
+        self.root = sparse.vstack(
+            [sqrt(spacing * weight) * self.matrix(values[n], first) for n, weight in weights.items()]
+        )
+        self.hessian = self.root.T @ self.root
         free = slice(basis.free.start, basis.free.stop)
         hessian = self.hessian[free, free]
         # the scale keeps the two kinds of rows comparable in size for pivoting
@@ -132,13 +141,14 @@ class MinimumSnap:
         # one step of refinement with the residual: the least integral is small compared with its terms
         solved += factor.solve(right_side - system @ solved)
         self.coefficients[free] = solved[:n]
-        snap, turn = grid.snap @ self.coefficients, grid.turn @ self.coefficients
-        self.cost = grid.spacing * float(np.sum(snap * snap) + ROTATION_TIME_S**4 * np.sum(turn * turn))
+        self.cost = float(np.sum((grid.root @ self.coefficients) ** 2))
 
     def jets(self) -> tuple[Array, Array]:
         """Times (n,) from its beginning and jets (7, n, 3) along the path, relative to its first point."""
         total_s = float(self.basis.breaks[-1])
         times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
+        near_s = _END_SHARE * float(times[1])
+        times = np.insert(times, (1, -1), (near_s, total_s - near_s))
         values, first = self.basis.band(times, 7)
         return times, band_jets(values, first, self.coefficients)
 

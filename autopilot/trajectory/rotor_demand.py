@@ -175,8 +175,9 @@ def demand_derivatives(jets: Array, body: Body) -> Array:
     return out
 
 
-def rotor_commands(path_demand: Array, spacing: float, tau: float) -> Array:
-    """(n, rotors) commands F + tau F' to rotors with the lag `tau`, for samples `spacing` s apart."""
+def rotor_commands(path_demand: Array, spacing: float | Array, tau: float) -> Array:
+    """(n, rotors) commands F + tau F' to rotors with the lag `tau`, for samples `spacing` s apart, or at
+    these n times (s)."""
     forces = path_demand[:, FIRST_ROTOR:]
     if tau == 0.0 or len(forces) < 3:
         return forces

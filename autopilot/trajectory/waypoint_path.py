@@ -344,7 +344,7 @@ def _slowing(
     for fine, jets in path.jets():
         if not time_optimal:
             factor = max(factor, float(limits_used(jets, speed, accel).max()))
-        over = float(excess(demand(jets, body), float(fine[1] - fine[0]), bounds).max())
+        over = float(excess(demand(jets, body), fine, bounds).max())
         if over > 0.0:
             factor = max(factor, 1.0 + over)
     return factor

@@ -8,11 +8,18 @@ from math import cos, dist, inf, nextafter, radians, sin, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import Vec3
-from autopilot.trajectory.minimum_snap import REST, ROTATION_TIME_S, MinimumSnap, NoPathError, Section
+from autopilot.trajectory.minimum_snap import (
+    REST,
+    ROTATION_TIME_S,
+    ROTOR_TIME_S,
+    MinimumSnap,
+    NoPathError,
+    Section,
+)
 from autopilot.trajectory.peaks import Body, survey_transfer
 from autopilot.trajectory.prepare import REFUSE, PathLimits, prepare
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, demand, rotor_commands
@@ -59,6 +66,8 @@ def assert_within(jets: Array, spacing: float) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(points=st.lists(places, min_size=3, max_size=6).filter(apart), quick=st.booleans())
+# its greatest demand was in its last millisecond
+@example(points=[(0.0, 0.0, 1.0), (0.0, 0.0, 2.0), (0.0, 3.0, 1.0)], quick=True)
 def test_every_point_is_passed_at_its_time_within_the_bounds(points: list[Vec3], quick: bool) -> None:
     path, times = plan_waypoint_path(points, 2.0, 1.5, BODY, BOUNDS, quick)
     table = path.table()
@@ -93,12 +102,13 @@ def test_the_path_is_that_of_a_dense_programme() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * basis.spacing
     at = (basis.breaks[:-1, None] + half * (1.0 + nodes)).ravel()
-    values, first = basis.band(at, 7)
-    dense = np.zeros((7, len(at), basis.count))
+    values, first = basis.band(at, 8)
+    dense = np.zeros((8, len(at), basis.count))
     for i, begin in enumerate(first):
         dense[:, i, begin : begin + 10] = values[:, i]
     weight = np.tile(half * weights, basis.intervals)[:, None]
-    H = dense[4].T @ (weight * dense[4]) + ROTATION_TIME_S**4 * dense[6].T @ (weight * dense[6])
+    four, six, seven = (dense[n].T @ (weight * dense[n]) for n in (4, 6, 7))
+    H = four + ROTATION_TIME_S**4 * (six + ROTOR_TIME_S**2 * seven)
     point_values, point_first = basis.band(times[1:-1], 1)
     A = np.zeros((2, basis.count))
     for i, begin in enumerate(point_first):
@@ -301,7 +311,16 @@ def test_the_stretches_of_a_passage_join() -> None:
     assert made[-1].end_s == made[-1].table[-1, 1]
 
 
+@pytest.mark.parametrize("total_s", [0.2, 4.0])
+def test_each_end_of_a_path_has_a_sample_next_to_it(total_s: float) -> None:
+    times, jets = MinimumSnap(Section(np.array(SQUARE), np.linspace(0.0, total_s, 4), REST)).jets()
+    gaps = np.diff(times)
+    assert (times[0], times[-1]) == (0.0, total_s) and (gaps > 0.0).all()
+    assert max(gaps[0], gaps[-1]) < 0.11 * gaps[2:-2].min()
+    assert jets.shape[1] == len(times)
+
+
 def test_a_flight_of_days_is_judged_by_no_more_samples_than_one_of_minutes() -> None:
     points = np.array([[0.0, 0.0, 2.0], [1000.0, 0.0, 2.0], [-1000.0, 0.0, 2.0]])
     times, _ = MinimumSnap(Section(points, np.array([0.0, 1e5, 3e5]), REST)).jets()
-    assert len(times) == 20_001
+    assert len(times) == 20_003
