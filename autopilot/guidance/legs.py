@@ -11,12 +11,21 @@ from math import inf, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
+from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
 from autopilot.trajectory.reeling import reel, straight_way
 from autopilot.trajectory.shaping import ShapedSignals
 from autopilot.trajectory.slack_cable import slack_pace
 from autopilot.trajectory.splines import evaluate_path
 from autopilot.trajectory.swing import swing_direction
-from autopilot.trajectory.transfer import PEAK_SPEED, STEP_TERMS, Pace, pace, reachable_speed, transfer
+from autopilot.trajectory.transfer import (
+    PEAK_SPEED,
+    STEP_TERMS,
+    Pace,
+    lift_pace,
+    pace,
+    reachable_speed,
+    transfer,
+)
 from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -259,8 +268,8 @@ class Creep:
 class Reel:
     """The winch lowers the load (raises it: `speed` negative) while the vehicle is held at height `top_m`.
 
-    The length of the cable is the depth of the load below that height. The rate rises to `speed` along the s
-    of `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose.
+    The length of the cable is the depth of the load below that height. The rate rises to `speed` along a
+    ramp of `ramp_s`, stays for `cruise_s`, and falls as it rose.
     """
 
     begin: Vec3
@@ -499,7 +508,7 @@ def reel_leg(begin: Vec3, length: float, target_length: float, speed: float, acc
     the load hangs at `begin`, the vehicle stays."""
     length_change = abs(target_length - length)
     rate = reachable_speed(length_change, speed, accel)
-    ramp = max(PEAK_SPEED * rate / accel, MIN_RAMP_S)
+    ramp = max(PEAK_RAMP_ACCEL * rate / accel, MIN_RAMP_S)
     rate = min(rate, length_change / ramp)
     sign = 1.0 if target_length > length else -1.0
     return Reel(begin, begin[2] + length, sign * rate, ramp, length_change / rate - ramp)
@@ -519,3 +528,9 @@ def carry_leg(
     distance is zero; see `autopilot.trajectory.transfer.pace`."""
     distance = norm(sub(end, begin))
     return Transfer(begin, end, pace(distance, speed, accel, min_move_s).stretched(min_duration_s))
+
+
+def lift_leg(begin: Vec3, end: Vec3, speed: float, accel: float, min_move_s: float) -> Transfer:
+    """A transfer straight up or down, from or to near the ground, within the limits given; see
+    `autopilot.trajectory.transfer.lift_pace`."""
+    return Transfer(begin, end, lift_pace(norm(sub(end, begin)), speed, accel, min_move_s))

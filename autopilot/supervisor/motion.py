@@ -19,6 +19,7 @@ from autopilot.guidance.legs import (
     SwingDamping,
     brake_leg,
     carry_leg,
+    lift_leg,
     path_stop_leg,
     winch_hold_height,
 )
@@ -140,6 +141,11 @@ def stopped_run_of(
 def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, min_duration_s: float = 0.0) -> Leg:
     """A transfer of the load to another place, at rest at both ends, that takes at least `min_duration_s`."""
     return carry_leg(begin, end, speed, settings.motion.accel_m_s2, settings.min_move_s, min_duration_s)
+
+
+def lift(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
+    """A transfer straight up or down, from or to near the ground, at rest at both ends."""
+    return lift_leg(begin, end, speed, settings.motion.accel_m_s2, settings.min_move_s)
 
 
 def cable_length_at(flight: Flight, here: Vec3, settings: Settings) -> float:

@@ -16,7 +16,7 @@ from autopilot.guidance.legs import (
     Hold,
     Leg,
     SwingDamping,
-    carry_leg,
+    lift_leg,
     slack_leg,
 )
 from autopilot.guidance.setpoint_follower import (
@@ -25,7 +25,7 @@ from autopilot.guidance.setpoint_follower import (
     TrackPosition,
     start_following,
 )
-from autopilot.supervisor.motion import AT_REST, carry, commanded_motion, position_mode, stopping_legs
+from autopilot.supervisor.motion import AT_REST, carry, commanded_motion, lift, position_mode, stopping_legs
 from autopilot.supervisor.setpoint_source import active_setpoint
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -87,9 +87,9 @@ def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     if flight.cable.released:
         legs, here = stopping_legs(flight, view, settings)
         up = (here[0], here[1], flight.mission.takeoff_altitude_m)
-        return (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings))
+        return (*legs, lift(here, up, settings.motion.lift_speed_m_s, settings))
     top = (view.x_load[0], view.x_load[1], flight.mission.takeoff_altitude_m)
-    return (carry(view.x_load, top, settings.motion.lift_speed_m_s, settings),)
+    return (lift(view.x_load, top, settings.motion.lift_speed_m_s, settings),)
 
 
 def _stop_above_ground(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
@@ -98,7 +98,7 @@ def _stop_above_ground(flight: Flight, view: View, settings: Settings) -> tuple[
     if here[2] >= MIN_LOAD_HEIGHT:
         return legs, here
     up = (here[0], here[1], MIN_LOAD_HEIGHT)
-    return (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
+    return (*legs, lift(here, up, settings.motion.lift_speed_m_s, settings)), up
 
 
 def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -112,7 +112,7 @@ def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     min_height = settings.motion.return_altitude_m
     if here[2] < min_height and hypot(goal[0] - here[0], goal[1] - here[1]) > HOME_RADIUS:
         up = (here[0], here[1], min_height)
-        legs, here = (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
+        legs, here = (*legs, lift(here, up, settings.motion.lift_speed_m_s, settings)), up
     return (*legs, carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 
@@ -165,7 +165,7 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     if is_blind:
         motion = settings.motion
         speed, accel = BLIND_SPEED_FACTOR * motion.lift_speed_m_s, BLIND_SPEED_FACTOR * motion.accel_m_s2
-        down: tuple[Leg, ...] = (carry_leg(here, low, speed, accel, settings.min_move_s),)
+        down: tuple[Leg, ...] = (lift_leg(here, low, speed, accel, settings.min_move_s),)
     else:
         down = _descent(here, low, settings)
     return (*legs, *down, Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION))
@@ -182,8 +182,8 @@ def _descent(begin: Vec3, low: Vec3, settings: Settings) -> tuple[Leg, ...]:
         settings.min_move_s,
     )
     near = (low[0], low[1], begin[2] - quick_m)
-    slow = carry(near, low, motion.lift_speed_m_s, settings)
-    return (carry(begin, near, motion.descent_speed_m_s, settings), slow) if quick_m > 0.0 else (slow,)
+    slow = lift(near, low, motion.lift_speed_m_s, settings)
+    return (lift(begin, near, motion.descent_speed_m_s, settings), slow) if quick_m > 0.0 else (slow,)
 
 
 def _clear_of_load(here: Vec3, view: View, settings: Settings) -> Vec3:

@@ -17,7 +17,7 @@ from autopilot.guidance.legs import (
     Swing,
     reel_leg,
 )
-from autopilot.supervisor.motion import AT_REST, cable_length_at, carry
+from autopilot.supervisor.motion import AT_REST, cable_length_at, carry, lift
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase
 from autopilot.trajectory.shaping import ShapedSignals, unshaped_signals
@@ -54,7 +54,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
     match step:
         case Takeoff():
             up = destination(step, here, flight)
-            return (carry(here, up, settings.motion.lift_speed_m_s, settings),)
+            return (lift(here, up, settings.motion.lift_speed_m_s, settings),)
         case Waypoint(hold_s=hold):
             there = destination(step, here, flight)
             path = prepared_path(flight, flight.mission.step)

@@ -8,7 +8,7 @@ x'''' is the snap of the load; x^(6) determines how the vehicle turns, and tau i
 matters: with the snap alone the path would leave rest with a jump of the moment. x^(7) determines how fast
 the forces of the rotors change, and sigma is about their lag: without it the moment would rise within one
 interval of the spline, however short. At its two ends the load moves steadily or rests: it has a velocity,
-and derivatives 2 to 6 are zero.
+and derivatives 2 to 6 are zero. A section of two points is a straight one: steady motion, or a ramp.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from autopilot.trajectory.convex import band_jets
+from autopilot.trajectory.ramp import PARTS, WAYS, ramp
 from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, power_table
 
 Indices = NDArray[np.int64]
@@ -77,7 +78,7 @@ class _Grid:
         self.basis = basis = Basis(0.0, total_s, intervals)
         samples = _SAMPLES * intervals
         spacing = total_s / samples
-        values, first = basis.band(spacing * (np.arange(samples) + 0.5), 8)
+        values, first = basis.band(spacing * np.arange(0.5, samples), 8)
         weights = {4: 1.0, 6: ROTATION_TIME_S**4, 7: ROTATION_TIME_S**4 * ROTOR_TIME_S**2}
         # rows whose squares sum to the integral
         self.root = sparse.vstack(
@@ -145,10 +146,7 @@ class MinimumSnap:
 
     def jets(self) -> tuple[Array, Array]:
         """Times (n,) from its beginning and jets (7, n, 3) along the path, relative to its first point."""
-        total_s = float(self.basis.breaks[-1])
-        times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
-        near_s = _END_SHARE * float(times[1])
-        times = np.insert(times, (1, -1), (near_s, total_s - near_s))
+        times = _sample_times(float(self.basis.breaks[-1]))
         values, first = self.basis.band(times, 7)
         return times, band_jets(values, first, self.coefficients)
 
@@ -161,30 +159,53 @@ class MinimumSnap:
         return table
 
 
+def _sample_times(total_s: float) -> Array:
+    """Times (s) at which a section of `total_s` seconds is judged."""
+    times = np.linspace(0.0, total_s, int(np.clip(total_s / _FINE_S, 50, _MAX_FINE_SAMPLES)) + 1)
+    near_s = _END_SHARE * float(times[1])
+    return np.insert(times, (1, -1), (near_s, total_s - near_s))
+
+
 def on_clock(times: Array) -> Array:
     """Times (s) in whole microseconds: the stretches of a path join exactly on the vehicle's clock."""
     return np.asarray(np.round(times * 1e6) * 1e-6)
 
 
-class SteadyMotion:
-    """The path of a section at constant velocity."""
+class StraightMotion:
+    """The path of a section along a line, at constant velocity or along a ramp."""
 
     def __init__(self, section: Section) -> None:
         self.section = section
         self.origin: Array = section.points[0]
+        self._duration_s = float(section.times[1] - section.times[0])
+        self._begin, end = section.velocities
+        self._gain = end - self._begin
 
     def jets(self) -> tuple[Array, Array]:
         """As those of `MinimumSnap`."""
-        times = self.section.times - self.section.times[0]
-        jets = np.zeros((ORDERS, len(times), 3))
-        jets[0] = self.section.points - self.origin
-        jets[1] = self.section.velocities
+        if self.section.is_steady:
+            times = np.array([0.0, self._duration_s])
+            jets = np.zeros((ORDERS, len(times), 3))
+        else:
+            times = _sample_times(self._duration_s)
+            growth = np.array([ramp(self._duration_s, time) for time in times.tolist()])
+            jets = growth.T[:, :, None] * self._gain
+        jets[0] += times[:, None] * self._begin
+        jets[1] += self._begin
         return times, jets
 
     def table(self) -> PieceTable:
         """The path as a table, as it is flown."""
-        powers = np.stack([self.origin, self.section.velocities[0]])
-        return power_table(self.section.times, powers[None])
+        if self.section.is_steady:
+            powers, breaks = np.zeros((1, 2, 3)), self.section.times
+        else:
+            part_s = self._duration_s / PARTS
+            scales = part_s ** (1.0 - np.arange(DEGREE + 1))
+            powers = (WAYS * scales)[:, :, None] * self._gain
+            breaks = np.linspace(self.section.times[0], self.section.times[-1], PARTS + 1)
+        powers[:, 0] += self.origin + (breaks[:-1, None] - breaks[0]) * self._begin
+        powers[:, 1] += self._begin
+        return power_table(breaks, powers)
 
 
 class JoinedPath:
@@ -195,15 +216,13 @@ class JoinedPath:
 
     def __init__(self, sections: Sequence[Section]) -> None:
         """NoPathError if a section is not possible."""
-        splines: list[MinimumSnap | SteadyMotion] = []
+        splines: list[MinimumSnap | StraightMotion] = []
         for section in sections:
-            if section.is_steady:
-                splines.append(SteadyMotion(section))
-                continue
             times = section.times.copy()
             end = None if section is sections[-1] else -1
             times[1:end] = on_clock(times[1:end])
-            splines.append(MinimumSnap(replace(section, times=times)))
+            motion = StraightMotion if len(section.points) == 2 else MinimumSnap
+            splines.append(motion(replace(section, times=times)))
         self.splines = tuple(splines)
 
     def jets(self) -> Iterator[tuple[Array, Array]]:

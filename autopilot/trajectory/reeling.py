@@ -4,23 +4,9 @@ from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
+from autopilot.trajectory.ramp import Growth, ramp
 from autopilot.trajectory.signals import Jet
-from autopilot.trajectory.transfer import STEP_TERMS, transfer
-
-Growth = tuple[float, float, float, float, float, float, float]  # a length and its derivatives 1 ... 6
-
-_GROWTH_TERMS = tuple((power + 1.0, c) for power, c in STEP_TERMS)  # of the integral of s
-
-
-@kernel
-def _ramp(ramp_s: float, t: float) -> Growth:
-    u = t / ramp_s
-    grown = 0.0
-    for i in range(len(_GROWTH_TERMS)):
-        power, c = _GROWTH_TERMS[i]
-        grown += c * u**power / power
-    w = transfer(ZERO, (1.0, 0.0, 0.0), ramp_s, t)
-    return (ramp_s * grown, w[0][0], w[1][0], w[2][0], w[3][0], w[4][0], w[5][0])
+from autopilot.trajectory.transfer import transfer
 
 
 @kernel
@@ -28,10 +14,10 @@ def _growth(ramp_s: float, cruise_s: float, t: float) -> Growth:
     """Growth for a rate of 1, before the end of the motion."""
     left = 2.0 * ramp_s + cruise_s - t
     if t <= ramp_s:
-        return _ramp(ramp_s, max(t, 0.0))
+        return ramp(ramp_s, max(t, 0.0))
     if left >= ramp_s:
         return (t - 0.5 * ramp_s, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    back = _ramp(ramp_s, left)
+    back = ramp(ramp_s, left)
     return (ramp_s + cruise_s - back[0], back[1], -back[2], back[3], -back[4], back[5], -back[6])
 
 
@@ -39,7 +25,7 @@ def _growth(ramp_s: float, cruise_s: float, t: float) -> Growth:
 def reel(begin: Vec3, speed: float, ramp_s: float, cruise_s: float, t: float) -> Jet:
     """Position of the load and its derivatives 1 ... 6 at time t (s) while the winch lowers it from `begin`,
     under a vehicle that stays where it is: the rate rises to `speed` (m/s; negative: the load is raised)
-    along the s of `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose."""
+    along a ramp of `ramp_s`, stays for `cruise_s`, and falls as it rose."""
     x, y, z = begin
     if 2.0 * ramp_s + cruise_s - t <= 0.0:
         return (x, y, z - speed * (ramp_s + cruise_s)), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
@@ -58,8 +44,7 @@ def reel(begin: Vec3, speed: float, ramp_s: float, cruise_s: float, t: float) ->
 @kernel
 def straight_way(begin: Vec3, end: Vec3, duration: float, ramp_s: float, t: float) -> Jet:
     """Position and its derivatives 1 ... 6 at time t (s) along a straight line, from rest to rest: along
-    `transfer`, or, with a ramp, at constant speed between two ramps of `ramp_s`, on which the speed follows
-    the s of `autopilot.trajectory.transfer`."""
+    `transfer`, or, with a ramp, at constant speed between two ramps of `ramp_s`."""
     if ramp_s == 0.0 or t >= duration:
         return transfer(begin, end, duration, t)
     velocity = scale(1.0 / (duration - ramp_s), sub(end, begin))

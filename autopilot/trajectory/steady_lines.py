@@ -1,15 +1,16 @@
 """A path through waypoints along the straight lines between them, at a steady speed on each.
 
-Each part of the path is the smoothest one (`autopilot.trajectory.minimum_snap`) between two states of steady
-motion, so that the parts join without a jump of any rotor force:
+Each part of the path leads from one state of steady motion to another, so that the parts join without a jump
+of any rotor force:
 
-* a ramp on a line, from one speed to another: with u, v the speeds, it covers (u + v) / 2 times its duration,
-  and its peak acceleration is a constant, found by `_ramp_ratio`, times |v - u| / duration;
-* a turn past a waypoint, from a place before it to another at the same distance behind it, at the same speed
-  v at both. The two distances together are v times the duration times a share: the less it is, the slower is
-  the load at the waypoint, and the shorter its way. It is as great as the lines have room for, and as the
-  load is nowhere faster than v: nearly 1 for a slight turn, 0.8 for one of 90 degrees. The peak acceleration
-  is a ratio that depends on angle and share alone times v / duration.
+* a ramp on a line, from one speed to another (`autopilot.trajectory.ramp`): with u, v the speeds, it covers
+  (u + v) / 2 times its duration, and its peak acceleration is PEAK_RAMP_ACCEL |v - u| / duration;
+* a turn past a waypoint, the smoothest path (`autopilot.trajectory.minimum_snap`) from a place before it to
+  another at the same distance behind it, at the same speed v at both. The two distances together are v times
+  the duration times a share: the less it is, the slower is the load at the waypoint, and the shorter its way.
+  It is as great as the lines have room for, and as the load is nowhere faster than v: nearly 1 for a slight
+  turn, 0.8 for one of 90 degrees. The peak acceleration is a ratio that depends on angle and share alone
+  times v / duration.
 
 Along lines that are long beside speed^2 / acceleration this is the quickest path but for a few per cent, and
 it does not leave the lines but in turns. Between short lines another is quicker
@@ -28,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from autopilot.trajectory.minimum_snap import REST, JoinedPath, MinimumSnap, Section, on_clock
+from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
 from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 
 _BISECTIONS = 40
@@ -45,14 +47,6 @@ def _shape(points: Array, velocities: Array) -> tuple[float, float]:
     times = np.linspace(0.0, _LONG_S, len(points))
     _, jets = MinimumSnap(Section(points, times, velocities)).jets()
     return float(np.linalg.norm(jets[1], axis=1).max()), float(np.linalg.norm(jets[2], axis=1).max())
-
-
-@lru_cache(maxsize=1)
-def _ramp_ratio() -> float:
-    """The peak acceleration of a ramp times its duration over the difference of the speeds."""
-    end = np.array([_LONG_S, 0.0, 0.0])  # at 1 m/s
-    velocities = np.vstack([REST[0], 2.0 * end / _LONG_S])
-    return _shape(np.vstack([REST[0], end]), velocities)[1] * _LONG_S / 2.0
 
 
 class _Turn(NamedTuple):
@@ -119,6 +113,7 @@ class SteadyLines:
         self._directions = lines / self._lengths[:, None]
         self._speeds = self._speeds_at_corners(speed)
         self.is_steady = bool((self._speeds[1:-1] == speed).all())
+        self.is_straight = len(self.corners) == 2
         self.sections: list[Section] = []
         self._turn_sections: list[int] = []
         for i in range(len(lines)):
@@ -229,7 +224,7 @@ class SteadyLines:
         return self._way(self._turns[corner], speed)
 
     def _ramp_s(self, begin: float, end: float) -> float:
-        return max(_ramp_ratio() * abs(end - begin) / self._accel, self._least_s)
+        return max(PEAK_RAMP_ACCEL * abs(end - begin) / self._accel, self._least_s)
 
     def _ramp_way(self, begin: float, end: float) -> float:
         return 0.5 * (begin + end) * self._ramp_s(begin, end) if begin != end else 0.0

@@ -17,7 +17,7 @@ from autopilot.geometry.linear import ZERO, Vec3, add, dot
 from autopilot.trajectory.descent import descent_pace
 from autopilot.trajectory.load_path import evaluate_load_path, path_tables
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
-from autopilot.trajectory.transfer import Pace, pace
+from autopilot.trajectory.transfer import Pace, lift_pace, pace
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -252,7 +252,8 @@ def _travel_and_wait(
     min_move_s = 0.0 if isinstance(step, Winch) else min_move_duration(max(cable, 0.0), gravity)
     if lowered or isinstance(step, Land):
         return descent_pace(distance, vertical.descent_m_s, speed, accel, min_move_s), waiting
-    return pace(distance, speed, accel, min_move_s), waiting
+    at_pace = pace if isinstance(step, Waypoint | ReturnHome) else lift_pace
+    return at_pace(distance, speed, accel, min_move_s), waiting
 
 
 def expected_duration_s(

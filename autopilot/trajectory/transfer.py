@@ -8,16 +8,18 @@ its first six derivatives zero at both ends. Its slope is 12012 u^6 (1 - u)^6, w
   6 * 12012 * (5/22)^5 / sqrt(11).
 
 Over a long way this takes almost three times as long as the peak speed would, and the load creeps at both
-ends. A long way is therefore flown at constant speed between two ramps, along which the speed follows s.
+ends. All but the shortest ways are therefore flown at constant speed between two ramps
+(`autopilot.trajectory.ramp`); lifts and descents only where they are long.
 """
 
 from __future__ import annotations
 
-from math import comb, isclose, sqrt
+from math import comb, sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
+from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
 from autopilot.trajectory.signals import Jet
 
 # Taylor coefficients of s(u): (power, coefficient) of u^7 ... u^13
@@ -25,9 +27,9 @@ STEP_TERMS = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) 
 PEAK_SPEED = 3003.0 / 1024.0
 PEAK_ACCELERATION = 72072.0 * (5.0 / 22.0) ** 5 / sqrt(11.0)
 
-# s: a way that would take longer along the polynomial alone is flown at constant speed in between
+# s: a lift that would take longer along the polynomial alone is flown at constant speed in between
 CRUISE_AFTER_S = 10.0
-_RAMP_SHARE = 1.0 / 3.0  # of the time of the shortest such way
+_RAMP_SHARE = 1.0 / 3.0  # of the time of the shortest such lift
 
 # of u^13 ... u^7; there are no lower powers
 _COEFFICIENTS = tuple(float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k) for k in range(6, -1, -1))
@@ -76,11 +78,6 @@ class Pace(NamedTuple):
     duration_s: float
     ramp_s: float = 0.0
 
-    @property
-    def evens_out(self) -> bool:
-        """Whether it is slower than its limits, so that no longer way takes less time."""
-        return isclose(self.ramp_s, _RAMP_SHARE * self.duration_s)
-
     def peak_speed(self, distance: float) -> float:
         """The peak speed (m/s) over a distance (m) that it takes some time to fly."""
         mean = distance / (self.duration_s - self.ramp_s)  # with ramps, this is the constant speed
@@ -95,14 +92,27 @@ class Pace(NamedTuple):
 
 def reachable_speed(distance: float, speed_max: float, accel_max: float) -> float:
     """The greatest speed (m/s), up to speed_max, to which two ramps over a distance (m) lead with peak
-    acceleration <= accel_max (m/s^2): a ramp takes PEAK_SPEED speed / accel_max, at half the speed on
+    acceleration <= accel_max (m/s^2): a ramp takes PEAK_RAMP_ACCEL speed / accel_max, at half the speed on
     average."""
-    return min(speed_max, sqrt(distance * accel_max / PEAK_SPEED))
+    return min(speed_max, sqrt(distance * accel_max / PEAK_RAMP_ACCEL))
 
 
 def pace(distance: float, speed_max: float, accel_max: float, min_move_s: float = 0.0) -> Pace:
     """The pace over a distance (m) with peak speed <= speed_max (m/s) and peak acceleration <= accel_max
-    (m/s^2). No move, and no ramp, takes less than `min_move_s`.
+    (m/s^2). No move, and no ramp, takes less than `min_move_s`: a short way that is quicker along the
+    polynomial alone is flown along it."""
+    if distance == 0.0:
+        return Pace(0.0)
+    alone = Pace(max(transfer_duration(distance, speed_max, accel_max), min_move_s))
+    speed = reachable_speed(distance, speed_max, accel_max)
+    ramp = max(PEAK_RAMP_ACCEL * speed / accel_max, min_move_s)
+    steady = Pace(ramp + max(distance / speed, ramp), ramp)
+    return min(alone, steady)
+
+
+def lift_pace(distance: float, speed_max: float, accel_max: float, min_move_s: float = 0.0) -> Pace:
+    """The same for lifting and lowering, near the ground: along the polynomial alone as long as that takes no
+    more than `CRUISE_AFTER_S`, beyond that between ramps as gentle as it.
 
     The duration grows with the distance: the shortest way that is flown at constant speed takes as long as
     the longest that is not.
@@ -113,7 +123,8 @@ def pace(distance: float, speed_max: float, accel_max: float, min_move_s: float 
     least_s = max(CRUISE_AFTER_S, min_move_s / _RAMP_SHARE)
     if duration <= least_s:
         return Pace(duration)
-    speed = min(reachable_speed(distance, speed_max, accel_max), distance / ((1.0 - _RAMP_SHARE) * least_s))
+    reachable = sqrt(distance * accel_max / PEAK_SPEED)
+    speed = min(speed_max, reachable, distance / ((1.0 - _RAMP_SHARE) * least_s))
     ramp = max(PEAK_SPEED * speed / accel_max, min_move_s, least_s - distance / speed)
     return Pace(ramp + distance / speed, ramp)
 

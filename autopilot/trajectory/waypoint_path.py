@@ -34,7 +34,7 @@ from autopilot.trajectory.rotor_demand import Bounds, demand
 from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 from autopilot.trajectory.steady_lines import SteadyLines
 from autopilot.trajectory.timeline import min_move_duration
-from autopilot.trajectory.transfer import PEAK_SPEED, pace, reachable_speed, transfer_duration
+from autopilot.trajectory.transfer import PEAK_SPEED, pace, transfer_duration
 
 Indices = NDArray[np.int64]
 
@@ -128,7 +128,7 @@ def ride(length: float, speed: float, accel: float) -> tuple[float, float, float
     """A ride over `length` m: its greatest speed (m/s), in how many seconds it is reached, and the time (s)
     of the ride."""
     ramp_accel = _RIDE_ACCEL_SHARE * accel
-    cruise = reachable_speed(length, speed, ramp_accel)
+    cruise = min(speed, sqrt(length * ramp_accel / PEAK_SPEED))
     ramp_s = PEAK_SPEED * cruise / ramp_accel
     return cruise, ramp_s, ramp_s + length / cruise
 
@@ -262,11 +262,12 @@ def _times_after(durations: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Planned:
-    """Sections of a path, and which times of the path of these sections, or a slower one, are those at its
-    waypoints."""
+    """Sections of a path, which times of the path of these sections, or a slower one, are those at its
+    waypoints, and the least duration (s) of the path."""
 
     sections: Sequence[Section]
     passes: Callable[[JoinedPath], Array]
+    least_s: float = 0.0
 
 
 def plan_waypoint_path(
@@ -287,9 +288,10 @@ def plan_waypoint_path(
     distances = [dist(a, b) for a, b in pairwise(points)]
     stops_s = sum(pace(distance, speed, accel, least_s).duration_s for distance in distances)
     found: list[tuple[JoinedPath, Array]] = []
+    is_straight = False
 
     def consider(planned: _Planned) -> None:
-        path = _scaled_path(planned.sections, speed, accel, body, bounds, time_optimal)
+        path = _scaled_path(planned, speed, accel, body, bounds, time_optimal)
         times = planned.passes(path)
         if times[-1] <= stops_s:
             found.append((path, times))
@@ -303,11 +305,13 @@ def plan_waypoint_path(
     else:
         with suppress(NoPathError):
             lines = _steady_lines(places, speed, accel, least_s, body, bounds)
-            consider(_Planned(lines.sections, lines.passes))
+            consider(_Planned(lines.sections, lines.passes, float(lines.sections[-1].times[-1])))
             if found and lines.is_steady:
                 return found[0]
-    with suppress(NoPathError):
-        consider(_one_section(quickest_ride(places, speed, accel)[0]))
+            is_straight = lines.is_straight
+    if not is_straight:  # else waypoints on a line could make the flight along it quicker
+        with suppress(NoPathError):
+            consider(_one_section(quickest_ride(places, speed, accel)[0]))
     if not found:
         raise NoPathError("flights with a stop at each point are quicker")
     first, last = found[0], found[-1]
@@ -351,7 +355,7 @@ def _slowing(
 
 
 def _scaled_path(
-    sections: Sequence[Section],
+    planned: _Planned,
     speed: float,
     accel: float,
     body: Body,
@@ -359,6 +363,7 @@ def _scaled_path(
     time_optimal: bool,
 ) -> JoinedPath:
     """The path of the sections, all as many times as long as the limits demand."""
+    sections = planned.sections
     total_s = begin_s = float(sections[-1].times[-1])
 
     def evaluate(seconds: float) -> tuple[JoinedPath, float]:
@@ -370,7 +375,7 @@ def _scaled_path(
     if not time_optimal:
         # peaks scale with time almost exactly: two rounds are accurate to one part in a thousand
         for _ in range(2):
-            total_s *= min(factor, 2.0)
+            total_s = max(total_s * min(factor, 2.0), planned.least_s)
             path, factor = evaluate(total_s)
     for _ in range(4 * _SCALING_ROUNDS):
         if factor <= 1.0 + _CLOSE:

@@ -127,7 +127,7 @@ def unreached_speed_notes(
         reached_m_s = max(
             peaks_m_s.get(way.item, way.transfer.peak_speed(dist(way.begin, way.end))) for way in ways
         )
-        is_told = any(way.item in slow or way.transfer.evens_out for way in ways)
+        is_told = any(way.item in slow for way in ways)
         if is_told or reached_m_s >= MIN_REACHED_SHARE * asked_m_s:
             continue
         length_m, accel_m_s2 = sum(dist(way.begin, way.end) for way in ways), table["MIS_ACCEL"]

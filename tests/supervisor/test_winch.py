@@ -78,7 +78,7 @@ def test_a_mission_paused_while_reeling_goes_on_to_the_same_length() -> None:
             sky.settings = replace(sky.settings, cable_length_m=length)
 
     assert sky.ask(StartMission(1)).result == ACCEPTED
-    tick(2.5)
+    tick(2.3)
     assert sky.ask(Pause()).result == ACCEPTED
     tick(4.0)
     paused = sky.flight.cable.length_m

@@ -13,12 +13,13 @@ from autopilot.trajectory.feasibility import VehicleLimits, check, paths, peaks
 from autopilot.trajectory.slack_cable import set_down_duration_s, tauten_duration_s
 from autopilot.trajectory.timeline import (
     DETECTION_S,
+    USUAL_CABLE_M,
     MissionState,
     expected_duration_s,
     min_move_duration,
     timeline,
 )
-from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.transfer import pace, transfer_duration
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import OneRotor
 from missions.fileformat import load_mission, shipped
@@ -214,7 +215,8 @@ def test_the_timeline_follows_the_load() -> None:
         (0.0, 0.0, 0.0),
     ]
     assert [leg.begin for leg in found[1:]] == [leg.end for leg in found[:-1]]
-    assert found[1].duration_s == pytest.approx(4.0 + transfer_duration(sqrt(6.0), 2.0, 1.0))
+    least_s = min_move_duration(USUAL_CABLE_M, 9.81)
+    assert found[1].duration_s == pytest.approx(4.0 + pace(sqrt(6.0), 2.0, 1.0, least_s).duration_s)
     assert found[2].duration_s == 5.0
 
 

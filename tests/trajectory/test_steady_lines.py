@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import pairwise
 from math import dist, inf, nextafter
 
@@ -11,9 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import Vec3
-from autopilot.trajectory.minimum_snap import JoinedPath
+from autopilot.trajectory.minimum_snap import JoinedPath, NoPathError
 from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 from autopilot.trajectory.steady_lines import SteadyLines
+from autopilot.trajectory.timeline import min_move_duration
 from autopilot.trajectory.transfer import pace
 from autopilot.trajectory.waypoint_path import plan_waypoint_path, sample_path
 from tests.trajectory.test_waypoint_path import BODY, BOUNDS, CLOCK_S, PEAK, apart
@@ -57,11 +59,11 @@ def test_a_path_through_far_points_is_smooth_and_never_slower_than_stops(
 @pytest.mark.parametrize(("side_m", "speed"), [(10.0, 2.0), (100.0, 5.0), (1000.0, 5.0), (5000.0, 15.0)])
 def test_each_turn_of_a_square_costs_less_than_the_ramps_at_its_ends(side_m: float, speed: float) -> None:
     """A turn of 90 degrees takes 0.78 speed / accel longer than the lines to and from its corner, and the two
-    ramps together 2.04 of them."""
+    ramps together 2.18 of them."""
     points = [(x * side_m, y * side_m, 6.0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))]
     table, times = planned(points, speed)
     unit = speed / ACCEL
-    assert times[-1] == pytest.approx(4.0 * side_m / speed + (2.04 + 3.0 * 0.78) * unit, abs=1.2 * unit)
+    assert times[-1] == pytest.approx(4.0 * side_m / speed + (2.18 + 3.0 * 0.78) * unit, abs=1.2 * unit)
     flown = sample_path(table, np.linspace(0.0, times[-1], 20_000))[0]
     low, high = flown[:, :2].min(axis=0), flown[:, :2].max(axis=0)
     beside = np.minimum(np.abs(flown[:, :2] - low), np.abs(flown[:, :2] - high)).min(axis=1).max()
@@ -107,6 +109,27 @@ def test_waypoints_on_a_line_do_not_slow_it_down() -> None:
     for point, time in zip(row, times, strict=True):
         assert evaluate_path(table, float(time))[0] == pytest.approx(point, abs=1e-6 + 4.0 * CLOCK_S)
     assert (np.diff(times) > 0.0).all()
+
+
+@given(
+    length=st.floats(0.2, 300.0),
+    shares=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4, unique=True),
+    speed=speeds,
+)
+def test_a_waypoint_on_a_line_never_makes_the_flight_along_it_quicker(
+    length: float, shares: list[float], speed: float
+) -> None:
+    """And not slower either where the line is long enough for two ramps."""
+    row: list[Vec3] = [
+        (0.6 * length * share, -0.8 * length * share, 6.0) for share in (0.0, *sorted(shares), 1.0)
+    ]
+    least_s = min_move_duration(BODY.cable_length, BODY.gravity)
+    alone = pace(length, speed, ACCEL, least_s)
+    with suppress(NoPathError):
+        _, times = planned(row, speed)
+        assert times[-1] >= alone.duration_s - CLOCK_S
+        if alone.ramp_s > 0.0:
+            assert times[-1] == pytest.approx(alone.duration_s, rel=1e-6, abs=CLOCK_S)
 
 
 def test_a_turn_leaves_a_waypoint_beside_it_on_the_line() -> None:

@@ -10,6 +10,7 @@ import pytest
 from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.trajectory.peaks import survey_transfer
 from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     RELEASE_S,
@@ -22,7 +23,7 @@ from autopilot.trajectory.timeline import (
     state_after,
     timeline,
 )
-from autopilot.trajectory.transfer import PEAK_SPEED, pace, transfer_duration
+from autopilot.trajectory.transfer import pace, transfer_duration
 from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.vehicle.file import load_vehicle
 from missions.model import (
@@ -230,7 +231,7 @@ def test_half_the_speed_takes_twice_as_long():
     slow, fast = (seconds(Speed(speed), there) - rest for speed in (1.0, 2.0))
     least_s = min_move_duration(USUAL_CABLE_M, 9.81)
     assert slow == pytest.approx(1000.0 + least_s)
-    assert fast == pytest.approx(500.0 + 2.0 * PEAK_SPEED / 1.5)
+    assert fast == pytest.approx(500.0 + PEAK_RAMP_ACCEL * 2.0 / 1.5)
 
 
 def test_a_place_is_left_from_where_the_load_is():

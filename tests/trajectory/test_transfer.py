@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -11,11 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import ZERO, norm, scale, sub
+from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
 from autopilot.trajectory.reeling import straight_way
 from autopilot.trajectory.transfer import (
     PEAK_ACCELERATION,
     PEAK_SPEED,
     Pace,
+    lift_pace,
     pace,
     transfer,
     transfer_duration,
@@ -91,6 +94,7 @@ def test_it_moves_one_way_only(t: float) -> None:
     assert np.dot(jet[1], np.subtract(P1, P0)) >= 0.0
 
 
+@pytest.mark.parametrize("at_pace", [pace, lift_pace])
 @given(
     distance=st.floats(0.01, 3000.0),
     speed=st.floats(0.1, 20.0),
@@ -98,9 +102,9 @@ def test_it_moves_one_way_only(t: float) -> None:
     min_move=st.floats(0.0, 15.0),
 )
 def test_a_paced_way_keeps_to_its_limits(
-    distance: float, speed: float, accel: float, min_move: float
+    at_pace: Callable[..., Pace], distance: float, speed: float, accel: float, min_move: float
 ) -> None:
-    duration, ramp = pace(distance, speed, accel, min_move)
+    duration, ramp = at_pace(distance, speed, accel, min_move)
     assert duration >= min_move and (ramp == 0.0 or min_move <= ramp <= 0.5 * duration * (1.0 + 1e-12))
     way = (0.6 * distance, 0.0, -0.8 * distance)
     share = np.linspace(0.0, 1.0, 401)
@@ -116,29 +120,42 @@ def test_a_paced_way_keeps_to_its_limits(
     )
 
 
-def test_a_long_way_takes_little_longer_than_at_full_speed() -> None:
-    assert pace(1000.0, 5.0, 1.5).duration_s == pytest.approx(1000.0 / 5.0 + PEAK_SPEED * 5.0 / 1.5)
+def test_a_way_takes_little_longer_than_at_full_speed() -> None:
+    for distance in (50.0, 1000.0):
+        assert pace(distance, 5.0, 1.5, 2.0) == Pace(
+            pytest.approx(distance / 5.0 + PEAK_RAMP_ACCEL * 5.0 / 1.5), PEAK_RAMP_ACCEL * 5.0 / 1.5
+        )
+    assert lift_pace(1000.0, 5.0, 1.5).duration_s == pytest.approx(1000.0 / 5.0 + PEAK_SPEED * 5.0 / 1.5)
 
 
+def test_a_short_way_is_flown_along_the_polynomial_where_that_is_quicker() -> None:
+    """Each of two ramps, too, takes the time of the least move."""
+    alone = Pace(transfer_duration(1.5, 1.5, 1.5))
+    assert 2.0 < alone.duration_s < 4.0
+    assert pace(1.5, 1.5, 1.5, 2.0) == alone
+    assert pace(0.05, 1.5, 1.5, 2.0) == Pace(2.0)
+    assert pace(2.2, 1.5, 1.5, 2.0) == Pace(4.0, 2.0)
+    assert pace(1.5, 1.5, 1.5).ramp_s > 0.0, "without it two ramps are quicker"
+
+
+@pytest.mark.parametrize("at_pace", [pace, lift_pace])
 @given(speed=st.floats(0.1, 20.0), accel=st.floats(0.1, 10.0), min_move=st.floats(0.0, 15.0))
-def test_a_longer_way_takes_longer(speed: float, accel: float, min_move: float) -> None:
+def test_a_longer_way_takes_longer(
+    at_pace: Callable[..., Pace], speed: float, accel: float, min_move: float
+) -> None:
     """Also from a way on the polynomial to one with constant speed."""
     distances = np.geomspace(0.01, 3000.0, 400).tolist()
-    durations = [pace(distance, speed, accel, min_move).duration_s for distance in distances]
+    durations = [at_pace(distance, speed, accel, min_move).duration_s for distance in distances]
     assert all(after >= before * (1.0 - 1e-12) for before, after in pairwise(durations))
     # nowhere by more than in proportion to the way
     assert all(after <= 1.04 * before for before, after in pairwise(durations))
 
 
-def test_a_way_that_is_slower_so_that_longer_ones_take_no_less_time_says_so() -> None:
-    ways = {distance: pace(distance, 2.0, 1.5) for distance in (6.0, 8.0, 11.0, 14.0)}
-    assert {distance: way.evens_out for distance, way in ways.items()} == {
-        6.0: False,
-        8.0: True,
-        11.0: True,
-        14.0: False,
-    }
-    assert ways[8.0].duration_s == ways[11.0].duration_s == pytest.approx(10.0)
+def test_a_lift_that_is_slower_so_that_longer_ones_take_no_less_time() -> None:
+    ways = [lift_pace(distance, 2.0, 1.5) for distance in (6.0, 8.0, 11.0, 14.0)]
+    assert ways[0].ramp_s == 0.0
+    assert ways[1].duration_s == ways[2].duration_s == pytest.approx(10.0)
+    assert ways[3].duration_s == pytest.approx(14.0 / 2.0 + PEAK_SPEED * 2.0 / 1.5)
 
 
 def test_a_stretched_way_keeps_its_shape() -> None:
