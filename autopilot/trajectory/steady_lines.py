@@ -8,9 +8,9 @@ of any rotor force:
 * a turn past a waypoint, the smoothest path (`autopilot.trajectory.minimum_snap`) from a place before it to
   another at the same distance behind it, at the same speed v at both. The two distances together are v times
   the duration times a share: the less it is, the slower is the load at the waypoint, and the shorter its way.
-  It is as great as the lines have room for, and as the load is nowhere faster than v: nearly 1 for a slight
-  turn, 0.8 for one of 90 degrees. The peak acceleration is a ratio that depends on angle and share alone
-  times v / duration.
+  It is the one with which the lines on both sides are flown in the least time, of those with which the load
+  is nowhere faster than v: nearly 1 for a slight turn, 0.8 for one of 90 degrees, less where there is little
+  room. The peak acceleration is a ratio that depends on angle and share alone times v / duration.
 
 Along lines that are long beside speed^2 / acceleration this is the quickest path but for a few per cent, and
 it does not leave the lines but in turns. Between short lines another is quicker
@@ -23,7 +23,6 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from itertools import pairwise
 from math import ceil, cos, radians, sin
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +34,6 @@ from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 _BISECTIONS = 40
 _SHARES = tuple(1.0 - 0.025 * i for i in range(15))
 _FASTER = 1.0005  # how many times as fast the load may be in a turn as at its ends
-_WAY_COST = 0.25
 # of a shape, so long that the time over which the turning of the vehicle matters does not
 _LONG_S = 30.0
 _LEAST_LINE_M = 1e-3
@@ -54,11 +52,6 @@ class _Turn(NamedTuple):
 
     share: float
     ratio: float
-
-    @property
-    def cost(self) -> float:
-        """The time lost at the corner, and `_WAY_COST` of the time of its way: a short one can be fast."""
-        return self.ratio * (1.0 - self.share + _WAY_COST * 0.5 * self.share)
 
 
 @lru_cache(maxsize=256)
@@ -107,7 +100,9 @@ class SteadyLines:
         self._rooms = [0.0, *(float(min(rooms[i - 1], rooms[i])) for i in self.corners[1:-1]), 0.0]
         self._turns = [_Turn(1.0, 0.0)] * len(self.corners)
         for corner, i in enumerate(self.corners[1:-1], 1):
-            self._turns[corner] = self._best_turn(corner, angles[i - 1], speed)
+            # upwards: a turn is no sharper than the one whose shape it takes
+            shapes = _turn_shapes(ceil(angles[i - 1]))
+            self._turns[corner] = min(shapes, key=partial(self._passing_s, rooms[i - 1 : i + 1], speed))
         lines = np.diff(self._points, axis=0)
         self._lengths = np.linalg.norm(lines, axis=1)
         self._directions = lines / self._lengths[:, None]
@@ -121,12 +116,18 @@ class SteadyLines:
             if i + 1 < len(lines):
                 self._add_turn(i + 1)
 
-    def _best_turn(self, corner: int, angle_deg: float, speed: float) -> _Turn:
-        """The turn that is fastest at its corner of those that fit, or the one for a slower corner."""
-        # upwards: a turn is no sharper than the one whose shape it takes
-        shapes = _turn_shapes(ceil(angle_deg))
-        fitting = (shape for shape in shapes if self._way(shape, speed) <= self._rooms[corner])
-        return next(fitting, None) or min(shapes, key=attrgetter("cost"))
+    def _passing_s(self, rooms: Array, speed: float, turn: _Turn) -> float:
+        """The time (s) that the rooms (m) before and behind a corner take with a turn there, and with a ramp
+        to it and from it."""
+        in_turn = _greatest(lambda v: self._way(turn, v) <= rooms.min(), 0.0, speed)
+        passing_s = self._turn_s(turn, in_turn)
+        for room in (rooms - self._way(turn, in_turn)).tolist():
+            steady = _greatest(partial(self._ramp_fits, room, in_turn), in_turn, speed)
+            ramp_way = self._ramp_way(in_turn, steady)
+            passing_s += (room - ramp_way) / steady
+            if ramp_way:
+                passing_s += self._ramp_s(in_turn, steady)
+        return passing_s
 
     def _add_line(self, i: int, speed: float) -> None:
         start, direction, length = self._points[i], self._directions[i], float(self._lengths[i])
@@ -198,6 +199,9 @@ class SteadyLines:
             if high > low:
                 speeds[i] = _greatest(partial(self._falls, i, low), low, high)
         return speeds
+
+    def _ramp_fits(self, room: float, begin: float, end: float) -> bool:
+        return bool(self._ramp_way(begin, end) <= room)
 
     def _turn_fits(self, corner: int, speed: float) -> bool:
         return bool(self._turn_way(corner, speed) <= self._rooms[corner])

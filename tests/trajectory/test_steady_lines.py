@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from itertools import pairwise
-from math import dist, inf, nextafter
+from math import cos, dist, inf, nextafter, radians, sin
 
 import numpy as np
 import pytest
@@ -12,12 +12,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import Vec3
+from autopilot.trajectory import steady_lines
 from autopilot.trajectory.minimum_snap import JoinedPath, NoPathError
 from autopilot.trajectory.splines import Array, PieceTable, evaluate_path
 from autopilot.trajectory.steady_lines import SteadyLines
 from autopilot.trajectory.timeline import min_move_duration
 from autopilot.trajectory.transfer import pace
-from autopilot.trajectory.waypoint_path import plan_waypoint_path, sample_path
+from autopilot.trajectory.waypoint_path import MIN_WAYPOINT_DISTANCE_M, plan_waypoint_path, sample_path
 from tests.trajectory.test_waypoint_path import BODY, BOUNDS, CLOCK_S, PEAK, apart
 
 ACCEL = 1.5
@@ -123,6 +124,7 @@ def test_a_waypoint_on_a_line_never_makes_the_flight_along_it_quicker(
     row: list[Vec3] = [
         (0.6 * length * share, -0.8 * length * share, 6.0) for share in (0.0, *sorted(shares), 1.0)
     ]
+    assume(min(dist(a, b) for a, b in pairwise(row)) >= MIN_WAYPOINT_DISTANCE_M)
     least_s = min_move_duration(BODY.cable_length, BODY.gravity)
     alone = pace(length, speed, ACCEL, least_s)
     with suppress(NoPathError):
@@ -140,6 +142,26 @@ def test_a_turn_leaves_a_waypoint_beside_it_on_the_line() -> None:
     path = JoinedPath(lines.sections)
     for point, time in zip(points, lines.passes(path), strict=True):
         assert evaluate_path(path.table(), float(time))[0] == pytest.approx(point, abs=1e-6 + 4.0 * CLOCK_S)
+
+
+@pytest.mark.parametrize("angle_deg", [10, 30, 60, 90, 150])
+@pytest.mark.parametrize("between_m", [4.0, 15.0, 60.0])
+@pytest.mark.parametrize("speed", [1.5, 8.0])
+def test_with_no_other_shape_of_its_turns_is_a_path_quicker(
+    angle_deg: int, between_m: float, speed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two turns, with a line between them, but for two hundredths: each is chosen as if alone."""
+    east, north = cos(radians(angle_deg)), sin(radians(angle_deg))
+    corner = (between_m * east, between_m * north, 6.0)
+    points = np.array([(-80.0, 0.0, 6.0), (0.0, 0.0, 6.0), corner, (corner[0] + 80.0, corner[1], 6.0)])
+
+    def duration_s() -> float:
+        return float(SteadyLines(points, speed, ACCEL, LEAST_S).sections[-1].times[-1])
+
+    chosen_s, shapes = duration_s(), steady_lines._turn_shapes(angle_deg)
+    for shape in shapes:
+        monkeypatch.setattr(steady_lines, "_turn_shapes", lambda _, shape=shape: (shape,))
+        assert chosen_s <= 1.02 * duration_s()
 
 
 def test_no_ramp_and_no_turn_is_shorter_than_the_least_time() -> None:
