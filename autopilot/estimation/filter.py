@@ -265,6 +265,8 @@ _PROBLEM_TEXTS = {
     LOAD_UNSETTLED: "load position not settled",
     NO_INERTIAL: "no reading of the inertial unit",
 }
+_UNSETTLED = (POSITION_UNSETTLED, FIX_UNSETTLED, ATTITUDE_UNSETTLED, HEADING_UNSETTLED, LOAD_UNSETTLED)
+IMPACT_TOLD_S = 1.0  # after an impact, for which it counts as the cause of what is not settled
 
 
 @kernel
@@ -355,7 +357,14 @@ def problem_texts(state: EstimatorState, *problems: int) -> tuple[str, ...]:
 
     `problems` are results of `inertial_problem`, `vehicle_problem` and `load_problem`.
     """
-    return tuple(_PROBLEM_TEXTS[code].format(state.uncertainty.horizontal) for code in problems if code)
+    return tuple(_problem_text(state, code) for code in problems if code)
+
+
+def _problem_text(state: EstimatorState, code: int) -> str:
+    """One of these problems in words, with the impact that has caused it if there was one."""
+    text = _PROBLEM_TEXTS[code].format(state.uncertainty.horizontal)
+    follows_impact = code in _UNSETTLED and state.clipping.impact_age_s <= IMPACT_TOLD_S
+    return f"{text} after an impact" if follows_impact else text
 
 
 def estimate_loss(state: EstimatorState, problem: int) -> str:
@@ -363,10 +372,10 @@ def estimate_loss(state: EstimatorState, problem: int) -> str:
     a landing, in words; empty if it is. Written so that NaN is a loss."""
     uncertainty = state.uncertainty
     if problem == NO_INERTIAL:
-        return _PROBLEM_TEXTS[NO_INERTIAL]
+        return _problem_text(state, NO_INERTIAL)
     if not knows_attitude(state, problem):
-        return _PROBLEM_TEXTS[ATTITUDE_UNSETTLED]
+        return _problem_text(state, ATTITUDE_UNSETTLED)
     slow_std = state.sensor_errors.horizontal_slow_std if state.vehicle.source == RECEIVER else 0.0
     if not (uncertainty.horizontal <= POSITION_STD_TO_LAND + STATED_STD_FACTOR * slow_std):
-        return _PROBLEM_TEXTS[FIX_UNSETTLED].format(uncertainty.horizontal)
+        return _problem_text(state, FIX_UNSETTLED)
     return ""

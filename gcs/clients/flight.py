@@ -35,6 +35,7 @@ from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
 from gcs.expected_flight import limit_text, time_limit_s
+from gcs.failure_reason import AFTERMATH_US, TimedText, failure_reason
 from gcs.mission_items import in_mission_terms
 from missions.model import Mission
 
@@ -48,7 +49,6 @@ REPORT_MESSAGES = (
 )
 FIND_LIMIT_US = 30_000_000
 READY_LIMIT_US = 20_000_000  # then arming is requested nevertheless, and the vehicle reports what is wrong
-AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the pictures
 
 OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
 
@@ -145,6 +145,7 @@ class FlightClient:
         self._parameters: ParameterList | None = None  # while they are being requested
         self._stage_start_us: int | None = None  # the ground station's clock
         self._flight_start_us: int | None = None  # the vehicle's clock
+        self._text_times_us: list[int] = []  # of the texts, by the vehicle's clock
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
         self._texts_armed = 0  # texts that came before arming
         self._was_armed = False
@@ -157,8 +158,9 @@ class FlightClient:
         self._texts_in_mission = 0  # texts that came before the last heartbeat in mission mode
         self._item_flown = 0  # the last one in the air
         self._setpoint: tuple[int, int] | None = None  # phase and item of the last setpoint
+        self._failure = ""  # why the autopilot has given up
         self._failed_us: int | None = None  # the vehicle's clock at the failure
-        self._pending_outcome: Outcome | None = None  # the outcome, once the aftermath is captured
+        self._pending_outcome: Outcome | None = None  # the outcome, once the vehicle is disarmed again
 
     # ---- what differs between autopilots
 
@@ -181,6 +183,8 @@ class FlightClient:
             ):
                 continue
             self.view.update(one, now_us)
+            if len(self._text_times_us) < len(self.view.texts):
+                self._text_times_us.append(self.view.time_us or 0)
             if self._operations:
                 self._operations[0].receive(one.message, now_us)
             if self._parameters is not None and one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
@@ -218,12 +222,12 @@ class FlightClient:
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it has not ended."""
         if self.outcome is None:
-            self._end(self._pending_outcome or Outcome("interrupted", reason))
+            self._end(self._failure_outcome() or Outcome("interrupted", reason))
 
     def end_as_lost(self, reason: str) -> None:
         """End the flight because a process or the link is gone."""
         if self.outcome is None:
-            self._end((self._pending_outcome or Outcome("lost")).with_reason(reason))
+            self._end((self._failure_outcome() or Outcome("lost")).with_reason(reason))
 
     def explain_silence(self, explanation: str) -> None:
         """Add to the outcome why the vehicle fell silent, if it did; `explanation` is empty if that is not
@@ -330,11 +334,9 @@ class FlightClient:
             self._item_flown = setpoint.seq
         if setpoint is not None and setpoint.phase in _LANDING_PHASES:
             self._mission_over = self._mission_over or setpoint.seq == len(self.items) - 1
-        if self._pending_outcome is None:
-            reason = self._failure()
-            if reason:
-                self._pending_outcome = Outcome("diverged", reason)
-                self._failed_us = view.time_us or 0
+        self._failure = self._present_failure() or self._failure
+        if self._failure and self._failed_us is None:
+            self._failed_us = view.time_us or 0
 
     def _update_mode(self) -> None:
         """Record if the vehicle leaves the mission mode, which this client never requests, and for which
@@ -358,14 +360,22 @@ class FlightClient:
         action = _ACTION_OF_MODE.get(self._mode_after_mission, f"mode {self._mode_after_mission}")
         return "; ".join(reasons) or f"{action} commanded by another ground station"
 
-    def _failure(self) -> str:
+    def _present_failure(self) -> str:
         """Why the autopilot has given up; empty if it has not."""
         if self.view.phase == _FAILSAFE:
-            texts = self.view.problems_since(self._texts_armed, mavlink.MAV_SEVERITY_CRITICAL)
-            return "; ".join(texts) or "the autopilot went into failsafe"
-        if self._was_airborne:
-            return "; ".join(self.view.problems_since(self._texts_before, mavlink.MAV_SEVERITY_CRITICAL))
-        return ""
+            return self._reason_since(self._texts_armed) or "the autopilot went into failsafe"
+        return self._reason_since(self._texts_before) if self._was_airborne else ""
+
+    def _reason_since(self, count: int) -> str:
+        """Why the flight was lost, by the texts that came after the first `count`."""
+        times_us, texts = self._text_times_us[count:], self.view.texts[count:]
+        return failure_reason(
+            [TimedText(us, one.severity, one.text) for us, one in zip(times_us, texts, strict=True)]
+        )
+
+    def _failure_outcome(self) -> Outcome | None:
+        """The outcome of a flight that has failed, or is being refused; None of any other."""
+        return Outcome("diverged", self._failure) if self._failure else self._pending_outcome
 
     def _check_end(self) -> bool:
         """End the flight if an end condition holds; True if it does."""
@@ -375,10 +385,10 @@ class FlightClient:
             return False
         if self._flight_start_us is None:
             self._flight_start_us = now_us
-        if self._pending_outcome is not None and self._failed_us is not None:
+        if self._failed_us is not None:
             if now_us - self._failed_us < AFTERMATH_US:
                 return False
-            self._end(self._pending_outcome)
+            self._end(Outcome("diverged", self._failure))
             return True
         if self._was_armed and view.armed is False:
             self._end(self._landed_outcome())

@@ -38,6 +38,7 @@ from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.expected_flight import limit_text
+from gcs.failure_reason import AFTERMATH_US, TimedText, failure_reason
 from gcs.mission_items import in_mission_terms
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
@@ -146,7 +147,9 @@ class SweepFlight:
         self.arm_us, self.start_us = map(self._tick_from, (start_times.arm_us, start_times.start_us))
         self.result = FlightResult()
         self._warnings: list[str] = []  # the vehicle's warnings since its last decision in phase MISSION
+        self._texts_in_air: list[TimedText] = []
         self.airborne_us = -1
+        self.failed_us = -1  # when the vehicle reported that the flight has failed, -1: it did not
         self.mission_us = 0
         self.mission_until_us = 0
         self.motions = RequestedMotions()
@@ -232,13 +235,16 @@ class SweepFlight:
         until_us = now_us + self.cell.limit_us
         if self.airborne_us >= 0:
             until_us = self.airborne_us + self.cell.limit_us + self.tick_us
-        for time_us in (self.arm_us, self.start_us):
+        failure_ends_us = self.failed_us + AFTERMATH_US if self.failed_us >= 0 else -1
+        for time_us in (self.arm_us, self.start_us, failure_ends_us):
             if now_us < time_us < until_us:
                 until_us = time_us
         return -(-until_us // self.tick_us)
 
     def _account(self, phase: Phase, elapsed_us: int, slack_events: int) -> None:
-        """Add time and slack events of a stretch that was flown in this phase."""
+        """Add time and slack events of a stretch that was flown in this phase, before the flight failed."""
+        if self.failed_us >= 0:
+            return
         if phase in _LOAD_CARRIED:
             self.result.slack_events += slack_events
         if phase == Phase.MISSION:
@@ -253,10 +259,10 @@ class SweepFlight:
             self.core.move_cable(now_us)
         self._measure_battery()
         phase = self.core.flight.phase
-        self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase)
+        self._on_texts(self.core.decide(now_us, self.tick_us).texts, phase, now_us)
         flight = self.core.flight
         self.requested_path = _NO_ROWS
-        if flight.phase != Phase.MISSION or not flight.legs:
+        if flight.phase != Phase.MISSION or not flight.legs or self.failed_us >= 0:
             return
         if flight.legs[0].control_mode != LOAD_POSITION:
             self.requested_path = _NO_PATH
@@ -329,19 +335,26 @@ class SweepFlight:
         result.outcome, result.reason = outcome, in_mission_terms(reason, self.cell.mission)
         result.lost_phase = lost_phase
 
-    def _on_texts(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
+    def _on_texts(self, texts: tuple[tuple[int, str], ...], phase: Phase, now_us: int) -> None:
         if phase == Phase.MISSION:
             self._warnings.clear()
         for severity, text in texts:
             self.result.texts.append(text)
             if severity <= mavlink.MAV_SEVERITY_WARNING:
                 self._warnings.append(text)
-            if severity <= mavlink.MAV_SEVERITY_CRITICAL and self.airborne_us >= 0:
-                self._end("diverged", text, phase.name.lower())
+            if self.airborne_us >= 0:
+                self._texts_in_air.append(TimedText(now_us, severity, text))
+        if self.failed_us < 0 and failure_reason(self._texts_in_air):
+            self.failed_us = now_us
+            self.result.lost_phase = phase.name.lower()
 
     def _check_end(self, now_us: int) -> None:
         flight = self.core.flight
         if self.result.outcome:
+            return
+        if self.failed_us >= 0:
+            if now_us - self.failed_us >= AFTERMATH_US:
+                self._end("diverged", failure_reason(self._texts_in_air), self.result.lost_phase)
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
             self._end_landed()
@@ -368,7 +381,8 @@ class SweepFlight:
         """Compute the figures of the flight and return its result."""
         result, f = self.result, unpack(Figures, self.figures, 0)
         if self.airborne_us >= 0:
-            result.flight_s = (self.now_us - self.airborne_us) * 1e-6
+            end_us = self.failed_us if self.failed_us >= 0 else self.now_us
+            result.flight_s = (end_us - self.airborne_us) * 1e-6
         result.mission_s = self.mission_us * 1e-6
         if f.samples > 0.0:
             result.load_error_max_m = f.error_max

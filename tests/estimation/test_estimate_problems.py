@@ -163,6 +163,17 @@ def test_a_fix_that_has_not_settled_says_how_good_it_is() -> None:
     )
 
 
+def test_what_is_not_settled_after_an_impact_names_it() -> None:
+    state = settled(TRACKER, TRACKER, "horizontal", 9.0)
+    words = {0.0: f"{POSITION} after an impact", 0.9: f"{POSITION} after an impact", 1.1: POSITION}
+    for age_s, text in words.items():
+        hit = state._replace(clipping=state.clipping._replace(impact_age_s=age_s))
+        assert estimate_problems(hit, OLDEST_S) == (text,)
+    silent = settled(TRACKER, TRACKER, VEHICLE_AGE, 9.0)
+    silent = silent._replace(clipping=silent.clipping._replace(impact_age_s=0.0))
+    assert estimate_problems(silent, OLDEST_S) == (NO_POSE,), "an impact does not silence the tracker"
+
+
 def test_a_longer_limit_of_age_holds_for_the_receiver_too() -> None:
     state = settled(RECEIVER, CAMERA, VEHICLE_AGE, 2.5)
     assert estimate_problems(state, OLDEST_S) == (NO_FIX,)

@@ -6,7 +6,6 @@ import pytest
 
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import (
-    AFTERMATH_US,
     FIND_LIMIT_US,
     READY_LIMIT_US,
     REPORT_INTERVAL_US,
@@ -14,6 +13,7 @@ from gcs.clients.flight import (
     FlightClient,
     Stage,
 )
+from gcs.failure_reason import AFTERMATH_US
 
 EXPECTED_S = 20.0
 PX4_MISSION, PX4_LAND = 0x04040000, 0x06040000
@@ -225,6 +225,33 @@ def test_a_critical_text_in_the_air_is_diverged(world, fly):
     )
     client, _ = fly()
     assert (client.outcome.name, client.outcome.reason) == ("diverged", "Estimator lost")
+
+
+def test_the_reason_tells_what_led_to_the_failure_and_how_it_ended(world, fly):
+    told = {
+        2.5: (mavlink.MAV_SEVERITY_WARNING, "Path waits: load 5.1 m off its path"),  # long before
+        7.5: (mavlink.MAV_SEVERITY_WARNING, "Battery low, 15 % left"),  # the failure itself would say so
+        7.7: (mavlink.MAV_SEVERITY_WARNING, "Cable slack"),
+        7.8: (mavlink.MAV_SEVERITY_INFO, "Load caught"),
+        8.0: (mavlink.MAV_SEVERITY_CRITICAL, "Failsafe: vehicle position not settled"),
+        8.5: (mavlink.MAV_SEVERITY_WARNING, "Cable slack again"),
+        8.7: (mavlink.MAV_SEVERITY_CRITICAL, "Failsafe: vehicle position not settled"),
+        9.5: (mavlink.MAV_SEVERITY_EMERGENCY, "Flight given up: tilt 121 deg"),
+        10.5: (mavlink.MAV_SEVERITY_EMERGENCY, "never heard"),
+    }
+
+    def script(vehicle, t):
+        normal_flight(vehicle, t)
+        for at_s, (severity, text) in told.items():
+            if abs(t - at_s) < 0.01:
+                vehicle.say(text, severity)
+
+    world.vehicle.script = script
+    client, _ = fly()
+    assert (client.outcome.name, client.outcome.reason) == (
+        "diverged",
+        "Cable slack; Failsafe: vehicle position not settled; Flight given up: tilt 121 deg",
+    )
 
 
 def test_a_critical_text_on_the_ground_or_a_warning_in_the_air_is_not(world, fly):

@@ -119,6 +119,17 @@ def test_same_end_of_a_flight_that_is_lost(short: str) -> None:
     flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": THESIS, "SIM_ACT_DELAY_MS": 60.0}))
 
 
+def test_same_end_of_a_flight_that_a_gust_throws_to_the_ground(short: str) -> None:
+    gust = {"SIM_GUST_U": -45.0, "SIM_GUST_AT_S": 10.0, "SIM_GUST_FOR_S": 2.0}
+    found, _ = flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
+    assert found.outcome == "diverged"
+    slack, failure, *_ = found.reason.split("; ")
+    assert slack == "Cable slack: falling with the load to catch it"
+    assert failure == "Failsafe: vehicle position not settled after an impact, landing"
+    # the figures end with the failure, and the flight is followed for two seconds more
+    assert found.lost_phase in ("lift", "mission")
+
+
 def test_same_end_of_a_flight_that_empties_its_battery(short: str) -> None:
     """30 mAh: the voltage falls to nothing, and the rotors stop."""
     settings = {"CTL_LAW": PLUMBLINE, "SIM_BATTERY": 1.0, "SIM_BAT_CAP": 30.0}
