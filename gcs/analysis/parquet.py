@@ -14,6 +14,7 @@ import numpy as np
 
 from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
+from gcs.analysis.item_time import item_began_s
 from gcs.analysis.samples import PHASE_NAMES, Samples
 from gcs.analysis.tracks import Telemetry, rotor_names
 from gcs.formats.arrow import array_of, path_for_arrow, text_array
@@ -44,7 +45,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     estimated_quat = linear(estimated_attitude.time_s, estimated_attitude.quat_wxyz, t)
     acceleration = linear(setpoint.time_s, setpoint.acceleration_m_s2, t)
     acceleration[np.isnan(samples.desired_m).any(axis=1)] = np.nan  # zero is sent where there is no path
-    began_s = as_of(setpoint.time_s, setpoint.time_s - setpoint.elapsed_s, t)
+    began_s = as_of(setpoint.time_s, item_began_s(setpoint, telemetry.mission_reached), t)
     battery = telemetry.battery
     wind_m_s = as_of(wind.time_s, wind.wind_m_s + wind.gust_m_s, t, max_gap_s=np.inf)
 

@@ -71,8 +71,8 @@ class SetpointTrack:
     requested_m: Floats  # (n, 3) ENU, requested by the mission; desired is the nearest that can be flown
     requested_m_s: Floats  # (n, 3) ENU
     q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
-    elapsed_s: Floats  # (n,) since the item or phase began
-    duration_s: Floats  # (n,) of the item or phase, NaN if open
+    elapsed_s: Floats  # (n,) since the leg began: an item or a phase has one or several
+    duration_s: Floats  # (n,) of the leg, NaN if open
     item: Ints  # (n,) mission item
     phase: Ints  # (n,) PLUMBLINE_PHASE
     control_mode: Ints  # (n,) PLUMBLINE_CONTROL_MODE
