@@ -64,6 +64,9 @@ _REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
+# the same for the command that was accepted last: by the clock of a simulation that is faster than the
+# wall clock, a client that missed the ACK repeats it late
+LAST_REPEAT_US = 60_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
@@ -611,7 +614,7 @@ class CommandService:
         return _answer(command, verdict, peer)
 
     def _record_executed(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
-        self._executed = {k: d for k, d in self._executed.items() if now_us - d.at_us <= REPEAT_US}
+        self._executed = {k: d for k, d in self._executed.items() if now_us - d.at_us <= LAST_REPEAT_US}
         self._executed[peer, command] = _ExecutedCommand(call, verdict, now_us)
         self._last = (peer, command)
 
@@ -620,7 +623,8 @@ class CommandService:
         call = _call_of_long(message)
         if message.confirmation:
             done = self._executed.get((peer, call.command))
-            if done and done.call == repr(call) and now_us - done.at_us <= REPEAT_US:
+            limit_us = LAST_REPEAT_US if self._last == (peer, call.command) else REPEAT_US
+            if done and done.call == repr(call) and now_us - done.at_us <= limit_us:
                 return [_ack(call.command, done.verdict.result, peer)]
         return self._execute(call, peer, now_us, decide)
 

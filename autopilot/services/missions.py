@@ -50,6 +50,9 @@ from autopilot.wire.items.limits import MAX_ITEMS
 
 RETRY_US = 250_000  # after this silence a requested item is requested again, as PX4 does
 MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way fails 1 in 10^6 items
+# Requests for one item after which the silence before the next one doubles each time: a client on a busy
+# machine answers late, and later still by the clock of a simulation that is faster than the wall clock
+QUICK_REQUESTS, MAX_RETRY_US = 10, 4_000_000
 # Requests for the first item as MISSION_ITEM_INT, after which the client is assumed to know only MISSION_ITEM
 # (DroneKit). Never in the other order: MAVSDK cancels on a MISSION_REQUEST.
 INT_REQUESTS = 6
@@ -221,7 +224,7 @@ class MissionService:
             upload.as_float = True
         upload.requests += 1
         upload.lossy = True
-        upload.retry_us = now_us + RETRY_US
+        upload.retry_us = now_us + _retry_interval_us(upload.requests)
         return [self._item_request()]
 
     def _receive_item(
@@ -511,6 +514,11 @@ def _refused_item(peer: Peer, text: str | None, result: int, kind: int = _MISSIO
     """The answer to an item outside an upload that is not flown."""
     texts: list[Output] = [SendText(mavlink.MAV_SEVERITY_WARNING, text)] if text else []
     return [*texts, _ack(peer, result, kind)]
+
+
+def _retry_interval_us(requests: int) -> int:
+    """The silence after so many requests for an item, after which it is requested again."""
+    return min(RETRY_US << max(requests - QUICK_REQUESTS, 0), MAX_RETRY_US)
 
 
 def _item_of_int(m: Any) -> WireItem:

@@ -6,7 +6,7 @@ import errno
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
@@ -34,6 +34,7 @@ _MAX_SILENCE_US = 1_000_000  # longest silence that a ground station which share
 _MAX_DATAGRAM_BYTES = (
     32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
 )
+_MAX_PACKED_BYTES = 1400  # bytes of several messages in one datagram to any other ground station
 _MAX_WINDOWS = 4  # windows that are sent together to a ground station that sends nothing meanwhile
 _MAX_RECEIVED_BYTES = 2048  # bytes of a datagram from the ground; the rest is dropped
 _MAX_PIECE_BYTES = 280  # bytes of a datagram that are handed over together: the largest frame
@@ -83,6 +84,18 @@ def _split_datagram(datagram: bytes, link: Link) -> list[tuple[bytes, Link]]:
         return [(datagram, link)]
     frames = [received.frame for received in decode(datagram, MAX_GARBAGE_BYTES)[0]] or [b""]
     return [(frame, link) for frame in frames]
+
+
+def _packed(datagrams: Iterable[tuple[Link, bytes]]) -> list[tuple[Link, bytes]]:
+    """The messages of each link in as few datagrams as a network does not divide: a receiver whose machine is
+    busy has room for a number of datagrams rather than of bytes."""
+    packed: list[tuple[Link, bytes]] = []
+    for link, datagram in datagrams:
+        if packed and packed[-1][0] == link and len(packed[-1][1]) + len(datagram) <= _MAX_PACKED_BYTES:
+            packed[-1] = (link, packed[-1][1] + datagram)
+        else:
+            packed.append((link, datagram))
+    return packed
 
 
 class GroundStations:
@@ -154,7 +167,7 @@ class GroundStations:
 
     def _send(self, datagrams: list[tuple[Link, bytes]], onboard: Onboard) -> None:
         waiting, requested = self._waiting, self._storage_worker.requested
-        waiting.extend((requested, link, datagram) for link, datagram in datagrams)
+        waiting.extend((requested, link, datagram) for link, datagram in _packed(datagrams))
         until = time.perf_counter() + _SEND_BUDGET_S
         while waiting and waiting[0][0] <= self._storage_worker.finished and time.perf_counter() < until:
             _, link, datagram = waiting.popleft()

@@ -10,7 +10,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, is_addressed_to
 
 RETRY_US = 500_000
-SENDS = 5
+SENDS = 10
 IN_PROGRESS_TIMEOUT_US = 5_000_000  # after IN_PROGRESS
 FORCE = 21196.0  # the MAVLink number that makes arming and disarming unconditional
 UNUSED = math.nan

@@ -8,6 +8,7 @@
     ARM       rotors on                                   START     OVER refused
     START     start the mission                           FLY       DISARM
     FLY       until landed and disarmed, or lost          OVER      -
+              disarmed since it was armed                 ARM
     DISARM    rotors off again                            OVER      OVER
 
 Once the vehicle flies, time limits run on its clock, so that they hold at any speed of simulation.
@@ -149,6 +150,9 @@ class FlightClient:
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
         self._texts_armed = 0  # texts that came before arming
         self._was_armed = False
+        self._last_armed: bytes | None = None  # the last heartbeat by which `_was_armed` was decided
+        self._disarmed_heartbeats = 0  # of a vehicle that has not been armed since it accepted the start
+        self._rearms = 0
         self._was_airborne = False
         self._mission_over = False
         self._is_manual = False  # the user controls the flight through this client
@@ -240,7 +244,7 @@ class FlightClient:
     def _advance(self, now_us: int) -> bool:
         """Finish the current operation or stage if it has ended; True if something changed."""
         if self.stage is Stage.FLY:
-            return self._check_end()
+            return self._check_end(now_us)
         row = self.stage_row(self.stage)
         if self._operations:
             result = self._operations[0].result
@@ -283,6 +287,8 @@ class FlightClient:
             self._enter(row.stage_if_refused, now_us)
 
     def _enter(self, stage: Stage, now_us: int) -> None:
+        if stage is Stage.START and self._rearms:
+            stage = Stage.FLY  # it has accepted the start, and begins when it is armed
         if stage is Stage.OVER:
             self._end(self._pending_outcome or Outcome("completed"))
             return
@@ -296,6 +302,8 @@ class FlightClient:
             self._parameters = ParameterList(self.connection.target)
         if stage is Stage.FLY:
             self._flight_start_us = self.view.time_us
+            # this one may be of before the start
+            self._last_armed = self.view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
             self._operations, self._parameters = [], None
             return
         operations = self.stage_row(stage).operations
@@ -320,7 +328,7 @@ class FlightClient:
         view = self.view
         phase = view.phase
         self._update_mode()
-        self._was_armed = self._was_armed or bool(view.armed)
+        self._update_armed()
         if phase is not None and phase not in _GROUND_PHASES and not self._was_airborne:
             self._was_airborne = True
             self._texts_before = len(view.texts)
@@ -337,6 +345,14 @@ class FlightClient:
         self._failure = self._present_failure() or self._failure
         if self._failure and self._failed_us is None:
             self._failed_us = view.time_us or 0
+
+    def _update_armed(self) -> None:
+        """Record whether the vehicle was armed, or how often it has stated that it is not."""
+        heartbeat = self.view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+        if self._was_armed or heartbeat == self._last_armed:
+            return
+        self._last_armed, self._was_armed = heartbeat, bool(self.view.armed)
+        self._disarmed_heartbeats += not self._was_armed
 
     def _update_mode(self) -> None:
         """Record if the vehicle leaves the mission mode, which this client never requests, and for which
@@ -377,8 +393,9 @@ class FlightClient:
         """The outcome of a flight that has failed, or is being refused; None of any other."""
         return Outcome("diverged", self._failure) if self._failure else self._pending_outcome
 
-    def _check_end(self) -> bool:
-        """End the flight if an end condition holds; True if it does."""
+    def _check_end(self, ground_us: int) -> bool:
+        """End the flight if an end condition holds, or arm the vehicle again; True if one of both was done.
+        `ground_us`: the ground station's clock."""
         view = self.view
         now_us = view.time_us
         if now_us is None:
@@ -392,6 +409,11 @@ class FlightClient:
             return True
         if self._was_armed and view.armed is False:
             self._end(self._landed_outcome())
+            return True
+        if self._disarmed_heartbeats >= _DISARMED_HEARTBEATS and self._rearms < _REARMS:
+            self._rearms += 1
+            self._disarmed_heartbeats = 0
+            self._enter(Stage.ARM, ground_us)
             return True
         if now_us - self._flight_start_us > self._limit_s * 1e6:
             where = f"still in phase {view.phase_name or 'unknown'}, item {self._item()}"
@@ -444,6 +466,9 @@ class FlightClient:
         return int(setpoint.seq) if setpoint is not None and self._flight_start_us is not None else 0
 
 
+# On a busy machine, a simulation that is faster than the wall clock may disarm the vehicle again before the
+# start arrives: it then waits to be armed. The first heartbeat may be older than the arming.
+_DISARMED_HEARTBEATS, _REARMS = 2, 3
 _FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
 _MISSION_MODES = ("mission", "auto")  # of PX4 and of ArduPilot
 _ACTION_OF_MODE = {"land": "landing", "return": "return", "rtl": "return", "hold": "hold", "guided": "hold"}

@@ -74,6 +74,8 @@ class MissionUpload:
             return  # an item that came twice or too late; the vehicle requests again what it lacks
         elif result == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._restart()
+        elif result == mavlink.MAV_MISSION_ERROR and self._next and self._restarts < RESTARTS:
+            self._restart()  # it has given the upload up, and the message that said so was lost
         else:
             where = f"item {self._next - 1}" if self._next else "the mission"
             text = f"{self._name}: {where} refused: {_result_text(result)}"

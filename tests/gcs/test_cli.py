@@ -466,7 +466,7 @@ def test_a_vehicle_that_stops_answering_is_one_line(live, monkeypatch):
     vehicle, port = live
     monkeypatch.setattr(command_module, "RETRY_US", 20_000)
     vehicle.silent_commands = {mavlink.MAV_CMD_NAV_LAND}
-    assert "no answer after 5 tries" in one_line(run("land", "--connect", port), EXIT_ERROR)
+    assert "no answer after 10 tries" in one_line(run("land", "--connect", port), EXIT_ERROR)
 
 
 def test_a_mission_goes_up_comes_down_and_is_cleared(live):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
+from autopilot.services.commands import FORCE_ARM, LAST_REPEAT_US, PARSERS, REPEAT_US
 from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, PX4, Identity
 from autopilot.services.records import (
     ParameterChanged,
@@ -491,6 +491,18 @@ def test_a_command_after_another_one_is_no_repetition(rig):
     assert acks(rig.replies(long(22, (NAN,) * 7))) == [(22, DENIED)]
 
 
+def test_a_marked_repetition_of_the_last_command_may_come_late(rig):
+    """By the clock of a simulation that is faster than the wall clock."""
+    rig.replies(long(300, (0,)))
+    rig.now_us += LAST_REPEAT_US // 2
+    assert acks(rig.replies(long(300, (0,), confirmation=1))) == [(300, OK)]
+    assert len(rig.asked) == 1
+    rig.replies(long(193, (0,)))
+    rig.now_us += REPEAT_US + 1
+    rig.replies(long(300, (0,), confirmation=1))
+    assert len(rig.asked) == 3, "after another command it is meant"
+
+
 def test_a_command_said_twice_is_done_twice(rig):
     rig.replies(long(193, (0,)))
     rig.replies(long(193, (0,)))
@@ -503,7 +515,7 @@ def test_a_repetition_is_the_same_command_from_the_same_asker_soon_after(rig, ot
         rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
     rig.replies(long(300, (0,)))
     if other == "late":
-        rig.now_us += REPEAT_US + 1
+        rig.now_us += LAST_REPEAT_US + 1
     params = (1,) if other == "parameters" else (0,)
     rig.replies(long(300, params, confirmation=1), system=245 if other == "asker" else 255)
     assert len(rig.asked) == 2

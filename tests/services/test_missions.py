@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from autopilot.geometry.linear import ZERO, Vec3
@@ -16,6 +17,8 @@ from autopilot.services.missions import (
     INT_REQUESTS,
     LATE_ITEM_US,
     MAX_REQUESTS,
+    MAX_RETRY_US,
+    QUICK_REQUESTS,
     RETRY_US,
 )
 from autopilot.services.records import MissionChanged, Verdict
@@ -26,6 +29,7 @@ from autopilot.wire.items import WireItem, home_item, located_steps
 from autopilot.wire.items.limits import MAX_ITEMS
 
 LAT, LON = round(Home().latitude_deg * 1e7), round(Home().longitude_deg * 1e7)
+PATIENCE_US = 45_000_000  # more than the vehicle has for an item
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
 
 
@@ -80,7 +84,7 @@ def test_nan_and_integer_coordinates_survive_bit_by_bit(rig, as_message):
 def test_asks_again_and_gives_up(rig_with, items):
     rig = rig_with(items(3))
     rig.send(count(5))
-    heard = silence(rig, (MAX_REQUESTS + 1) * RETRY_US)
+    heard = silence(rig, PATIENCE_US)
     asked = [INT] * INT_REQUESTS + [REQUEST] * (MAX_REQUESTS - INT_REQUESTS)
     assert heard == [(kind, 0) for kind in asked] + [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
     assert rig.endpoint.mission.items == items(3)
@@ -90,10 +94,24 @@ def test_asks_again_and_gives_up(rig_with, items):
 def test_gives_up_in_the_middle_as_int_only(rig, items, as_message):
     rig.replies(count(3))
     rig.send(as_message(0, items(3)[0]))
-    heard = silence(rig, (MAX_REQUESTS + 1) * RETRY_US)
+    heard = silence(rig, PATIENCE_US)
     assert heard == [(INT, 1)] * MAX_REQUESTS + [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
     assert rig.endpoint.mission.items == ()
     assert not rig.events
+
+
+def test_it_asks_quickly_at_first_and_then_waits_longer(rig):
+    """At forty times real time, a client that is busy for a second has not answered for forty."""
+    rig.send(count(1))
+    asked_us, before = [], rig.now_us
+    while rig.now_us - before < PATIENCE_US:
+        if any(kind in (INT, REQUEST) for kind, _ in silence(rig, 50_000)):
+            asked_us.append(rig.now_us)
+    intervals_us = np.diff(asked_us)
+    expected_us = [RETRY_US] * QUICK_REQUESTS + [500_000, 1_000_000, 2_000_000, MAX_RETRY_US]
+    assert intervals_us[: len(expected_us)] == pytest.approx(expected_us, abs=50_000)
+    assert intervals_us[len(expected_us) :] == pytest.approx(MAX_RETRY_US, abs=50_000)
+    assert intervals_us.sum() > 25_000_000
 
 
 def test_a_slow_upload_is_not_given_up(rig, items, as_message):

@@ -30,6 +30,7 @@ SLOW_S = 1e-3  # for one message: more than a tick has for all
 HEARS_S = 0.1  # within which a datagram arrives
 MOST_TICKS = 50  # until a datagram that had to wait for a later tick is sent
 MOST_READ = 2048  # bytes read at a time, from a datagram or a TCP client
+MOST_PACKED = 1400  # bytes of messages sent together, which a network does not divide
 LONGEST = 65_507  # bytes that a datagram can have
 
 
@@ -135,6 +136,23 @@ def test_a_datagram_of_many_messages_is_handed_over_tick_by_tick(ground: Callabl
     for _ in range(39):
         autopilot.exchange()
     assert autopilot.heard == list(range(40))
+
+
+def test_messages_of_a_tick_are_packed_into_few_datagrams(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    messages = [pings(seq, 1) for seq in range(100)]
+    for link in ((0, autopilot.peers[0].getsockname()), (1, autopilot.peers[1].getsockname())):
+        autopilot.onboard.said += [(link, message) for message in messages]
+    for _ in range(MOST_TICKS):
+        autopilot.exchange()
+    for peer in autopilot.peers:
+        heard = []
+        with suppress(TimeoutError):
+            while True:
+                heard.append(peer.recv(LONGEST))
+        assert b"".join(heard) == b"".join(messages), "in their order"
+        assert max(map(len, heard)) <= MOST_PACKED
+        assert len(heard) == -(-len(b"".join(messages)) // MOST_PACKED) < 5
 
 
 def test_what_is_no_message_is_passed_over_and_what_follows_is_heard(ground: Callable[[], Ground]) -> None:
@@ -252,7 +270,8 @@ def test_much_that_has_waited_is_sent_tick_by_tick(
     looks = count(0.0, 1e-4)
     monkeypatch.setattr(time, "perf_counter", lambda: next(looks))  # each datagram takes 0.1 ms
     link = (0, autopilot.peers[0].getsockname())
-    autopilot.onboard.said = [(link, bytes((number,))) for number in range(50)]
+    # too long to be packed together
+    autopilot.onboard.said = [(link, bytes((number,)) * (MOST_PACKED // 2 + 1)) for number in range(50)]
     autopilot.peers[0].settimeout(0.0)
     received, most = b"", 0
     for _ in range(10):
@@ -260,7 +279,7 @@ def test_much_that_has_waited_is_sent_tick_by_tick(
         before = len(received)
         with suppress(BlockingIOError):
             while True:
-                received += autopilot.peers[0].recv(100)
+                received += autopilot.peers[0].recv(1)
         most = max(most, len(received) - before)
     assert received == bytes(range(50))
     assert most <= 10

@@ -197,6 +197,37 @@ def test_start_refused_disarms(world, fly):
     assert not world.vehicle.armed
 
 
+def test_one_that_disarms_before_the_start_arrives_is_armed_again(world, fly):
+    """Ten seconds of a fast simulation are a moment of a busy machine."""
+    vehicle = world.vehicle
+
+    def script(vehicle, t):
+        arms = [one for one in vehicle.commands if one.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM]
+        if len(arms) == 1:
+            vehicle.armed = False
+            vehicle.started_us = vehicle.now_us
+        else:
+            normal_flight(vehicle, t)
+
+    vehicle.script = script
+    client, stages = fly()
+    assert (client.outcome.name, client.outcome.reason) == ("completed", "")
+    assert stages[-4:] == [Stage.FLY, Stage.ARM, Stage.FLY, Stage.OVER]
+    starts = [one for one in vehicle.commands if one.command == mavlink.MAV_CMD_MISSION_START]
+    assert len(starts) == 1, "it begins what waits"
+
+
+def test_one_that_cannot_be_kept_armed_is_not_armed_for_ever(world, fly):
+    def script(vehicle, t):
+        vehicle.armed = False
+
+    world.vehicle.script = script
+    client, _ = fly()
+    assert client.outcome.name == "timeout"
+    arms = [one for one in world.vehicle.commands if one.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM]
+    assert len(arms) == 4
+
+
 def test_armed_already(world, fly):
     world.vehicle.armed = True
     client, _ = fly()

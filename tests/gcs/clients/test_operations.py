@@ -109,6 +109,39 @@ def test_garbage_is_counted_and_dropped(world):
     assert connection.target == TARGET
 
 
+# ---- missions that the vehicle gives up
+
+
+def upload_that_is_answered(items, *acks):
+    """An upload whose first item was requested, and the messages it sends after each of the acks."""
+    operation = MissionUpload(TARGET, items)
+    operation.poll(0)
+    operation.receive(heard(mavlink.MAVLink_mission_request_int_message(255, 190, 0)), 1)
+    assert [one.get_type() for one in operation.poll(2)] == ["MISSION_ITEM_INT"]
+    sent = []
+    for now_us, ack in enumerate(acks, start=3):
+        operation.receive(heard(mavlink.MAVLink_mission_ack_message(255, 190, ack)), now_us)
+        sent += [one.get_type() for one in operation.poll(now_us)]
+        if operation.result is None:
+            operation.receive(heard(mavlink.MAVLink_mission_request_int_message(255, 190, 0)), now_us)
+            operation.poll(now_us)
+    return operation, sent
+
+
+@pytest.mark.parametrize("ack", [mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR])
+def test_an_upload_that_the_vehicle_gave_up_begins_again(items, ack):
+    """ERROR: the item came too late, and the message that cancelled the upload was lost."""
+    operation, sent = upload_that_is_answered(items, ack)
+    assert operation.result is None and sent == ["MISSION_COUNT"]
+
+
+def test_one_that_fails_again_and_again_is_refused(items):
+    operation, sent = upload_that_is_answered(items, *4 * [mavlink.MAV_MISSION_ERROR])
+    assert sent == 3 * ["MISSION_COUNT"]
+    assert operation.result.status is Status.REFUSED
+    assert operation.result.text == "upload: item 0 refused: error"
+
+
 # ---- commands
 
 

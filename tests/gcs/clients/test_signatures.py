@@ -12,6 +12,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, key_of_text, timestamp_of
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import gcs
+from gcs.clients.command import SENDS
 from gcs.clients.connection import Connection
 from gcs.clients.flight import FlightClient
 from gcs.errors import EXIT_DONE, EXIT_ERROR
@@ -78,7 +79,7 @@ def test_a_flight_that_is_not_answered_says_that_a_key_is_missing(world, items):
             break
     assert client.outcome is not None
     assert client.outcome.name == "lost"
-    assert client.outcome.reason.startswith(f"interval of LOAD_SETPOINT: no answer after 5 tries; {NO_KEY}")
+    assert client.outcome.reason.startswith(f"interval of LOAD_SETPOINT: no answer after 10 tries; {NO_KEY}")
 
 
 @pytest.mark.parametrize(
@@ -124,13 +125,13 @@ def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_ca
     assert texts[0] == EXIT_ERROR
     assert texts[1][0].startswith(f"gcs: its texts could not be requested: {NO_KEY}name the file")
     code, told = run("status")
-    assert code == EXIT_DONE and len(asked) == 5
+    assert code == EXIT_DONE and len(asked) == SENDS
     (line,) = [line for line in told if "listening" not in line]
     assert line.startswith("gcs: texts, and rate, lateness and missed ticks of the simulator are missing: ")
     assert NO_KEY in line
     log = tmp_path / "flight.tlog"
     code, told = run("capture", "--duration", "0.2", "--out", str(log))
-    assert code == EXIT_DONE and len(asked) == 5
+    assert code == EXIT_DONE and len(asked) == SENDS
     assert told[0].startswith("gcs: only what the vehicle sends by itself is captured, without truth: ")
     assert NO_KEY in told[0]
     assert list(read_tlog(log))
