@@ -1,4 +1,5 @@
-"""flight.mcap: the flight for Foxglove, PlotJuggler and Rerun, in protobuf schemas of Foxglove and Plumbline.
+"""flight.mcap: the flight for Foxglove, PlotJuggler and Rerun, in protobuf schemas of Foxglove and Plumbline,
+and a message of ROS 2 for the battery.
 
 | topic | schema | what |
 |---|---|---|
@@ -6,6 +7,7 @@
 | /tf | foxglove.FrameTransforms | vehicle and load in world |
 | /scene | foxglove.SceneUpdate | vehicle, load and paths at the start; the cable until the load is released |
 | /load/flown, /load/asked | foxglove.PosesInFrame | flown and requested path, at the start |
+| /battery | sensor_msgs/msg/BatteryState | the battery as the vehicle reports it, measured or calculated |
 | /texts | foxglove.Log | status texts of the vehicle |
 
 World ENU, body FLU, SI. Times count from boot.
@@ -21,9 +23,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gcs.analysis.axes import Floats
+from gcs.analysis.battery_state import DEFINITION, TYPE_NAME, encoded_battery_state
 from gcs.analysis.parquet import flight_columns
 from gcs.analysis.samples import PHASE_NAMES, Samples
-from gcs.analysis.tracks import Telemetry
+from gcs.analysis.tracks import BatteryTrack, Telemetry
 from gcs.errors import GcsError, from_clone
 
 _WORLD, _VEHICLE, _LOAD = "world", "vehicle", "load"
@@ -58,17 +61,35 @@ def require_libraries() -> None:
 def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:
     """Write the file; GcsError if the libraries are not installed."""
     require_libraries()
-    from mcap_protobuf.writer import Writer
+    from mcap.writer import Writer
 
-    with path.open("wb") as file, Writer(file) as log:
+    with path.open("wb") as file:
+        log: Any = Writer(file)
+        log.start()
+        channels: dict[str, int] = {}
         messages = sorted(_messages(telemetry, samples, layout), key=lambda one: one[0])
         for time_s, topic, message in messages:
+            if topic not in channels:
+                channels[topic] = _channel(log, topic, message)
+            data = message if isinstance(message, bytes) else message.SerializeToString()
             ns = round(time_s * _NANO)
-            log.write_message(topic, message, ns, ns)
+            log.add_message(channels[topic], ns, data, ns)
+        log.finish()
+
+
+def _channel(log: Any, topic: str, message: Any) -> int:
+    """The number of a new channel for messages like this one: protobuf, or the encoded battery."""
+    from mcap.well_known import MessageEncoding, SchemaEncoding
+    from mcap_protobuf.schema import register_schema
+
+    if isinstance(message, bytes):
+        schema = log.register_schema(TYPE_NAME, SchemaEncoding.ROS2, DEFINITION.encode())
+        return int(log.register_channel(topic, MessageEncoding.CDR, schema))
+    return int(log.register_channel(topic, MessageEncoding.Protobuf, register_schema(log, type(message))))
 
 
 def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterator[tuple[float, str, Any]]:
-    """(time, topic, message) of all messages, unordered."""
+    """(time, topic, message) of all messages, unordered; a message that is bytes is a battery's state."""
     known = np.isfinite(samples.actual_m).all(axis=1) & np.isfinite(samples.vehicle_m).all(axis=1)
     if known.any():
         start_s = float(samples.time_s[known][0])
@@ -78,6 +99,15 @@ def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterato
         yield from _cable(samples, known)
     yield from _columns(telemetry, samples)
     yield from _texts(telemetry)
+    yield from _battery(telemetry.reported_battery)
+
+
+def _battery(battery: BatteryTrack) -> Iterator[tuple[float, str, Any]]:
+    columns = battery.time_s, battery.voltage_v, battery.current_a, 0.01 * battery.left_pct
+    for received_s, voltage_v, current_a, share_left in np.stack(columns, axis=1).tolist():
+        time_s = max(received_s, 0.0)
+        message = encoded_battery_state(round(time_s * _NANO), voltage_v, current_a, share_left)
+        yield time_s, "/battery", message
 
 
 def _columns(telemetry: Telemetry, samples: Samples) -> Iterator[tuple[float, str, Any]]:

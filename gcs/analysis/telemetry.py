@@ -300,10 +300,12 @@ def _snaps(c: Columns) -> SnapTrack:
 def _battery(
     readings: list[tuple[int, BatteryReading]], parameters: Mapping[str, float], boot_us: int
 ) -> BatteryTrack:
-    if not parameters.get(_SIMULATED_BATTERY):
-        readings = []
-    charge = parameters.get(_CHARGE, nan), parameters.get(_CAPACITY, nan)
-    rows = [(r.voltage, r.current, r.used_mah, percent_by_used(r, *charge)) for _, r in readings]
+    if parameters.get(_SIMULATED_BATTERY):
+        charge = parameters.get(_CHARGE, nan), parameters.get(_CAPACITY, nan)
+        left_pct = [percent_by_used(r, *charge) for _, r in readings]
+    else:
+        left_pct = [100.0 * r.remaining for _, r in readings]
+    rows = [(r.voltage, r.current, r.used_mah, left) for (_, r), left in zip(readings, left_pct, strict=True)]
     times_us = np.array([unix_us - boot_us for unix_us, _ in readings], dtype=np.float64)
     return _sorted(BatteryTrack(times_us * _MICRO, *np.array(rows, dtype=np.float64).reshape(-1, 4).T))
 
@@ -368,7 +370,8 @@ def _assemble(
         simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
         wind=_wind(columns[mavlink.MAVLINK_MSG_ID_WIND_STATE]),
         snaps=_snaps(columns[mavlink.MAVLINK_MSG_ID_CABLE_SNAP]),
-        battery=battery,
+        battery=battery if setup.parameters.get(_SIMULATED_BATTERY) else _battery([], {}, 0),
+        reported_battery=battery,
         texts=texts,
         mission=setup.mission,
         parameters=setup.parameters,

@@ -184,7 +184,7 @@ class SnapTrack:
 
 @dataclass(frozen=True)
 class BatteryTrack:
-    """BATTERY_STATUS of a simulated battery, NaN for what is unknown; time stamps of the capture."""
+    """BATTERY_STATUS, NaN for what is unknown; time stamps of the capture."""
 
     GAP_S = 2.5  # a value holds for this long: one message of each second may be missing
 
@@ -224,6 +224,7 @@ class Telemetry:
     wind: WindTrack
     snaps: SnapTrack
     battery: BatteryTrack  # empty unless the log says that a battery is simulated
+    reported_battery: BatteryTrack  # also what the vehicle calculates without one
     texts: tuple[StatusText, ...]
     mission: tuple[WireItem, ...]  # the last transferred mission, if all of it is in the log
     parameters: dict[str, float]  # the last values that the vehicle reported

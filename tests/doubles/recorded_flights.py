@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert.battery import BatteryReading, battery_status_message
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.telemetry import telemetry_of
 from gcs.analysis.tracks import Telemetry
@@ -98,6 +99,7 @@ class Flight:
     texts: list[tuple[float, int, str]] = field(default_factory=list)
     winds: list[tuple[float, tuple]] = field(default_factory=list)  # time of the beginning, gust pulse, ENU
     snaps: list[tuple[float, float, float]] = field(default_factory=list)  # time, speed, impulse
+    batteries: list[tuple[float, BatteryReading]] = field(default_factory=list)  # as the vehicle reports it
     drop: Callable[[int, str], bool] = lambda i, kind: False
     system: int = 1  # of the vehicle; its simulator is always 1
 
@@ -115,6 +117,8 @@ class Flight:
         for t, speed, impulse in self.snaps:
             message = mavlink.MAVLink_cable_snap_message(round(t * 1e6), speed, impulse)
             yield BOOT_US + round(t * 1e6), truth.frame(message)
+        for t, reading in self.batteries:
+            yield BOOT_US + round(t * 1e6), common.frame(battery_status_message(reading))
         half = float(np.sqrt(0.5))
         # numbers of Python, of whole columns at once: a row of an array takes longer than its frame
         quats = self.quat.tolist()

@@ -14,6 +14,7 @@ pytest.importorskip("mcap_protobuf", reason="pip install -e '.[mcap]'")
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from autopilot.wire.convert.battery import BatteryReading
 from gcs.analysis.mcap import Layout, write_mcap
 from gcs.analysis.parquet import flight_columns
 from gcs.analysis.samples import samples_of
@@ -113,3 +114,37 @@ def test_a_log_without_a_flight_gives_an_empty_file(tmp_path: Path) -> None:
     flight = flights.flight(1.0, flights.still)
     flight.drop = lambda i, kind: True
     assert written(flight, tmp_path) == ({}, {})
+
+
+def test_the_battery_is_the_message_that_ros_knows(tmp_path: Path) -> None:
+    """Also of a vehicle without a simulated battery, which reports what it calculates."""
+    ros = pytest.importorskip("mcap_ros2.decoder", reason="pip install -e '.[dev]'")
+    flight = flights.case_b(duration_s=2.0)
+    flight.batteries = [
+        (1.0, BatteryReading(12.4, 6.5, 20.0, 0.97)),
+        (2.0, BatteryReading(12.3, 6.25, 22.0, 0.96)),
+        (3.25, BatteryReading()),
+    ]
+    telemetry = flight.telemetry()
+    path = tmp_path / "flight.mcap"
+    write_mcap(path, telemetry, samples_of(telemetry), Layout(ROTORS_M, 0.02))
+    reader = make_reader(io.BytesIO(path.read_bytes()), decoder_factories=[ros.DecoderFactory()])
+    found = list(reader.iter_decoded_messages(topics=["/battery"]))
+    schemas = {(schema.name, schema.encoding, channel.message_encoding) for schema, channel, _, _ in found}
+    assert schemas == {("sensor_msgs/msg/BatteryState", "ros2msg", "cdr")}
+    stamps = [(battery.header.stamp.sec, battery.header.stamp.nanosec) for _, _, _, battery in found]
+    assert stamps == [(1, 0), (2, 0), (3, 250_000_000)]
+    assert [message.log_time for _, _, message, _ in found] == [s * 10**9 + ns for s, ns in stamps]
+    batteries = [battery for _, _, _, battery in found]
+    numbers = [(one.voltage, one.current, one.percentage) for one in batteries]
+    assert numbers[:2] == [
+        pytest.approx((12.4, -6.5, 0.97), rel=1e-6),
+        pytest.approx((12.3, -6.25, 0.96), rel=1e-6),
+    ]
+    assert np.isnan(numbers[2]).all()
+    assert np.isnan([(one.temperature, one.charge, one.capacity) for one in batteries]).all()
+    kinds = [
+        (one.power_supply_status, one.power_supply_health, one.power_supply_technology) for one in batteries
+    ]
+    assert kinds == 3 * [(2, 0, 3)], "discharging, of unknown health, lithium polymer"
+    assert all(one.present and not one.cell_voltage and not one.serial_number for one in batteries)
