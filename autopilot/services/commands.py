@@ -286,6 +286,14 @@ def _orbit(call: Call, context: Context) -> Request | Verdict:
     return Orbit(radius, speed, east, north, up, faces_centre=_ORBIT_YAWS.get(behaviour))
 
 
+def _do_orbit(call: Call, context: Context) -> Request | Verdict:
+    """A circle. MAVSDK sends its height above sea level in frame 3, as PX4 reads it in any frame; a height
+    above home is sent in frame 6."""
+    if call.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT:
+        call = call._replace(frame=mavlink.MAV_FRAME_GLOBAL)
+    return _orbit(call, context)
+
+
 def _change_altitude(call: Call, context: Context) -> Request | Verdict:
     frame = _as_integer(call.p[1])
     if not math.isfinite(call.p[0]) or frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
@@ -540,7 +548,7 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_DO_GRIPPER: _gripper,
     mavlink.MAV_CMD_DO_WINCH: _winch,
-    mavlink.MAV_CMD_DO_ORBIT: _orbit,
+    mavlink.MAV_CMD_DO_ORBIT: _do_orbit,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
     mavlink.MAV_CMD_NAV_LOITER_TIME: _loiter,  # nothing follows after the time: the load stays

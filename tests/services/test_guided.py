@@ -279,6 +279,27 @@ def test_guided_commands(rig):
     assert long(rig, m.MAV_CMD_PREFLIGHT_CALIBRATION) == 0
 
 
+@pytest.mark.parametrize(
+    ("frame", "height_m"),
+    [
+        (m.MAV_FRAME_GLOBAL, HOME.altitude_m + 3.0),
+        (m.MAV_FRAME_GLOBAL_INT, HOME.altitude_m + 3.0),
+        (m.MAV_FRAME_GLOBAL_RELATIVE_ALT, HOME.altitude_m + 3.0),  # MAVSDK's `absolute_altitude_m`
+        (m.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 3.0),
+    ],
+)
+def test_the_height_of_an_orbit_is_that_of_its_frame_except_for_that_of_mavsdk(rig, frame, height_m):
+    place = round(HOME.latitude_deg * 1e7), round(HOME.longitude_deg * 1e7)
+    command = m.MAVLink_command_int_message
+    rig.send(command(1, 1, frame, m.MAV_CMD_DO_ORBIT, 0, 0, 2.0, 1.0, 0.0, NAN, *place, height_m))
+    assert rig.asked[-1].altitude_m == pytest.approx(3.0, abs=1e-3)
+    rig.send(command(1, 1, frame, m.MAV_CMD_NAV_LOITER_TURNS, 0, 0, 1.0, 0.0, 2.0, NAN, *place, 3.0))
+    above_home_m = 3.0 if frame in (3, 6) else 3.0 - HOME.altitude_m
+    assert rig.asked[-1].altitude_m == pytest.approx(above_home_m, abs=1e-3), "no command of MAVSDK's"
+    rig.send(command(1, 1, frame, m.MAV_CMD_DO_ORBIT, 0, 0, 2.0, 1.0, 0.0, NAN, *place, NAN))
+    assert rig.asked[-1].altitude_m is None, "the present height"
+
+
 any_float = st.floats(width=32)
 
 
