@@ -29,6 +29,7 @@ _STATUS_MESSAGES = {
 }
 
 _NO_MISSION = 0xFFFF  # in the field `total` of MISSION_CURRENT
+_NO_VOLTAGE = 0xFFFF  # in the field `voltage_battery` of SYS_STATUS
 
 _SEVERITIES = {
     value: str(entry.name).removeprefix("MAV_SEVERITY_").lower()
@@ -132,6 +133,11 @@ def _mission_items(total: int) -> int | None:
     return {0: None, _NO_MISSION: 0}.get(total, total)
 
 
+def _battery_v(voltage_mv: int) -> float | None:
+    """The voltage in SYS_STATUS; None if it is not known."""
+    return None if voltage_mv == _NO_VOLTAGE else voltage_mv * 1e-3
+
+
 def status_record(view: VehicleView) -> dict[str, Any]:
     """Keys of `gcs status --json` except the texts; None for what the vehicle has not sent."""
     load = view.latest.get("LOAD_STATE")
@@ -158,7 +164,7 @@ def status_record(view: VehicleView) -> dict[str, Any]:
         "cable_taut": None if load is None else bool(load.taut),
         "load_error_m": view.load_error_m,
         "rotor_use": view.rotor_use,
-        "battery_v": None if battery is None else battery.voltage_battery * 1e-3,
+        "battery_v": None if battery is None else _battery_v(battery.voltage_battery),
         "rate_hz": None if world is None else world.rate_hz,
         "late_p99_us": None if world is None else world.late_p99_us,
         "missed_ticks": None if world is None else world.missed,

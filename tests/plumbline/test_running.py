@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 from collections.abc import Callable
@@ -9,11 +10,14 @@ from dataclasses import fields
 from math import nan
 from typing import Any
 
+import numpy as np
 import pytest
 
 import plumbline
 from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert.telemetry import attitude_values, local_position_ned_values
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.axes import roll_pitch_yaw
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import Target
 from gcs.clients.vehicle_view import VehicleView
@@ -239,6 +243,56 @@ def test_a_message_from_before_tells_nothing_new() -> None:
     assert not is_new(state_of(session.view))
     session.pass_time()
     assert is_new(state_of(session.view))
+
+
+def test_motion_attitude_and_battery_are_those_of_the_tables_of_a_flight() -> None:
+    view = VehicleView()
+    empty = state_of(view)
+    readers = ("load_velocity_m_s", "vehicle_m", "vehicle_velocity_m_s", "vehicle_angles_rad")
+    readers += ("vehicle_rate_rad_s", "battery_v", "battery_a", "battery_left_pct")
+    assert [getattr(empty, name) for name in readers] == len(readers) * [None]
+
+    angles = (0.3, -0.2, 2.5)  # roll, pitch, yaw
+    half = [(math.cos(0.5 * angle), math.sin(0.5 * angle)) for angle in angles]
+    (cr, sr), (cp, sp), (cy, sy) = half
+    quat = (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+    battery = {"voltage_battery": 12_340, "current_battery": 650, "battery_remaining": 81}
+    unused = dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
+    sensors = dict.fromkeys((f"onboard_control_sensors_{one}" for one in ("present", "enabled", "health")), 0)
+    estimated = mavlink.PLUMBLINE_SOURCE_ESTIMATED
+    pull = (0.7, 0.9, 0, 1, estimated)  # distance, tension, slack events, taut, source
+    sent = (
+        mavlink.MAVLink_local_position_ned_message(
+            *local_position_ned_values(0, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+        ),
+        mavlink.MAVLink_attitude_message(*attitude_values(0, quat, (0.4, 0.5, 0.6))),
+        mavlink.MAVLink_sys_status_message(**sensors, load=0, **battery, **unused),
+        mavlink.MAVLink_load_state_message(0, 1.0, 2.0, -3.0, 0.2, 0.1, -0.3, 0, 0, 1, 0, 0, 0, *pull),
+    )
+    for message in sent:
+        (received,) = messages(FrameWriter(1, 1).frame(message))[0]
+        view.update(received, 0)
+    state = state_of(view)
+    assert state.load_velocity_m_s == pytest.approx((0.1, 0.2, 0.3))
+    assert state.vehicle_m == pytest.approx((1.0, 2.0, 3.0))
+    assert state.vehicle_velocity_m_s == pytest.approx((0.1, 0.2, 0.3))
+    assert state.vehicle_angles_rad == pytest.approx(angles)
+    assert state.vehicle_angles_rad == pytest.approx(roll_pitch_yaw(np.array(quat)).tolist())
+    assert state.vehicle_rate_rad_s == pytest.approx((0.4, 0.5, 0.6))
+    assert (state.battery_v, state.battery_a, state.battery_left_pct) == pytest.approx((12.34, 6.5, 81.0))
+
+    unknown = {"voltage_battery": 0xFFFF, "current_battery": -1, "battery_remaining": -1}
+    (received,) = messages(
+        FrameWriter(1, 1).frame(mavlink.MAVLink_sys_status_message(**sensors, load=0, **unknown, **unused))
+    )[0]
+    view.update(received, 0)
+    state = state_of(view)
+    assert (state.battery_v, state.battery_a, state.battery_left_pct) == (None, None, None)
 
 
 def test_a_vehicle_that_is_only_kept_level_does_not_hold() -> None:
