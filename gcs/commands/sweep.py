@@ -67,7 +67,7 @@ from gcs.shell.display import notify, results_to_stdout
 @click.option(
     "--sample",
     type=WholeNumber(min=1),
-    help="Draw this many settings (Latin hypercube) instead of flying the whole grid.",
+    help="Draw this many different settings (Latin hypercube) instead of flying the whole grid.",
 )
 @time_limit_option
 @click.option(

@@ -14,6 +14,8 @@ from functools import lru_cache
 from itertools import product
 from typing import Any, TypeVar
 
+import numpy as np
+
 from autopilot.own.law import law_name, law_number, own_law_reference
 from autopilot.own.own_code import NO_OWN_CODE, OwnCode, parameters_for
 from autopilot.own.source import OwnError
@@ -27,7 +29,7 @@ from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError
 from gcs.mission_files import load
-from gcs.sweep.drawing import drawn_index, drawn_number, draws_whole_numbers
+from gcs.sweep.drawing import drawn_index, drawn_number, draws_whole_numbers, without_repeats
 from gcs.sweep.plan_values import MAX_FLIGHTS, MAX_VALUES, PlanError, VariedParameter, varied_values
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
@@ -111,10 +113,13 @@ class SweepPlan:
         from scipy.stats.qmc import LatinHypercube
 
         fractions = LatinHypercube(len(self.varied), rng=_DRAW_SEED).random(self.sample)
-        return [
+        drawn = [
             tuple(_drawn_value(v, float(fraction)) for v, fraction in zip(self.varied, row, strict=True))
             for row in fractions
         ]
+        if any(v.continuous for v in self.varied):
+            return drawn
+        return without_repeats(drawn, [v.values for v in self.varied], np.random.default_rng(_DRAW_SEED))
 
     def conditions(self, case: Case) -> Conditions:
         """The conditions under which the flight is flown."""
@@ -222,6 +227,12 @@ def make_plan(
         raise PlanError(*error.lines) from None
     except ValueError as error:
         raise PlanError(*_error_lines(error)) from None
+    settings_in_all = math.prod(len(one.values) for one in varied)
+    if sample > settings_in_all and not any(one.continuous for one in varied):
+        raise PlanError(
+            f"--sample {sample}: these values make {settings_in_all} settings only, and a repeated one is "
+            "the same flight again; leave --sample out, and give more --seeds"
+        )
     plan = SweepPlan(
         mission,
         vehicle,

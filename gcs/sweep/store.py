@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -85,15 +84,8 @@ def table_of(rows: Sequence[Row], column_schema: pyarrow.Schema) -> pyarrow.Tabl
 
 
 def _distinct_flights(plan: SweepPlan) -> list[tuple[Any, ...]]:
-    """What distinguishes each flight of a plan: law, varied values, seed, and which it is of those in which
-    all of these are equal (drawn points of whole numbers can be)."""
-    counts: Counter[tuple[Any, ...]] = Counter()
-    flights = []
-    for case in plan.cases():
-        flight = (case.law, case.varied, case.seed)
-        flights.append((*flight, counts[flight]))
-        counts[flight] += 1
-    return flights
+    """What distinguishes each flight of a plan: law, varied values and seed."""
+    return [(case.law, case.varied, case.seed) for case in plan.cases()]
 
 
 def _damaged(path: Path) -> InputError:

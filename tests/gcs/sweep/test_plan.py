@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -233,11 +234,36 @@ def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) ->
 
 
 def test_of_a_parameter_that_takes_whole_numbers_only_such_are_drawn(short: str) -> None:
-    plan = planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.0, 4.0), True)], {}, sample=20)
+    rotors, wind = ("SIM_ENGINE_FAIL", (0.0, 4.0)), ("SIM_WIND_E", (1.0, 3.0))
+    varied = [VariedParameter(name, ends, True) for name, ends in (rotors, wind)]
+    plan = planned(short, varied, {}, sample=20)
     drawn = [case.varied[0] for case in plan.cases()]
     assert sorted(drawn) == [one for one in (0.0, 1.0, 2.0, 3.0, 4.0) for _ in range(4)]
     with pytest.raises(PlanError, match=r"SIM_ENGINE_FAIL = 0.5; must be a whole number"):
         planned(short, [VariedParameter("SIM_ENGINE_FAIL", (0.5, 4.0), True)], {}, sample=20)
+
+
+@pytest.mark.parametrize("sample", [6, 10, 14, 15])
+def test_of_listed_values_no_setting_is_drawn_twice(short: str, sample: int) -> None:
+    """Three and five values: a Latin hypercube of 15 has 10 to 13 of the 15 pairs, and others twice."""
+    varied = [
+        VariedParameter("SIM_WIND_E", (0.0, 1.0, 2.0), False),
+        VariedParameter("SIM_ENGINE_FAIL", (0.0, 4.0), True),
+    ]
+    plan = planned(short, varied, {}, sample=sample)
+    drawn = [case.varied for case in plan.cases()]
+    assert len(drawn) == len(set(drawn)) == sample
+    for k in range(2):
+        counts = Counter(setting[k] for setting in drawn).values()
+        assert max(counts) - min(counts) <= 1, "each value about as often"
+    assert list(from_json(plan.to_json()).cases()) == list(plan.cases())
+
+
+def test_more_settings_than_there_are_cannot_be_drawn(short: str) -> None:
+    varied = [VariedParameter(name, (0.0, 1.0), False) for name in ("SIM_WIND_E", "SIM_WIND_N")]
+    assert len(list(planned(short, varied, {}, sample=4).cases())) == 4
+    with pytest.raises(PlanError, match="--sample 5: these values make 4 settings only"):
+        planned(short, varied, {}, sample=5)
 
 
 @pytest.mark.parametrize(

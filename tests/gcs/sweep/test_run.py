@@ -223,18 +223,6 @@ def test_a_folder_with_a_colon_is_a_folder(
     assert without_clock(tmp_path / folder) == without_clock(complete)
 
 
-def test_equal_drawn_points_are_told_apart_when_a_sweep_is_extended(
-    whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path
-) -> None:
-    plan, complete, _ = whole
-    draws = (replace(plan.varied[0], values=(2.0, 2.0)),)
-    less, more = (replace(plan, varied=draws, sample=3, seeds=seeds) for seeds in ((2,), (2, 3)))
-    assert len({case.varied for case in less.cases()}) == 1
-    rows = pq.read_table(complete / "flights.parquet").to_pylist()
-    Store(tmp_path, less).add([{**row, "index": index} for index, row in enumerate(rows[:3])])
-    assert len(Store(tmp_path, more).stored_indices()) == 3
-
-
 def test_flights_are_stored_without_what_imports_pandas(
     whole: tuple[SweepPlan, Path, run.SweepResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
