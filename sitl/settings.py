@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3
@@ -29,6 +30,8 @@ class Settings(NamedTuple):
     failing_rotors: int = 0  # bit i: rotor i+1
     failing_share: float = 0.0  # share of its command that a failing rotor gives
     rotors_fail_at_us: int = 0
+    sensors_fail_at_us: int = 0  # those of `failed_sensors`
+    sensors_work_at_us: float = inf  # from when on these work again
     stamp_offset_us: int = 0  # added to the time stamps of the readings of trackers, camera and receiver
     overrides: Overrides = ()
 
@@ -48,6 +51,7 @@ def settings_of(table: ParameterTable) -> Settings:
             f"SIM_RATE_HZ = {rate:g} Hz; a tick must be a whole number of microseconds, and "
             f"{SECOND_US} us / {rate:g} is not: take one of {allowed}"
         )
+    fail_at_us, fail_for_us = (round(table[f"SIM_SENS_{name}_S"] * SECOND_US) for name in ("AT", "FOR"))
     return Settings(
         tick_us=tick_us,
         actuator_delay_us=round(table["SIM_ACT_DELAY_MS"] * 1000.0),
@@ -55,6 +59,8 @@ def settings_of(table: ParameterTable) -> Settings:
         sensor_latency_us=round(table["SIM_SENS_LAT_MS"] * 1000.0),
         sensor_loss=table["SIM_DROP_PCT"] / 100.0,
         failed_sensors=tuple(bool(int(table["SIM_SENS_FAIL"]) >> bit & 1) for bit in range(7)),
+        sensors_fail_at_us=fail_at_us,
+        sensors_work_at_us=fail_at_us + fail_for_us if fail_for_us else inf,
         wind=(table["SIM_WIND_E"], table["SIM_WIND_N"], table["SIM_WIND_U"]),
         gust_std=table["SIM_GUST_STD"],
         gust_tau_s=table["SIM_GUST_TAU_S"],

@@ -49,7 +49,8 @@ GUSTS = 8
 # columns of `clock`
 FITTED, COUNT, NOMINAL, DUE, OUTAGE_END, HEAD, LENGTH, LATENCY, LEAD = range(9)
 # columns of `delivery`
-RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET = range(7)  # the last three: us
+RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET, FAILS_AT, FAILS_UNTIL = range(9)
+# the last five: us
 # columns of `queue`: when the reading leaves the sensor (us), its time stamp (us), then the reading
 DEPARTURE_US, STAMP_US, READING = 0, 1, 2
 _COLUMNS = 15
@@ -110,7 +111,7 @@ class WorldRows(NamedTuple):
     model: Row  # WorldModel
     seed: Ints  # (1,)
     clock: Ints  # (sensors, 9)
-    delivery: Floats  # (sensors, 7)
+    delivery: Floats  # (sensors, 9)
     errors: Floats  # (sensors, 20) biases, drifts, angles of the rotors
     queue: Floats  # (sensors, capacity, 15) readings on their way
     commands: Floats  # (capacity, 1 + rotors) takes effect at (us), forces (N)
@@ -194,14 +195,16 @@ def _sample(
 
 @kernel
 def _is_delivered(clock: Ints, delivery: Floats, noise: Noise) -> bool:
-    """Draw the fate of a reading: lost singly, or in an outage of exponentially distributed length."""
+    """Draw the fate of a reading: lost singly, or in an outage of exponentially distributed length. All
+    readings of a failed sensor are lost."""
+    works = clock[DUE] < delivery[FAILS_AT] or clock[DUE] >= delivery[FAILS_UNTIL]
     if delivery[LOSS] == 0.0 and delivery[OUTAGE_CHANCE] == 0.0:
-        return True
+        return bool(works)
     lost, outage_draw = uniform(noise, _FATE_BLOCK)
     if clock[DUE] >= clock[OUTAGE_END] and outage_draw <= delivery[OUTAGE_CHANCE]:
         length_s = -log(uniform(noise, _OUTAGE_BLOCK)[0]) * delivery[OUTAGE_S]
         clock[OUTAGE_END] = clock[DUE] + max(int(np.rint(length_s * 1000000)), 1)
-    return bool(clock[DUE] >= clock[OUTAGE_END] and lost > delivery[LOSS])
+    return bool(works and clock[DUE] >= clock[OUTAGE_END] and lost > delivery[LOSS])
 
 
 @kernel
@@ -445,13 +448,13 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
 
 
 def delivery_table(profile: Profile, settings: Settings) -> Floats:
-    """(sensors, 7) rate of each sensor, the losses of its readings, and their additional delay and the error
-    of their time stamps.
+    """(sensors, 9) rate of each sensor, the losses of its readings, their additional delay, the error of
+    their time stamps, and when the sensor fails and works again.
 
-    All readings of a failed sensor are lost. The inertial unit is wired to the autopilot, so the losses of
-    `settings` on the way do not affect it.
+    The inertial unit is wired to the autopilot, so the losses of `settings` on the way do not affect it.
     """
-    table_rows = np.zeros((SENSORS, 7))
+    table_rows = np.zeros((SENSORS, 9))
+    table_rows[:, [FAILS_AT, FAILS_UNTIL]] = np.inf
     for sensor, table in enumerate(fitted_sensors(with_overrides(profile, settings.overrides))):
         if table is None:
             continue
@@ -459,7 +462,7 @@ def delivery_table(profile: Profile, settings: Settings) -> Floats:
         rate_hz, _, lead_us = _timing(table, settings)
         link_loss = 0.0 if sensor == IMU else settings.sensor_loss
         if settings.failed_sensors[sensor]:
-            link_loss = 1.0
+            row[FAILS_AT], row[FAILS_UNTIL] = settings.sensors_fail_at_us, settings.sensors_work_at_us
         row[RATE], row[LOSS] = rate_hz, min(table.loss + link_loss, 1.0)
         period_us = nominal_us(rate_hz, settings.tick_us, lead_us, 1) + lead_us
         row[OUTAGE_CHANCE] = table.outages_per_min / 60.0 * period_us / SECOND_US

@@ -72,6 +72,9 @@ _REQUIREMENTS = (
         ("SIM_ENGINE_AT_S", "SIM_ENGINE_MUL"), ("SIM_ENGINE_FAIL",), "no rotor fails; set SIM_ENGINE_FAIL"
     ),
     _Requirement(
+        ("SIM_SENS_AT_S", "SIM_SENS_FOR_S"), ("SIM_SENS_FAIL",), "no sensor fails; set SIM_SENS_FAIL"
+    ),
+    _Requirement(
         ("SIM_CBL_MASS", "SIM_CBL_CD", "SIM_CBL_EA", "SIM_CBL_DAMP", "SIM_LOAD_GYR", *_LOAD_TURNS),
         ("SIM_CBL_LINKS",),
         "the cable has no links; set SIM_CBL_LINKS",

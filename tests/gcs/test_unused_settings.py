@@ -31,6 +31,8 @@ OF_WORLD: dict[str, tuple[float, dict[str, float]]] = {
     "SIM_GUST_AT_S": (12.0, {"SIM_GUST_E": 2.0}),
     "SIM_GUST_TAU_S": (2.0, {"SIM_GUST_STD": 1.0}),
     "SIM_ENGINE_AT_S": (12.0, {"SIM_ENGINE_FAIL": 1.0}),
+    "SIM_SENS_AT_S": (12.0, {"SIM_SENS_FAIL": 2.0}),
+    "SIM_SENS_FOR_S": (12.0, {"SIM_SENS_FAIL": 2.0}),
     "SIM_ENGINE_MUL": (0.9, {"SIM_ENGINE_FAIL": 1.0}),
     "SIM_CBL_MASS": (0.01, ON_LINKS),
     "SIM_CBL_CD": (2.0, {**ON_LINKS, "SIM_CABLE_DIAM": 5.0}),

@@ -274,6 +274,19 @@ def test_the_winch_reaches_the_rate_it_is_told_by_the_next_tick(core) -> None:
     assert flown.cable_length == standing  # nothing hangs on it
 
 
+def test_a_sensor_fails_at_the_time_and_for_the_time_that_are_set(core) -> None:
+    """All its readings of this time are lost, and no others."""
+    whole = collected(core("lab"), 200)
+    brief = collected(core("lab", SIM_SENS_FAIL=2, SIM_SENS_AT_S=0.2, SIM_SENS_FOR_S=0.3), 200)
+    lasting = collected(core("lab", SIM_SENS_FAIL=2, SIM_SENS_AT_S=0.2), 200)
+    before = {time_us: one for time_us, one in whole["mocap"].items() if time_us < 200_000}
+    after = {time_us: one for time_us, one in whole["mocap"].items() if time_us >= 500_000}
+    assert before and after
+    assert str(brief["mocap"]) == str(before | after)
+    assert str(lasting["mocap"]) == str(before)
+    assert str(brief["load_tracker"]) == str(whole["load_tracker"])
+
+
 @pytest.mark.parametrize("failed", range(7))
 @pytest.mark.parametrize("profile", ["lab", "rtk"])
 def test_a_failed_sensor_is_silent_and_the_others_say_what_they_did(core, profile: str, failed: int) -> None:
