@@ -66,6 +66,8 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
     if flight.phase == Phase.MISSION and phase != Phase.MISSION:
         stopped_run = stopped_run_of(flight, view, settings, legs) or flight.mission.stopped_run
         flight = replace(flight, mission=replace(flight.mission, stopped_run=stopped_run))
+    if phase == Phase.TAUTEN:
+        flight = replace(flight, cable=replace(flight.cable, ground_place=view.x_load))
     entered = replace(
         flight,
         phase=phase,

@@ -25,7 +25,7 @@ from autopilot.guidance.legs import (
 )
 from autopilot.guidance.setpoint_follower import TrackAttitude, TrackPosition
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
+from autopilot.supervisor.state import CARRYING, Flight, Phase, View, leg_time_s
 
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
 FALL_SPEED = 1.0  # m/s: a load that sinks faster has fallen and was caught; it is not being lowered
@@ -39,6 +39,15 @@ MIN_CABLE_COSINE = 0.5
 def position_mode(flight: Flight) -> int:
     """The control mode in which positions are flown: of the load, or of the vehicle that has released it."""
     return QUAD_POSITION if flight.cable.released else LOAD_POSITION
+
+
+def tracks_position(flight: Flight) -> bool:
+    """Whether the flight is judged by a position: of the load, or of the vehicle that has released it or that
+    pulls its cable taut."""
+    if not flight.legs:
+        return False
+    tautens = flight.phase == Phase.TAUTEN
+    return tautens or (flight.phase in CARRYING and flight.legs[0].control_mode == position_mode(flight))
 
 
 def with_control_modes(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:

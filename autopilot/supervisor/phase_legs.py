@@ -201,6 +201,8 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
     clear = min(view.x_quad[2], view.x_load[2] + CLEARANCE * settings.cable_length_m)
     down = (view.x_quad[0], view.x_quad[1], clear)
     aside = (view.x_load[0] - SET_DOWN_OFFSET * settings.cable_length_m, view.x_load[1], clear)
+    if dist(view.x_quad[:2], view.x_load[:2]) >= SET_DOWN_OFFSET * settings.cable_length_m:
+        aside = down  # it is beside its load already: wind too strong for it keeps it there
     low_height = view.x_load[2] + creep_down_share(settings.cable_length_m) * settings.cable_length_m
     low = (aside[0], aside[1], min(clear, low_height))
     return (

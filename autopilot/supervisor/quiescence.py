@@ -31,7 +31,7 @@ from autopilot.guidance.legs import (
     winch_hold_height,
 )
 from autopilot.guidance.setpoint_follower import TrackAttitude
-from autopilot.supervisor.motion import position_mode
+from autopilot.supervisor.motion import tracks_position
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CARRYING,
@@ -142,7 +142,6 @@ def next_stretch(
     end_times.append(end_us)
     if _is_decided_at_every_tick(flight, leg, settings):
         end_times.append(now_us)
-    tracked = flight.phase in CARRYING and leg.control_mode == position_mode(flight)
     anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
     return Stretch(
         mode=leg.control_mode,
@@ -155,7 +154,7 @@ def next_stretch(
         offset_limit=max_load_offset(settings),
         condition_met=flight.condition_since_us >= 0,
         stopped_height=flight.stopped_height,
-        error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
+        error_limit=settings.failsafe.load_error_limit_m if tracks_position(flight) else inf,
         load_suspended=load_suspended,
         taut_length=flight.cable.taut_length_m,
         load_weight=settings.load_weight_n,
@@ -269,7 +268,7 @@ def may_need_decision(
     )
     if not finite or not tilt <= stretch.tilt_limit or not known:
         return True
-    tracked = state.x_quad if stretch.released else state.x_load
+    tracked = state.x_quad if stretch.mode == QUAD_POSITION else state.x_load
     if not norm(sub(tracked, target)) <= stretch.error_limit:
         return True
     pull_share = pull / stretch.load_weight

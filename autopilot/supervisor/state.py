@@ -178,6 +178,7 @@ class CableState:
     reel_rate: float = 0.0  # m/s, at which the length grows now
     reel_accel: float = 0.0  # m/s^2
     reel_target_m: float | None = None  # length that the present mission step requires
+    ground_place: Vec3 = ZERO  # where the load lay when its cable began to be pulled taut
     taut_length_m: float = 0.0  # from load to vehicle when lifting began: the true length of the cable
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack

@@ -1,5 +1,5 @@
-"""Wind that pushes the vehicle harder than its load pulls: nothing of it is taken for the load, and a vehicle
-that it slides over the ground is not armed."""
+"""Wind that pushes the vehicle harder than its load pulls: nothing of it is taken for the load. A vehicle
+that it slides over the ground is not armed, and one that it carries off before its load is lifted lands."""
 
 from __future__ import annotations
 
@@ -63,3 +63,18 @@ def test_a_vehicle_that_its_load_holds_in_the_wind_takes_off(sensors: str) -> No
     conditions = Conditions("heavy", sensors, settings={"SIM_WIND_E": 18.0})
     flown = fly(mission, conditions, start_times(mission, conditions))
     assert flown.outcome == "completed", flown.texts
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "sensors", "wind"), [("heavy-real", "lab", 16.0), ("bebop-real", "gps", 14.0)]
+)
+def test_a_vehicle_that_wind_carries_off_while_it_pulls_its_cable_taut_lands_at_once(
+    vehicle: str, sensors: str, wind: float
+) -> None:
+    """It dragged its load for 115 s and 340 m, or for 58 s and 62 m, and was silent for so long."""
+    craft = Craft(Takeoff(1.5), Land(), vehicle=vehicle, sensors=sensors, SIM_WIND_E=wind)
+    craft.begin()
+    craft.run(at_phase(Phase.SET_DOWN), 5.0)
+    assert "Failsafe: carried off by the wind while tautening the cable" in "".join(craft.texts)
+    craft.run(at_phase(Phase.DISARMED), 10.0)
+    assert craft.truth.x_load[0] < 25.0

@@ -10,11 +10,10 @@ from math import cos, degrees, isfinite, radians
 from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3, column, dot, norm, sub
-from autopilot.guidance.legs import LevelHold
-from autopilot.supervisor.motion import position_mode
+from autopilot.guidance.legs import QUAD_POSITION, LevelHold
+from autopilot.supervisor.motion import tracks_position
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
-    CARRYING,
     CRITICAL,
     IN_AIR,
     Event,
@@ -114,14 +113,12 @@ def is_out_of_control(flight: Flight, view: View, settings: Settings) -> bool:
 
 
 def path_error(flight: Flight, view: View) -> PathError | None:
-    """How far the load is off its position, or the vehicle that has released it; None if no position is
-    controlled."""
-    if flight.phase not in CARRYING or not flight.legs:
-        return None
+    """How far the load is off its position, or the vehicle that has released it or pulls its cable taut; None
+    if no position is controlled."""
     jet = setpoint(flight, view.now_us)
-    if jet is None or flight.legs[0].control_mode != position_mode(flight):
+    if jet is None or not tracks_position(flight):
         return None
-    if flight.cable.released:
+    if flight.legs[0].control_mode == QUAD_POSITION:
         return PathError("vehicle", sub(view.x_quad, jet[0]), sub(view.v_quad, jet[1]))
     return PathError("load", sub(view.x_load, jet[0]), sub(view.v_load, jet[1]))
 
@@ -134,11 +131,12 @@ def off_path_text(error: PathError, settings: Settings) -> str:
 
 def is_controlled(flight: Flight, view: View, error: PathError, settings: Settings) -> bool:
     """Whether a vehicle that is far off is controlled nevertheless, and only too weak for the wind or its
-    path: vehicle and cable are roughly upright, and from far away it does not push itself farther."""
+    path: vehicle, and the cable of a load that hangs, are roughly upright, and from far away it does not push
+    itself farther."""
     upward, cable = column(view.attitude, 2), sub(view.x_quad, view.x_load)
     if not cos(view.tilt_rad) >= MAX_LEAN_COSINE:
         return False
-    if not flight.cable.released and not cable[2] >= MAX_LEAN_COSINE * norm(cable):
+    if error.body == "load" and not cable[2] >= MAX_LEAN_COSINE * norm(cable):
         return False
     if error.distance_m <= max(MIN_AWAY_M, settings.cable_length_m) or error.approach_m_s >= 0.0:
         return True

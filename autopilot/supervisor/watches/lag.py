@@ -22,9 +22,11 @@ MIN_SPEED = 1.0  # m/s, below which that speed is not reduced
 
 def watch_lag(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """Let the path wait for a vehicle or load that is farther off than FS_LOAD_ERR, hold, or land. A landing
-    that has begun continues, and one that seems out of control is left to `failsafe`."""
+    that has begun continues; one that seems out of control is left to `failsafe`, the way to a taut cable to
+    `tautening`."""
     error = path_error(flight, view)
-    if error is None or flight.phase == Phase.LOWER or flight.out_of_control_since_us >= 0:
+    elsewhere = flight.phase in (Phase.LOWER, Phase.TAUTEN)
+    if error is None or elsewhere or flight.out_of_control_since_us >= 0:
         return WatchResult(flight)
     limit_m, comes_nearer = settings.failsafe.load_error_limit_m, error.approach_m_s >= MIN_APPROACH
     if error.distance_m <= limit_m:

@@ -1,10 +1,12 @@
-"""Pulling the cable taut: the rising vehicle is kept over its load until the cable pulls."""
+"""Pulling the cable taut: the rising vehicle is kept over its load until the cable pulls. A vehicle that the
+wind carries off meanwhile, or that drags its load along, lands."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import degrees, radians
 
-from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.geometry.linear import Vec3, dot, norm, sub
 from autopilot.guidance.legs import Creep, slack_leg
 from autopilot.supervisor.phase_legs import HEIGHT_SIGMAS
 from autopilot.supervisor.settings import Settings
@@ -21,8 +23,11 @@ from autopilot.supervisor.state import (
     with_condition,
 )
 from autopilot.supervisor.watches.cable_pull import PULL_US, TAUT_PULL_SHARE, cable_pull_share
+from autopilot.supervisor.watches.failsafe import PathError, off_path_text, path_error
+from autopilot.supervisor.watches.lag import RESUME_SHARE
 from autopilot.supervisor.watches.watch_result import WatchResult
 from autopilot.trajectory.slack_cable import creep_up_share
+from autopilot.wire.dialect.plumbline import MAV_SEVERITY_ERROR
 
 # m, and share of the cable's length: a rising vehicle that is farther beside the load is moved over it. What
 # a camera sees of a load far below is about as uncertain.
@@ -35,12 +40,24 @@ PATIENCE_S = 30.0
 # The vehicle's setpoint rises above the cable's length by this share of it, and at least by this share of the
 # lead at which the law pulls with the load's weight: then the cable must have come taut.
 STRETCH_SHARE, LEAD_SHARE = 0.3, 1.3
+MIN_SPEED = 0.3  # m/s: a vehicle or load that moves away more slowly is not carried off
+WINDY_TILT_RAD = radians(20.0)  # a vehicle that tilts more pushes against strong wind
 HIDDEN_S = 2.0  # where the pull decides, the setpoint rises on for this time, as gusts may hide the pull
 
 
 def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResult:
-    """Lift when the cable pulls; land if it never does although the vehicle rises."""
-    if flight.phase != Phase.TAUTEN or len(flight.legs) != 1:
+    """Lift when the cable pulls; land if it never does although the vehicle rises, or if the wind is too
+    strong."""
+    if flight.phase != Phase.TAUTEN or flight.out_of_control_since_us >= 0:  # `failsafe` cares for the latter
+        return WatchResult(flight)
+    error, limit_m = path_error(flight, view), settings.failsafe.load_error_limit_m
+    assert error is not None
+    way = sub(view.x_load, flight.cable.ground_place)  # along which the vehicle has dragged its load
+    # on a short cable, a load that was not dragged as far may hold the vehicle yet
+    may_be_held = max(norm(way), settings.cable_length_m) <= limit_m
+    if error.distance_m > limit_m and error.approach_m_s <= -MIN_SPEED and not may_be_held:
+        return _carried_off(flight, off_path_text(error, settings))
+    if len(flight.legs) != 1:
         return WatchResult(flight)
     flight = _note_pull(flight, view, settings)
     if has_lasted(flight.condition_since_us, PULL_US, view.now_us):
@@ -57,9 +74,12 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     is_too_late = view.now_us > give_up_us(flight, settings)
     # for example because the load was not seen well from the ground
     if not norm(sub(over, at)) <= max_load_offset(settings):
+        if norm(way) > limit_m and dot(way, view.v_load) >= MIN_SPEED * norm(way):
+            return _carried_off(flight, f"load dragged by {norm(way):.1f} m (FS_LOAD_ERR {limit_m:g})")
         if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
-            text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
+            causes = _causes(error, view, settings, "VEH_CABLE_LEN")
+            text = f"Cable pulls at {length:.2f} m, landing; {causes}"
             return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
         if not is_too_late:
             return WatchResult(_moved_over_load(flight, view, creep, at, over))
@@ -67,9 +87,25 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     if not view.load_tracked:
         last_height += HIDDEN_S * creep.velocity[2]
     if flight.condition_since_us < 0 and (at[2] > last_height or is_too_late):
-        text = "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
+        causes = _causes(error, view, settings, "VEH_CABLE_LEN and VEH_LOAD_MASS")
+        text = f"Cable never taut, landing; {causes}"
         return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
     return WatchResult(flight)
+
+
+def _carried_off(flight: Flight, how_far: str) -> WatchResult:
+    """Land, as the wind is too strong."""
+    text = f"Failsafe: carried off by the wind while tautening the cable, {how_far}, landing"
+    return WatchResult(interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, text),))
+
+
+def _causes(error: PathError, view: View, settings: Settings, parameters: str) -> str:
+    """What may be wrong when the cable does not come taut: these parameters, or strong wind."""
+    near = error.distance_m <= RESUME_SHARE * settings.failsafe.load_error_limit_m
+    if near and view.tilt_rad <= WINDY_TILT_RAD:
+        return f"check {parameters}"
+    found = f"{error.distance_m:.1f} m off its path, tilted by {degrees(view.tilt_rad):.0f} deg"
+    return f"too much wind ({found})? Else check {parameters}"
 
 
 def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
