@@ -58,6 +58,8 @@ _MAX_STALL_S = 60.0  # how long the vehicle's clock may stand still while its he
 _RETRY_S = 0.1
 _NEAR_M = 0.1
 _SLOW_M_S = 0.1
+_CLOSER_M = 0.01  # by less a load that is held has not come closer to where it was sent
+_HELD_AWAY_S = 30.0  # after so long without coming closer, a load that is held away from there stays away
 _LEAST_REEL_M = 1e-3  # for less the winch may stay still
 _STILL_S = 1.5  # three times the interval of WINCH_STATUS
 _NAMED_CONDITIONS: dict[str, Condition] = {
@@ -191,6 +193,8 @@ class RunningVehicle:
 
         The load has arrived when its path has ended, within 0.1 m of the position, and it is slower than
         0.1 m/s. A mission that is being flown ends. After a release the position is that of the vehicle.
+        `Error`, with the distance that is left, if it has not arrived within `timeout_s`, or if it is held
+        away from the position, as by a strong wind, and comes no closer for 30 s.
         """
         height_m = None if up_m is None else number("up_m", up_m)
         place = (number("east_m", east_m), number("north_m", north_m), height_m)
@@ -199,17 +203,10 @@ class RunningVehicle:
         self._require_armed("goto")
         self._command(lambda session: reposition(session, place, False, checked_speed_m_s).operation)
         if wait:
-            view, reported_by = self._session.view, mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT
-            self.wait(_newly(view, reported_by, lambda state: self._has_arrived(state, place)), limit_s)
-
-    def _has_arrived(self, state: State, place: tuple[float, float, float | None]) -> bool:
-        position, speed_m_s = self._session.view.motion_without_load or (state.load_m, state.load_speed_m_s)
-        if position is None or speed_m_s is None or not state.holding:
-            return False
-        offsets = [
-            actual - wanted for actual, wanted in zip(position, place, strict=True) if wanted is not None
-        ]
-        return math.hypot(*offsets) < _NEAR_M and speed_m_s < _SLOW_M_S
+            view = self._session.view
+            way = _Way(view, place)
+            arrived = _newly(view, mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT, way.has_ended_there)
+            self._in_thread(lambda: self._watch(arrived, "goto", limit_s, way))
 
     @checked_flags
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
@@ -343,8 +340,8 @@ class RunningVehicle:
             raise GcsError(f"wait {shown_value(until)}: must be one of {known}, a number or a function")
         return until, "what was asked for"
 
-    def _watch(self, condition: Condition, what: str, timeout_s: float) -> State:
-        """Wait for a condition, in the thread of the link."""
+    def _watch(self, condition: Condition, what: str, timeout_s: float, way: _Way | None = None) -> State:
+        """Wait for a condition, in the thread of the link; with `way`, that the load flies it."""
         session, clock = self._session, _Clock()
         was_armed, texts_before = self.state.armed, len(session.view.texts)
         found: list[State] = []
@@ -358,8 +355,13 @@ class RunningVehicle:
                 problems.append(f"the vehicle fell silent for {self._timeout_s:g} s")
             elif was_armed and not state.armed:
                 problems.append("the vehicle was disarmed")
+            elif way is not None and way.has_ended_elsewhere(state):
+                limits = f"must be within {_NEAR_M:g} m and slower than {_SLOW_M_S:g} m/s"
+                since = f"its way has ended, and for {_HELD_AWAY_S:g} s it has come no closer"
+                problems.append(f"{way.remaining(state)} ({limits}): {since}")
             elif clock.elapsed_s(state) > timeout_s:
-                problems.append(f"not within {timeout_s:g} s of the vehicle's clock")
+                where = way.remaining(state) if way is not None else f"phase {state.phase or 'not known'}"
+                problems.append(f"not within {timeout_s:g} s of the vehicle's clock: {where}")
             elif clock.stalled_s > _MAX_STALL_S:
                 problems.append(f"the vehicle's clock stands still for {_MAX_STALL_S:g} s; is sitl running?")
             elif self._closing.is_set():
@@ -465,6 +467,46 @@ class _Clock:
     def stalled_s(self) -> float:
         """How long the vehicle's clock has stood still, by the clock of this machine."""
         return (monotonic_us() - self._changed_us) * 1e-6
+
+
+class _Way:
+    """The way of the load, or of a vehicle that released it, to a place."""
+
+    def __init__(self, view: VehicleView, place: tuple[float, float, float | None]) -> None:
+        self._view = view
+        self._place = place
+        self._clock = _Clock()
+        self._least_m = math.inf  # least distance since the way has ended
+        self._since_s = 0.0  # since when it has not become less
+
+    def _distance_and_speed(self, state: State) -> tuple[float, float] | None:
+        position, speed_m_s = self._view.motion_without_load or (state.load_m, state.load_speed_m_s)
+        if position is None or speed_m_s is None:
+            return None
+        pairs = zip(position, self._place, strict=True)
+        return math.hypot(*(actual - wanted for actual, wanted in pairs if wanted is not None)), speed_m_s
+
+    def has_ended_there(self, state: State) -> bool:
+        """Whether it is held at the place, at rest."""
+        motion = self._distance_and_speed(state)
+        return bool(motion and state.holding and motion[0] < _NEAR_M and motion[1] < _SLOW_M_S)
+
+    def has_ended_elsewhere(self, state: State) -> bool:
+        """Whether it is held, and has come no closer to the place for `_HELD_AWAY_S`."""
+        now_s, motion = self._clock.elapsed_s(state), self._distance_and_speed(state)
+        if motion is None or not state.holding:
+            self._least_m, self._since_s = math.inf, now_s
+        elif motion[0] < self._least_m - _CLOSER_M:
+            self._least_m, self._since_s = motion[0], now_s
+        return now_s - self._since_s > _HELD_AWAY_S
+
+    def remaining(self, state: State) -> str:
+        """How far it is from the place, for an error."""
+        motion, phase = self._distance_and_speed(state), f"phase {state.phase or 'not known'}"
+        if motion is None:
+            return f"the distance from the goal is not known, {phase}"
+        what = "vehicle" if self._view.motion_without_load else "load"
+        return f"{what} {motion[0]:.2f} m from the goal at {motion[1]:.2f} m/s, {phase}"
 
 
 def _newly(view: VehicleView, message_id: int, condition: Condition) -> Condition:

@@ -329,8 +329,45 @@ def test_what_position_commands_refer_to_is_awaited(
     )
     with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
         vehicle.goto(*here, timeout_s=2.0)
-        with pytest.raises(plumbline.Error, match="not within 2 s of the vehicle's clock"):
+        what = "load" if control_mode == LOAD_POSITION else "vehicle"
+        left = f"not within 2 s of the vehicle's clock: {what} 1.00 m from the goal at 0.00 m/s, phase hold"
+        with pytest.raises(plumbline.Error, match=f"waiting for goto: {left}"):
             vehicle.goto(here[0], here[1], here[2] + 1.0, timeout_s=2.0)
     for height_m in (here[2], None):  # without a height it keeps the one that it has
         move = reposition(session, (here[0], here[1] + 2.0, height_m), False, None)  # type: ignore[arg-type]
         assert move.distance_m == pytest.approx(2.0)
+
+
+def load_at(east_m: float) -> Any:
+    """LOAD_STATE at rest, 1 m above home."""
+    estimated = mavlink.PLUMBLINE_SOURCE_ESTIMATED
+    return mavlink.MAVLink_load_state_message(0, 0.0, east_m, -1.0, *REST, 0.7, 0.0, 0, 0, estimated)
+
+
+def at_home_in_hold(at: Callable[[float], Any]) -> ReportingSession:
+    """An armed vehicle that holds its load, and whose reports are those of `at`."""
+    return ReportingSession(
+        ARMED,
+        mavlink.MAVLink_gps_global_origin_message(473977420, 85455940, 0),
+        mavlink.MAVLink_home_position_message(473977420, 85455940, 0, 0, 0, 0, LEVEL, 0, 0, 0),
+        load_at(0.0),
+        in_hold(0.0, nan),
+        at=at,
+    )
+
+
+def test_a_load_that_is_held_away_from_its_goal_ends_goto() -> None:
+    """It flies for 5 s, and creeps closer until 45 s."""
+
+    def report(time_s: float) -> Any:
+        if round(time_s * 10) % 2:
+            return in_hold(time_s, 5.0 if time_s < 5.0 else nan)
+        return load_at(0.6 if time_s > 45.0 else 0.15 + 0.01 * time_s)
+
+    session = at_home_in_hold(report)
+    with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
+        with pytest.raises(plumbline.Error) as told:
+            vehicle.goto(1.0, 0.0, 1.0)
+        assert vehicle.state.time_s == pytest.approx(45.0 + 30.0, abs=2.0)
+    left = "waiting for goto: load 0.40 m from the goal at 0.00 m/s, phase hold (must be within 0.1 m"
+    assert left in str(told.value) and "for 30 s it has come no closer" in str(told.value)
