@@ -68,6 +68,14 @@ _NAMED_CONDITIONS: dict[str, Condition] = {
     "mission complete": lambda state: state.mission == "complete",
     "landed": lambda state: state.armed is False and state.landed != "in the air",
 }
+# messages that show what a command changed
+_SHOW_STATE = (
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+)
+_SHOWN_S = 1.0  # in which a requested message arrives
 # messages that must be newer than the request to wait: one from before the last command may say that what
 # this command begins is already over
 _REPORTED_BY = {
@@ -105,7 +113,8 @@ def connect(
 class RunningVehicle:
     """A running vehicle, as `connect` returns it. Use it in a `with` block, or `close` it.
 
-    A command returns when the vehicle has accepted it; a refusal raises an `Error` with the vehicle's reason.
+    A command returns when the vehicle has accepted it and `state` shows it; a refusal raises an `Error` with
+    the vehicle's reason.
     `takeoff`, `goto`, `winch` and `land` also wait until the manoeuvre is finished, unless `wait=False`. Time
     limits of waiting are in seconds of the vehicle's clock, so that they mean the same at any simulation
     speed and on a busy machine. Positions are those of the load: metres east, north and up from home.
@@ -116,6 +125,7 @@ class RunningVehicle:
         self._timeout_s = timeout_s
         self._jobs: queue.Queue[Callable[[], None]] = queue.Queue()
         self._closing = threading.Event()
+        self._not_sent: set[int] = set()  # messages of `_SHOW_STATE` that the vehicle does not have
         try:
             session.find()
         except BaseException:
@@ -152,7 +162,7 @@ class RunningVehicle:
             with suppress(NoVehicleError):  # the refusal gives the reason
                 self.wait("ready", limit_s)
         self._command(lambda session: command.arm(session.target, force))
-        self.wait(lambda state: state.armed is True, limit_s)
+        self._finish(lambda state: state.armed is True, "arm", limit_s)
 
     @checked_flags
     def disarm(self, *, force: bool = False) -> None:
@@ -206,7 +216,7 @@ class RunningVehicle:
             view = self._session.view
             way = _Way(view, place)
             arrived = _newly(view, mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT, way.has_ended_there)
-            self._in_thread(lambda: self._watch(arrived, "goto", limit_s, way))
+            self._finish(arrived, "goto", limit_s, way)
 
     @checked_flags
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
@@ -237,6 +247,7 @@ class RunningVehicle:
         with errors_for_python():
             send = checked_upload(path, checked, force, False, lambda _: None)
         self._with_retries(lambda: send(self._session))
+        self._with_retries(self._show_state)
 
     def start(self) -> None:
         """Fly the mission from its first item; a disarmed vehicle begins when it is armed."""
@@ -261,7 +272,7 @@ class RunningVehicle:
         reeled = _reeled(checked_m, self.state.cable_length_m)
         self._command(lambda session: command.winch(session.target, checked_m, checked_speed_m_s))
         if wait:
-            self.wait(reeled, limit_s)
+            self._finish(reeled, "winch", limit_s)
 
     def release(self) -> None:
         """Let the load go. In the air it falls, and the vehicle holds its position."""
@@ -319,8 +330,16 @@ class RunningVehicle:
         """
         condition, what = self._condition(until)
         checked_s = positive("timeout_s", timeout_s)
+        if isinstance(until, str):
+            return self._finish(condition, what, checked_s)
         limit_s = math.inf if isinstance(until, int | float) else checked_s
         return self._in_thread(lambda: self._watch(condition, what, limit_s))
+
+    def _finish(self, condition: Condition, what: str, limit_s: float, way: _Way | None = None) -> State:
+        """Wait for the end of a manoeuvre, and return the state after it."""
+        self._in_thread(lambda: self._watch(condition, what, limit_s, way))
+        self._with_retries(self._show_state)
+        return self.state
 
     def _condition(self, until: str | float | Condition) -> tuple[Condition, str]:
         if isinstance(until, str):
@@ -414,6 +433,23 @@ class RunningVehicle:
 
     def _command(self, make: Callable[[Session], Operation]) -> None:
         self._with_retries(lambda: self._session.run(make(self._session)))
+        self._with_retries(self._show_state)
+
+    def _show_state(self) -> None:
+        """Request, in the thread of the link, what the vehicle sends only once or twice a second."""
+        for message_id in _SHOW_STATE:
+            if message_id not in self._not_sent:
+                self._request_anew(message_id)
+
+    def _request_anew(self, message_id: int) -> None:
+        session = self._session
+        is_new = _newly(session.view, message_id, lambda _: True)
+        try:
+            session.run(command.request_message(session.target, message_id))
+        except RefusedError:
+            self._not_sent.add(message_id)
+        else:
+            session.watch(lambda: is_new(self.state), _SHOWN_S)
 
     def _request_load_state(self) -> None:
         """Request frequent messages of the load's state; a vehicle that has none is accepted too."""

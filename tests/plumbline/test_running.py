@@ -21,6 +21,7 @@ from gcs.analysis.axes import roll_pitch_yaw
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import Target
 from gcs.clients.vehicle_view import VehicleView
+from gcs.errors import RefusedError
 from gcs.shell.link import UdpSocket, free_port
 from gcs.workflows.reposition import reposition
 from plumbline import RunningVehicle
@@ -126,6 +127,7 @@ class QuietSession:
     def __init__(self, failures: int = 0) -> None:
         self.failures = failures
         self.target = Target(1, 1)
+        self.view = VehicleView()
 
     def find(self) -> None:
         """The vehicle is there."""
@@ -144,7 +146,9 @@ class QuietSession:
         """Nothing is heard."""
 
     def run(self, operation: Any) -> Any:
-        """Every request is answered."""
+        """Every command is accepted, and none of the messages that are requested is known."""
+        if operation.name.startswith("request of "):
+            raise RefusedError(operation.name)
 
     def close(self) -> None:
         """Nothing is open."""
@@ -179,7 +183,6 @@ class ReportingSession(QuietSession):
 
     def __init__(self, *reported: Any, at: Callable[[float], Any]) -> None:
         super().__init__()
-        self.view = VehicleView()
         self._time_us = 0
         self._at = at
         self._frames = FrameWriter(1, 1)  # numbers the messages: they differ
@@ -206,6 +209,7 @@ ZERO3, REST, LEVEL = (0.0,) * 3, (0.0,) * 9, (1.0, 0.0, 0.0, 0.0)
 ARMED = mavlink.MAVLink_heartbeat_message(
     2, mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_MODE_FLAG_SAFETY_ARMED, 0, 4, 3
 )
+DISARMED = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 3, 3)
 LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 
 
@@ -235,6 +239,48 @@ def test_a_wait_ends_with_what_the_last_command_began(until: str, under_way: Any
     session = ReportingSession(ARMED, over, at=lambda time_s: under_way if time_s < 5.0 else over)
     with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
         assert (vehicle.wait(until).time_s or 0.0) >= 5.0
+
+
+class SlowlyReportingSession(ReportingSession):
+    """A session with a vehicle that does at once what it is told, and reports its phase only if asked."""
+
+    def __init__(self) -> None:
+        super().__init__(ARMED, in_phase(mavlink.PLUMBLINE_PHASE_MISSION), at=self._report)
+        self.phase = mavlink.PLUMBLINE_PHASE_MISSION
+
+    def _report(self, time_s: float) -> Any:
+        return DISARMED if self.phase == mavlink.PLUMBLINE_PHASE_DISARMED else ARMED
+
+    def run(self, operation: Any) -> Any:
+        changes = {"pause": mavlink.PLUMBLINE_PHASE_HOLD, "land": mavlink.PLUMBLINE_PHASE_DISARMED}
+        self.phase = changes.get(operation.name, self.phase)
+        if operation.name == "request of LOAD_SETPOINT":
+            self._hear(in_phase(self.phase))
+        elif operation.name == "request of HEARTBEAT":
+            self._hear(self._report(0.0))
+        elif operation.name.startswith("request of "):
+            raise RefusedError(operation.name)
+
+
+def in_phase(phase: int) -> Any:
+    """LOAD_SETPOINT in this phase."""
+    return mavlink.MAVLink_load_setpoint_message(0, *REST, *ZERO3, 0.0, nan, 0, phase, LOAD_POSITION)
+
+
+def test_what_a_command_changed_is_seen_when_it_returns() -> None:
+    with RunningVehicle(SlowlyReportingSession(), 1.0) as vehicle:  # type: ignore[arg-type]
+        assert vehicle.state.phase == "mission"
+        vehicle.pause()
+        assert vehicle.state.phase == "hold"
+        vehicle.land()
+        assert (vehicle.state.armed, vehicle.state.phase) == (False, "disarmed")
+
+
+def test_what_ended_is_seen_when_a_wait_returns() -> None:
+    session = SlowlyReportingSession()
+    with RunningVehicle(session, 1.0) as vehicle:  # type: ignore[arg-type]
+        session.phase = mavlink.PLUMBLINE_PHASE_DISARMED  # by itself
+        assert vehicle.wait("landed").phase == "disarmed"
 
 
 def test_a_message_from_before_tells_nothing_new() -> None:

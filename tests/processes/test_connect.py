@@ -110,10 +110,12 @@ def test_a_script_leads_a_vehicle_from_the_ground_to_the_ground(start: Callable[
         vehicle.start()
         assert vehicle.wait(lambda state: state.mission_item == 1).mission_items == 3
         vehicle.pause()
+        assert (vehicle.state.mode, vehicle.state.phase) == ("hold", "hold")
         rests = vehicle.wait("holding")
         assert rests.phase == "hold" and rests.load_speed_m_s == pytest.approx(0.0, abs=0.01)
         vehicle.resume()
-        assert vehicle.wait().mission == "complete"
+        ended = vehicle.wait()
+        assert (ended.mission, ended.phase, ended.landed) == ("complete", "disarmed", "on the ground")
         assert vehicle.state.load_m == pytest.approx((0.5, 0.0, 0.02), abs=0.1)
 
 
