@@ -37,10 +37,14 @@ _PHRASES = (  # phrases of the command line, and their equivalents in Python
     (r"--set ", "settings: "),
     (
         r"\(other addresses: --connect (\d+) or --connect HOST:PORT\)",
-        r'(another address: connect("udpin:127.0.0.1:\1"))',
+        r"(another address: connect(\1))",
     ),
-    (r"--connect (?=[A-Z0-9])", "connect to "),
-    (r"(?<![\w-])(?<!gcs sweep )--([a-z]+)", r"\1"),  # a command that is quoted keeps its options
+    (r"--connect (\d+)", r"connect(\1)"),
+    (r"--connect (?=[A-Z])", "connect to "),
+    (
+        r"(?<![\w-])(?<!gcs sweep )(?<!autopilot )--([a-z]+)",
+        r"\1",
+    ),  # a command that is quoted keeps its options
 )
 
 

@@ -86,7 +86,7 @@ _REPORTED_BY = {
 
 @called_by_scripts
 def connect(
-    address: str = "udpin:127.0.0.1:14550",
+    address: str | int = "udpin:127.0.0.1:14550",
     *,
     sysid: int | None = None,
     timeout_s: float = 10.0,
@@ -94,16 +94,18 @@ def connect(
 ) -> RunningVehicle:
     """Connect to a running vehicle: `sitl` and `autopilot` started by hand, `gcs fly --speed 1`, any other.
 
-    `address`: `udpin:HOST:PORT`, `HOST:PORT` or `PORT` to wait there for the vehicle, `udpout:HOST:PORT` to
-    send first. `sysid`: the MAVLink system id of the vehicle, if several send there; without it the first one
-    that is heard. `timeout_s`: how long the vehicle may be silent, now and later, by the clock of this
-    machine. `signing_key`: 32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle
-    is heard.
+    `address`: `udpin:HOST:PORT`, `HOST:PORT` or `PORT`, also as a number, to wait there for the vehicle,
+    `udpout:HOST:PORT` to send first, `tcp:HOST:PORT` to connect by TCP (`autopilot --tcp`). `sysid`: the
+    MAVLink system id of the vehicle, if several send there; without it the first one that is heard.
+    `timeout_s`: how long the vehicle may be silent, now and later, by the clock of this machine.
+    `signing_key`: 32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
     """
     limit_s = positive("timeout_s", timeout_s)
     if signing_key is not None and not (isinstance(signing_key, bytes) and len(signing_key) == KEY_BYTES):
         raise GcsError(f"signing_key: must be {KEY_BYTES} bytes, as secrets.token_bytes({KEY_BYTES})")
     with errors_for_python():
+        if isinstance(address, int):
+            address = str(whole_number("address", address, 1, 65535))
         found = parse_address(text("address", address, "udpin:127.0.0.1:14550"))
         system = None if sysid is None else whole_number("sysid", sysid, 1, 255)
         where = replace(found, signing_key=signing_key, system=system)

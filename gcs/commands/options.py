@@ -179,7 +179,8 @@ def connect_option(function: F) -> F:
         type=AddressType(),
         default=str(DEFAULT_PORT),
         show_default=True,
-        help="Connection to the vehicle: PORT or HOST:PORT to listen there, udpout:HOST:PORT to send first.",
+        help="Connection to the vehicle: PORT or HOST:PORT to listen there, udpout:HOST:PORT to send first, "
+        "tcp:HOST:PORT to connect by TCP.",
     )(sysid_option(function))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import secrets
 import select
 import socket
@@ -14,14 +15,19 @@ from itertools import chain
 from typing import Protocol
 
 from gcs.errors import GcsError
+from gcs.shell.tcp_socket import TcpSocket
 
 DEFAULT_PORT = 14550
 API_PORT = 14540
 PAGE_PORT = 8090  # TCP, of the live page
 LOOPBACK = "127.0.0.1"
+ANY_HOST = "0.0.0.0"
 _DATAGRAM = 65_535
 _CHOSEN_PORTS = range(20_000, 32_000)  # systems choose from 32,768 (Linux) or from 49,152 (others)
 _BUFFER = 4 * 1024 * 1024  # bytes: a second of the fast streams, in case a report is being written meanwhile
+
+
+_ADDRESS = re.compile(r"(?:(udpin|udp|udpout|tcp|tcpout):(//)?)?(?:([^:/]*):)?(\d{1,5})", re.ASCII)
 
 
 class AddressError(GcsError):
@@ -30,29 +36,45 @@ class AddressError(GcsError):
 
 @dataclass(frozen=True)
 class Address:
-    """Where to meet a vehicle: with `listen` we wait there for its messages, otherwise we send first."""
+    """Where to meet a vehicle: with `listen` we wait there for its messages, otherwise we send first, or with
+    `tcp` connect to it."""
 
     host: str
     port: int
     listen: bool = True
+    tcp: bool = False
     system: int | None = None  # id of the vehicle among several; None: the one that is heard first
     signing_key: bytes | None = field(default=None, repr=False)  # key with which messages are signed
 
     def __str__(self) -> str:
-        return f"{'' if self.listen else 'udpout:'}{self.host}:{self.port}"
+        scheme = "tcp:" if self.tcp else "" if self.listen else "udpout:"
+        return f"{scheme}{self.host}:{self.port}"
+
+    @property
+    def link(self) -> str:
+        """The address for texts, with the protocol."""
+        return f"TCP {self.host}:{self.port}" if self.tcp else f"UDP {self}"
 
 
 SITL_TRUTH = Address(LOOPBACK, 14560)  # where sitl sends the truth by default
 
 
 def parse_address(text: str) -> Address:
-    """`14550`, `HOST:PORT`, `udpin:HOST:PORT` (wait there) or `udpout:HOST:PORT` (send first)."""
-    rest = text.removeprefix("udpin:").removeprefix("udpout:")
-    host, _, port = rest.rpartition(":")
-    if not port.isdigit() or not 0 < int(port) < 65536 or (":" in rest and not host) or ":" in host:
-        forms = "PORT, HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT, with a port of 1 ... 65535"
-        raise AddressError(f"address {text!r}; must be {forms}")
-    return Address(host or LOOPBACK, int(port), listen=not text.startswith("udpout:"))
+    """`14550`, `HOST:PORT`, `udpin:HOST:PORT` (wait there), `udpout:HOST:PORT` (send first), or
+    `tcp:HOST:PORT`.
+
+    As other programs write it: `udp:` is `udpin:`, `tcpout:` is `tcp:`, and `//` may follow; `udpin://:PORT`
+    are all interfaces.
+    """
+    match = _ADDRESS.fullmatch(text)
+    scheme, slashes, host, port = match.groups() if match else (None, None, None, "0")
+    listen, tcp = scheme in (None, "udpin", "udp"), scheme in ("tcp", "tcpout")
+    if host == "" and slashes and listen:
+        host = ANY_HOST
+    if host == "" or not 0 < int(port) < 65536:
+        forms = "PORT, HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT or tcp:HOST:PORT"
+        raise AddressError(f"address {text!r}; must be {forms}, with a port of 1 ... 65535")
+    return Address(host or LOOPBACK, int(port), listen, tcp)
 
 
 def free_port(count: int = 1, among: range = _CHOSEN_PORTS) -> int:
@@ -158,15 +180,17 @@ class UdpSocket:
         self._socket.close()
 
 
-def open_address(address: Address) -> UdpSocket:
+def open_address(address: Address) -> UdpSocket | TcpSocket:
     """The socket for this address of a vehicle."""
+    if address.tcp:
+        return TcpSocket(address.host, address.port)
     if address.listen:
         return UdpSocket(address.host, address.port)
     try:
         host = socket.gethostbyname(address.host)
     except OSError as error:
         raise GcsError(f"host {address.host!r}: {error.strerror or error}") from None
-    return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
+    return UdpSocket(ANY_HOST if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
 
 
 class Readable(Protocol):

@@ -89,17 +89,17 @@ class Session:
         if self._connection.target is None or self.view.armed is None or not signatures.are_valid:
             if signatures.problem:
                 raise NoVehicleError(
-                    f"no vehicle with a valid signature on UDP {self.address}: {signatures.problem}"
+                    f"no vehicle with a valid signature on {self.address.link}: {signatures.problem}"
                 )
             if self.address.system is not None and self._socket.other_systems:
                 heard = ", ".join(map(str, self._socket.other_systems))
                 raise NoVehicleError(
-                    f"no vehicle with system id {self.address.system} heard on UDP {self.address} within "
+                    f"no vehicle with system id {self.address.system} heard on {self.address.link} within "
                     f"{self._find_s:g} s; heard there: {heard} (MAV_SYS_ID of the autopilot)"
                 )
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(
-                f"no vehicle heard on UDP {self.address} within {self._find_s:g} s; is autopilot running, "
+                f"no vehicle heard on {self.address.link} within {self._find_s:g} s; is autopilot running, "
                 f"with its simulator, and sending there? (other addresses: --connect {other} or "
                 "--connect HOST:PORT)"
             )

@@ -6,7 +6,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.connection import is_vehicle
 from gcs.clients.datagrams import messages
 from gcs.shell.display import notify
-from gcs.shell.link import Address, UdpSocket, monotonic_us, open_address
+from gcs.shell.link import Address, monotonic_us, open_address
 
 REPLACEMENT_US = (
     2_000_000  # after this silence another vehicle that sends is assumed to be this one, started again
@@ -21,7 +21,7 @@ class VehicleSocket:
 
     def __init__(self, address: Address) -> None:
         self._address = address
-        self._socket: UdpSocket = open_address(address)
+        self._socket = open_address(address)
         self._vehicle: Sender | None = None
         self._last_received_us = 0
         self._autopilots: dict[Sender, int] = {}  # senders before there was a vehicle, with their system ids
@@ -84,7 +84,7 @@ class VehicleSocket:
                 self._reported.add(sender)
                 other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
                 notify(
-                    f"another vehicle (system {system}) speaks on UDP {self._address} from {other} and is "
+                    f"another vehicle (system {system}) speaks on {self._address.link} from {other} and is "
                     f"not heard, nor does it hear what is said to {ours}; choose with --sysid, or give each "
                     "a port of its own: autopilot --gcs"
                 )

@@ -29,6 +29,7 @@ from gcs.shell.link import (
     unix_us,
 )
 from gcs.shell.page_server import PageCallbacks, PageServer, Site
+from gcs.shell.tcp_socket import TcpSocket
 from gcs.view.controls import SLIDERS
 from gcs.view.station import Station
 from gcs.web import LIVE_FILES, LIVE_PAGE, asset
@@ -62,9 +63,11 @@ class UdpLinks:
     """Vehicles that were started separately, at one address or several."""
 
     def __init__(self, addresses: tuple[Address, ...], truth: Address | None) -> None:
-        self._sockets: list[UdpSocket] = []
-        self._routes: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # socket and peer by system id
-        self._outgoing: list[UdpSocket] = []  # of `udpout:` addresses: the vehicle waits until we send first
+        self._sockets: list[UdpSocket | TcpSocket] = []
+        # socket and peer by system id
+        self._routes: dict[int, tuple[UdpSocket | TcpSocket, tuple[str, int]]] = {}
+        # of `udpout:` and `tcp:` addresses: the vehicle waits until we send first
+        self._outgoing: list[UdpSocket | TcpSocket] = []
         self._truth: UdpSocket | None = None
         self._worlds = TruthSources()
         try:

@@ -150,7 +150,7 @@ def test_what_cannot_be_taken_is_an_error_of_one_line(
             "settings = [1]; must be a dict, as {'SIM_WIND_E': 3}",
         ),  # type: ignore[arg-type]
         (lambda: plumbline.sweep("hover", vary=[1]), "vary = [1]; must be a dict, as {'SIM_WIND_E': [0, 3]}"),  # type: ignore[arg-type]
-        (lambda: plumbline.connect(15999), "address = 15999; must be a text, as 'udpin:127.0.0.1:14550'"),  # type: ignore[arg-type]
+        (lambda: plumbline.connect(15999.5), "address = 15999.5; must be a text, as 'udpin:127.0.0.1:14550'"),  # type: ignore[arg-type]
         (lambda: Mission("a", None), "steps = None; must be a list of steps, as [Takeoff(1.0), Land()]"),  # type: ignore[arg-type]
         (
             lambda: Picture(lambda _: b"").save("x.jpg"),

@@ -30,10 +30,16 @@ from plumbline.state import State, state_of
 
 WRONG: dict[str, tuple[Any, str]] = {
     "address": (lambda: plumbline.connect("14550x"), "address '14550x'; must be PORT, HOST:PORT, udpin:"),
+    "port": (lambda: plumbline.connect(0), "address = 0; must be "),
+    "flag": (lambda: plumbline.connect(True), "address = True; must be "),
+    "tcp": (
+        lambda: plumbline.connect(f"tcp:127.0.0.1:{free_port()}"),
+        "cannot be connected to: Connection refused; does the vehicle listen there (autopilot --tcp ",
+    ),
     "nobody": (
         lambda: plumbline.connect(f"udpin:127.0.0.1:{free_port()}", timeout_s=0.1),
         "within 0.1 s; is autopilot running, with its simulator, and sending there? "
-        '(another address: connect("udpin:127.0.0.1:14540"))',
+        "(another address: connect(14540))",
     ),
     "nobody to speak to": (
         lambda: plumbline.connect(f"udpout:127.0.0.1:{free_port()}", timeout_s=0.1),
@@ -113,8 +119,8 @@ def test_a_winch_is_awaited_while_the_vehicle_still_has_to_stop() -> None:
 def test_a_port_that_is_taken_and_free_again_after_a_failure() -> None:
     port = free_port()
     taken = UdpSocket("127.0.0.1", port)
-    with pytest.raises(plumbline.Error, match="is in use by another program"):
-        plumbline.connect(str(port), timeout_s=0.1)
+    with pytest.raises(plumbline.Error, match=r"is in use by another program.* e\.g\. connect\(14540\)"):
+        plumbline.connect(port, timeout_s=0.1)
     taken.close()
     with pytest.raises(plumbline.Error, match="no vehicle heard"):
         plumbline.connect(str(port), timeout_s=0.1)

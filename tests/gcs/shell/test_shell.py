@@ -83,13 +83,19 @@ def test_a_reader_who_has_read_enough_stops_nothing(
         ("0.0.0.0:14550", Address("0.0.0.0", 14550)),
         ("udpin:localhost:5", Address("localhost", 5)),
         ("udpout:10.0.0.2:18570", Address("10.0.0.2", 18570, listen=False)),
+        ("udpin://127.0.0.1:14540", Address("127.0.0.1", 14540)),
+        ("udpin://:14540", Address("0.0.0.0", 14540)),
+        ("udp:127.0.0.1:14540", Address("127.0.0.1", 14540)),
+        ("udpout://10.0.0.2:18570", Address("10.0.0.2", 18570, listen=False)),
+        ("tcp:10.0.0.2:5760", Address("10.0.0.2", 5760, listen=False, tcp=True)),
+        ("tcpout://10.0.0.2:5760", Address("10.0.0.2", 5760, listen=False, tcp=True)),
     ],
 )
 def test_addresses(text, address):
     assert parse_address(text) == address
 
 
-@pytest.mark.parametrize("text", ["", "x", "1:2:x", "0", "65536", "127.0.0.1:", ":14550", "tcp:1:2", "-1"])
+@pytest.mark.parametrize("text", ["", "x", "1:2:x", "0", "65536", "127.0.0.1:", ":14550", "tcp:1:2:3", "-1"])
 def test_bad_addresses_name_what_is_allowed(text):
     with pytest.raises(AddressError, match="must be PORT, HOST:PORT") as error:
         parse_address(text)
@@ -102,6 +108,26 @@ def test_a_busy_port_is_named_with_the_way_out():
             UdpSocket(port=_where(taken)[1])
         assert taken.address in str(error.value)
     assert "--connect 14540" in str(error.value)
+
+
+def test_a_vehicle_is_spoken_to_by_tcp():
+    whole = FrameWriter(1, 1).frame(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
+    with closing(socket.create_server(("127.0.0.1", 0))) as server:
+        ours = open_address(parse_address(f"tcp:127.0.0.1:{server.getsockname()[1]}"))
+        theirs, _ = server.accept()
+        ours.send(b"hello")
+        assert theirs.recv(5) == b"hello"
+        theirs.sendall(whole + whole[:7])
+        wait([ours], WAIT_S)
+        assert ours.drain() == [whole], "a frame is given when it is whole"
+        theirs.sendall(whole[7:])
+        wait([ours], WAIT_S)
+        assert ours.drain() == [whole]
+        theirs.close()
+        wait([ours], WAIT_S)
+        assert ours.drain() == [] and not ours.has_datagram, "an ended connection is silent"
+        ours.send(b"gone?")
+        ours.close()
 
 
 def test_answers_go_to_whoever_spoke():
