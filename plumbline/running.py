@@ -129,7 +129,7 @@ class RunningVehicle:
         self._closing = threading.Event()
         self._not_sent: set[int] = set()  # messages of `_SHOW_STATE` that the vehicle does not have
         try:
-            session.find()
+            session.find_to_command()
         except BaseException:
             session.close()
             raise

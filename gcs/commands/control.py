@@ -22,7 +22,7 @@ MISSION_STATE_S = 1.5  # in which a vehicle reports whether it flies a mission, 
 def _send(address: Address, make: Callable[[Session], Operation], needs_arming: bool = False) -> None:
     """Send one command and print the answer. `needs_arming`: a disarmed vehicle executes it when armed."""
     with Session(address) as session:
-        session.find()
+        session.find_to_command()
         text = session.run(make(session)).text
         click.echo(text + (_arming_hint(session) if needs_arming else ""))
 
@@ -72,7 +72,7 @@ def start_command(address: Address) -> None:
     A disarmed vehicle accepts the command and starts when it is armed. A mission under way begins again.
     """
     with Session(address) as session:
-        session.find()
+        session.find_to_command()
         if session.view.armed:
             session.watch(lambda: session.view.mission_state is not None, MISSION_STATE_S)
         is_under_way = session.view.mission_state == "active"
@@ -156,7 +156,7 @@ def goto_command(
     from gcs.workflows.reposition import reposition
 
     with Session(address) as session:
-        session.find()
+        session.find_to_command()
         move = reposition(session, (east, north, up), frame == "load", speed)
         distance_text = "" if isnan(move.distance_m) else f"; {move.distance_m:.1f} m to go"
         click.echo(session.run(move.operation).text + distance_text)

@@ -83,7 +83,7 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
 def clear_command(address: Address) -> None:
     """Delete the mission on the vehicle."""
     with Session(address) as session:
-        click.echo(session.run(MissionClear(session.find())).text)
+        click.echo(session.run(MissionClear(session.find_to_command())).text)
 
 
 def _record(item: WireItem) -> dict[str, Any]:

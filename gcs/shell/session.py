@@ -23,6 +23,7 @@ FIND_S = 5.0
 TRUTH_S = 2.0  # the truth states five times a second of its clock to which run it belongs
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may arrive a little later
 _TICK_S = 0.02
+_OTHERS_S = 0.1  # in which an autopilot sends messages
 _STALLED = "it or its simulator is stopped (SIGSTOP, a debugger), or the link loses messages: try again"
 
 OnDatagram = Callable[[bytes, int], None]  # called with a datagram and its time
@@ -104,6 +105,18 @@ class Session:
                 "--connect HOST:PORT)"
             )
         return self._connection.target
+
+    def find_to_command(self) -> Target:
+        """As `find`, for what moves or changes the vehicle: GcsError if another one has its system id."""
+        target = self.find()
+        self.watch(lambda: bool(self._socket.twin_problem), _OTHERS_S)
+        self.require_no_twin()
+        return target
+
+    def require_no_twin(self) -> None:
+        """GcsError if another vehicle with the same system id sends here too."""
+        if self._socket.twin_problem:
+            raise GcsError(self._socket.twin_problem)
 
     def watch(
         self,

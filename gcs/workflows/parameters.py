@@ -47,7 +47,7 @@ def set_parameter(name: str, value: float, address: Address) -> str:
     """Set one parameter and read it back; return a line on the result. If the value may be unintended, a line
     says so."""
     with Session(address) as session:
-        operation = ParameterSet(session.find(), name.upper(), value)
+        operation = ParameterSet(session.find_to_command(), name.upper(), value)
         done = exchange(session, operation, name).text
     if 0.0 < abs(value) < 1.0:
         from gcs.workflows.flight_inputs import setting_warnings
@@ -101,7 +101,7 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
         raise InputError(f"{file}: {error}") from None
     refused = 0
     with Session(address) as session, StepDisplay("parameters") as display:
-        target = session.find()
+        target = session.find_to_command()
         names: list[str] = []
         for done, (name, value) in enumerate(values.items()):
             display.update(done, len(values))

@@ -48,6 +48,7 @@ def fly_running(
     with TruthLink(options.truth_at) as truth:
         with Session(address) as session:
             session.find_with_truth(truth)
+            session.require_no_twin()
             if session.unanswered_reason:  # it would not answer anything else either
                 raise NoVehicleError(f"{mission.name}: not flown: {session.unanswered_reason}")
             home = vehicle_home(session)

@@ -51,7 +51,7 @@ def upload(
     """Check a mission by name or path for `vehicle` and upload it; `print_line` gets a line for each list."""
     send = checked_upload(mission, vehicle, force, skip, print_line)
     with Session(address) as session:
-        session.find()
+        session.find_to_command()
         send(session)
 
 

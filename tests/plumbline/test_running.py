@@ -135,7 +135,7 @@ class QuietSession:
         self.target = Target(1, 1)
         self.view = VehicleView()
 
-    def find(self) -> None:
+    def find_to_command(self) -> None:
         """The vehicle is there."""
 
     def watch(self, done: Callable[[], bool], seconds: float | None) -> bool:

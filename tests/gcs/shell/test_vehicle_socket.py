@@ -9,8 +9,10 @@ import pytest
 
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.errors import GcsError
 from gcs.shell import vehicle_socket
 from gcs.shell.link import Address, UdpSocket, free_port, parse_address, wait
+from gcs.shell.session import Session
 from gcs.shell.vehicle_socket import REPLACEMENT_US, VehicleSocket
 
 WAIT_S = 5.0
@@ -86,6 +88,40 @@ def test_of_two_vehicles_the_first_is_heard_and_answered(
     wait([first], WAIT_S)
     assert first.drain() == [b"answer"]
     assert not second.has_datagram
+
+
+def test_a_twin_is_no_choice_and_is_no_trouble_after_it_has_fallen_silent(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two
+    heard(ground, second, telemetry())
+    heard(ground, first, heartbeat())
+    assert "two vehicles with system id 1 speak on UDP 127.0.0.1:" in ground.twin_problem
+    assert f"from {first.address} and {second.address}" in ground.twin_problem
+    clock.now_us = REPLACEMENT_US
+    assert not ground.twin_problem
+    heard(ground, first, telemetry())
+    assert "give one another id (MAV_SYS_ID), or give each a port" in capsys.readouterr().err
+    heard(ground, second, telemetry())
+    assert ground.twin_problem
+
+
+def test_a_vehicle_with_another_id_is_no_twin(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock
+) -> None:
+    first, second = two
+    heard(ground, first, heartbeat())
+    heard(ground, second, heartbeat(system=2))
+    heard(ground, first, telemetry())
+    assert not ground.twin_problem
+
+
+def test_what_moves_one_of_two_twins_is_refused(address: Address, two: tuple[UdpSocket, UdpSocket]) -> None:
+    with Session(address) as session:
+        for one in two:
+            one.send(heartbeat())
+        with pytest.raises(GcsError, match="two vehicles with system id 1 speak on UDP"):
+            session.find_to_command()
 
 
 def test_another_autopilot_is_named_by_any_message_of_it(
