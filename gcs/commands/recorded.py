@@ -58,7 +58,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     DIR is a simulated flight's folder, FILE its telemetry log (.tlog), from which the true states are read,
     or rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. Each number comes with its
     95 % interval; a warning lists those that the recording does not determine because load or vehicle move
-    too little.
+    too little. Still air is assumed.
 
     \b
     gcs identify flight-15.csv.gz --columns motion-capture

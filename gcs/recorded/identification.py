@@ -44,6 +44,10 @@ _MAX_VEHICLE_ITERATIONS = 60
 _CONVERGED = 1e-6  # change of each parameter in an iteration
 _EDGE_S = 5.0  # left out at both ends of the filtered signals
 
+# at speeds below, a load that leans more in the mean is blown; tracking points that are off lean some 0.003
+_SLOW_M_S = 0.3
+_MAX_LEAN = 0.005
+
 _STEPS = {
     "length_m": 0.01,
     "drag_per_m": 0.005,
@@ -254,6 +258,22 @@ def map_warning(vehicle: Sequence[Identified]) -> str:
     return (
         f"the tilt shows {share.value:.2f} of the vehicle's acceleration, and of a multirotor some 1: the "
         "column map may not fit (lengths in m, times in s, order of the quaternion, which column is which)"
+    )
+
+
+def wind_warning(motion: Motion, gravity_m_s2: float) -> str:
+    """Why the drags may be wrong, by the mean lean of the cable at low speed; empty: the air may be still."""
+    speed = np.linalg.norm(motion.attachment.velocity, axis=1)
+    acceleration = motion.attachment.acceleration
+    cable = motion.load - motion.attachment.position
+    pull = -cable[:, :2] / cable[:, 2:] + acceleration[:, :2] / (gravity_m_s2 + acceleration[:, 2:])
+    slow = speed < _SLOW_M_S
+    lean = float(np.hypot(*np.mean(pull[slow], axis=0))) if slow.any() else 0.0
+    if lean <= _MAX_LEAN:
+        return ""
+    return (
+        f"the load hangs {np.degrees(np.arctan(lean)):.1f} degrees off the vertical while the vehicle is "
+        "slow, as in a wind, and still air is assumed: the drags, and what depends on them, may be wrong"
     )
 
 

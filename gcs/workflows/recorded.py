@@ -39,6 +39,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         length_warning,
         map_warning,
         tracked_length,
+        wind_warning,
     )
 
     path = find_recording(path)
@@ -64,7 +65,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
         "not_told": [one.name for one in found if not one.is_determined],
-        "doubt": length_warning(motion) or map_warning(vehicle),
+        "doubt": length_warning(motion) or map_warning(vehicle) or wind_warning(motion, model.gravity_m_s2),
     }
 
 

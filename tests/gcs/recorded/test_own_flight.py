@@ -26,6 +26,7 @@ from gcs.recorded.identification import (
     identify_vehicle,
     length_warning,
     map_warning,
+    wind_warning,
 )
 from gcs.recorded.motion import motion_of
 from gcs.recorded.recording import read_recording
@@ -226,6 +227,18 @@ def test_a_length_that_changes_is_named() -> None:
     reeled = np.where(np.arange(100)[:, None] < 50, (0.0, 0.0, 0.0), (0.0, 0.0, 0.2))
     motion.load = reeled
     assert length_warning(motion).startswith("the load is 0.50 to 0.70 m from the vehicle, by a winch or")  # type: ignore[arg-type]
+
+
+def test_a_load_that_is_blown_aside_casts_doubt_on_the_drags() -> None:
+    """Also if the vehicle accelerates: in still air the cable then leans back as much."""
+    rows, ahead = np.zeros((100, 3)), np.array((1.0, 0.0, 0.0))
+    attachment = SimpleNamespace(position=rows, velocity=rows, acceleration=0.981 * ahead + rows)
+    motion = SimpleNamespace(load=rows - 0.1 * ahead - np.array((0.0, 0.0, 1.0)), attachment=attachment)
+    assert wind_warning(motion, 9.81) == ""  # type: ignore[arg-type]
+    motion.load = motion.load + 0.01 * ahead
+    assert wind_warning(motion, 9.81).startswith("the load hangs 0.6 degrees off the vertical")  # type: ignore[arg-type]
+    attachment.velocity = rows + ahead
+    assert wind_warning(motion, 9.81) == "", "its own speed blows it aside"  # type: ignore[arg-type]
 
 
 def test_a_tilt_that_does_not_show_the_acceleration_casts_doubt_on_the_map() -> None:
