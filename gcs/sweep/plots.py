@@ -68,7 +68,8 @@ def draw_map(
             ax.set_xlabel(_label(names[0], units))
             ax.set_ylabel(_label(names[1], units))
         figure.subplots_adjust(left=0.05, right=0.985, bottom=0.13, top=0.88, wspace=0.2)
-        figure.suptitle(f"law {flights.law}", x=0.012, ha="left", fontsize=11, color=INK)
+        title = f"law {flights.law}{pooled_text(plan, names)}; errors of completed flights"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=11, color=INK)
         save(figure, path)
 
 
@@ -99,29 +100,50 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
 
 
 def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, units: dict[str, str]) -> None:
-    """Draw the share of success and the error over one parameter, for all laws."""
+    """Draw the share of success and the error over one parameter, for all laws. The errors are of the flights
+    that completed: where others were lost, the marker is hollow."""
     with style():
         figure = new_figure(11.0, 3.7)
         left, right = figure.subplots(1, 2, sharex=True)
         colours = law_colours([flights.law for flights in laws])
+        any_lost = False
         for flights, colour, (marker, size) in zip(laws, colours, cycle(_MARKERS), strict=False):
             found = cells(flights, plan, (name,))
             x, line = found.axes[0], {"color": colour, "marker": marker, "markersize": size}
             left.plot(x, 100.0 * found.success, label=flights.law, **line)
-            right.plot(x, 1e3 * found.error_median_m, **line)
+            median = 1e3 * found.error_median_m
+            right.plot(x, median, **line)
             right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0)
+            lost = (found.success < 1.0) & np.isfinite(median)
+            right.plot(x[lost], median[lost], linestyle="", markerfacecolor="white", **line)
+            any_lost = any_lost or bool(lost.any())
         right.plot([], [], "o-", color=GREY, markersize=4, label="median")
         right.plot([], [], "--", color=GREY, linewidth=1.0, label="worst")
+        if any_lost:
+            hollow = {"markersize": 4, "markerfacecolor": "white", "label": "some lost"}
+            right.plot([], [], "o", color=GREY, **hollow)
         left.set_ylim(-4.0, 104.0)
         left.set_title("completed (%)")
-        right.set_title("greatest load error (mm)")
+        right.set_title("greatest load error")
+        right.set_ylabel("of completed flights (mm)")
         right.set_yscale("log")
         label_errors(right)
         for ax in (left, right):
             ax.set_xlabel(_label(name, units))
             draw_legend(ax)
-        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
+        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.84, wspace=0.2)
+        title = f"{name}{pooled_text(plan, (name,))}"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=11, color=INK)
         save(figure, path)
+
+
+def pooled_text(plan: SweepPlan, names: tuple[str, ...]) -> str:
+    """What the figures over these parameters are taken over: the other varied parameters and the seeds. Empty
+    if there is none of these."""
+    others = [v.name for v in plan.varied if v.name not in names and len(set(v.values)) > 1]
+    parts = [f"all values of {', '.join(others)}"] if others else []
+    parts += [f"{len(plan.seeds)} seeds"] if len(plan.seeds) > 1 else []
+    return f": over {' and '.join(parts)}" if parts else ""
 
 
 def label_errors(ax: Any) -> None:

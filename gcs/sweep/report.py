@@ -21,7 +21,7 @@ from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plan_values import seeds_text
-from gcs.sweep.plots import draw_curve, draw_map
+from gcs.sweep.plots import draw_curve, draw_map, pooled_text
 from gcs.sweep.results import STEP_FIGURES, Cells, Flights, cells, completion_range, flights_by_law
 from gcs.sweep.standouts import Standout, base_command, repeat_command, stored_standouts
 from gcs.sweep.store import Store
@@ -45,7 +45,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
     for name in names if laws else []:
         picture = directory / f"curve-{name.lower()}.png"
         draw_curve(picture, laws, plan, name, units)
-        curves.append(_picture(picture, f"{name}: over all other settings and seeds"))
+        curves.append(_picture(picture, f"{name}{pooled_text(plan, (name,))}"))
     for pair in list(combinations(names, 2))[:_MAX_PAIRS]:
         for flights in laws:
             picture = directory / f"map-{flights.law}-{pair[0].lower()}-{pair[1].lower()}.png"
