@@ -13,6 +13,7 @@ FILE = "metrics.toml"
 UNKNOWN = "–"
 _LOST = ("diverged", "lost")  # outcomes
 _ONE_METRE = 1.0  # lengths of this or more are shown in metres, not in millimetres
+_ONE_CENTIMETRE = 0.01
 
 
 class _StrictModel(BaseModel):
@@ -44,13 +45,16 @@ class Metric(_StrictModel):
         return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
 
     def formatted_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-        """The values of several records as displayed; all in metres if one is a metre or more."""
+        """The values of several records as displayed; all in metres if one is a metre or more, with as many
+        digits as the smallest of them needs."""
         values = [record.get(self.name) for record in records]
         if self._displayed_unit != "mm" or not any(
             value is not None and abs(value) >= _ONE_METRE for value in values
         ):
             return tuple(self.formatted(record) for record in records)
-        return tuple(UNKNOWN if value is None else f"{value:.3f} m" for value in values)
+        smallest = min(abs(value) for value in values if value is not None)
+        decimals = 4 if 0.0 < smallest < _ONE_CENTIMETRE else 3
+        return tuple(UNKNOWN if value is None else f"{value:.{decimals}f} m" for value in values)
 
     @property
     def _displayed_unit(self) -> str:

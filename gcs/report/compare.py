@@ -145,15 +145,26 @@ def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
 def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
     """The figures by group, without those that are unknown or 0 in all runs or state how it was flown."""
     found = []
+    same_mission = _are_of_one_mission(runs)
     for group, metrics in GROUPS:
         rows = [
-            Figure(metric, metric.formatted_alike([run.record for run in runs]), _best(metric, runs))
+            Figure(
+                metric,
+                metric.formatted_alike([run.record for run in runs]),
+                _best(metric, runs) if same_mission else (),
+            )
             for metric in metrics
             if metric.name not in _CONDITIONS and any(run.record[metric.name] for run in runs)
         ]
         if rows:
             found.append((group, rows))
     return found
+
+
+def _are_of_one_mission(runs: Sequence[Run]) -> bool:
+    """Whether the missions have one name or, where one file was named by different paths, the same steps."""
+    names = {run.record["mission"] for run in runs}
+    return len(names) == 1 or set(_different_steps(runs)) == {UNKNOWN}
 
 
 def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
@@ -176,25 +187,50 @@ def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
-    """The label of each flight on the page, from what differs: `thesis, SIM_ACT_DELAY_MS=72`. If several
-    flights have the same label, or none, the flight's name is added, which is that of its folder."""
+    """The label of each flight on the page, from what differs: `thesis, SIM_ACT_DELAY_MS=72`. The differences
+    that tell the flights apart come first. If several flights have the same label, or none, the flight's name
+    is added, which is that of its folder."""
     given = {*_CONDITIONS, *(name for run in runs for name in run.meta.settings)}
     all_differences = [one for one in differences(runs) if one.name not in _NOT_IN_LABELS]
     # the given settings, without the parameters that follow from them; if none differ, as with captured
     # flights, what the vehicle reported
     different = [one for one in all_differences if one.name in given] or all_differences
+    rows = [
+        tuple(
+            _label_part(one.name, value, unchanged)
+            for value, unchanged in zip(one.values, one.unchanged, strict=True)
+        )
+        for one in different
+    ]
+    telling = _telling_apart(rows)
+    rows = telling + [row for row in rows if row not in telling]
+    max_parts = max(_MAX_PARTS, len(telling))
     found = []
     for i in range(len(runs)):
-        parts = [
-            part for one in different if (part := _label_part(one.name, one.values[i], one.unchanged[i]))
-        ]
-        more = f" and {len(parts) - _MAX_PARTS} more" if len(parts) > _MAX_PARTS else ""
-        found.append(", ".join(parts[:_MAX_PARTS]) + more)
+        parts = [row[i] for row in rows if row[i]]
+        more = f" and {len(parts) - max_parts} more" if len(parts) > max_parts else ""
+        found.append(", ".join(parts[:max_parts]) + more)
     titles = [label or ("default settings" if different else "") for label in found]
     return [
         label if titles.count(label) == 1 else ", ".join(filter(None, (label, run.name)))
         for label, run in zip(titles, runs, strict=True)
     ]
+
+
+def _telling_apart(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Those of the rows, a value for each flight, by which the flights are told apart, in the given order: at
+    each turn the row is taken that tells the most of them apart."""
+    chosen: list[tuple[str, ...]] = []
+
+    def told_apart(taken: Sequence[tuple[str, ...]]) -> int:
+        return len(set(zip(*taken, strict=True)))
+
+    while others := [row for row in rows if row not in chosen]:
+        best = max(others, key=lambda row: told_apart([*chosen, row]))
+        if chosen and told_apart([*chosen, best]) == told_apart(chosen):
+            break
+        chosen.append(best)
+    return [row for row in rows if row in chosen]
 
 
 def _label_part(name: str, value: str, unchanged: bool) -> str:
@@ -268,6 +304,7 @@ def comparison_page(runs: Sequence[Run]) -> str:
     """The page: tables, all tracks in one scene, all errors in one plot."""
     start_name, times = common_start(runs)
     titles = labels(runs)
+    found = figures(runs)
     return render(
         "gcs.report",
         "compare.html",
@@ -280,7 +317,8 @@ def comparison_page(runs: Sequence[Run]) -> str:
             for run, label in zip(runs, titles, strict=True)
         ],
         differences=differences(runs),
-        groups=[(group.title, rows) for group, rows in figures(runs)],
+        groups=[(group.title, rows) for group, rows in found],
+        has_best=any(row.best for _, rows in found for row in rows),
     )
 
 

@@ -126,6 +126,32 @@ def test_flights_are_called_by_what_differs(runs: list[Path]) -> None:
     assert labels([base, many])[1] == "thesis, seed 7, SIM_WIND_D=1 and 2 more"
 
 
+def test_what_tells_flights_apart_comes_first_in_their_names(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+
+    def other(mission: str, law: str, sensors: str, wind_m_s: float) -> Run:
+        meta = replace(base.meta, settings={"SIM_WIND_E": wind_m_s})
+        record = {**base.record, "mission": mission, "law": law, "sensors": sensors}
+        return replace(base, name=f"{law}-{wind_m_s:g}", meta=meta, record=record)
+
+    first, second = other("tour.toml", "plumbline", "gps", 3.0), other("tour.toml", "plumbline", "gps", 12.0)
+    assert labels([first, second, other("case-b", "lqr", "lab", 3.0)]) == [
+        "tour.toml, SIM_WIND_E=3, plumbline and 1 more",
+        "tour.toml, SIM_WIND_E=12, plumbline and 1 more",
+        "case-b, SIM_WIND_E=3, lqr and 1 more",
+    ]
+    assert labels([first, second]) == ["SIM_WIND_E=3", "SIM_WIND_E=12"]
+
+
+def test_no_flight_of_several_missions_is_the_best(runs: list[Path]) -> None:
+    one, other = [loaded(run) for run in runs[:2]]
+    renamed = replace(other, record={**other.record, "mission": "folder/case-b.toml"})
+    assert comparison([one, renamed])["best"] == comparison([one, other])["best"] != {}
+    items = encode_steps([Takeoff(5.0), Waypoint(0.0, 0.0, 6.0), Land()], one.telemetry.home)
+    elsewhere = replace(renamed, telemetry=replace(other.telemetry, mission=items))
+    assert comparison([one, elsewhere])["best"] == {}
+
+
 def test_the_best_is_the_best(runs: list[Path]) -> None:
     found = [loaded(run) for run in runs]
     values = [run.record["load_error_rms_m"] for run in found]
@@ -161,7 +187,7 @@ def test_lengths_beside_each_other_are_in_one_unit(runs: list[Path]) -> None:
         replace(base, record={**base.record, "load_error_max_m": value}) for value in (0.0061, 12.3, None)
     ]
     rows = {row.metric.name: row.values for _, rows in figures(found) for row in rows}
-    assert rows["load_error_max_m"] == ("0.006 m", "12.300 m", "–")
+    assert rows["load_error_max_m"] == ("0.0061 m", "12.3000 m", "–")
     assert rows["load_error_rms_m"][0].endswith(" mm")
 
 
