@@ -100,7 +100,8 @@ def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
     except MissionItemError as error:
         step = step_index(error.seq, mission.steps)
         kind = KINDS[type(mission.steps[step])]
-        raise InputError(f"{mission.name}: items[{step}] ({kind}): {error.text}") from None
+        where = mission.locations[step] if mission.locations else mission.name
+        raise InputError(f"{where}: items[{step}] ({kind}): {error.text}") from None
 
 
 def step_in_file(step: int, mission: Mission) -> int:
@@ -108,6 +109,13 @@ def step_in_file(step: int, mission: Mission) -> int:
     wrong with the vehicle itself is told of step 0."""
     numbers = mission.numbers.steps if isinstance(mission, ForeignMission) else ()
     return numbers[step] if numbers else step
+
+
+def problem_in_file(step: int, text: str, mission: Mission) -> str:
+    """A text about a step, with file and line of the step or the numbers of a file of another ground
+    station. What is wrong with the vehicle itself names no item."""
+    where = f"{mission.locations[step]}: " if mission.locations and text.startswith("items[") else ""
+    return where + in_file_terms(text, mission)
 
 
 def in_file_terms(text: str, mission: Mission) -> str:

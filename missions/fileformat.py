@@ -98,7 +98,8 @@ def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") 
     errors = [f"{locations[i]}: items[{i}] {problem}" for i, problem in misplaced_trajectories(steps)]
     if errors:
         raise MissionFileError(errors)
-    return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
+    found = tuple(locations) if text else ()
+    return Mission(name, head.title, head.description, tuple(head.assumptions), steps, locations=found)
 
 
 def _with_rows(item: TrajectoryItem, file: Path) -> TrajectoryItem:

@@ -241,10 +241,12 @@ KINDS: dict[type[Step], str] = {  # their names in files
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """A named list of steps. `assumptions` states each value that was chosen and not found in the source."""
+    """A named list of steps. `assumptions` states each value that was chosen and not found in the source;
+    `locations` is `FILE:LINE` of each step in a mission file, empty if there is none."""
 
     name: str
     title: str
     description: str
     assumptions: tuple[str, ...]
     steps: tuple[Step, ...]
+    locations: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)

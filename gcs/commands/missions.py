@@ -55,7 +55,10 @@ def missions_command(as_json: bool) -> None:
     help="Set a parameter of the autopilot, such as MIS_ROTOR_MARG; repeatable.",
 )
 @click.option("--as-asked", is_flag=True, help="Check the paths as asked, not shaped.")
-@click.option("--law", hidden=True, help="Refused: paths are checked, not a law.")
+@click.option(
+    "--law",
+    help="Check the paths as this built-in law flies them: plumbline (shaped), thesis or lqr (as asked).",
+)
 @json_option
 @click.pass_context
 def check_command(
@@ -75,15 +78,23 @@ def check_command(
     would refuse, such as a path that leaves the fence of a .plan; the exit code is then 1. Otherwise the
     duration of each path, its distance from the requested path, and its peaks of rotor force, tension and
     tilt are printed. With --as-asked the paths are judged as the laws thesis and lqr fly them, without
-    shaping; how closely such a law follows them is not judged. With --planner the paths through waypoints are
-    those of your own planner, whose errors are printed.
+    shaping, as with --law of one of these; how closely such a law follows them is not judged. With --planner
+    the paths through waypoints are those of your own planner, whose errors are printed.
     """
-    if law is not None:
+    from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+
+    if law is not None and law not in LAWS:
         raise click.UsageError(
-            "paths are checked and not a law; --as-asked checks them as the laws thesis and lqr fly them", ctx
+            f"--law {law}: must be {', '.join(LAWS)}; paths are checked and not your own law: with "
+            "--as-asked unless it has follows_shaped",
+            ctx,
         )
+    as_asked = as_asked or law not in (None, DEFAULT_LAW)
     if planner and as_asked:
-        raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)
+        raise click.UsageError(
+            "--as-asked, and --law thesis or lqr, judge no path of a planner; leave --planner or these out",
+            ctx,
+        )
 
     from gcs.workflows.before_flight import CHECKING_TEXT
     from gcs.workflows.check_mission import check_mission
@@ -95,10 +106,10 @@ def check_command(
         from gcs.workflows.own_planner import own_planner
 
         with own_planner(planner, vehicle) as own:
-            found = check_mission(mission, vehicle, as_asked, own, given)
+            found = check_mission(mission, vehicle, as_asked, own, given, law or "")
     else:
         with notify_if_slow(CHECKING_TEXT, as_json):
-            found = check_mission(mission, vehicle, as_asked, settings=given)
+            found = check_mission(mission, vehicle, as_asked, settings=given, law=law or "")
     if as_json:
         print_json(asdict(found))
     else:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from autopilot.vehicle.shipped import VEHICLES
+from gcs.errors import GcsError
 from gcs.foreign_mission import ForeignMission
 from gcs.shell.display import notify_if_slow
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable_marks import is_known_flyable
-from missions.model import Mission, Waypoint
+from missions.model import Mission, Waypoint, Winch
 from sitl.sensors.shipped import PROFILES
 
+_FIXED_CABLE_LAW = "lqr"  # flies one length of the cable
 CHECKING_TEXT = "checking whether the vehicle can fly it; paths that are hard to shape take a while"
 
 
@@ -59,6 +61,23 @@ def _only_shipped_inputs(options: FlightOptions) -> bool:
         and options.sensors in PROFILES.names()
         and not options.settings
     )
+
+
+def law_problem(mission: Mission, law: str) -> str:
+    """Why every vehicle refuses to fly the mission with this law; an empty string if it does not."""
+    winch = next((i for i, step in enumerate(mission.steps) if isinstance(step, Winch)), None)
+    if law != _FIXED_CABLE_LAW or winch is None:
+        return ""
+    from gcs.mission_items import problem_in_file  # loads much
+
+    text = f"items[{winch}] (winch): the law {law} flies one length of the cable; fly it with another law"
+    return problem_in_file(winch, text, mission)
+
+
+def check_law(mission: Mission, options: FlightOptions) -> None:
+    """GcsError if the law cannot fly the mission, whether or not another check is waived."""
+    if problem := law_problem(mission, options.law):
+        raise GcsError(problem)
 
 
 def check_mission(mission: Mission, options: FlightOptions) -> None:

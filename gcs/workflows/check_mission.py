@@ -11,7 +11,7 @@ from math import dist
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_length_problem, timeline
+from autopilot.trajectory.timeline import TimelineEntry
 from autopilot.trajectory.transfer import reachable_speed, transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
@@ -28,11 +28,12 @@ from gcs.mission_items import (
     in_file_terms,
     in_mission_terms,
     items_of,
+    problem_in_file,
     step_in_file,
 )
-from gcs.workflows.before_flight import unused_planner_text
+from gcs.workflows.before_flight import law_problem, unused_planner_text
 from gcs.workflows.flight_inputs import vehicle_warnings
-from gcs.workflows.flyable import violations
+from gcs.workflows.flyable import violations, winch_items
 from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits, with_settings
 from missions.model import (
@@ -44,7 +45,6 @@ from missions.model import (
     Speed,
     Takeoff,
     Waypoint,
-    Winch,
 )
 
 # Share of the rotors' range that a path must leave for control if the true vehicle differs from the assumed
@@ -54,27 +54,6 @@ from missions.model import (
 MIN_CONTROL_SHARE = 0.25
 MIN_REACHED_SHARE = 0.9  # of a speed that the mission sets: a way that stays below it is reported
 MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
-
-
-def winch_violations(mission: Mission, table: AutopilotParameters) -> Iterator[Violation]:
-    """Winch items that request a cable length beyond the default limits of the vehicle's winch; the vehicle
-    would refuse the mission at its start."""
-    min_m, max_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
-    for entry, _, length_m in _winch_items(mission, table):
-        problem = cable_length_problem(length_m, min_m, max_m)
-        if problem:
-            text = f"items[{entry.item}] (winch): {problem}: change length_m, or these of the vehicle"
-            limit_m = min_m if length_m < min_m else max_m
-            yield Violation(entry.item, "cable length", length_m, limit_m, entry.transfer_s, text)
-
-
-def _winch_items(
-    mission: Mission, table: AutopilotParameters
-) -> Iterator[tuple[TimelineEntry, Winch, float]]:
-    """Each winch item, and the length of the cable after it."""
-    for entry in timeline(mission.steps, _start(table)):
-        if isinstance(entry.step, Winch) and entry.after.cable_m is not None:
-            yield entry, entry.step, entry.after.cable_m
 
 
 def path_reports(
@@ -199,11 +178,6 @@ def _move_s(entry: TimelineEntry) -> float:
     return entry.duration_s if isinstance(entry.step, LoadPath | AttitudeRun) else entry.transfer_s
 
 
-def _start(table: AutopilotParameters) -> MissionState:
-    usual_m_s = table["MIS_SPEED"]
-    return MissionState(cable_m=table["VEH_CABLE_LEN"], speed_m_s=usual_m_s, usual_speed_m_s=usual_m_s)
-
-
 def parameter_notes(belief: Vehicle, known: Collection[str]) -> Iterator[str]:
     """A line about each parameter with which the vehicle is delivered and that only custom code may have."""
     for name in belief.parameters:
@@ -216,7 +190,7 @@ def parameter_notes(belief: Vehicle, known: Collection[str]) -> Iterator[str]:
 
 def winch_notes(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
     """A line about each winch item while the load is carried, which path reports do not include."""
-    for entry, step, length_m in _winch_items(mission, table):
+    for entry, step, length_m in winch_items(mission, table):
         if not entry.before.released:
             speed_m_s = step.speed_m_s or table["WNC_SPEED"]
             duration_s = transfer_duration(abs(step.length_m), speed_m_s, table["WNC_ACCEL"])
@@ -290,7 +264,9 @@ def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...])
     return replace(
         found,
         violations=tuple(
-            replace(one, item=step_in_file(one.item, mission), text=in_file_terms(one.text, mission))
+            replace(
+                one, item=step_in_file(one.item, mission), text=problem_in_file(one.item, one.text, mission)
+            )
             for one in found.violations
         ),
         paths=tuple(replace(one, item=step_in_file(one.item, mission)) for one in found.paths),
@@ -305,13 +281,17 @@ def check_mission(
     as_asked: bool,
     planner: Planner | None = None,
     settings: Sequence[tuple[str, float]] = (),
+    law: str = "",
 ) -> CheckResult:
     """Check a mission by name or path, or the file of another ground station, against a vehicle with these
-    parameters of its autopilot; `as_asked`: without shaping.
+    parameters of its autopilot; `as_asked`: without shaping. `law`: also whether it can be flown with this
+    law, the name of a built-in one.
 
     GcsError if a custom `planner` fails to plan it.
     """
     limits, mission = load_limits(vehicle, settings), read(name_or_path)
+    if problem := law_problem(mission, law):
+        return CheckResult(mission.name, vehicle, (), (), (), (problem,))
     notes: tuple[str, ...] = ()
     if isinstance(mission, ForeignMission):
         empty = () if mission.items else ("nothing that can be flown",)
@@ -322,7 +302,7 @@ def check_mission(
             notes += ("note: does not end on the ground: for gcs upload, not for gcs fly or gcs sweep",)
     table = with_settings(autopilot_parameters(limits.vehicle), settings)
     shaped = shapes_paths(table, not as_asked)
-    found = [*violations(mission, vehicle, limits, not as_asked, settings), *winch_violations(mission, table)]
+    found = violations(mission, vehicle, limits, not as_asked, settings)
     reports = [] if found else path_reports(mission, limits, planner, shaped)
     answer = Answer() if found else ask_supervisor(mission, table, not as_asked, planner)
     warnings = (

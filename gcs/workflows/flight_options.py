@@ -81,9 +81,9 @@ class FlightOptions:
 
     @property
     def mission_settings(self) -> tuple[tuple[str, float], ...]:
-        """The settings that determine which paths the autopilot flies (MIS_) and the vehicle that it assumes
-        (VEH_), the last of each name."""
-        named = (s for s in self.settings if s.startswith(("MIS_", "VEH_")))
+        """The settings that determine which paths the autopilot flies (MIS_), and the vehicle (VEH_) and the
+        winch (WNC_) that it assumes, the last of each name."""
+        named = (s for s in self.settings if s.startswith(("MIS_", "VEH_", "WNC_")))
         return tuple(dict(map(parse_setting, named)).items())
 
     @property

@@ -27,7 +27,7 @@ from gcs.mission_files import load
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
+from gcs.workflows.before_flight import check_law, check_mission, check_options, mission_warnings
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, parse_setting
 from gcs.workflows.report import make_report
@@ -84,6 +84,8 @@ def fly(
     if options.connect is None and options.firmware is None:
         warnings = check_options(options)
     mission = load(options.mission)
+    if options.connect is None and options.firmware is None:
+        check_law(mission, options)
     if options.firmware is not None and isinstance(mission, ForeignMission):
         raise InputError(
             f"{options.mission}: --autopilot converts mission files of Plumbline; upload a file of another "

@@ -11,7 +11,7 @@ from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
 from gcs.foreign_mission import home_of
 from gcs.shell.display import FlightDisplay
-from gcs.workflows.before_flight import check_mission, check_options, mission_warnings
+from gcs.workflows.before_flight import check_law, check_mission, check_options, mission_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.started_flight import flight_client
 from gcs.workflows.warmup import in_process_parts, vehicle_parts, warm_up
@@ -30,6 +30,7 @@ def fly_in_process(
     `warn` is called with a line for each option that may be unintended, `log_sensors` with the bytes of a log
     of the sensors.
     """
+    check_law(mission, options)
     for line in (*check_options(options), *mission_warnings(options.planner, mission)):
         warn(line)
     of_the_vehicle = vehicle_parts(options.vehicle, map(parse_setting, options.settings))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 from math import radians
 from operator import attrgetter
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from autopilot.control.laws import LAWS
 from autopilot.own.own_code import OwnCode
 from autopilot.supervisor.settings import path_limits
 from autopilot.trajectory import feasibility
@@ -24,6 +26,7 @@ from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE, GcsError, InputError
 from gcs.expected_flight import expected_entries, expected_flight_s, time_limit_s
 from gcs.mission_files import load
 from gcs.workflows import flyable
+from gcs.workflows.before_flight import law_problem
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
@@ -35,10 +38,10 @@ from gcs.workflows.check_mission import (
     timeout_warnings,
     unreached_speed_notes,
     winch_notes,
-    winch_violations,
 )
 from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import parse_setting
+from gcs.workflows.flyable import winch_violations
 from gcs.workflows.vehicle_limits import load_limits, with_settings
 from missions.model import Land, Mission, Release, Speed, Step, Takeoff, Waypoint, Winch
 
@@ -203,10 +206,77 @@ def test_a_cable_that_is_reeled_is_told_with_its_duration() -> None:
     assert shorter.startswith("note: items[2] (winch): 17.6 s, to a cable of 0.70 m")
 
 
-def test_a_law_is_not_checked_and_its_paths_are() -> None:
-    result = CliRunner().invoke(gcs, ["check", "case-a", "--law", "thesis"], prog_name="gcs")
-    assert result.exit_code == EXIT_USAGE
-    assert "--as-asked checks them as the laws thesis and lqr fly them" in result.stderr
+def test_paths_are_checked_as_a_law_flies_them_and_a_custom_law_is_not() -> None:
+    def checked(*options: str) -> tuple[int, str]:
+        found = CliRunner().invoke(gcs, ["check", "case-a", *options], prog_name="gcs")
+        return found.exit_code, found.stdout or found.stderr
+
+    assert checked("--law", "thesis") == checked("--as-asked") != checked("--law", "plumbline") == checked()
+    code, text = checked("--law", "mine.py")
+    assert code == EXIT_USAGE and "paths are checked and not your own law: with --as-asked" in text
+
+
+WINCHED = """title = "Short cable"
+description = "A mission for tests."
+
+[[items]]
+type = "takeoff"
+altitude_m = 1.0
+
+[[items]]
+type = "winch"
+length_m = -0.65
+
+[[items]]
+type = "signals"
+duration_s = 8.0
+[[items.terms]]
+axis = "z"
+amplitude_m = -2.0
+rise_s = 4.0
+hold_s = 1.0
+fall_s = 3.0
+
+[[items]]
+type = "land"
+"""
+
+
+@pytest.fixture
+def winched(tmp_path: Path) -> Path:
+    """A winch that makes the cable too short, and a path that comes too low above the ground."""
+    path = tmp_path / "winched.toml"
+    path.write_text(WINCHED)
+    return path
+
+
+def test_what_follows_from_an_impossible_cable_is_not_told(winched: Path) -> None:
+    line = f"{winched}:8: items[1] (winch): a cable of 0.05 m; must be 0.3 ... 3 m"
+    (found,) = check_mission(str(winched), "bebop", as_asked=False).lines()
+    assert found.startswith(line)
+    with pytest.raises(GcsError, match=re.escape(line)):
+        flyable.require_flyable(load(str(winched)), "bebop")
+    winched.write_text(WINCHED.replace("-0.65", "-0.25"))
+    lines = check_mission(str(winched), "bebop", as_asked=False).lines()
+    assert all(one.startswith(f"{winched}:12: items[2] (signals): at ") for one in lines)
+
+
+def test_a_step_that_cannot_be_flown_is_told_with_file_and_line(winched: Path) -> None:
+    winched.write_text(WINCHED.replace("altitude_m = 1.0", "altitude_m = 0.1"))
+    lines = check_mission(str(winched), "bebop", as_asked=False).lines()
+    assert [line.partition(" (")[0] for line in lines] == [f"{winched}:4: items[0]", f"{winched}:8: items[1]"]
+
+
+def test_a_law_that_cannot_fly_a_winch_is_told_before_a_flight(winched: Path) -> None:
+    line = f"{winched}:8: items[1] (winch): the law lqr flies one length of the cable"
+    (found,) = check_mission(str(winched), "bebop", as_asked=True, law="lqr").lines()
+    assert found.startswith(line)
+    for law in LAWS.values():
+        assert bool(law_problem(load(str(winched)), law.name)) != law.supports_reeling
+    for force in ([], ["--force"]):
+        flown = CliRunner().invoke(gcs, ["fly", str(winched), "--law", "lqr", *force], prog_name="gcs")
+        assert flown.exit_code == EXIT_ERROR
+        assert line in flown.stderr
 
 
 def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_mends_it(
@@ -216,7 +286,9 @@ def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_me
         feasibility, "shaped_path", lambda step, _: ShapingResult(unshaped_signals(step), "no way")
     )
     (line,) = check_mission("case-a", "bebop", as_asked=False).lines()
-    assert line.startswith("items[2] (signals): no way; a path must leave 15 % of the rotors' range free")
+    assert line.startswith(
+        "missions/case-a.toml:20: items[2] (signals): no way; a path must leave 15 % of the rotors' range"
+    )
     for mends in ("amplitude_m", "rise_s", "MIS_ROTOR_MARG", "MIS_INFEASIBLE 1"):
         assert mends in line
 

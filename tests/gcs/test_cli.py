@@ -260,7 +260,8 @@ def test_what_four_rotors_cannot_fly_is_refused_with_limit_and_excess(tmp_path):
     )
     refused = run("fly", str(mission), "--out", str(tmp_path / "out"), "--quiet")
     assert (refused.exit_code, refused.stdout) == (EXIT_ERROR, "")
-    head = "gcs: wild cannot be flown by vehicle bebop; --force tries: items[1] (signals): at 4.9 s "
+    where = f"{mission}:7: items[1] (signals)"
+    head = f"gcs: wild cannot be flown by vehicle bebop; --force tries: {where}: at 4.9 s "
     assert refused.stderr.splitlines()[-1].startswith(head)
     assert not (tmp_path / "out").exists()
     told = run("fly", str(mission), "--out", str(tmp_path / "out")).stderr
