@@ -249,12 +249,16 @@ def battery_numbers(telemetry: Telemetry) -> Numbers:
 
 
 def estimator_numbers(samples: Samples) -> Numbers:
-    """Estimated minus true load position over the mission window."""
+    """Estimated minus true, and estimated minus requested, load position over the mission window."""
     norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.carried], axis=1)
+    followed = (samples.estimated_m - samples.requested_m)[samples.position_tracked]
+    followed_norm = np.linalg.norm(followed, axis=1)
     filter_norm = np.linalg.norm((samples.filtered_m - samples.actual_m)[samples.carried], axis=1)
     return {
         "estimator_error_max_m": _statistic(norm, np.max),
         "estimator_error_rms_m": _statistic(norm, _rms),
+        "estimated_load_error_max_m": _statistic(followed_norm, np.max),
+        "estimated_load_error_rms_m": _statistic(followed_norm, _rms),
         "filter_error_max_m": _statistic(filter_norm, np.max),
         "filter_error_rms_m": _statistic(filter_norm, _rms),
     }

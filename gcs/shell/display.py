@@ -175,7 +175,8 @@ class LiveBars:
 
 
 class FlightDisplay(LiveBars):
-    """One flight: phase, mission item, load error, rotor use, simulated time and its ratio to real time."""
+    """One flight: phase, mission item, load error as the vehicle estimates it, rotor use, simulated time and
+    its ratio to real time."""
 
     def __init__(self, title: str, quiet: bool) -> None:
         super().__init__(quiet)
@@ -202,7 +203,7 @@ class FlightDisplay(LiveBars):
             "{task.percentage:>3.0f}%",
             "[cyan]{task.fields[phase]}",
             "{task.fields[item]}",
-            "load {task.fields[error]}",
+            "load error (est.) {task.fields[error]}",
             "rotors {task.fields[rotors]}",
             "{task.fields[clock]} {task.fields[pace]}",
         )
@@ -229,8 +230,8 @@ class FlightDisplay(LiveBars):
 
     def _line(self, fields: dict[str, str]) -> str:
         words = [fields["clock"], fields["phase"], fields["item"]]
-        for label in ("load", "rotors"):
-            figure = fields["error" if label == "load" else label].strip()
+        for label, field in (("load error (est.)", "error"), ("rotors", "rotors")):
+            figure = fields[field].strip()
             words.append("" if figure.startswith("-") else f"{label} {figure}")
         words.append(fields["pace"])
         return "  ".join(word for word in words if word)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -31,13 +32,15 @@ PARTS = "parts"
 METADATA_KEY = b"plumbline"
 Row = dict[str, Any]
 
-_TEXT_COLUMNS = ("law", "outcome", "reason", "lost_phase")
+_TEXT_COLUMNS = ("law", "outcome", "reason", "cause", "lost_phase")
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)")
 _INTEGER_COLUMNS = ("index", "seed", "slack_events")
 
 
 def columns(plan: SweepPlan) -> tuple[str, ...]:
     """The columns of the table: number, law and seed of the flight, varied values, results."""
-    figures = tuple(f.name for f in fields(FlightResult) if f.name != "texts")
+    figures = [f.name for f in fields(FlightResult) if f.name != "texts"]
+    figures.insert(figures.index("reason") + 1, "cause")
     return ("index", "law", "seed", *(v.name for v in plan.varied), *figures, "wall_s")
 
 
@@ -54,6 +57,11 @@ def schema(plan: SweepPlan) -> pyarrow.Schema:
     return pa.schema([(name, kind(name)) for name in columns(plan)], metadata=metadata)
 
 
+def cause_of(reason: str) -> str:
+    """The reason of a flight without its numbers, which is the same for all flights that end alike."""
+    return "; ".join(dict.fromkeys(_NUMBER.sub("#", reason).split("; ")))
+
+
 def row_of(plan: SweepPlan, case: Case, result: FlightResult, wall_s: float) -> Row:
     """The row of a flight."""
     figures = {f.name: getattr(result, f.name) for f in fields(FlightResult) if f.name != "texts"}
@@ -64,6 +72,7 @@ def row_of(plan: SweepPlan, case: Case, result: FlightResult, wall_s: float) -> 
         "seed": case.seed,
         **varied,
         **figures,
+        "cause": cause_of(result.reason),
         "wall_s": wall_s,
     }
 

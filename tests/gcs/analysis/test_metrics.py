@@ -165,7 +165,7 @@ def test_errors_of_a_known_error():
     flight.actual[mission[-1]] = flight.desired[mission[-1]] + (0.0, 0.012, 0.0)
     flight.estimated = flight.actual + np.array((0.0, 0.0, 0.002))
     found = record(flight)
-    n = len(mission)
+    n, half = len(mission), len(mission) // 2
     expected = {
         "load_error_max_m": 0.012,
         "load_error_rms_m": np.sqrt(((n - 1) * 0.005**2 + 0.012**2) / n),
@@ -176,6 +176,11 @@ def test_errors_of_a_known_error():
         "load_error_rms_y_m": 0.012 / np.sqrt(n),
         "estimator_error_max_m": 0.002,
         "estimator_error_rms_m": 0.002,
+        "estimated_load_error_max_m": np.hypot(0.012, 0.002),
+        "estimated_load_error_rms_m": np.sqrt(
+            ((half * (0.003**2 + 0.006**2)) + (n - 1 - half) * (0.003**2 + 0.002**2) + 0.012**2 + 0.002**2)
+            / n
+        ),
     }
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, abs=tolerances.WIRE_M), name

@@ -34,7 +34,7 @@ from gcs.sweep.plan_values import PlanError, VariedParameter
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, completion_range, flights_by_law, law_record
 from gcs.sweep.standouts import repeat_command, stored_standouts
-from gcs.sweep.store import Row, Store, columns
+from gcs.sweep.store import Row, Store, cause_of, columns
 from tests.doubles.browser import Browser
 from tests.gcs.sweep.conftest import AtOnce, stored_plan
 
@@ -77,6 +77,7 @@ def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Sweep
     assert table.column("index").to_pylist() == list(range(6))
     assert table.column("SIM_ACT_DELAY_MS").to_pylist() == [0.0, 0.0, 4.0, 4.0, 60.0, 60.0]
     assert table.column("outcome").to_pylist() == ["completed"] * 4 + ["diverged"] * 2
+    assert table.column("cause").to_pylist() == list(map(cause_of, table.column("reason").to_pylist()))
     assert all(table.column("reason").to_pylist()[4:]) and all(table.column("lost_phase").to_pylist()[4:])
     errors = table.column("load_error_max_m").to_pylist()[:4]
     assert all(0.001 < error < 0.3 for error in errors)
@@ -625,3 +626,21 @@ def test_a_sweep_with_a_part_that_is_not_compiled_says_that_it_compiles(
     assert bool(said) is not quiet
     if said:
         assert said[0].startswith("gcs: compiling the flight software, once: the sweep's flight, about ")
+
+
+@pytest.mark.parametrize(
+    ("reason", "cause"),
+    [
+        ("", ""),
+        (
+            "Flight given up: tilt 120.3 deg exceeds FS_TILT_DEG 120; Rotor 2 failed; Rotor 3 failed",
+            "Flight given up: tilt # deg exceeds FS_TILT_DEG #; Rotor # failed",
+        ),
+        (
+            "EKF2 lost the load; at -1.5e-3 m, item 7 (items[2] of the mission)",
+            "EKF2 lost the load; at # m, item # (items[#] of the mission)",
+        ),
+    ],
+)
+def test_flights_that_end_alike_have_one_cause(reason: str, cause: str) -> None:
+    assert cause_of(reason) == cause
