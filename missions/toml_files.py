@@ -233,6 +233,8 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
     lines = text.splitlines()
     at = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
     reason = message.split(" (at ", maxsplit=1)[0]
+    if at.lstrip().startswith("[[") and reason.startswith("Cannot overwrite"):
+        reason = "Cannot declare"  # a table [key] stands before the list [[key]]
     duplicate = next((instead for begins, instead in _DUPLICATES.items() if reason.startswith(begins)), "")
     if duplicate:
         reason = duplicate.format(key=re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip())

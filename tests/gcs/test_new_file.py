@@ -17,6 +17,7 @@ from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
 from gcs.workflows.new_file import kinds
 from missions.model import Land, Mission, Takeoff, Waypoint
+from missions.schema import ITEMS
 from sitl.sensors.profile import Profile
 
 SHORT = Mission("short", "Short", "", (), (Takeoff(0.5), Waypoint(0.2, 0.0, 0.5), Land()))
@@ -147,3 +148,10 @@ def test_every_key_of_a_vehicle_is_named() -> None:
 def test_every_sensor_is_named() -> None:
     profile = Profile.model_validate(uncommented("sensors"))
     assert [name for name in Profile.model_fields if getattr(profile, name) is None] == []
+
+
+def test_the_mission_template_names_every_type_of_item(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    assert CliRunner().invoke(gcs, ["new", "mission", str(path)]).exit_code == 0
+    text = path.read_text()
+    assert [kind for kind in ITEMS if not re.search(rf"\b{kind}\b", text)] == []

@@ -329,3 +329,9 @@ def test_the_room_stands_alone() -> None:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module:
                 assert node.module.split(".")[0] not in ("autopilot", "sitl", "gcs")
+
+
+def test_a_list_behind_a_table_of_its_name_is_told_its_brackets() -> None:
+    text = 'title = "t"\ndescription = "d"\n[items]\ntype = "takeoff"\n[[items]]\ntype = "land"\n'
+    with pytest.raises(MissionFileError, match=r"m.toml:5:8: not TOML: .*write \[\[items\]\] for each table"):
+        parse_mission(text, "m", "m.toml")
