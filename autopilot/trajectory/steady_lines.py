@@ -55,7 +55,7 @@ class _Turn(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def _turn_shapes(angle_deg: int) -> tuple[_Turn, ...]:
+def turn_shapes(angle_deg: int) -> tuple[_Turn, ...]:
     """The shapes of turns by an angle: the greater the share, the faster is the load at the corner."""
     angle = radians(angle_deg)
     before, after = np.array([1.0, 0.0, 0.0]), np.array([cos(angle), sin(angle), 0.0])
@@ -101,7 +101,7 @@ class SteadyLines:
         self._turns = [_Turn(1.0, 0.0)] * len(self.corners)
         for corner, i in enumerate(self.corners[1:-1], 1):
             # upwards: a turn is no sharper than the one whose shape it takes
-            shapes = _turn_shapes(ceil(angles[i - 1]))
+            shapes = turn_shapes(ceil(angles[i - 1]))
             self._turns[corner] = min(shapes, key=partial(self._passing_s, rooms[i - 1 : i + 1], speed))
         lines = np.diff(self._points, axis=0)
         self._lengths = np.linalg.norm(lines, axis=1)

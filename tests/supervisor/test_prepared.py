@@ -30,7 +30,7 @@ ROUND = (
     Waypoint(3.0, 3.0, 2.5),
     Waypoint(0.0, 3.0, 2.0, hold_s=1.0),
 )
-PASSING_M_S = 0.15  # round corners of 90 degrees between lines of 3 m at up to 1.5 m/s
+PASSING_M_S = 0.1  # round corners of 90 degrees between lines of 3 m at up to 1.5 m/s
 # error of the trapezoid rule over a tick, at a jerk of a few m/s^3
 TRAPEZOID_M = 1e-5
 LIMITS = SETTINGS.limits._replace(shape_paths=True)

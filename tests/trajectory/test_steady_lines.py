@@ -158,9 +158,9 @@ def test_with_no_other_shape_of_its_turns_is_a_path_quicker(
     def duration_s() -> float:
         return float(SteadyLines(points, speed, ACCEL, LEAST_S).sections[-1].times[-1])
 
-    chosen_s, shapes = duration_s(), steady_lines._turn_shapes(angle_deg)
+    chosen_s, shapes = duration_s(), steady_lines.turn_shapes(angle_deg)
     for shape in shapes:
-        monkeypatch.setattr(steady_lines, "_turn_shapes", lambda _, shape=shape: (shape,))
+        monkeypatch.setattr(steady_lines, "turn_shapes", lambda _, shape=shape: (shape,))
         assert chosen_s <= 1.02 * duration_s()
 
 
