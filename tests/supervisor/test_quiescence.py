@@ -105,7 +105,9 @@ DISTURBANCES: dict[str, Callable[[View], View]] = {
     "both a little off": lambda v: v._replace(
         x_quad=moved(v.x_quad, 0.0, 0.3, 0.0), x_load=moved(v.x_load, 0.0, 0.3, 0.0)
     ),
-    "vehicle far off": lambda v: v._replace(x_quad=moved(v.x_quad, 0.0, 5.1, 0.0)),
+    "carried off": lambda v: v._replace(
+        x_quad=moved(v.x_quad, 6.0, 0.0, 0.0), v_quad=(1.0, 0.0, 0.0), x_load=moved(v.x_load, 6.0, 0.0, 0.0)
+    ),
     "load dragged away": lambda v: v._replace(x_load=moved(v.x_load, 6.0, 0.0, 0.0), v_load=(1.0, 0.0, 0.0)),
     "load beside": lambda v: v._replace(x_load=moved(v.x_load, 0.1, 0.0, 0.0)),
     "load does not sink": lambda v: v._replace(x_load=moved(v.x_load, 0.0, 0.0, 0.2)),

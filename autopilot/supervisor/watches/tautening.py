@@ -51,7 +51,8 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     if flight.phase != Phase.TAUTEN or flight.out_of_control_since_us >= 0:  # `failsafe` cares for the latter
         return WatchResult(flight)
     error, limit_m = path_error(flight, view), settings.failsafe.load_error_limit_m
-    assert error is not None
+    if error is None:
+        return WatchResult(flight)
     way = sub(view.x_load, flight.cable.ground_place)  # along which the vehicle has dragged its load
     # on a short cable, a load that was not dragged as far may hold the vehicle yet
     may_be_held = max(norm(way), settings.cable_length_m) <= limit_m
