@@ -54,7 +54,7 @@ def top_speeds(craft: Craft) -> dict[int, float]:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "later_m_s"), [(b"MIS_SPEED", 2.0, 2.0), (b"MIS_ACCEL", 0.1, 0.627)]
+    ("name", "value", "later_m_s"), [(b"MIS_SPEED", 2.0, 2.0), (b"MIS_ACCEL", 0.1, 0.679)]
 )
 def test_they_apply_from_the_next_path_on(name: bytes, value: float, later_m_s: float) -> None:
     craft = begun(*ITEMS)

@@ -41,7 +41,6 @@ def test_the_check_before_a_flight_takes_what_is_set() -> None:
 
 
 def test_a_cable_that_is_too_long_for_the_path_is_named() -> None:
-    with pytest.raises(
-        plumbline.Error, match="by vehicle bebop with VEH_CABLE_LEN=8; force=True tries: items"
-    ):
+    told = r"by vehicle bebop with VEH_CABLE_LEN=8; force=True tries: missions/case-c.toml:20: items\[2\]"
+    with pytest.raises(plumbline.Error, match=told):
         plumbline.fly("case-c", settings={"VEH_CABLE_LEN": 8}, quiet=True)
