@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_CRITICAL, MAV_SEVERITY_WARNING
 
-AFTERMATH_US = (
-    2_000_000  # followed after the vehicle has reported a failure: how it went on, and for the pictures
-)
+# followed after the vehicle has reported a failure: how it went on, and for the pictures
+AFTERMATH_US = 2_000_000
 _BEFORE_US = 5_000_000  # a warning that is older has not led to the failure
 _OF_BATTERY = "Battery "  # of an empty battery, the text of the failure says so itself
 

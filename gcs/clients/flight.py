@@ -146,7 +146,7 @@ class FlightClient:
         self._parameters: ParameterList | None = None  # while they are being requested
         self._stage_start_us: int | None = None  # the ground station's clock
         self._flight_start_us: int | None = None  # the vehicle's clock
-        self._text_times_us: list[int] = []  # of the texts, by the vehicle's clock
+        self._texts: list[TimedText] = []  # those of the view, by the vehicle's clock
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
         self._texts_armed = 0  # texts that came before arming
         self._was_armed = False
@@ -187,8 +187,9 @@ class FlightClient:
             ):
                 continue
             self.view.update(one, now_us)
-            if len(self._text_times_us) < len(self.view.texts):
-                self._text_times_us.append(self.view.time_us or 0)
+            if len(self._texts) < len(self.view.texts):
+                told = self.view.texts[-1]
+                self._texts.append(TimedText(self.view.time_us or 0, told.severity, told.text))
             if self._operations:
                 self._operations[0].receive(one.message, now_us)
             if self._parameters is not None and one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
@@ -379,15 +380,8 @@ class FlightClient:
     def _present_failure(self) -> str:
         """Why the autopilot has given up; empty if it has not."""
         if self.view.phase == _FAILSAFE:
-            return self._reason_since(self._texts_armed) or "the autopilot went into failsafe"
-        return self._reason_since(self._texts_before) if self._was_airborne else ""
-
-    def _reason_since(self, count: int) -> str:
-        """Why the flight was lost, by the texts that came after the first `count`."""
-        times_us, texts = self._text_times_us[count:], self.view.texts[count:]
-        return failure_reason(
-            [TimedText(us, one.severity, one.text) for us, one in zip(times_us, texts, strict=True)]
-        )
+            return failure_reason(self._texts[self._texts_armed :]) or "the autopilot went into failsafe"
+        return failure_reason(self._texts[self._texts_before :]) if self._was_airborne else ""
 
     def _failure_outcome(self) -> Outcome | None:
         """The outcome of a flight that has failed, or is being refused; None of any other."""

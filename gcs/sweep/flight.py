@@ -344,7 +344,7 @@ class SweepFlight:
                 self._warnings.append(text)
             if self.airborne_us >= 0:
                 self._texts_in_air.append(TimedText(now_us, severity, text))
-        if self.failed_us < 0 and failure_reason(self._texts_in_air):
+        if texts and self.failed_us < 0 and failure_reason(self._texts_in_air):
             self.failed_us = now_us
             self.result.lost_phase = phase.name.lower()
 
