@@ -15,6 +15,7 @@ from itertools import chain
 from typing import Protocol
 
 from gcs.errors import GcsError
+from gcs.shell.open_socket import OpenSocket
 from gcs.shell.tcp_socket import TcpSocket
 
 DEFAULT_PORT = 14550
@@ -99,7 +100,7 @@ def _is_free(port: int) -> bool:
     return True
 
 
-class UdpSocket:
+class UdpSocket(OpenSocket):
     """One socket; answers go to the sender of the last datagram."""
 
     def __init__(self, host: str = LOOPBACK, port: int = 0, peer: tuple[str, int] | None = None) -> None:
@@ -118,14 +119,6 @@ class UdpSocket:
         """HOST:PORT, as options of other programs take it."""
         host, port = self._socket.getsockname()[:2]
         return f"{host}:{port}"
-
-    def fileno(self) -> int:
-        return self._socket.fileno()
-
-    @property
-    def has_datagram(self) -> bool:
-        """Whether a datagram has arrived and was not read yet."""
-        return bool(select.select([self], [], [], 0.0)[0])
 
     def drain(self) -> list[bytes]:
         """All datagrams that have arrived, without waiting."""
@@ -175,9 +168,6 @@ class UdpSocket:
             return  # UDP: the protocols above repeat what was lost
         except OSError as error:
             raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
-
-    def close(self) -> None:
-        self._socket.close()
 
 
 def open_address(address: Address) -> UdpSocket | TcpSocket:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import select
 import socket
 from contextlib import suppress
 
 from autopilot.wire.codec import decodable_length
 from gcs.errors import GcsError
+from gcs.shell.open_socket import OpenSocket
 
 _CONNECT_S = 5.0
 _READ_BYTES = 65_536
 
 
-class TcpSocket:
+class TcpSocket(OpenSocket):
     """Has the methods of a `UdpSocket`; a datagram is here what has arrived of whole frames.
 
     When the vehicle closes the connection, it is silent from then on.
@@ -31,14 +31,6 @@ class TcpSocket:
             ) from None
         self._socket.settimeout(None)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def fileno(self) -> int:
-        return self._socket.fileno()
-
-    @property
-    def has_datagram(self) -> bool:
-        """Whether bytes have arrived and were not read yet."""
-        return bool(select.select([self], [], [], 0.0)[0])
 
     def drain(self) -> list[bytes]:
         """All whole frames that have arrived, without waiting."""
@@ -74,6 +66,3 @@ class TcpSocket:
     def send_to(self, datagram: bytes, peer: tuple[str, int]) -> None:
         """As `send`."""
         self.send(datagram)
-
-    def close(self) -> None:
-        self._socket.close()
