@@ -89,7 +89,11 @@ _ACTION_MODES = {
     ActionWhenArmed.MISSION: identity.AUTO_MISSION,
     ActionWhenArmed.OFFBOARD: identity.AUTO_LOITER,
 }
-_SOURCE_MODES = {SetpointSource.OFFBOARD: identity.OFFBOARD, SetpointSource.MANUAL: identity.POSCTL}
+_SOURCE_MODES = {
+    SetpointSource.OFFBOARD: (identity.OFFBOARD, 0),
+    SetpointSource.MANUAL: (identity.POSCTL, 0),
+    SetpointSource.TARGET: identity.FOLLOW_MODE,
+}
 _LANDED_STATES = {
     Phase.ARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
     Phase.TAUTEN: mavlink.MAV_LANDED_STATE_TAKEOFF,
@@ -137,7 +141,7 @@ def reported_mode(flight: Flight) -> tuple[int, int]:
     if flight.action_when_armed == ActionWhenArmed.OFFBOARD and rising:
         return identity.OFFBOARD, 0
     if flight.phase == Phase.GUIDED and flight.setpoints.source in _SOURCE_MODES:
-        return _SOURCE_MODES[flight.setpoints.source], 0
+        return _SOURCE_MODES[flight.setpoints.source]
     return identity.AUTO, sub_mode(flight)
 
 

@@ -59,6 +59,7 @@ from autopilot.services.requests import (
     FollowRates,
     FollowSetpoint,
     FollowStick,
+    FollowTarget,
     GetMessageInterval,
     InjectFailure,
     Reposition,
@@ -110,7 +111,8 @@ _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 _NO_INSTANT = np.zeros(0)
 
-_SETPOINT_REQUESTS = FollowSetpoint | FollowAttitude | FollowRates | FollowStick  # they change no mode
+# they change no mode
+_SETPOINT_REQUESTS = FollowSetpoint | FollowAttitude | FollowRates | FollowStick | FollowTarget
 _METADATA = {
     mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
     mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
@@ -744,6 +746,7 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,
             m.MAVLINK_MSG_ID_MANUAL_CONTROL: guided.receive_stick,
             m.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: guided.receive_channels,
+            m.MAVLINK_MSG_ID_FOLLOW_TARGET: guided.receive_target,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
             m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,

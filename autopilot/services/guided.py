@@ -1,4 +1,4 @@
-"""Setpoints and sticks: messages that are repeated many times a second and are never acknowledged.
+"""Setpoints, sticks and targets: messages that are repeated again and again and are never acknowledged.
 
 Each message becomes a request in ENU. A message that requests nothing that can be flown is refused by a
 STATUSTEXT, once in WARNING_INTERVAL_US for each reason. Body axes are level and follow the heading; a yaw of
@@ -13,7 +13,13 @@ from typing import Any
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
 from autopilot.services.records import Decide, Output, Peer, SendText, Verdict
-from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
+from autopilot.services.requests import (
+    FollowAttitude,
+    FollowRates,
+    FollowSetpoint,
+    FollowStick,
+    FollowTarget,
+)
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -26,6 +32,8 @@ _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis does not exist
 _NOT_OVERRIDDEN = (0, 65535)  # of a channel: given back, ignored
+# bits of the capabilities of FOLLOW_TARGET: what its sender estimates
+_TARGET_POSITION, _TARGET_VELOCITY = 0x1, 0x2
 _PULSE_CENTRE_US, _PULSE_RANGE_US, _PULSE_MARGIN_US = 1500, 500, 200
 
 _BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
@@ -36,7 +44,7 @@ _ABOVE_HOME = (
 )
 _ABOVE_SEA = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 
-SetpointRequest = FollowSetpoint | FollowAttitude | FollowRates | FollowStick
+SetpointRequest = FollowSetpoint | FollowAttitude | FollowRates | FollowStick | FollowTarget
 
 
 def _masked(values: tuple[float, float, float], mask: int, shift: int) -> Vec3:
@@ -178,6 +186,18 @@ def read_channels(m: Any) -> FollowStick | Verdict | None:
     return FollowStick((-back, -right, up), -clockwise)
 
 
+def read_target(m: Any, home: Home) -> FollowTarget | Verdict:
+    """FOLLOW_TARGET. Without a velocity, or without an altitude, it is not reported, or that of home."""
+    is_place = abs(m.lat) <= 900_000_000 and abs(m.lon) <= 1_800_000_000
+    if not m.est_capabilities & _TARGET_POSITION or not is_place:
+        return _refused("Target refused: FOLLOW_TARGET without a position")
+    east, north, _ = enu_from_geodetic(m.lat, m.lon, 0, home)
+    height = m.alt - home.altitude_m if math.isfinite(m.alt) else 0.0
+    has_velocity = m.est_capabilities & _TARGET_VELOCITY and all(map(math.isfinite, m.vel))
+    velocity = enu_from_ned((m.vel[0], m.vel[1], m.vel[2])) if has_velocity else None
+    return FollowTarget((east, north, height), velocity)
+
+
 def _refused(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_DENIED, text)
 
@@ -212,6 +232,10 @@ class GuidedService:
         """RC_CHANNELS_OVERRIDE."""
         request = read_channels(message)
         return [] if request is None else self._handle_request(request, now_us, decide)
+
+    def receive_target(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """FOLLOW_TARGET, which addresses no system."""
+        return self._handle_request(read_target(message, self._home), now_us, decide)
 
     def _handle_request(
         self, request: SetpointRequest | Verdict, now_us: int, decide: Decide

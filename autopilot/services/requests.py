@@ -161,6 +161,14 @@ class FollowStick:
 
 
 @dataclass(frozen=True, slots=True)
+class FollowTarget:
+    """One report of the motion of a target, ENU from home; a velocity of None is not reported."""
+
+    position: Vec3
+    velocity: Vec3 | None
+
+
+@dataclass(frozen=True, slots=True)
 class Orbit:
     """Fly the load round a circle. None: radius, speed and centre of the circle that is being flown; without
     one the vehicle's radius, the speed of transfers, and a centre here. A height of None is the present one.
@@ -323,6 +331,7 @@ SupervisorRequest = (
     | FollowAttitude
     | FollowRates
     | FollowStick
+    | FollowTarget
     | TurnHeading
     | LookAt
     | Orbit

@@ -24,6 +24,7 @@ from autopilot.services.identity import (
     AUTO_MISSION,
     AUTOPILOT_COMPONENT,
     DIALECT_COMPONENT,
+    FOLLOW_MODE,
     LOAD_COMPONENT,
     WINCH_COMPONENT,
     Identity,
@@ -334,6 +335,8 @@ def _load_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _winch_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    if (s.main_mode, s.sub_mode) == FOLLOW_MODE:
+        return ()  # FollowMe of MAVSDK takes it for the autopilot's: the mode has ended, and it crashes later
     return (winch_heartbeat_message(s),)
 
 

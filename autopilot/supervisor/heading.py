@@ -14,8 +14,9 @@ from autopilot.guidance.setpoint_follower import (
     TrackAttitude,
 )
 from autopilot.supervisor.motion import commanded_motion
+from autopilot.supervisor.setpoint_source import source_stream
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, Flight, Phase, SetpointSource, View
+from autopilot.supervisor.state import IN_AIR, Flight, Phase, View
 from missions.model import LookAt, TurnHeading
 
 # between the stored and the estimated heading on the ground; beyond it the latter is used
@@ -114,8 +115,5 @@ def _with_setpoint_aim(flight: Flight, view: View, settings: Settings) -> Flight
 
 def _followed_stream(flight: Flight) -> SetpointStream | None:
     """The stream of setpoints that is followed, if there is one."""
-    if flight.phase != Phase.GUIDED or flight.setpoints.source == SetpointSource.ORBIT:
-        return None
-    manual = flight.setpoints.source == SetpointSource.MANUAL
-    stream = flight.setpoints.manual if manual else flight.setpoints.offboard
-    return None if stream.setpoint is None else stream
+    stream = source_stream(flight) if flight.phase == Phase.GUIDED else None
+    return None if stream is None or stream.setpoint is None else stream

@@ -2,24 +2,50 @@
 
 from __future__ import annotations
 
-from autopilot.guidance.setpoint_follower import PositionSetpoint, Setpoint
+from dataclasses import replace
+
+from autopilot.geometry.linear import ZERO
+from autopilot.guidance.setpoint_follower import PositionSetpoint, Setpoint, SetpointStream
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, SetpointSource
+
+TARGET_LOSS_US = 3_000_000  # silence after which a target counts as lost; MAVSDK reports one once a second
+WAIT = PositionSetpoint(velocity=ZERO)  # while there is no target
+
+
+def source_stream(flight: Flight) -> SetpointStream | None:
+    """The stream whose setpoints are followed while GUIDED; None: a circle, which needs none."""
+    match flight.setpoints.source:
+        case SetpointSource.ORBIT:
+            return None
+        case SetpointSource.MANUAL:
+            return flight.setpoints.manual
+        case SetpointSource.OFFBOARD:
+            return flight.setpoints.offboard
+        case SetpointSource.TARGET:
+            return flight.setpoints.beside_target
 
 
 def active_setpoint(flight: Flight) -> Setpoint | None:
     """The setpoint that is followed while GUIDED; None before the first."""
-    match flight.setpoints.source:
-        case SetpointSource.ORBIT:
-            return flight.setpoints.circle
-        case SetpointSource.MANUAL:
-            return flight.setpoints.manual.setpoint
-        case SetpointSource.OFFBOARD:
-            return flight.setpoints.offboard.setpoint
+    stream = source_stream(flight)
+    return flight.setpoints.circle if stream is None else stream.setpoint
+
+
+def is_target_lost(flight: Flight, now_us: int) -> bool:
+    """Whether a target that was known has not been reported for too long."""
+    stream = flight.setpoints.beside_target
+    return stream.setpoint is not WAIT and not stream.is_fresh(now_us, TARGET_LOSS_US)
+
+
+def waiting_for_target(flight: Flight, now_us: int) -> Flight:
+    """The flight that waits until its target is reported."""
+    return replace(flight, setpoints=replace(flight.setpoints, beside_target=SetpointStream(WAIT, now_us)))
 
 
 def is_source_lost(flight: Flight, now_us: int, settings: Settings) -> bool:
-    """Whether the source of setpoints has been silent for too long; a circle needs none."""
+    """Whether the source of setpoints has been silent for too long; a circle needs none, and a target is
+    waited for."""
     limits, source = settings.setpoints, flight.setpoints.source
     if source == SetpointSource.OFFBOARD:
         stream = flight.setpoints.offboard

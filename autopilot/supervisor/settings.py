@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import radians
 
 from autopilot.guidance.heading import HeadingLimits
+from autopilot.guidance.target import TargetPlace
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import PathLimits
 from autopilot.trajectory.rotor_demand import bounds_along_paths
@@ -20,6 +21,8 @@ from autopilot.vehicle.rotors import (
 )
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
+HEIGHT_OVER_TARGET = 2  # FLW_TGT_ALT_M
+LONGEST_SMOOTHING_S = 10.0  # of the velocity of a target, with FLW_TGT_RS = 1
 MIN_AUTHORITY = 0.1  # least authority over moments to fly with, as a share of that of all rotors
 
 
@@ -129,6 +132,7 @@ class Settings:
     heading: HeadingLimits
     failsafe: FailsafeSettings
     setpoints: SetpointSettings
+    target_place: TargetPlace
     fence: FenceSettings
     winch: WinchSettings
     rotors: RotorSettings
@@ -182,6 +186,14 @@ def settings_from(
             hover_share=table["MPC_THR_HOVER"],
             ardupilot_guided=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
             target_is_vehicle=table["GDE_TARGET"] != 0.0,
+        ),
+        target_place=TargetPlace(
+            height_m=table["FLW_TGT_HT"],
+            height_over_target=int(table["FLW_TGT_ALT_M"]) == HEIGHT_OVER_TARGET,
+            distance_m=table["FLW_TGT_DST"],
+            angle=radians(table["FLW_TGT_FA"]),
+            max_turning_m_s=table["FLW_TGT_MAX_VEL"],
+            smoothing_s=LONGEST_SMOOTHING_S * table["FLW_TGT_RS"],
         ),
         fence=FenceSettings(
             action=int(table["GF_ACTION"]),

@@ -14,6 +14,7 @@ from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
 from autopilot.guidance.heading import HEADING_EAST, Heading
 from autopilot.guidance.legs import Leg, PathResume
 from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle, FollowLimits, SetpointStream
+from autopilot.guidance.target import Target
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
@@ -105,6 +106,7 @@ class SetpointSource(Enum):
     OFFBOARD = "setpoints"
     MANUAL = "the stick"
     ORBIT = "a circle"
+    TARGET = "a target"
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +195,8 @@ class Setpoints:
     offboard: SetpointStream = NO_STREAM
     manual: SetpointStream = NO_STREAM
     circle: Circle | None = None
+    target: Target | None = None
+    beside_target: SetpointStream = NO_STREAM  # where the load is to be while it follows the target
     heading_setpoint_us: int = -1  # when the setpoint was received whose heading is the present aim
 
 

@@ -159,12 +159,12 @@ def test_a_ground_station_that_vanishes_disturbs_nobody(
 @staged
 def mavsdk_turns_and_winches(stage: Stage) -> tuple[Told, Witness]:
     stage.begin(speed=SPEED)
-    steps = ("ready", "take_off", "winch", "yaw", "accelerate", "body_rates", "come_back")
+    steps = ("ready", "take_off", "winch", "yaw", "accelerate", "body_rates", "follow", "come_back")
     finished = stage.program("mavsdk_flight.py", f"udpin://{LOOPBACK}:{stage.api}", *steps)
     return finished(), stage.witness
 
 
-def test_mavsdk_turns_the_nose_and_works_the_winch(
+def test_mavsdk_turns_the_nose_works_the_winch_and_leads_the_load(
     mavsdk_turns_and_winches: Callable[[], tuple[Told, Witness]],
 ) -> None:
     told, witness = mavsdk_turns_and_winches()

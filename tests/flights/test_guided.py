@@ -7,6 +7,7 @@ import math
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.setpoint_follower import TrackPosition
 from autopilot.supervisor.state import Phase, setpoint
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from missions import model
 from tests.doubles.craft import Craft
@@ -89,3 +90,30 @@ def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
     # measured 11 mm from the reference and 0.279 m; a stop that coasted on downwards ended on the ground
     assert worst < 0.025
     assert lowest > 0.26
+
+
+def test_a_target_that_turns_is_followed_in_the_simulator() -> None:
+    """Its position is reported once a second, as MAVSDK does; it walks at 1 m/s and turns left."""
+    craft = Craft(FLW_TGT_HT=2.0, FLW_TGT_DST=1.0)
+    craft.wait(1.0)
+    assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
+    assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    assert craft.command(m.MAV_CMD_DO_SET_MODE, 1.0, 4.0, 8.0) == ACCEPTED
+    assert craft.texts[-1] == "FOLLOWME: waiting for FOLLOW_TARGET"
+    home = Home()
+    east, north = 2.0, 0.0
+    for way_east, way_north in ((1.0, 0.0), (0.0, 1.0)):
+        for _ in range(15):
+            lat, lon, _ = geodetic_from_enu((east, north, 0.0), home)
+            none, upright = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+            place = lat, lon, home.altitude_m
+            craft.send(m.MAVLink_follow_target_message(0, 1, *place, none, none, upright, none, none, 0))
+            craft.wait(1.0)
+            east, north = east + way_east, north + way_north
+        # measured 3 mm: positions are transferred in units of 1e-7 degrees, which are 11 mm
+        behind = (east - way_east, north - way_north, 2.0)
+        assert norm(sub(craft.truth.x_load, behind)) < 0.05
+    craft.wait(6.0)
+    assert craft.texts[-1] == "No FOLLOW_TARGET for 3 s: the load waits for it"
+    assert norm(craft.truth.v_load) < 0.02

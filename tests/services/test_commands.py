@@ -422,10 +422,10 @@ def test_set_mode_message_refused(rig, base_mode, custom, result):
     ("flavour", "custom", "text"),
     [
         (PX4, 7 << 16, "STABILIZED not flown; use LOITER MISSION RTL LAND"),
-        (PX4, 8 << 24 | 4 << 16, "FOLLOWME not flown; use LOITER MISSION RTL LAND"),
+        (PX4, 5 << 16, "ACRO not flown; use LOITER MISSION RTL LAND POSCTL"),
         (PX4, 99 << 16, "Mode 6488064 unknown; use LOITER MISSION RTL LAND"),
         (ARDUPILOT, 0, "STABILIZE not flown; use GUIDED AUTO RTL LAND"),
-        (ARDUPILOT, 23, "FOLLOW not flown; use GUIDED AUTO RTL LAND POSHOLD"),
+        (ARDUPILOT, 1, "ACRO not flown; use GUIDED AUTO RTL LAND POSHOLD"),
         (ARDUPILOT, 77, "Mode 77 unknown; use GUIDED AUTO RTL LAND POSHOLD"),
         (ARDUPILOT, 2**32 - 1, "Mode 4294967295 unknown; use GUIDED AUTO RTL LAND"),
     ],

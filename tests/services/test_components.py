@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from autopilot.services.identity import Identity
+from autopilot.services.identity import FOLLOW_MODE, Identity
 from autopilot.services.requests import Winch
 from autopilot.wire.dialect import plumbline as m
 
@@ -164,3 +164,19 @@ def test_each_component_counts_its_own_messages(rig):
 def test_what_the_winch_says_of_itself_comes_from_it(rig):
     said = {r.component for r in rig.run(SECOND_US) if r.message.get_type() == "WINCH_STATUS"}
     assert said == {WINCH}
+
+
+def test_the_winch_is_silent_while_a_target_is_followed(rig):
+    """FollowMe of MAVSDK takes every HEARTBEAT of the system for the autopilot's, and ends its own mode."""
+    rig.send(long((1, WINCH), m.MAV_CMD_DO_WINCH, 1, 5))
+
+    def winch_beats():
+        got = rig.run(5 * SECOND_US)
+        return sum(r.message.get_type() == "HEARTBEAT" and r.component == WINCH for r in got)
+
+    assert winch_beats() == 5
+    main, sub = FOLLOW_MODE
+    rig.changes = {"main_mode": main, "sub_mode": sub}
+    assert winch_beats() == 0
+    rig.changes = {}
+    assert winch_beats() == 5

@@ -45,7 +45,7 @@ _NAMES = (b"LOAD_MASS", b"CTRL_RATE_HZ", b"MIS_TAKEOFF_ALT")
 # messages that the vehicle handles, and a few that it does not
 HANDLED = [
     11, 4, 20, 21, 23, 37, 38, 39, 40, 41, 43, 44, 45, 47, 48, 51, 66, 73, 75, 76, 110, 111, 117, 119, 121,
-    122, 256, 0, 84, 253, 69, 70, 82, 86,
+    122, 256, 0, 84, 253, 69, 70, 82, 86, 144,
 ]  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from autopilot.services.guided import (
     read_global,
     read_local,
     read_stick,
+    read_target,
 )
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -23,6 +24,7 @@ from autopilot.services.requests import (
     FollowRates,
     FollowSetpoint,
     FollowStick,
+    FollowTarget,
     Orbit,
     Pause,
     Reposition,
@@ -229,6 +231,37 @@ def test_channels_that_are_given_back_ask_for_nothing(rig):
 def test_a_pulse_of_no_receiver_is_refused():
     assert isinstance(read_channels(channels(pitch=2201)), Verdict)
     assert isinstance(read_channels(channels(pitch=100)), Verdict)
+
+
+def target(capabilities, lat, lon, alt=0.0, velocity=(0.0, 0.0, 0.0)):
+    place = round(lat * 1e7), round(lon * 1e7), alt
+    none, upright = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    return m.MAVLink_follow_target_message(0, capabilities, *place, velocity, none, upright, none, none, 0)
+
+
+def test_a_target_is_reported_with_what_its_sender_estimates():
+    home = Home(47.0, 8.0, 500.0)
+    asked = read_target(target(3, 47.0001, 8.0001, 502.0, (1.0, 2.0, -0.5)), home)
+    assert isinstance(asked, FollowTarget)
+    assert asked.position == pytest.approx((7.6, 11.12, 2.0), abs=0.02)
+    assert asked.velocity == (2.0, 1.0, 0.5)
+    # MAVSDK sends a velocity that it does not claim to know
+    assert read_target(target(1, 47.0, 8.0, 502.0, (1.0, 2.0, 0.0)), home) == FollowTarget(
+        (0.0, 0.0, 2.0), None
+    )
+    unknown = (math.nan, 0.0, 0.0)
+    assert read_target(target(3, 47.0, 8.0, math.nan, unknown), home) == FollowTarget((0.0, 0.0, 0.0), None)
+
+
+@pytest.mark.parametrize("message", [target(2, 47.0, 8.0), target(3, 91.0, 8.0), target(3, 47.0, 181.0)])
+def test_a_target_without_a_position_is_refused(message):
+    verdict = read_target(message, Home(47.0, 8.0, 500.0))
+    assert verdict == Verdict(m.MAV_RESULT_DENIED, "Target refused: FOLLOW_TARGET without a position")
+
+
+def test_a_target_of_any_sender_is_handed_on(rig):
+    rig.send(target(3, 47.0, 8.0))
+    assert [type(asked) for asked in rig.asked] == [FollowTarget]
 
 
 def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):

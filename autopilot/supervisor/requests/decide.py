@@ -16,6 +16,7 @@ from autopilot.services.requests import (
     FollowRates,
     FollowSetpoint,
     FollowStick,
+    FollowTarget,
     Grab,
     Land,
     Orbit,
@@ -47,6 +48,7 @@ from autopilot.supervisor.requests.orbit import orbit
 from autopilot.supervisor.requests.payload import grab, release_load, winch
 from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
 from autopilot.supervisor.requests.takeoff import takeoff
+from autopilot.supervisor.requests.target import follow_target
 from autopilot.supervisor.requests.verdicts import Decision, Handler
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, View
@@ -81,6 +83,7 @@ HANDLERS: dict[type, Handler] = {
     FollowAttitude: follow_attitude,
     FollowRates: follow_rates,
     FollowStick: follow_stick,
+    FollowTarget: follow_target,
     TurnHeading: turn_heading,
     LookAt: look_at,
     Orbit: orbit,

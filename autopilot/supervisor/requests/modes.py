@@ -15,6 +15,7 @@ from autopilot.supervisor.requests.guided import offboard, position_control
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.mission import continue_mission
 from autopilot.supervisor.requests.takeoff import takeoff
+from autopilot.supervisor.requests.target import follow_me
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, Handler, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -94,6 +95,7 @@ MODES: dict[tuple[int, int], Handler] = {
     (identity.AUTO, identity.AUTO_MISSION): continue_mission,
     (identity.AUTO, identity.AUTO_RTL): return_home,
     (identity.AUTO, identity.AUTO_LAND): land,
+    identity.FOLLOW_MODE: follow_me,
     (identity.OFFBOARD, 0): offboard,
     (identity.POSCTL, 0): position_control,
 }
@@ -130,4 +132,5 @@ def _in_guided_mode(flight: Flight) -> bool:
     rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (
         flight.phase == Phase.HOLD and flight.accepts_setpoints
     )
-    return rising or (flight.phase == Phase.GUIDED and flight.setpoints.source != SetpointSource.MANUAL)
+    by_setpoints = flight.setpoints.source in (SetpointSource.OFFBOARD, SetpointSource.ORBIT)
+    return rising or (flight.phase == Phase.GUIDED and by_setpoints)

@@ -12,7 +12,13 @@ from autopilot.guidance.setpoint_follower import (
 )
 from autopilot.supervisor.motion import with_control_modes
 from autopilot.supervisor.phase_legs import MIN_LOAD_HEIGHT
-from autopilot.supervisor.setpoint_source import active_setpoint, is_source_lost
+from autopilot.supervisor.setpoint_source import (
+    TARGET_LOSS_US,
+    active_setpoint,
+    is_source_lost,
+    is_target_lost,
+    waiting_for_target,
+)
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     INFO,
@@ -48,13 +54,17 @@ def watch_takeoff_setpoint(flight: Flight, view: View, settings: Settings) -> Wa
 
 
 def watch_setpoints(flight: Flight, view: View, settings: Settings) -> WatchResult:
-    """Lead the load towards the setpoint of this moment; hold it if the source falls silent."""
+    """Lead the load towards the setpoint of this moment; hold it if the source falls silent. A target that is
+    lost is waited for."""
     if flight.phase != Phase.GUIDED:
         return WatchResult(flight)
     source, circle = flight.setpoints.source, flight.setpoints.circle
     if is_source_lost(flight, view.now_us, settings):
         text = f"Nothing usable from {source.value} any more: holding"
         return WatchResult(flight, Event.HOLD, ((WARNING, text),))
+    if source == SetpointSource.TARGET and is_target_lost(flight, view.now_us):
+        text = f"No FOLLOW_TARGET for {TARGET_LOSS_US / 1e6:g} s: the load waits for it"
+        return WatchResult(waiting_for_target(flight, view.now_us), texts=((WARNING, text),))
     if source == SetpointSource.ORBIT and circle is not None and view.now_us >= circle.ends_us:
         return WatchResult(flight, Event.HOLD, ((INFO, "Circle flown: holding"),))
     setpoint, leg = active_setpoint(flight), flight.legs[0]

@@ -10,12 +10,15 @@ import math
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from mavsdk import ComponentType, Configuration, Mavsdk, MavsdkError
 from mavsdk.plugins.action import Action
+from mavsdk.plugins.follow_me import Config as FollowConfig
+from mavsdk.plugins.follow_me import FollowMe, TargetLocation
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.gripper import Gripper
@@ -364,6 +367,30 @@ class Pilot:
         offboard.set_attitude(Attitude(0.0, 0.0, 90.0, 0.5))
         self.heading(90.0)
         offboard.stop()
+        self.mode("HOLD")
+
+    def follow(self) -> None:
+        """The load at 8.5 m, 6 m behind somebody who walks north."""
+        follower, seen = FollowMe(self.system), self.telemetry.position_velocity_ned
+        self.until("its parameters", lambda: follower.get_config().max_tangential_vel_m_s == 5.0)
+        follower.set_config(FollowConfig(8.5, 6.0, 0.1, FollowConfig.FollowAltitudeMode(0), 5.0, 180.0))
+        follower.start()
+        self.mode("FOLLOW_ME")
+        self.until("its own heartbeat", follower.is_active)
+        home, begun = self.telemetry.home(), time.monotonic()
+
+        def walked_m() -> float:
+            return 10.0 + 0.5 * (time.monotonic() - begun)
+
+        def behind() -> bool:
+            walked = walked_m()
+            place = home.latitude_deg + walked / DEGREE_M, home.longitude_deg, home.absolute_altitude_m
+            follower.set_target_location(TargetLocation(*place, 0.0, 0.0, 0.0))
+            load, speed = seen().position, seen().velocity.north_m_s
+            return abs(load.north_m - walked + 6.0) < 0.2 and speed > 0.05 and self.height() > 9.0
+
+        self.until("the load behind its target", behind)
+        follower.stop()
         self.mode("HOLD")
 
     def winch(self) -> None:

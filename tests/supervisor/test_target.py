@@ -1,0 +1,106 @@
+"""FOLLOWME: the load accompanies a target that ground stations report."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.onboard.snapshot import reported_mode
+from autopilot.services import identity
+from autopilot.services.records import Verdict
+from autopilot.services.requests import FollowTarget, Land, Pause, SetMode
+from autopilot.supervisor.state import Phase, SetpointSource
+from autopilot.wire.dialect import plumbline as m
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
+
+FOLLOWME = SetMode(identity.AUTO, identity.AUTO_FOLLOW, name="FOLLOWME")
+MODE = (identity.AUTO, identity.AUTO_FOLLOW)
+PLACE = SETTINGS.target_place
+WAITS = "FOLLOWME: waiting for FOLLOW_TARGET"
+
+
+def walk(sky: Sky, begin: Vec3, velocity: Vec3, seconds: float, reports_velocity: bool = True) -> Vec3:
+    """Fly while a target walks from a place on and reports once a second; where it is in the end."""
+    start_us = sky.view.now_us
+
+    def place() -> Vec3:
+        t = (sky.view.now_us - start_us) * 1e-6
+        x, y, z = (b + t * v for b, v in zip(begin, velocity, strict=True))
+        return (x, y, z)
+
+    for k in range(round(seconds * 1e6 / STEP_US)):
+        if k * STEP_US % 1_000_000 == 0:
+            report = FollowTarget(place(), velocity if reports_velocity else None)
+            assert sky.ask(report).result == ACCEPTED
+        sky.tick()
+    return place()
+
+
+@pytest.mark.parametrize("reports_velocity", [True, False])
+def test_the_load_flies_behind_a_target_and_faces_it(reports_velocity: bool) -> None:
+    sky = Sky().airborne()
+    assert sky.ask(FOLLOWME) == Verdict(ACCEPTED, WAITS)
+    assert reported_mode(sky.flight) == MODE
+    target = walk(sky, (2.0, 1.0, 0.0), (0.0, 1.2, 0.0), 25.0, reports_velocity)
+    assert reported_mode(sky.flight) == MODE
+    behind = (target[0], target[1] - PLACE.distance_m, PLACE.height_m)
+    assert norm(sub(sky.view.x_load, behind)) < 0.02
+    assert sky.view.v_load[1] == pytest.approx(1.2, abs=0.02)
+    assert sky.flight.heading.angle == pytest.approx(0.5 * math.pi, abs=0.02)
+
+
+def test_a_target_that_is_lost_is_waited_for_and_followed_again() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(FOLLOWME).result == ACCEPTED
+    target = walk(sky, (3.0, 0.0, 0.0), (1.0, 0.0, 0.0), 15.0)
+    sky.wait(12.0)
+    assert sky.texts[-1] == "No FOLLOW_TARGET for 3 s: the load waits for it"
+    assert sky.texts.count(sky.texts[-1]) == 1
+    assert reported_mode(sky.flight) == MODE and sky.flight.phase == Phase.GUIDED
+    waiting_at = sky.view.x_load
+    assert norm(sky.view.v_load) < 1e-3
+    sky.wait(5.0)
+    assert norm(sub(sky.view.x_load, waiting_at)) < 1e-3
+    target = walk(sky, target, (0.0, -1.0, 0.0), 25.0)
+    assert norm(sub(sky.view.x_load, (target[0], target[1] + PLACE.distance_m, PLACE.height_m))) < 0.02
+
+
+def test_reports_in_other_modes_move_nothing_and_are_known_when_the_mode_begins() -> None:
+    sky = Sky().airborne()
+    before = sky.view.x_load
+    target = walk(sky, (5.0, 0.0, 0.0), (0.5, 0.0, 0.0), 4.0)
+    assert norm(sub(sky.view.x_load, before)) < 1e-6
+    assert sky.flight.phase == Phase.HOLD
+    assert sky.ask(FOLLOWME) == Verdict(ACCEPTED)  # nothing is to be waited for
+    target = walk(sky, target, (0.5, 0.0, 0.0), 15.0)
+    assert norm(sub(sky.view.x_load, (target[0] - PLACE.distance_m, 0.0, PLACE.height_m))) < 0.02
+
+
+@pytest.mark.parametrize(("request_", "phase"), [(Pause(), Phase.HOLD), (Land(), Phase.LOWER)])
+def test_commands_take_over(request_: Pause | Land, phase: Phase) -> None:
+    sky = Sky().airborne()
+    assert sky.ask(FOLLOWME).result == ACCEPTED
+    walk(sky, (3.0, 0.0, 0.0), (1.0, 0.0, 0.0), 5.0)
+    assert sky.ask(request_).result == ACCEPTED
+    sky.tick()
+    assert sky.flight.phase == phase
+    assert reported_mode(sky.flight) != MODE
+
+
+def test_it_follows_in_the_air_only() -> None:
+    sky = Sky()
+    refused = Verdict(m.MAV_RESULT_TEMPORARILY_REJECTED, "FOLLOWME denied: take off first")
+    assert sky.ask(FOLLOWME) == refused
+
+
+def test_a_target_that_is_too_far_away_is_refused_and_not_followed() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(FOLLOWME).result == ACCEPTED
+    verdict = sky.ask(FollowTarget((2e5, 0.0, 0.0), None))
+    assert verdict == Verdict(m.MAV_RESULT_DENIED, "Target refused: more than 100000 m from home")
+    assert sky.flight.setpoints.source == SetpointSource.TARGET
+    before = sky.view.x_load
+    sky.wait(5.0)
+    assert norm(sub(sky.view.x_load, before)) < 1e-6
