@@ -17,6 +17,7 @@ from autopilot.wire.parameter_table import decimal_from_float32
 from gcs.clients.connection import Connection
 from gcs.clients.operation import Target
 from gcs.clients.vehicle_view import VehicleView
+from gcs.view.availability import unavailable_actions
 from gcs.view.link_quality import LinkQuality
 from gcs.view.tether import Tether
 from gcs.view.truth import PositionNED, Truth
@@ -134,6 +135,7 @@ class WatchedVehicle:
             "force_max": force_max,
             "estimator_error": self._estimator_error(),
             "wind": _rounded_values(self._wind()),
+            "unavailable": unavailable_actions(view),
             "link": self.link.record(now_us),
         }
 

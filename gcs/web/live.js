@@ -43,7 +43,8 @@
   const TAKE = {
     hello(record) {
       controls.offer(record.controls);
-      controls.enable(false);
+      page.enabled = undefined; // the sliders are new
+      enable();
     },
     session(record) {
       const isOver = Boolean(record.outcome && !page.session.outcome);
@@ -173,21 +174,26 @@
     page.socket.send(JSON.stringify({ vehicle: page.chosen, request: page.requests, action, arguments: words }));
   }
 
-  function enable() {
+  /** Why nothing can be commanded; empty if the chosen vehicle takes commands. */
+  function commandProblem() {
     const vehicle = page.vehicles.get(page.chosen);
-    const some = Boolean(vehicle && vehicle.state && !page.session.outcome);
-    if (some === page.enabled) return;
-    page.enabled = some;
-    controls.enable(some);
-    if (some && vehicle.record) controls.setParameters(vehicle.record.parameters);
-    const how = some ? "Double-click: take the load there. Drag: turn. Wheel: zoom." : "";
-    byId("hint").textContent = noPicture || how;
+    if (!isConnected()) return "the server of this page has ended";
+    if (page.session.outcome) return "the flight is over";
+    return vehicle && vehicle.state ? "" : "no vehicle has reported yet";
+  }
+
+  function enable() {
+    const vehicle = page.vehicles.get(page.chosen), why = commandProblem();
+    controls.enable(why, vehicle && vehicle.state ? vehicle.state.unavailable : {});
+    if (page.enabled === !why) return;
+    page.enabled = !why;
+    if (!why && vehicle.record) controls.setParameters(vehicle.record.parameters);
+    byId("hint").textContent = noPicture || (why ? "" : "Double-click: take the load there. Drag: turn. Wheel: zoom.");
   }
 
   if (scene) {
     scene.onPick((place, ground, clicks) => {
-      const vehicle = page.vehicles.get(page.chosen);
-      if (clicks !== 2 || !vehicle || !vehicle.state || page.session.outcome || !isConnected()) return;
+      if (clicks !== 2 || commandProblem()) return;
       const goal = place.map((value) => Math.round(value * 1000) / 1000);
       scene.setGoal(goal);
       ask("goto", { place: goal });
@@ -289,8 +295,7 @@
       if (TAKE[record.type]) TAKE[record.type](record);
     });
     socket.addEventListener("close", () => {
-      controls.enable(false);
-      page.enabled = false;
+      enable();
       showServer(true);
       setTimeout(connect, RETRY_MS);
     });

@@ -108,10 +108,18 @@
       box.classList.toggle("bad", !record.ok);
     }
 
-    /** Enables the controls if there is some vehicle to command, else disables them. */
-    enable(some) {
-      for (const button of document.querySelectorAll("#commands button, #world button")) button.disabled = !some;
-      if (!some) for (const { input } of this.sliders.values()) input.disabled = true;
+    /**
+     * Enables the controls, except those that the vehicle would refuse now; the title of a disabled one says why.
+     * @param why why nothing can be commanded, empty if something can
+     * @param unavailable the reasons of single actions
+     */
+    enable(why, unavailable) {
+      for (const button of document.querySelectorAll("#commands button, #world button")) {
+        const reason = why || unavailable[button.dataset.action] || "";
+        if (button.title !== reason) button.title = reason;
+        button.disabled = Boolean(reason);
+      }
+      if (why) for (const { input } of this.sliders.values()) input.disabled = true;
     }
   }
 

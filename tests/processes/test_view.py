@@ -79,7 +79,15 @@ def test_a_flight_is_seen_and_led_by_hand(
 
     browser.find("[data-action=hold]").click()
     browser.wait(f"{ANSWER} === 'pause: accepted' && {STATE}.phase === 'hold'")
-    browser.find("[data-action=disarm]").click()
+    disabled = "document.querySelectorAll('#flight-buttons button:disabled')"
+    assert browser.run(
+        f"return Object.fromEntries([...{disabled}].map((one) => [one.textContent, one.title]))"
+    ) == {
+        "Lift": "in the air",
+        "Arm": "armed already",
+        "Disarm": "in the air: land first",
+    }
+    browser.run("Plumbline.live.ask('disarm', {})")  # as if telemetry had been too late for the button
     browser.wait(f"{ANSWER}.includes('denied') && {ANSWER}.includes('in the air')")
 
     browser.find("[data-camera=top]").click()

@@ -32,6 +32,7 @@ HOVERING = {
     "phase": "hold",
     "armed": True,
     "load": None,
+    "unavailable": {"arm": "armed already", "takeoff": "in the air"},
     "link": {"lost": False, "age": 0.1, "rate": 50, "pace": 1.0, "loss": 0.0},
 }
 
@@ -101,3 +102,24 @@ def test_a_flight_that_is_over_keeps_its_outcome(page: Browser) -> None:
     page.run("sockets[0].end()")
     wait_for_panels(page)
     assert page.run(f"return [{CHIP}, {BANNER}.textContent]") == ["completed", "completed"]
+
+
+BUTTONS = """
+return Object.fromEntries([...document.querySelectorAll("#flight-buttons button")].map(
+  (one) => [one.dataset.action, one.disabled ? one.title : ""]))
+"""
+
+
+def test_a_button_that_the_vehicle_would_refuse_is_disabled_and_says_why(page: Browser) -> None:
+    assert set(page.run(BUTTONS).values()) == {"no vehicle has reported yet"}
+    say(page, {"type": "state", "vehicles": [HOVERING], "samples": {}})
+    shown = page.run(BUTTONS)
+    assert {action: why for action, why in shown.items() if why} == HOVERING["unavailable"]
+    assert "hold" in shown
+    landed = {**HOVERING, "phase": "disarmed", "armed": False, "unavailable": {"hold": "on the ground"}}
+    say(page, {"type": "state", "vehicles": [landed], "samples": {}})
+    assert {action: why for action, why in page.run(BUTTONS).items() if why} == {"hold": "on the ground"}
+    say(page, {"type": "session", "kind": "fly", "outcome": "completed", "reason": ""})
+    assert set(page.run(BUTTONS).values()) == {"the flight is over"}
+    page.run("sockets[0].end()")
+    assert set(page.run(BUTTONS).values()) == {ENDED}
