@@ -51,6 +51,7 @@ def render_page(
         still=_picture(directory, PICTURES[0].file, PICTURES[0].caption),
         has_texts=bool(replay["texts"]),
         steps=bool(replay["steps"]),
+        has_worst=replay["worst"] is not None,
         shows_estimate=replay["source"] == "estimate",
         command=meta.command,
         version=meta.version,

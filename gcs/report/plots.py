@@ -15,6 +15,7 @@ from gcs.analysis.failure import after_failure
 from gcs.analysis.record import FlightMeta, Record
 from gcs.analysis.samples import CARRIED, Samples
 from gcs.analysis.tracks import Telemetry
+from gcs.report.missing import no_attitude_error_reason, no_error_reason
 from gcs.report.replay import layout_of
 from gcs.report.style import (
     AXES,
@@ -35,6 +36,7 @@ from gcs.report.style import (
     length_scale,
     new_axes_grid,
     new_figure,
+    note,
     note_if_empty,
     phase_spans,
     rotor_colour,
@@ -79,11 +81,20 @@ class View:
 
     @property
     def shown(self) -> NDArray[np.bool_]:
-        """(n,) the mission window, and after a failure the flight until the load is set down."""
+        """(n,) the mission window, and after a failure the flight until the load is set down; all of a flight
+        without a mission window."""
+        in_mission = self.samples.in_mission
+        return self._until_set_down | in_mission if in_mission.any() else np.ones_like(in_mission)
+
+    @property
+    def _until_set_down(self) -> NDArray[np.bool_]:
+        """(n,) after a failure, until the load is set down."""
         failed_s = self.record["failure_s"]
-        if failed_s is None:
-            return self.samples.in_mission
-        return self.samples.in_mission | after_failure(self.samples, failed_s)
+        return (
+            np.zeros_like(self.samples.in_mission)
+            if failed_s is None
+            else after_failure(self.samples, failed_s)
+        )
 
     @property
     def error_m(self) -> Floats:
@@ -91,8 +102,13 @@ class View:
         failed_s = self.record["failure_s"]
         if failed_s is None:
             return self.samples.error_m
-        known = self.shown | (self.samples.time_s < failed_s)
+        known = self.samples.in_mission | self._until_set_down | (self.samples.time_s < failed_s)
         return np.where(known[:, None], self.samples.error_m, np.nan)
+
+    def note_if_unknown(self, ax: Any, errors: Floats) -> None:
+        """Write into axes why they show no error of the load, if none of `errors` is known."""
+        if not np.isfinite(errors).any():
+            note(ax, no_error_reason(self.telemetry, self.samples))
 
     @property
     def rotors(self) -> Floats:
@@ -164,9 +180,12 @@ def error(view: View, path: Target) -> None:
     figure, axes = new_axes_grid(11.0, 6.2, 3, 2)
     s = view.samples
     visible = view.visible(s.time_s)
-    scale, unit = length_scale(view.error_m[visible])
     # a load that was released is not followed by estimator and filter
     actual_m = np.where(s.attached[:, None], s.actual_m, np.nan)
+    errors_m = view.error_m[visible]
+    scale, unit = length_scale(
+        errors_m if np.isfinite(errors_m).any() else (s.estimated_m - actual_m)[visible]
+    )
     estimate_error, filtered = scale * (s.estimated_m - actual_m), scale * (s.filtered_m - actual_m)
     has_filter = bool(np.isfinite(filtered).any())  # a custom estimator flies, the built-in filter beside it
     columns = (
@@ -190,7 +209,8 @@ def error(view: View, path: Target) -> None:
                 shown = filtered[visible, i]
                 draw(ax, s.time_s[visible], shown, color=GREEN, linewidth=0.8, label="built-in filter − true")
             draw(ax, s.time_s[visible], values[visible, i], color=BLUE, label="true − desired")
-            note_if_empty(ax)
+            if i == 0 or not ax.lines:  # once over the errors of the estimate
+                view.note_if_unknown(ax, values[visible, i])
             ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
             ax.set_ylabel(f"{axis} ({shown_unit})")
             _set_min_range(ax, 1e-3 * scale)
@@ -229,15 +249,15 @@ def psi(view: View, path: Target) -> None:
     figure, axes = new_axes_grid(10.0, 5.0, 2)
     cascade = view.telemetry.cascade
     visible = view.visible(cascade.time_s)
-    for ax, values, name, title, colour in (
-        (axes[0, 0], cascade.psi_R, "Ψ_R", "Vehicle attitude error function", BLUE),
-        (axes[1, 0], cascade.psi_q, "Ψ_q", "Load attitude error function", RED),
+    for ax, values, name, what, colour in (
+        (axes[0, 0], cascade.psi_R, "Ψ_R", "vehicle", BLUE),
+        (axes[1, 0], cascade.psi_q, "Ψ_q", "load", RED),
     ):
         draw(ax, cascade.time_s[visible], values[visible], color=colour)
-        ax.set_title(title)
+        ax.set_title(f"{what.capitalize()} attitude error function")
         ax.set_ylabel(_math_text(name))
         ax.set_ylim(bottom=0.0)
-        note_if_empty(ax)
+        note_if_empty(ax, no_attitude_error_reason(view.telemetry, what))
     figure.subplots_adjust(hspace=0.34)
     view.shade(axes[:, 0])
     save(figure, path)
@@ -374,8 +394,9 @@ def overview(view: View, path: Target) -> None:
             alpha=0.9,
             label=str(i + 1),
         )
+    view.note_if_unknown(above, error_m)
+    note_if_empty(below)
     for ax in (above, below):
-        note_if_empty(ax)
         draw_legend(ax)
     _limits(view, below)
     below.set_title("Rotor forces and limits")

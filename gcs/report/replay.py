@@ -22,6 +22,7 @@ from gcs.analysis.axes import Floats, quat_enu_flu_from_ned_frd
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.samples import PHASE_NAMES, Samples, samples_of
 from gcs.analysis.tracks import Telemetry, rotor_names
+from gcs.report.missing import no_error_reason
 from gcs.report.packing import Column, pack
 from gcs.report.steps import step_texts
 from gcs.report.style import phase_spans
@@ -79,6 +80,7 @@ def replay_of(
         ],
         "steps": steps_of(telemetry),
         "worst": worst_moment(samples),
+        "no_error": "" if np.isfinite(samples.error_m).any() else no_error_reason(telemetry, samples),
         "wind": _wind(telemetry),
         "samples": pack(*_columns(telemetry, samples, columns)),
     }

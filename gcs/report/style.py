@@ -15,6 +15,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats
 from gcs.analysis.samples import PHASE_NAMES
 from gcs.analysis.tracks import Ints
+from gcs.report.missing import NOT_IN_LOG
 
 # Okabe and Ito's palette
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -167,10 +168,18 @@ def length_scale(values_m: Floats) -> tuple[float, str]:
     return (1.0, "m") if finite.size and np.abs(finite).max() >= 1.0 else (1e3, "mm")
 
 
-def note_if_empty(ax: Any, text: str = "not in the log") -> None:
+def note_if_empty(ax: Any, text: str = NOT_IN_LOG) -> None:
     """Write `text` into axes in which nothing was drawn."""
     if not ax.lines and not ax.collections:
-        ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
+        note(ax, text)
+
+
+def note(ax: Any, text: str) -> None:
+    """Write `text` into the middle of the axes."""
+    pad = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5}
+    ax.text(
+        *(0.5, 0.5, text), transform=ax.transAxes, ha="center", va="center", color=GREY, bbox=pad, zorder=6
+    )
 
 
 def draw_legend(ax: Any, columns: int = 4) -> None:

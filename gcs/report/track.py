@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gcs.analysis.axes import Floats, body_axes
 from gcs.analysis.samples import Samples
+from gcs.report.missing import NOT_IN_LOG
 from gcs.report.style import GREY, INK, PALE, SHADOW, length_scale
 
 _SNAPSHOTS = 7
@@ -67,7 +68,7 @@ def draw_track(
     mission = known & shown
     if not known.any():
         ax.set_axis_off()
-        ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
+        ax.text2D(0.5, 0.5, NOT_IN_LOG, transform=ax.transAxes, ha="center", color=GREY)
         return
     is_tracked = mission & (np.abs(samples.desired_m) < _FAR_M).all(axis=1)
     central = mission if mission.any() else known

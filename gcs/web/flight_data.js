@@ -41,7 +41,7 @@
     }
 
     constructor(values, columns) {
-      Object.assign(this, values); // span, phases, texts, steps, worst, wind, limits_n, source
+      Object.assign(this, values); // span, phases, texts, steps, worst, no_error, wind, limits_n, source
       this.layout = values.vehicle;
       this._columns = columns;
       this.time = columns.time || new Float64Array(0);

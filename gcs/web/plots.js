@@ -1,4 +1,5 @@
-/* The plots of a flight: Plumbline.plotsOf(flight) gives options of Plumbline.Chart; those without data are left out. */
+/* The plots of a flight: Plumbline.plotsOf(flight) gives options of Plumbline.Chart. Those without data are left out; of
+   the first one, `absent` says why there is none. */
 (function () {
   "use strict";
   const Plumbline = (window.Plumbline = window.Plumbline || {});
@@ -29,14 +30,14 @@
   function position(flight) {
     const load = flight.vector("load"), asked = flight.vector("asked");
     if (!load) return null;
-    return { title: "Load position", unit: "m, dashed: asked", digits: 3, least: 0.1,
+    return { title: "Load position", unit: asked ? "m, dashed: asked" : "m", digits: 3, least: 0.1,
       series: [...lines(AXES, load), ...lines(AXES, asked, { dash: true, color: "faint", quiet: true })] };
   }
 
   function velocity(flight) {
     const speed = flight.vector("velocity"), asked = flight.vector("asked_velocity");
     if (!speed) return null;
-    return { title: "Load velocity", unit: "m/s, dashed: asked", digits: 2, least: 0.1,
+    return { title: "Load velocity", unit: asked ? "m/s, dashed: asked" : "m/s", digits: 2, least: 0.1,
       series: [...lines(AXES, speed), ...lines(AXES, asked, { dash: true, color: "faint", quiet: true })] };
   }
 
@@ -69,9 +70,10 @@
   }
 
   Plumbline.plotsOf = function (flight) {
-    const psi = ["psi_R", "psi_q"].map((name) => flight.column(name)).filter(Boolean);
+    const psi = [["Ψ_R", "psi_R"], ["Ψ_q", "psi_q"]].filter(([, name]) => flight.column(name));
     return [
-      lengths("Load error", flight.error, AXES, 2, flight.distance),
+      lengths("Load error", flight.error, AXES, 2, flight.distance)
+        || (flight.no_error ? { title: "Load error", absent: flight.no_error } : null),
       position(flight),
       single(flight, "tension", "Cable tension", "N", 2, 3, { least: 0.1, zero: true }),
       rotors(flight, "rotor", "Rotor forces"),
@@ -80,7 +82,8 @@
       angles("Cable from vertical", flight.cableAngles(), ["φ towards y", "θ towards −x"]),
       angles("Vehicle attitude", flight.angles(), ["roll", "pitch", "yaw"]),
       rotors(flight, "command", "Rotor commands"),
-      psi.length === 2 ? { title: "Error functions of the cascade", digits: null, series: lines(["Ψ_R", "Ψ_q"], psi), zero: true } : null,
+      psi.length ? { title: "Error functions of the cascade", digits: null, zero: true,
+        series: lines(psi.map(([name]) => name), psi.map(([, name]) => flight.column(name))) } : null,
       single(flight, "voltage", "Battery voltage", "V", 2, 1, { least: 0.1 }),
       single(flight, "charge", "Battery charge", "% of the full battery", 0, 2, { least: 1, zero: true }),
       wind(flight),

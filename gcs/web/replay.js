@@ -21,6 +21,14 @@
     });
   }
 
+  /** Shows in place of a plot why there is none. */
+  function showAbsent(card, { title, absent }) {
+    const name = card.appendChild(document.createElement("b"));
+    name.className = "chart-title";
+    name.textContent = title;
+    card.append(`: ${absent}.`);
+  }
+
   /** Marks the last row that has begun at time t. */
   function mark(rows, t) {
     const begun = rows.filter((row) => row.time !== null && row.time <= t + 1e-9);
@@ -67,7 +75,8 @@
     for (const options of Plumbline.plotsOf(flight)) {
       const card = byId("plots").appendChild(document.createElement("div"));
       card.className = "card";
-      new Plumbline.Chart(card, Object.assign({ time: flight.time, sync: group, height: 158 }, options));
+      if (options.absent) showAbsent(card, options);
+      else new Plumbline.Chart(card, Object.assign({ time: flight.time, sync: group, height: 158 }, options));
     }
     const texts = list(byId("texts"), flight.texts, (t) => transport.set(t, true));
     const steps = list(byId("steps"), flight.steps, (t) => transport.set(t, true));

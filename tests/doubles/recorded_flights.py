@@ -361,3 +361,12 @@ def _fly_it(made: Flight, rng: np.random.Generator) -> None:
     made.psi_q = 2e-4 * made.desired_a[:, 1] ** 2 + np.abs(rng.normal(0.0, 2e-4, n))
     made.psi_r = 8e-4 * made.desired_a[:, 1] ** 2 + np.abs(rng.normal(0.0, 4e-4, n))
     made.estimated = made.actual + rng.normal(0.0, 4e-4, (n, 3))
+
+
+def without_a_lift(phase: int, still_s: float = 2.0) -> Flight:
+    """A flight that is in this phase all the time, in which no law tracks the load."""
+    made = flight(still_s, still)
+    made.phase[:] = phase
+    made.psi_r[:], made.psi_q[:] = 0.01, np.nan
+    made.control_mode[:] = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
+    return made

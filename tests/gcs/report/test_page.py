@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.analysis.record import FlightMeta
 from gcs.report.build import build_report
@@ -294,4 +295,18 @@ def test_without_the_truth_it_shows_what_the_vehicle_believed(browser: Browser, 
     assert browser.run("return replay.flight.source") == "estimate"
     assert browser.run("return replay.stage.scene.crafts.size") == 1
     assert "believed" in browser.find(".keys").text
+    quiet(browser)
+
+
+def test_a_flight_without_a_position_to_follow_says_why_it_has_no_error(
+    browser: Browser, tmp_path: Path
+) -> None:
+    flight = flights.without_a_lift(mavlink.PLUMBLINE_PHASE_TAUTEN)
+    browser.open(report(flight, tmp_path).as_uri())
+    browser.wait(READY)
+    cards = browser.run("return [...document.querySelectorAll('#plots .card')].map((one) => one.textContent)")
+    assert cards[0] == "Load error: the load was not lifted: no position of the load was asked for."
+    assert any(card.startswith("Error functions of the cascade") for card in cards)  # that of the vehicle
+    assert not any("dashed: asked" in card for card in cards)
+    assert "greatest error" not in browser.find(".keys").text
     quiet(browser)

@@ -19,6 +19,7 @@ from PIL import Image
 from pyarrow import parquet
 from rich.console import Console
 
+from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.definitions import GROUPS, METRICS
 from gcs.analysis.record import FlightMeta, Record, flight_record, jsonable
 from gcs.analysis.samples import PHASE_NAMES, samples_of
@@ -458,6 +459,35 @@ def test_pictures_show_a_failure_and_the_landing_after_it(tmp_path):
     whole = view_of(flights.case_b(duration_s=6.0), tmp_path / "whole.tlog")
     assert whole.window[1] < whole.whole_flight[1]
     assert "failure" not in plots.summary_line(whole.record)
+
+
+@pytest.mark.parametrize(
+    ("phase", "reason"),
+    [
+        (mavlink.PLUMBLINE_PHASE_DISARMED, "the vehicle did not take off"),
+        (mavlink.PLUMBLINE_PHASE_TAUTEN, "the load was not lifted: no position of the load was asked for"),
+        (mavlink.PLUMBLINE_PHASE_HOLD, "no position of the load was asked for"),
+    ],
+)
+def test_a_picture_without_data_says_why(tmp_path, monkeypatch, phase, reason):
+    view = view_of(flights.without_a_lift(phase), tmp_path / "flight.tlog")
+    figures = []
+    monkeypatch.setattr(plots, "save", lambda figure, path: figures.append(figure))
+    for draw_it in (plots.overview, plots.error, plots.psi):
+        draw_it(view, io.BytesIO())
+    overview, error, psi = ([{one.get_text() for one in ax.texts} for ax in f.axes] for f in figures)
+    assert sum(reason in texts for texts in overview) == 1
+    assert [reason in texts for texts in error] == [True, True, False, True, False, True]
+    took_off = phase != mavlink.PLUMBLINE_PHASE_DISARMED
+    assert ("no attitude of the load was asked for" if took_off else reason) in psi[1]
+
+
+def test_a_lost_flight_without_a_mission_window_is_drawn_from_its_begin(tmp_path):
+    flight = flights.without_a_lift(mavlink.PLUMBLINE_PHASE_TAUTEN)
+    flight.texts.append((3.0, 3, "Failsafe: carried off by the wind, landing"))
+    view = view_of(flight, tmp_path / "flight.tlog")
+    assert view.record["failure_s"] == 3.0
+    assert view.shown.all()
 
 
 def test_the_page_says_which_figures_end_at_a_failure(tmp_path):
