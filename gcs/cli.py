@@ -5,6 +5,7 @@ A command's module is loaded only when the command is called, so that `gcs --hel
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -16,6 +17,8 @@ import click
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_problem
 from gcs.shell.display import notify, restore_stdout
 from missions.nearest import nearest
+
+_COMPLETE_VARIABLE = "_GCS_COMPLETE"  # set by a shell that completes a word, or reads how to do it
 
 # name: (module in gcs.commands, summary)
 COMMANDS = {
@@ -94,6 +97,10 @@ class Gcs(click.Group):
             from autopilot.shell.options import tolerate_closed_terminal
 
             tolerate_closed_terminal()
+        if _COMPLETE_VARIABLE in os.environ:
+            from gcs.commands.parameter_completion import register_bash
+
+            register_bash()
         try:
             code = super().main(args, standalone_mode=False, **extra)
         except GcsError as error:

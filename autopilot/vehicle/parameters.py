@@ -24,18 +24,17 @@ if TYPE_CHECKING:
 FILE = "parameters.toml"
 
 
-def _document() -> dict[str, Any]:
-    """The parsed file, with the names of the laws and the laws' own parameters."""
-    document = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
-    document["CTL_LAW"]["values"] = {str(law.number): law.name for law in law_files()}
+def _read_document() -> dict[str, Any]:
+    found = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
+    found["CTL_LAW"]["values"] = {str(law.number): law.name for law in law_files()}
     for law in law_files():
         own_parameters = dict(law.parameters)
-        document["groups"].update(own_parameters.pop("groups", {}))
-        document.update(own_parameters)
-    return document
+        found["groups"].update(own_parameters.pop("groups", {}))
+        found.update(own_parameters)
+    return found
 
 
-_DOCUMENT = _document()
+_DOCUMENT = _read_document()
 LAWS = tuple(law.name for law in law_files())  # CTL_LAW is an index into this
 OWN_LAW = len(LAWS)  # CTL_LAW of a custom law
 DEFAULT_LAW = LAWS[_DOCUMENT["CTL_LAW"]["default"]]
@@ -64,6 +63,11 @@ def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]])
         elif name in BENCH_MEASURED and BENCH_MEASURED[name] not in names:
             assumed = table.describe(BENCH_MEASURED[name])
             table.set(assumed.name, min(max(value, assumed.low), assumed.high))
+
+
+def document() -> dict[str, Any]:
+    """The parsed file, not checked, with the names of the laws and the laws' own parameters."""
+    return _DOCUMENT
 
 
 @cache

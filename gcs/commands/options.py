@@ -13,6 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from autopilot.shell.options import NonEmptyPath, WholeNumber
+from gcs.commands.parameter_completion import complete_settings
 from gcs.errors import InputError
 from gcs.folders import check_writable
 from gcs.shell.display import reserve_stdout_for_results, results_to_stdout, write_to_stdout
@@ -152,6 +153,11 @@ class SettingType(click.ParamType):  # type: ignore[type-arg]
         if not math.isfinite(parsed):
             self.fail(f"{value!r}; the value must be a finite number", param, ctx)
         return f"{name.strip().upper()}={number.strip()}"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return complete_settings(ctx, param, incomplete)
 
 
 def sysid_option(function: F, otherwise: str = "the first one heard") -> F:

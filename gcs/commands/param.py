@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from gcs.commands.options import OUTPUT_FILE, FiniteType, connect_option, json_option, print_json, print_table
+from gcs.commands.parameter_completion import complete_names
 from gcs.errors import GcsError
 from gcs.shell.link import Address
 from gcs.workflows.parameters import (
@@ -27,7 +28,7 @@ def param_command() -> None:
 
 
 @param_command.command("list")
-@click.argument("pattern", default="*")
+@click.argument("pattern", default="*", shell_complete=complete_names)
 @json_option
 @connect_option
 def list_command(pattern: str, as_json: bool, address: Address) -> None:
@@ -43,7 +44,7 @@ def list_command(pattern: str, as_json: bool, address: Address) -> None:
 
 
 @param_command.command("get")
-@click.argument("names", nargs=-1, required=True)
+@click.argument("names", nargs=-1, required=True, shell_complete=complete_names)
 @json_option
 @connect_option
 def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None:
@@ -56,7 +57,7 @@ def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None
 
 
 @param_command.command("set", context_settings={"ignore_unknown_options": True})  # -1 is a number here
-@click.argument("name")
+@click.argument("name", shell_complete=complete_names)
 @click.argument("value", type=FiniteType())
 @connect_option
 def set_command(name: str, value: float, address: Address) -> None:

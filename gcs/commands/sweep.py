@@ -26,6 +26,7 @@ from gcs.commands.options import (
     time_limit_option,
     vehicle_option,
 )
+from gcs.commands.parameter_completion import complete_settings
 from gcs.errors import EXIT_DONE, EXIT_REQUIRED
 from gcs.shell.display import notify, results_to_stdout
 
@@ -47,6 +48,7 @@ from gcs.shell.display import notify, results_to_stdout
     "varied",
     metavar="NAME=VALUES",
     multiple=True,
+    shell_complete=complete_settings,
     help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample NAME=LOW:HIGH or NAME=A,B,C; "
     "NAME=NAME=... gives several the same values; repeatable.",
 )

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
-from importlib.resources import files
 
 from autopilot.wire.parameter_file import ParameterFile, parameter_file
 from autopilot.wire.parameter_table import ParameterTable
 from sitl.plant.records import ChainModel, Drive, Truth
+from sitl.vehicles.sim_parameter_file import FILE, sim_document
 from sitl.vehicles.truth import CHAIN_KEYS
 
-FILE = "sim_parameters.toml"
 _ATTACHMENT = ("attachment_x", "attachment_y", "attachment_z")
 
 
 @cache
 def definitions() -> ParameterFile:
     """The definitions in `sim_parameters.toml`."""
-    text = (files("sitl") / FILE).read_text(encoding="utf-8")
-    return parameter_file(tomllib.loads(text), FILE)
+    return parameter_file(sim_document(), FILE)
 
 
 def sim_parameters(truth: Truth) -> ParameterTable:

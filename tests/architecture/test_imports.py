@@ -56,6 +56,7 @@ GCS = (
     *VEHICLE,
     "autopilot.vehicle.parameters",
     "sitl.sensors.shipped",
+    "sitl.vehicles.sim_parameter_file",
     "missions",
 )
 # room: what it may import besides itself. A module belongs to the longest room with which its name begins.

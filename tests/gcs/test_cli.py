@@ -20,6 +20,7 @@ import pytest
 from click.testing import CliRunner
 
 import plumbline
+from autopilot.vehicle.parameters import definitions as autopilot_definitions
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
@@ -35,6 +36,7 @@ from gcs.workflows import status as status_module
 from gcs.workflows import view as view_module
 from gcs.workflows.recorded_mission import same_items
 from missions.model import Land, Signals, Sine, Takeoff, Term, Waypoint
+from sitl.vehicles.sim_parameters import definitions as sim_definitions
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -115,6 +117,38 @@ def test_a_shell_can_complete_words(monkeypatch):
         ("fly hover --law th", ["plain,thesis"]),
     ):
         assert completed(line) == [*found, f"file,{line.split()[-1]}"]
+    for line, found in (
+        ("fly hover --set SIM_WIND", ["SIM_WIND_E=", "SIM_WIND_N=", "SIM_WIND_U="]),
+        ("check hover --set mis_rotor", ["MIS_ROTOR_MARG="]),
+        ("sweep hover --vary PLB_DELAY", ["PLB_DELAY_TOL="]),
+        ("param get VEH_CABLE", ["VEH_CABLE_LEN"]),
+        ("param set FS_LOAD_E", ["FS_LOAD_ERR"]),
+        ("param list FS_LOAD_E", ["FS_LOAD_ERR"]),
+    ):
+        assert completed(line) == [f"plain,{name}" for name in found]
+
+
+def test_every_parameter_can_be_completed_and_without_what_takes_long_to_load():
+    known = {*autopilot_definitions().parameters, *sim_definitions().parameters}
+    program = """import sys
+from gcs.commands.parameter_completion import complete_names
+print(*(item.value for item in complete_names(None, None, "")))
+print(*{name.partition(".")[0] for name in sys.modules})"""
+    told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
+    names, modules = map(str.split, told.splitlines())
+    assert set(names) == known and len(names) == len(known)
+    assert not set(modules) & {"numpy", "numba", "pydantic", "pymavlink"}
+
+
+def test_bash_writes_no_space_behind_a_name_that_a_value_follows():
+    source = CliRunner().invoke(gcs, [], prog_name="gcs", env={"_GCS_COMPLETE": "bash_source"}).stdout
+    # bash calls doubles: of the program, and of `compopt`, which works only while a word is completed
+    doubles = 'compopt() { echo "$@"; }; env() { echo "plain,$1"; }'
+    source = source.replace("env COMP_WORDS=", "env $0 COMP_WORDS=")
+    script = f'{source}\n{doubles}\n_gcs_completion gcs; echo "${{COMPREPLY[@]}}"'
+    for answer, told in (("SIM_WIND_E=", ["-o nospace", "SIM_WIND_E="]), ("status", ["status"])):
+        called = subprocess.run(["bash", "-c", script, answer], capture_output=True, text=True, check=True)
+        assert called.stdout.splitlines() == told
 
 
 def test_help_needs_nothing_but_click():
