@@ -5,8 +5,9 @@ the vehicle stay within their limits; the load is carried high enough and stays 
 no jump in position or velocity. The drag of the vehicle is included. What is not checked: at the joints of
 half-sine envelopes the acceleration jumps, and following a jump exactly would require an unbounded moment for
 an instant; both sides of a joint are checked, the jump itself is not. An autopilot that shapes its paths
-smooths the jump (`autopilot.trajectory.shaping`), others have an error there that does no harm. Wind, delays
-and noise are not part of the check either: a mission that passes can be flown in principle.
+smooths the jump (`autopilot.trajectory.shaping`), others have an error there that does no harm. Wind
+(`gcs.workflows.wind` judges it), delays and noise are not part of the check either: a mission that passes can
+be flown in principle.
 """
 
 from __future__ import annotations

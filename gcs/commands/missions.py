@@ -52,7 +52,8 @@ def missions_command(as_json: bool) -> None:
     "settings",
     type=SettingType(),
     multiple=True,
-    help="Set a parameter of the autopilot, such as MIS_ROTOR_MARG; repeatable.",
+    help="Set a parameter of the autopilot, such as MIS_ROTOR_MARG, or the wind (SIM_WIND_E, SIM_WIND_N); "
+    "repeatable.",
 )
 @click.option("--as-asked", is_flag=True, help="Check the paths as asked, not shaped.")
 @click.option(
@@ -77,9 +78,10 @@ def check_command(
     station. Every limit that it breaks is printed, with the time and the excess, or else what the vehicle
     would refuse, such as a path that leaves the fence of a .plan; the exit code is then 1. Otherwise the
     duration of each path, its distance from the requested path, and its peaks of rotor force, tension and
-    tilt are printed. With --as-asked the paths are judged as the laws thesis and lqr fly them, without
-    shaping, as with --law of one of these; how closely such a law follows them is not judged. With --planner
-    the paths through waypoints are those of your own planner, whose errors are printed.
+    tilt are printed, and the steady wind that the vehicle stands. With --as-asked the paths are judged as
+    the laws thesis and lqr fly them, without shaping, as with --law of one of these; how closely such a law
+    follows them is not judged. With --planner the paths through waypoints are those of your own planner,
+    whose errors are printed.
     """
     from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 

@@ -29,6 +29,10 @@ def check_options(options: FlightOptions) -> list[str]:
     unused = unused_settings(options.vehicle, options.sensors, (options.law,), settings)
     warnings += [f"--set {line}" for line in unused.values()]
     warnings += vehicle_warnings(options.vehicle)
+    if options.firmware is None and any(name.startswith("SIM_WIND_") for name, _ in settings):
+        from gcs.workflows.wind import wind_warnings
+
+        warnings += wind_warnings(options.vehicle, settings)
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from math import dist
+from math import dist, floor
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -36,6 +36,7 @@ from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flyable import violations, winch_items
 from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits, with_settings
+from gcs.workflows.wind import craft_of, split_wind
 from missions.model import (
     AttitudeRun,
     LoadPath,
@@ -226,6 +227,9 @@ class CheckResult:
     refusals: tuple[str, ...] = ()
     expected_s: float | None = None  # from arming to the end; None if it cannot be flown
     time_limit_s: float | None = None  # after which gcs fly gives up
+    # the greatest steady wind in which it can be flown, and why not in more; None if there is no such limit
+    wind_limit_m_s: float | None = None
+    wind_reason: str = ""
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -237,7 +241,8 @@ class CheckResult:
         if self.problems:
             return self.problems
         can_fly = f"{self.mission}: vehicle {self.vehicle} can fly it"
-        return (can_fly, *_path_lines(self.paths), *self._duration_lines(), *self.warnings)
+        paths = _path_lines(self.paths)
+        return (can_fly, *paths, *self._duration_lines(), *self._wind_lines(), *self.warnings)
 
     def _duration_lines(self) -> Iterator[str]:
         if self.expected_s is not None and self.time_limit_s is not None:
@@ -245,6 +250,11 @@ class CheckResult:
                 f"in all: about {limit_text(self.expected_s)} from arming to the end; gcs fly gives up after "
                 f"{limit_text(self.time_limit_s)}"
             )
+
+    def _wind_lines(self) -> Iterator[str]:
+        if self.wind_limit_m_s is not None:
+            limit_m_s = floor(10.0 * self.wind_limit_m_s) / 10.0
+            yield f"stands {limit_m_s:.1f} m/s of steady wind: in more, {self.wind_reason}"
 
 
 def _path_lines(reports: Iterable[PathReport]) -> Iterator[str]:
@@ -270,6 +280,7 @@ def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...])
             for one in found.violations
         ),
         paths=tuple(replace(one, item=step_in_file(one.item, mission)) for one in found.paths),
+        wind_reason=in_file_terms(found.wind_reason, mission),
         warnings=(*notes, *(in_file_terms(text, mission) for text in found.warnings)),
         refusals=tuple(in_mission_terms(text, mission) for text in found.refusals),
     )
@@ -284,11 +295,12 @@ def check_mission(
     law: str = "",
 ) -> CheckResult:
     """Check a mission by name or path, or the file of another ground station, against a vehicle with these
-    parameters of its autopilot; `as_asked`: without shaping. `law`: also whether it can be flown with this
-    law, the name of a built-in one.
+    parameters of its autopilot, in the wind that is among them; `as_asked`: without shaping. `law`: also
+    whether it can be flown with this law, the name of a built-in one.
 
     GcsError if a custom `planner` fails to plan it.
     """
+    wind_m_s, settings = split_wind(settings)
     limits, mission = load_limits(vehicle, settings), read(name_or_path)
     if problem := law_problem(mission, law):
         return CheckResult(mission.name, vehicle, (), (), (), (problem,))
@@ -304,6 +316,9 @@ def check_mission(
     shaped = shapes_paths(table, not as_asked)
     found = violations(mission, vehicle, limits, not as_asked, settings)
     reports = [] if found else path_reports(mission, limits, planner, shaped)
+    craft = craft_of(vehicle, limits)
+    if wind_m_s and not found:
+        found = [lack.violation for lack in craft.lacks(wind_m_s, reports)]
     answer = Answer() if found else ask_supervisor(mission, table, not as_asked, planner)
     warnings = (
         *(f"warning: {text}" for text in answer.warnings),
@@ -329,4 +344,6 @@ def check_mission(
     if not result.problems:
         limit_s = time_limit_s(expected_flight_s(mission, table))
         result = replace(result, expected_s=flown_s(mission, reports, table), time_limit_s=limit_s)
+        if wind := craft.limit(reports):
+            result = replace(result, wind_limit_m_s=wind.speed_m_s, wind_reason=wind.reason)
     return _in_file_terms(result, mission, notes)

@@ -81,7 +81,9 @@ def with_settings(table: AutopilotParameters, settings: Settings) -> AutopilotPa
     """The table with these parameters set; InputError for one that it has not, or a value out of range."""
     for name, value in settings:
         if name not in table:
-            raise InputError(f"--set {name}: must be a parameter of the autopilot")
+            raise InputError(
+                f"--set {name}: must be a parameter of the autopilot, or SIM_WIND_E or SIM_WIND_N"
+            )
         try:
             table.set(name, value)
         except ParameterError as error:

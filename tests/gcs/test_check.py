@@ -389,7 +389,7 @@ def test_paths_are_checked_with_the_parameters_that_are_set(value: str, flies: b
     assert (f"must leave {value} % of the rotors' range" in found.output) == (not flies)
 
 
-@pytest.mark.parametrize("setting", ["SIM_WIND_E=3", "MIS_NOTHING=1"])
+@pytest.mark.parametrize("setting", ["SIM_LOAD_MASS=3", "MIS_NOTHING=1"])
 def test_what_no_check_judges_is_not_set(setting: str) -> None:
     name = setting.partition("=")[0]
     with pytest.raises(InputError, match=f"--set {name}: must be a parameter of the autopilot"):
