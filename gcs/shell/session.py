@@ -14,8 +14,9 @@ from gcs.clients.datagrams import messages
 from gcs.clients.operation import Operation, Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import GcsError, NoVehicleError, RefusedError
-from gcs.shell.display import StepDisplay
+from gcs.shell.display import StepDisplay, notify
 from gcs.shell.link import Address, monotonic_us, unix_us, wait
+from gcs.shell.stopping import StopRequest
 from gcs.shell.truth import TruthLink
 from gcs.shell.vehicle_socket import VehicleSocket
 
@@ -62,12 +63,12 @@ class Session:
         was not read yet counts as received: on a busy machine this process may be late."""
         return self._connection.lost(monotonic_us()) and not self._socket.has_datagram
 
-    def find_with_truth(self, truth: TruthLink) -> Target:
+    def find_with_truth(self, truth: TruthLink, stop: StopRequest | None = None) -> Target:
         """As `find`; from then on the truth of the vehicle's world is received too, and is awaited briefly.
 
         The caller keeps `truth` and closes it.
         """
-        target = self.find()
+        target = self.find(stop)
         try:
             truth.set_vehicle_run(int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id))
         except RefusedError:  # another firmware, or a vehicle without a simulator
@@ -79,32 +80,41 @@ class Session:
             self.watch(lambda: truth.received, TRUTH_S)
         return target
 
-    def find(self) -> Target:
-        """Wait for the vehicle's heartbeat."""
-        signatures = self._connection.signatures
-        self.watch(
-            lambda: self.view.armed is not None and signatures.are_valid,
-            self._find_s,
-            "waiting for the vehicle",
-        )
-        if self._connection.target is None or self.view.armed is None or not signatures.are_valid:
-            if signatures.problem:
-                raise NoVehicleError(
-                    f"no vehicle with a valid signature on {self.address.link}: {signatures.problem}"
-                )
-            if self.address.system is not None and self._socket.other_systems:
-                heard = ", ".join(map(str, self._socket.other_systems))
-                raise NoVehicleError(
-                    f"no vehicle with system id {self.address.system} heard on {self.address.link} within "
-                    f"{self._find_s:g} s; heard there: {heard} (MAV_SYS_ID of the autopilot)"
-                )
-            other = 14540 if self.address.port != 14540 else 14550
-            raise NoVehicleError(
-                f"no vehicle heard on {self.address.link} within {self._find_s:g} s; is autopilot running, "
-                f"with its simulator, and sending there? (other addresses: --connect {other} or "
-                "--connect HOST:PORT)"
-            )
+    def find(self, stop: StopRequest | None = None) -> Target:
+        """Wait for the vehicle's heartbeat: for a few seconds, or with `stop` as long as it takes, which is
+        said. KeyboardInterrupt if the stop is requested before."""
+        signatures, label = self._connection.signatures, "waiting for the vehicle"
+
+        def is_found() -> bool:
+            return self.view.armed is not None and signatures.are_valid
+
+        self.watch(lambda: is_found() or bool(stop), self._find_s, label)
+        if stop is not None and not (is_found() or stop or signatures.problem):
+            notify(f"{self._silence_text()}; waiting for it, Ctrl-C ends this")
+            self.watch(lambda: is_found() or bool(stop) or bool(signatures.problem), None, label)
+        if stop:
+            raise KeyboardInterrupt
+        if self._connection.target is None or not is_found():
+            raise NoVehicleError(self._silence_text())
         return self._connection.target
+
+    def _silence_text(self) -> str:
+        """Why there is no vehicle, as far as is known."""
+        link = self.address.link
+        if self._connection.signatures.problem:
+            return f"no vehicle with a valid signature on {link}: {self._connection.signatures.problem}"
+        if self.address.system is not None and self._socket.other_systems:
+            heard = ", ".join(map(str, self._socket.other_systems))
+            return (
+                f"no vehicle with system id {self.address.system} heard on {link} within "
+                f"{self._find_s:g} s; heard there: {heard} (MAV_SYS_ID of the autopilot)"
+            )
+        other = 14540 if self.address.port != 14540 else 14550
+        return (
+            f"no vehicle heard on {link} within {self._find_s:g} s; is autopilot running, "
+            f"with its simulator, and sending there? (other addresses: --connect {other} or "
+            "--connect HOST:PORT)"
+        )
 
     def find_to_command(self) -> Target:
         """As `find`, for what moves or changes the vehicle: GcsError if another one has its system id."""

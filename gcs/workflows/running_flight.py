@@ -39,15 +39,17 @@ def fly_running(
     watch: Stopwatch,
     page: FlightPage | None = None,
 ) -> tuple[FlightClient, str]:
-    """Fly with the vehicle at `address`; if the flight is stopped early, command it to hold, or to land if it
-    cannot hold yet.
+    """Fly with the vehicle at `address`, once it sends there; if the flight is stopped early, command it to
+    hold, or to land if it cannot hold yet.
 
     Also returns why there is no truth of the vehicle's world; empty if there is. NoVehicleError if the key is
     missing without which the vehicle heeds no message.
     """
     with TruthLink(options.truth_at) as truth:
         with Session(address) as session:
-            session.find_with_truth(truth)
+            before, stop.hint = stop.hint, "stopping"  # there is nothing to report yet
+            session.find_with_truth(truth, stop)
+            stop.hint = before
             session.require_no_twin()
             if session.unanswered_reason:  # it would not answer anything else either
                 raise NoVehicleError(f"{mission.name}: not flown: {session.unanswered_reason}")
