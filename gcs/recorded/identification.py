@@ -131,7 +131,7 @@ def identify_load(
 
     `progress` receives the number of predictions of the recording that are done, and their greatest number.
     """
-    total = 1 + _MAX_ITERATIONS * (len(names) + len(_STEP_FACTORS))
+    total = 2 + _MAX_ITERATIONS * (len(names) + len(_STEP_FACTORS))
     done = 0
 
     def evaluate(candidate: LoadModel) -> tuple[Floats, Floats]:
@@ -143,6 +143,11 @@ def identify_load(
 
     steps = np.array([_STEPS[name] for name in names])
     errors, times = evaluate(model)
+    blown = _pushed_by_mean_lean(motion, model, names)
+    if blown != model:
+        blown_errors, _ = evaluate(blown)
+        if _cost(blown_errors) < _cost(errors):
+            model, errors = blown, blown_errors
     sensitivity = np.zeros((len(names), *errors.shape))
     for _ in range(_MAX_ITERATIONS):
         for j, name in enumerate(names):
@@ -264,17 +269,35 @@ def map_warning(vehicle: Sequence[Identified]) -> str:
 def wind_warning(motion: Motion, gravity_m_s2: float) -> str:
     """Why the drags may be wrong, by the mean lean of the cable at low speed; empty: the air may be still."""
     speed = np.linalg.norm(motion.attachment.velocity, axis=1)
-    acceleration = motion.attachment.acceleration
-    cable = motion.load - motion.attachment.position
-    pull = -cable[:, :2] / cable[:, 2:] + acceleration[:, :2] / (gravity_m_s2 + acceleration[:, 2:])
     slow = speed < _SLOW_M_S
-    lean = float(np.hypot(*np.mean(pull[slow], axis=0))) if slow.any() else 0.0
+    lean = float(np.hypot(*np.mean(_leans(motion, gravity_m_s2)[slow], axis=0))) if slow.any() else 0.0
     if lean <= _MAX_LEAN:
         return ""
     return (
         f"the load hangs {np.degrees(np.arctan(lean)):.1f} degrees off the vertical while the vehicle is "
         "slow, as in a wind, and still air is assumed: the drags, and what depends on them, may be wrong"
     )
+
+
+def _leans(motion: Motion, gravity_m_s2: float) -> Floats:
+    """(n, 2) how far the cable leans towards x and y, without the lean with which it accelerates the load as
+    the vehicle."""
+    acceleration = motion.attachment.acceleration
+    cable = motion.load - motion.attachment.position
+    leans: Floats = -cable[:, :2] / cable[:, 2:] + acceleration[:, :2] / (gravity_m_s2 + acceleration[:, 2:])
+    return leans
+
+
+def _pushed_by_mean_lean(motion: Motion, model: LoadModel, names: Sequence[str]) -> LoadModel:
+    """The model with the pushes among `names` as in a wind that makes the cable lean as it does in the mean.
+
+    From there a fit finds those of a strong wind, as it does not from 0. The same model if it hardly leans.
+    """
+    lean = np.nanmean(_leans(motion, model.gravity_m_s2), axis=0)
+    if not np.hypot(*lean) > _MAX_LEAN:
+        return model
+    pushes = zip(("push_x_m_s2", "push_y_m_s2"), model.gravity_m_s2 * lean, strict=True)
+    return model._replace(**{name: float(push) for name, push in pushes if name in names})
 
 
 def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:

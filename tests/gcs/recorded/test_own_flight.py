@@ -41,10 +41,10 @@ SMOOTHING = (
 )
 
 
-def flown_mission(mission: str, folder: Path) -> Path:
+def flown_mission(mission: str, folder: Path, **settings: float) -> Path:
     path = folder / "flight.tlog"
     with path.open("wb") as file:
-        outcome = fly(load_mission(mission), Conditions(), TlogWriter(file))
+        outcome = fly(load_mission(mission), Conditions(settings=settings), TlogWriter(file))
     assert outcome.name == "completed"
     return path
 
@@ -78,6 +78,20 @@ def test_length_mass_and_drag_of_the_truth_are_identified(
         width = found[name]["half_width"]
         assert found[name]["value"] == pytest.approx(value, abs=width + SMOOTHING * value)
         assert width < 0.01 * value
+
+
+def test_the_push_of_a_strong_wind_is_identified(tmp_path: Path) -> None:
+    wind_m_s, columns, truth = 14.0, load_map("telemetry"), load_vehicle("bebop")
+    motion = motion_of(
+        read_recording(flown_mission("case-b", tmp_path, SIM_WIND_N=wind_m_s), columns), columns
+    )
+    found = identify_load(motion, columns.load_model(truth.cable_length_m), columns.identify.parameters)
+    length, _, push_x, push_y = found
+    push_m_s2 = truth.load_drag_quadratic_n_s2_m2 * wind_m_s**2 / truth.load_mass_kg
+    assert push_y.value == pytest.approx(push_m_s2, abs=push_y.half_width)
+    assert push_y.half_width < 0.02 * push_m_s2
+    assert push_x.value == pytest.approx(0.0, abs=1e-3)
+    assert length.value == pytest.approx(truth.cable_length_m, abs=1e-3)
 
 
 def test_the_length_is_a_distance_and_shows_no_wrong_clock(flown: Path) -> None:
