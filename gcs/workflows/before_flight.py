@@ -29,10 +29,6 @@ def check_options(options: FlightOptions) -> list[str]:
     unused = unused_settings(options.vehicle, options.sensors, (options.law,), settings)
     warnings += [f"--set {line}" for line in unused.values()]
     warnings += vehicle_warnings(options.vehicle)
-    if options.firmware is None and any(name.startswith("SIM_WIND_") for name, _ in settings):
-        from gcs.workflows.wind import wind_warnings
-
-        warnings += wind_warnings(options.vehicle, settings)
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings
 
@@ -48,6 +44,15 @@ def mission_warnings(planner: str, mission: Mission) -> list[str]:
     if planner and (unused := unused_planner_text(mission)):
         lines.append(f"--planner {planner}: {unused}")
     return lines
+
+
+def wind_warnings(mission: Mission, options: FlightOptions) -> list[str]:
+    """A line for each thing that the vehicle lacks in the wind of the flight, which is flown nevertheless."""
+    if options.firmware is not None or not any(s.startswith("SIM_WIND_") for s in options.settings):
+        return []
+    from gcs.workflows.check_mission import wind_problems  # loads much
+
+    return wind_problems(mission, options)
 
 
 def unused_planner_text(mission: Mission) -> str:

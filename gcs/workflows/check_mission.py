@@ -15,7 +15,12 @@ from autopilot.trajectory.timeline import TimelineEntry
 from autopilot.trajectory.transfer import reachable_speed, transfer_duration
 from autopilot.vehicle.file import belief_of
 from autopilot.vehicle.model import Vehicle
-from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters, shapes_paths
+from autopilot.vehicle.parameters import (
+    DEFAULT_LAW,
+    AutopilotParameters,
+    autopilot_parameters,
+    shapes_paths,
+)
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items
 from autopilot.wire.parameter_names import unknown_parameter_text
@@ -33,6 +38,7 @@ from gcs.mission_items import (
 )
 from gcs.workflows.before_flight import law_problem, unused_planner_text
 from gcs.workflows.flight_inputs import vehicle_warnings
+from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable import violations, winch_items
 from gcs.workflows.refusals import Answer, ask_supervisor
 from gcs.workflows.vehicle_limits import load_limits, with_settings
@@ -212,6 +218,18 @@ def notes_after_release(mission: Mission, table: AutopilotParameters) -> Iterato
             f"note: {items}: about {sum(entry.duration_s for entry in rest):.0f} s, flown without the load, "
             "slower where the rotors ask for it; estimated from distances and speeds, no path to report"
         )
+
+
+def wind_problems(mission: Mission, options: FlightOptions) -> list[str]:
+    """What the vehicle lacks in the wind of a flight; along its paths too, unless they are those of a custom
+    planner, or are not checked."""
+    wind_m_s, others = split_wind(map(parse_setting, options.settings))
+    limits, reports = load_limits(options.vehicle, options.mission_settings), []
+    if not (options.planner or options.force):
+        table = with_settings(autopilot_parameters(limits.vehicle), options.mission_settings)
+        reports = path_reports(mission, limits, shaped=shapes_paths(table, options.law == DEFAULT_LAW))
+    lacks = craft_of(options.vehicle, limits, others).lacks(wind_m_s, reports)
+    return [problem_in_file(one.violation.item, one.violation.text, mission) for one in lacks]
 
 
 @dataclass(frozen=True)

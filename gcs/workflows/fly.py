@@ -27,7 +27,13 @@ from gcs.mission_files import load
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.before_flight import check_law, check_mission, check_options, mission_warnings
+from gcs.workflows.before_flight import (
+    check_law,
+    check_mission,
+    check_options,
+    mission_warnings,
+    wind_warnings,
+)
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, parse_setting
 from gcs.workflows.report import make_report
@@ -164,6 +170,8 @@ def _fly_started(
         from gcs.workflows.started_flight import fly_started_vehicle  # imported while the programs load
 
         check_mission(mission, options)
+        for line in wind_warnings(mission, options):
+            notify(line)
         _tell_start(options)
         if options.speed is None:
             from gcs.report.warm import load_libraries as load_report

@@ -11,7 +11,13 @@ from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
 from gcs.foreign_mission import home_of
 from gcs.shell.display import FlightDisplay
-from gcs.workflows.before_flight import check_law, check_mission, check_options, mission_warnings
+from gcs.workflows.before_flight import (
+    check_law,
+    check_mission,
+    check_options,
+    mission_warnings,
+    wind_warnings,
+)
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.started_flight import flight_client
 from gcs.workflows.warmup import in_process_parts, vehicle_parts, warm_up
@@ -27,7 +33,8 @@ def fly_in_process(
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `warn` is called with a line for each option that may be unintended, `log_sensors` with the bytes of a log
+    `warn` is called with a line for each option that may be unintended and for what the vehicle lacks in the
+    wind, `log_sensors` with the bytes of a log
     of the sensors.
     """
     check_law(mission, options)
@@ -36,6 +43,8 @@ def fly_in_process(
     of_the_vehicle = vehicle_parts(options.vehicle, map(parse_setting, options.settings))
     warm_up([*in_process_parts((options.law,)), *of_the_vehicle], options.quiet)
     check_mission(mission, options)
+    for line in wind_warnings(mission, options):
+        warn(line)
     settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(parse_setting, options.settings))}
     client = flight_client(mission, options, home_of(mission))
     with FlightDisplay(mission.name, options.quiet) as display, watched_calls():

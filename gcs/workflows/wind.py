@@ -20,8 +20,7 @@ from typing import NamedTuple
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation
 from autopilot.vehicle.file import load_truth_and_belief
 from gcs.errors import InputError
-from gcs.workflows.flight_options import SIMULATOR_PREFIX, Settings
-from gcs.workflows.vehicle_limits import load_limits
+from gcs.workflows.flight_options import Settings
 from missions.model import KINDS, AttitudeRun
 from sitl.plant.cable_drag import DRAG_COEFFICIENT
 from sitl.plant.records import Truth
@@ -190,12 +189,3 @@ def craft_of(vehicle: str, limits: VehicleLimits, settings: Settings = ()) -> Cr
         if name in table:
             table.set(name, value)
     return Craft(apply(truth, table), limits)
-
-
-def wind_warnings(vehicle: str, settings: Settings) -> list[str]:
-    """What the vehicle lacks in the wind that is among these parameters, along whatever path."""
-    given = list(settings)
-    wind_m_s, others = split_wind(given)
-    limits = load_limits(vehicle, [one for one in others if not one[0].startswith(SIMULATOR_PREFIX)])
-    lacks = craft_of(vehicle, limits, others).lacks(wind_m_s)
-    return [lack.violation.text for lack in lacks]

@@ -13,13 +13,14 @@ import plumbline
 from autopilot.trajectory.feasibility import PathReport
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
-from gcs.workflows.before_flight import check_options
+from gcs.mission_files import load
+from gcs.workflows.before_flight import check_mission, wind_warnings
 from gcs.workflows.vehicle_limits import load_limits
 from gcs.workflows.wind import Craft, craft_of
 from tests.gcs.test_refused_settings import options
 
 # a flight in too much wind says so
-pytestmark = pytest.mark.filterwarnings("ignore:in wind of:UserWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:.*in wind of:UserWarning")
 
 MARGIN = 0.15  # of the speed, within which check and flights agree
 STILL = PathReport(1, "waypoint", 10.0, 0.0, 1.1, 1.3, 0.9, 2.0, speed_m_s=1.0)
@@ -119,7 +120,17 @@ def test_more_drag_or_a_faster_path_or_a_weaker_rotor_stands_less_wind() -> None
 
 
 def test_a_flight_in_too_much_wind_is_warned_of_and_not_refused() -> None:
-    lacking = "in wind of 13.0 m/s the vehicle leans 48 deg to stay in place while it pulls the cable taut"
-    found = check_options(options(vehicle="bebop-real", settings=("SIM_WIND_E=-13", "MIS_ROTOR_MARG=20")))
-    assert [line for line in found if line.startswith(lacking)]
-    assert not [line for line in check_options(options(settings=("SIM_WIND_E=13",))) if "wind" in line]
+    flight = options("SIM_WIND_E=-14", "MIS_ROTOR_MARG=16")
+    check_mission(load("case-c"), flight)
+    (line,) = wind_warnings(load("case-c"), flight)
+    assert "case-c.toml:" in line
+    assert "items[2] (signals): in wind of 14.0 m/s from the worst direction one rotor has to give" in line
+    assert wind_warnings(load("case-c"), replace(flight, planner="line.py:Line")) == []
+    assert wind_warnings(load("case-c"), options("SIM_WIND_E=13")) == []
+    (line,) = wind_warnings(load("hover"), options("SIM_WIND_E=13", vehicle="bebop-real"))
+    assert line.startswith("in wind of 13.0 m/s the vehicle leans 48 deg to stay in place while it pulls the")
+    # with less drag than in its file it stands this wind
+    assert (
+        wind_warnings(load("hover"), options("SIM_WIND_E=13", "SIM_DRAG_SCALE=0.5", vehicle="bebop-real"))
+        == []
+    )
