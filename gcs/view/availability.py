@@ -38,6 +38,7 @@ def unavailable_actions(view: VehicleView) -> dict[str, str]:
         "hold": "on the ground: nothing is under way" if idle else _NOT_TO_HOLD.get(phase, ""),
         "land": grounded or _TERMINATED.get(phase, ""),
         "return": grounded or _NOT_TO_RETURN.get(phase, ""),
+        "goto": grounded or _NOT_TO_HOLD.get(phase, ""),
     }
     return {action: reason for action, reason in reasons.items() if reason}
 

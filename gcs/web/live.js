@@ -184,11 +184,13 @@
 
   function enable() {
     const vehicle = page.vehicles.get(page.chosen), why = commandProblem();
-    controls.enable(why, vehicle && vehicle.state ? vehicle.state.unavailable : {});
+    const unavailable = vehicle && vehicle.state ? vehicle.state.unavailable : {};
+    controls.enable(why, unavailable);
+    const hint = noPicture || (why ? "" : `${unavailable.goto ? "" : "Double-click: take the load there. "}Drag: turn. Wheel: zoom.`);
+    if (byId("hint").textContent !== hint) byId("hint").textContent = hint;
     if (page.enabled === !why) return;
     page.enabled = !why;
     if (!why && vehicle.record) controls.setParameters(vehicle.record.parameters);
-    byId("hint").textContent = noPicture || (why ? "" : "Double-click: take the load there. Drag: turn. Wheel: zoom.");
   }
 
   if (scene) {

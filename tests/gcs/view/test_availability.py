@@ -26,6 +26,7 @@ REQUESTS: dict[str, tuple[Any, ...]] = {
     "hold": (requests.Pause(),),
     "land": (requests.Land(),),
     "return": (requests.SetMode(identity.AUTO, identity.AUTO_RTL),),
+    "goto": (requests.Reposition(0.5, 0.5, 2.0, True),),
 }
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
@@ -83,7 +84,7 @@ def test_a_button_is_enabled_if_and_only_if_its_request_is_accepted_and_does_som
 
 def test_a_vehicle_on_the_ground_is_armed_for_its_mission_and_a_vehicle_in_the_air_is_not() -> None:
     ground = unavailable_actions(reported(flight_in(Phase.DISARMED, False, PLAN), 5))
-    assert set(ground) == {"disarm", "resume", "hold", "land", "return"}
+    assert set(ground) == {"disarm", "resume", "hold", "land", "return", "goto"}
     air = unavailable_actions(reported(flight_in(Phase.HOLD, False, PLAN), 5))
     assert air == {"arm": "armed already", "disarm": "in the air: land first", "takeoff": "in the air"}
 
@@ -99,4 +100,4 @@ def test_another_firmware_is_judged_by_what_it_reports_and_by_nothing_else() -> 
     flying = unavailable_actions(view_of(heartbeat(True), landed(mavlink.MAV_LANDED_STATE_IN_AIR)))
     assert set(flying) == {"arm", "disarm", "takeoff"}
     standing = unavailable_actions(view_of(heartbeat(False), landed(mavlink.MAV_LANDED_STATE_ON_GROUND)))
-    assert set(standing) == {"disarm", "resume", "hold", "land", "return"}
+    assert set(standing) == {"disarm", "resume", "hold", "land", "return", "goto"}

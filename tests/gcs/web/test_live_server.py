@@ -116,8 +116,11 @@ def test_a_button_that_the_vehicle_would_refuse_is_disabled_and_says_why(page: B
     shown = page.run(BUTTONS)
     assert {action: why for action, why in shown.items() if why} == HOVERING["unavailable"]
     assert "hold" in shown
-    landed = {**HOVERING, "phase": "disarmed", "armed": False, "unavailable": {"hold": "on the ground"}}
+    assert page.find("#hint").text.startswith("Double-click: take the load there.")
+    grounded = {"hold": "on the ground", "goto": "on the ground"}
+    landed = {**HOVERING, "phase": "disarmed", "armed": False, "unavailable": grounded}
     say(page, {"type": "state", "vehicles": [landed], "samples": {}})
+    assert page.find("#hint").text == "Drag: turn. Wheel: zoom."
     assert {action: why for action, why in page.run(BUTTONS).items() if why} == {"hold": "on the ground"}
     say(page, {"type": "session", "kind": "fly", "outcome": "completed", "reason": ""})
     assert set(page.run(BUTTONS).values()) == {"the flight is over"}
