@@ -222,6 +222,7 @@ def load_with_status(load: LoadEstimate, age_s: float, rejected: float, source: 
         rejected,
         source,
         load.laid_height,
+        load.laid_height_var,
     )
 
 
@@ -263,6 +264,7 @@ def corrected_load(
         load.rejected,
         load.source,
         load.laid_height,
+        load.laid_height_var,
     )
 
 

@@ -158,6 +158,7 @@ def predict_taut(
         load.rejected,
         load.source,
         load.laid_height,
+        load.laid_height_var,
     )
 
 
@@ -206,6 +207,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
         load.rejected,
         load.source,
         load.laid_height,
+        load.laid_height_var,
     )
 
 
@@ -243,11 +245,11 @@ def state_uncertainty(history: History, load: LoadEstimate, size: int) -> Uncert
 
 
 @kernel
-def pendulum_error(state: EstimatorState, tuning: EstimatorTuning) -> tuple[float, float]:
+def pendulum_error(state: EstimatorState, history: History, tuning: EstimatorTuning) -> tuple[float, float]:
     """Standard deviations of the pendulum's acceleration (rad/s^2), and of the speed at which the ends of
     the cable move apart (m/s)."""
     load, d = state.load, state.air.load_accel
-    if load.taut == 0.0 or not cable_is_unloaded(load, state.memory_s, state.missing_pull):
+    if load.taut == 0.0 or not cable_is_unloaded(load, history, state.memory_s, state.missing_pull):
         return tuning.cable_accel_std, 0.0
     if load.source != TRACKER:
         return LIFTING_ACCEL_STD, 0.0
@@ -276,7 +278,7 @@ def predict(
         gyro_var = max(gyro_var, tuning.gyro_range * tuning.gyro_range)
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
     a = vehicle.accel_quad
-    cable_accel_std, separation_std = pendulum_error(state, tuning)
+    cable_accel_std, separation_std = pendulum_error(state, history, tuning)
     inputs = PropagationInputs(
         (a[0], a[1], a[2] + tuning.gravity),
         R,

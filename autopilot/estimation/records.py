@@ -204,6 +204,7 @@ class LoadEstimate(NamedTuple):
     rejected: float
     source: float  # NO_SENSOR, TRACKER or CAMERA
     laid_height: float  # m, at which it lay when its cable came taut; NOT_LAID if it is in the air
+    laid_height_var: float  # m^2, of the height at which it lies or lay
 
 
 class SensorErrors(NamedTuple):
@@ -339,6 +340,7 @@ def blank_state() -> EstimatorState:
             rejected=0.0,
             source=NO_SENSOR,
             laid_height=NOT_LAID,
+            laid_height_var=0.0,
         ),
         sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0),

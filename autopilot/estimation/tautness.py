@@ -110,7 +110,29 @@ def orthogonal_axis(q: Vec3, across: Vec3) -> Vec3:
 
 
 @kernel
-def cable_is_unloaded(load: LoadEstimate, memory_s: float, missing_pull: float) -> bool:
+def load_height_var(load: LoadEstimate, history: History) -> float:
+    """Variance of the height (m^2) of a load at the end of its taut cable."""
+    P, along, L = history.covariance, cross(load.q_cable, load.across), load.length
+    rows = (POSITION + 2, DIRECTION, DIRECTION + 1, LENGTH)
+    factors = (1.0, L * load.across[2], L * along[2], load.q_cable[2])
+    variance = 0.0
+    for i in range(4):
+        for j in range(4):
+            variance += factors[i] * factors[j] * P[rows[i], rows[j]]
+    return variance
+
+
+@kernel
+def has_risen(load: LoadEstimate, history: History) -> bool:
+    """Whether a load on a taut cable that a camera has seen is above the place where it lay: it hangs,
+    however little its cable seems to pull."""
+    height_std = sqrt(max(0.0, load_height_var(load, history)))
+    height = load.laid_height + LIFTED_HEIGHT + HELD_SIGMAS * height_std
+    return load.source == CAMERA and not is_never_observed(load) and load.x_load[2] > height
+
+
+@kernel
+def cable_is_unloaded(load: LoadEstimate, history: History, memory_s: float, missing_pull: float) -> bool:
     """Whether a cable that counts as taut does not carry its load yet.
 
     The cable of a tracked load counts as taut some per cent of its length before it is, and readings up to
@@ -124,7 +146,7 @@ def cable_is_unloaded(load: LoadEstimate, memory_s: float, missing_pull: float) 
         return False
     if load.source == TRACKER:
         return not load.pull_duration_s > memory_s or load.rejected >= REJECTIONS_UNLOADED
-    return load.pull + missing_pull < LIFTING_PULL * load.tension
+    return load.pull + missing_pull < LIFTING_PULL * load.tension and not has_risen(load, history)
 
 
 @kernel
@@ -259,6 +281,7 @@ def _with_tautness(
         load.rejected,
         load.source,
         load.laid_height,
+        load.laid_height_var,
     )
 
 
@@ -338,10 +361,10 @@ def tauten(
 def slacken(load: LoadEstimate, history: History, position_var: float, velocity_var: float) -> LoadEstimate:
     """The load tracked separately from now on, with these variances; the cable's errors are dropped. A load
     without a tracker that was being lifted lies at the height at which it lay before."""
-    zero_covariance(history.covariance, DIRECTION, 5)
-    at_rest, x_load = (0.0, 0.0, 0.0), load.x_load
+    at_rest, x_load, laid_height_var = (0.0, 0.0, 0.0), load.x_load, load_height_var(load, history)
     if load.source != TRACKER and load.tautness_age_s <= LIFTING_S and load.laid_height > NOT_LAID:
-        x_load = (x_load[0], x_load[1], load.laid_height)
+        x_load, laid_height_var = (x_load[0], x_load[1], load.laid_height), load.laid_height_var
+    zero_covariance(history.covariance, DIRECTION, 5)
     return LoadEstimate(
         x_load,
         load.v_load if load.source == TRACKER else at_rest,
@@ -359,6 +382,7 @@ def slacken(load: LoadEstimate, history: History, position_var: float, velocity_
         load.rejected,
         load.source,
         load.laid_height,
+        laid_height_var,
     )
 
 
@@ -447,4 +471,5 @@ def with_load_position(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
         load.rejected,
         load.source,
         load.laid_height,
+        load.laid_height_var,
     )

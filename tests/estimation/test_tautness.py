@@ -257,7 +257,7 @@ def test_no_pull_of_a_tracked_load_is_missing_before_it_was_lifted() -> None:
     """A long cable counts as taut many seconds before it is: 100 m of it 1.5 m before, 10 s at 0.15 m/s."""
     lies = laid()._replace(source=TRACKER, taut=1.0, tension=WEIGHT, laid_height=TUNING.load_height)
     assert missed(lies, 0.0, 0.99, 10.0) == 0.0
-    assert cable_is_unloaded(lies._replace(tautness_age_s=10.0), 0.01, 0.0)
+    assert cable_is_unloaded(lies._replace(tautness_age_s=10.0), new_history(), 0.01, 0.0)
     lifted = lies._replace(x_load=(0.0, 0.0, TUNING.load_height + LIFTED_HEIGHT + 0.01))
     lifted = after(lifted, 0.3, 0.0, 1.0, DT)
     assert lifted.laid_height == NOT_LAID

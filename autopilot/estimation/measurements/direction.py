@@ -71,6 +71,7 @@ def with_observed_position(
         0.0,
         CAMERA,
         load.laid_height,
+        load.laid_height_var,
     )
 
 

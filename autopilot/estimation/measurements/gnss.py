@@ -163,6 +163,7 @@ def load_ahead(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
         0.0,
         CAMERA,
         load.laid_height,
+        GROUND_HEIGHT_STD * GROUND_HEIGHT_STD,
     )
 
 
@@ -188,6 +189,7 @@ def suspended_load(state: EstimatorState, history: History, tuning: EstimatorTun
         0.0,
         CAMERA,
         load.laid_height,
+        load.laid_height_var,
     )
     return tauten(at_end, state.vehicle, history, tuning, tuning.cable_length)
 

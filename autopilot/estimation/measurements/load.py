@@ -91,6 +91,7 @@ def with_tracked_motion(
         0.0,
         TRACKER,
         load.laid_height,
+        load.laid_height_var,
     )
 
 
