@@ -67,6 +67,9 @@ LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD, RESTING_AIR_SHARE = 5.0, 0.05, 0.7
 SEPARATION_SPEED_STD = 0.3
 PENDING_CORRECTION_TIME_S = 4.0  # time constant with which a plain receiver's corrections are passed on
 SPEED_ERROR_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
+# A load on the ground that is estimated farther from the vehicle than this share of its cable, and this many
+# deviations, is dragged along; how far beside it is not known where the vehicle is nearly as high (share)
+DRAGGING_SHARE, DRAGGING_SIGMAS, MIN_DRAGGING_SHARE = 1.05, 3.0, 0.3
 LOAD_ON_GROUND_WALK = 0.01  # m per square root of a second, of a load that stays where it is on the ground
 
 
@@ -163,8 +166,25 @@ def predict_taut(
 
 
 @kernel
-def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History, dt: float) -> LoadEstimate:
-    """A load on a slack cable: a tracked load continues at its velocity, any other stays where it is.
+def dragged_along(x_load: Vec3, vehicle: VehicleEstimate, distance_var: float, cable_length: float) -> Vec3:
+    """Where a load on the ground is whose estimated place is farther from the vehicle than its cable allows,
+    by more than the error of their distance (variance in m^2)."""
+    reach = DRAGGING_SHARE * cable_length + DRAGGING_SIGMAS * sqrt(distance_var)
+    east, north, height = sub(x_load, vehicle.x_quad)
+    level = sqrt(east * east + north * north)
+    allowed = max(sqrt(max(0.0, reach * reach - height * height)), MIN_DRAGGING_SHARE * cable_length)
+    if level <= allowed:
+        return x_load
+    share = allowed / level
+    return (vehicle.x_quad[0] + share * east, vehicle.x_quad[1] + share * north, x_load[2])
+
+
+@kernel
+def predict_slack(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, cable_length: float, dt: float
+) -> LoadEstimate:
+    """A load on a slack cable: a tracked load continues at its velocity, any other stays where it is, unless
+    the vehicle drags it along.
 
     The covariance of a load on the ground is that of its position relative to the vehicle, which the error
     of the vehicle's velocity shifts.
@@ -182,6 +202,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
             ab,
             bb,
         )
+        x_load = dragged_along(x_load, vehicle, P[POSITION + 2, POSITION + 2] + aa, cable_length)
     separation = sub(x_load, vehicle.x_quad)
     distance = norm(separation)
     q, across, q_dot = load.q_cable, load.across, load.q_cable_dot
@@ -313,7 +334,7 @@ def predict(
     if load.taut > 0.0:
         predicted_load = predict_taut(load, vehicle, air, tuning, dt)
     else:
-        predicted_load = predict_slack(load, vehicle, history, dt)
+        predicted_load = predict_slack(load, vehicle, history, tuning.cable_length, dt)
     frame_share = state.frame_share
     growth = rotor_drag_growth(thrust, state.last_thrust, frame_share, tuning)
     force = without_climb_drag(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from autopilot.estimation.predict import DRAGGING_SHARE, MIN_DRAGGING_SHARE, dragged_along
 from autopilot.estimation.records import (
     ATTITUDE,
     CAMERA,
@@ -315,3 +317,36 @@ def test_a_slack_cable_pulls_at_nothing_while_the_vehicle_flies_near_the_load(
     load = laid()
     vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
     assert is_pull_known(load, vehicle, new_history(), 0.0, TUNING) == known
+
+
+@pytest.mark.parametrize(
+    ("beside", "height", "std", "left"),
+    [
+        (0.9, 0.3, 0.0, 0.9),  # within reach
+        (1.3, 0.3, 0.0, sqrt(DRAGGING_SHARE**2 - 0.3**2)),
+        (20.0, 0.3, 0.0, sqrt(DRAGGING_SHARE**2 - 0.3**2)),
+        (1.3, 0.3, 0.1, 1.3),  # perhaps the place is not that far away
+        (0.2, 1.2, 0.0, 0.2),  # higher than the cable is long, but over its load
+        (0.9, 1.2, 0.0, MIN_DRAGGING_SHARE),
+    ],
+)
+def test_a_load_that_no_tracker_sees_follows_the_vehicle_at_the_end_of_its_cable(
+    beside: float, height: float, std: float, left: float
+) -> None:
+    """All in cable lengths."""
+    east, north = 0.6, 0.8
+    x_load = (3.0, -2.0, TUNING.load_height)
+    x_quad = (
+        x_load[0] + beside * LENGTH * east,
+        x_load[1] + beside * LENGTH * north,
+        x_load[2] + height * LENGTH,
+    )
+    vehicle = blank_state().vehicle._replace(x_quad=x_quad)
+    moved = dragged_along(x_load, vehicle, (std * LENGTH) ** 2, LENGTH)
+    expected = (x_quad[0] - left * LENGTH * east, x_quad[1] - left * LENGTH * north, x_load[2])
+    assert moved == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_load_is_not_dragged_by_a_cable_that_is_gone() -> None:
+    vehicle = blank_state().vehicle._replace(x_quad=(50.0, 0.0, 1.0))
+    assert dragged_along((0.0, 0.0, 0.0), vehicle, 0.01, inf) == (0.0, 0.0, 0.0)

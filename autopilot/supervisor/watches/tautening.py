@@ -40,7 +40,8 @@ PATIENCE_S = 30.0
 # The vehicle's setpoint rises above the cable's length by this share of it, and at least by this share of the
 # lead at which the law pulls with the load's weight: then the cable must have come taut.
 STRETCH_SHARE, LEAD_SHARE = 0.3, 1.3
-MIN_SPEED = 0.3  # m/s: a vehicle or load that moves away more slowly is not carried off
+MIN_SPEED = 0.3  # m/s: a vehicle that moves away from its place more slowly is not carried off
+MIN_DRAG_SPEED = 0.05  # m/s: the same of one that has dragged its load far away and goes on
 WINDY_TILT_RAD = radians(20.0)  # a vehicle that tilts more pushes against strong wind
 HIDDEN_S = 2.0  # where the pull decides, the setpoint rises on for this time, as gusts may hide the pull
 
@@ -75,7 +76,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     is_too_late = view.now_us > give_up_us(flight, settings)
     # for example because the load was not seen well from the ground
     if not norm(sub(over, at)) <= max_load_offset(settings):
-        if norm(way) > limit_m and dot(way, view.v_load) >= MIN_SPEED * norm(way):
+        if norm(way) > limit_m and dot(way, view.v_quad) >= MIN_DRAG_SPEED * norm(way):
             return _carried_off(flight, f"load dragged by {norm(way):.1f} m (FS_LOAD_ERR {limit_m:g})")
         if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
