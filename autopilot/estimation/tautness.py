@@ -186,6 +186,18 @@ def _may_pull(
 
 
 @kernel
+def _is_surely_slack(
+    load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
+) -> bool:
+    """Whether a cable that counts as slack, of a load without a tracker, is slack whatever seems to pull,
+    also if the height is wrong by some deviations."""
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    distance = norm(sub(load.x_load, vehicle.x_quad)) + HELD_SIGMAS * height_std
+    may_pull = _may_pull(load, vehicle, history, tuning)
+    return distance < PULL_DISTANCE * tuning.cable_length and not may_pull
+
+
+@kernel
 def _must_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
 ) -> bool:
@@ -213,7 +225,7 @@ def averaged_missing_pull(
         if load.laid_height > NOT_LAID:
             return before
     elif load.taut == 0.0:
-        if _may_pull(load, vehicle, history, tuning):
+        if not _is_surely_slack(load, vehicle, history, tuning):
             # a gust is over: what it made of the pull is not missing when the cable begins to pull
             return max(before, -max(load.pull, 0.0))
         return min(before - dt / MISSING_PULL_TIME_S * (load.pull + before), 0.0)
@@ -235,7 +247,7 @@ def is_pull_known(
     if load.taut == 0.0:
         height = vehicle.x_quad[2] - load.x_load[2]
         in_air = height > MIN_FLOWN_HEIGHT * tuning.cable_length
-        return load.source != TRACKER and in_air and not _may_pull(load, vehicle, history, tuning)
+        return load.source != TRACKER and in_air and _is_surely_slack(load, vehicle, history, tuning)
     hangs = load.laid_height <= NOT_LAID if load.source == TRACKER else load.tautness_age_s > LIFTING_S
     return hangs and load.pull + min(missing_pull, 0.0) > CERTAIN_PULL * load.tension
 

@@ -130,7 +130,11 @@ def laid(height_m: float = TUNING.load_height) -> LoadEstimate:
     """A load whose cable is slack, at this height."""
     load = blank_state().load
     return load._replace(
-        x_load=(0.0, 0.0, height_m), q_cable=(0.0, 0.0, -1.0), age_s=0.1, source=CAMERA, length=LENGTH
+        x_load=(0.0, 0.0, height_m),
+        q_cable=(0.0, 0.0, -1.0),
+        age_s=0.1,
+        source=CAMERA,
+        length=LENGTH,
     )
 
 
@@ -233,12 +237,16 @@ def test_a_pull_counts_where_the_cable_may_be_long_enough(
     assert (after(load, 1.0, 0.0, height, 0.28, height_std_m).taut > 0.0) == is_taut
 
 
-def missed(load: LoadEstimate, before: float, height: float, seconds: float) -> float:
+def missed(
+    load: LoadEstimate, before: float, height: float, seconds: float, height_std: float = 0.0
+) -> float:
     """What counts as missing, in weights, after this time."""
+    history = new_history()
+    history.covariance[POSITION + 2, POSITION + 2] = height_std**2
     vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, load.x_load[2] + height * TUNING.cable_length))
     missing = before * WEIGHT
     for _ in range(round(seconds / DT)):
-        missing = averaged_missing_pull(load, vehicle, new_history(), missing, TUNING, DT)
+        missing = averaged_missing_pull(load, vehicle, history, missing, TUNING, DT)
     return missing / WEIGHT
 
 
@@ -248,6 +256,20 @@ def test_what_a_gust_adds_to_the_pull_is_missing_only_as_long_as_it_blows() -> N
     assert learned == pytest.approx(-0.4, abs=0.01)
     assert missed(pulled, learned, 0.9, 1.0) == learned
     assert missed(laid()._replace(pull=0.1 * WEIGHT), learned, 0.9, DT) == pytest.approx(-0.1)
+
+
+def test_a_pull_is_neither_drag_nor_missing_where_the_height_is_too_uncertain_to_exclude_it() -> None:
+    """0.7 of the cable's length apart, and 0.1 of it uncertain: three deviations more, and the cable is taut.
+    With 0.75 as the least distance of a cable that pulls, it was taken to be slack: its pull was learned as
+    drag of the rotors, and hidden by this for as long as it pulled."""
+    pulled = laid()._replace(pull=0.5 * WEIGHT)
+    vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, pulled.x_load[2] + 0.7 * TUNING.cable_length))
+    history = new_history()
+    assert is_pull_known(pulled, vehicle, history, 0.0, TUNING)
+    history.covariance[POSITION + 2, POSITION + 2] = (0.1 * TUNING.cable_length) ** 2
+    assert not is_pull_known(pulled, vehicle, history, 0.0, TUNING)
+    assert missed(pulled, 0.0, 0.7, 8.0) == pytest.approx(-0.5, abs=0.02)
+    assert missed(pulled, 0.0, 0.7, 8.0, 0.1 * TUNING.cable_length) == 0.0
 
 
 def test_the_pull_of_a_load_in_the_air_is_not_learned_as_missing() -> None:
