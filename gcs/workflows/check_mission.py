@@ -86,7 +86,8 @@ def _as_sent(mission: Mission) -> Mission:
     steps = (
         there if isinstance(here, Waypoint) else here for here, there in zip(mission.steps, sent, strict=True)
     )
-    return replace(mission, steps=tuple(steps))
+    described = mission.name, mission.title, mission.description, mission.assumptions
+    return Mission(*described, tuple(steps), locations=mission.locations)
 
 
 def slowness_notes(reports: Sequence[PathReport]) -> Iterator[str]:

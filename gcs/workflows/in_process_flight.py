@@ -34,8 +34,7 @@ def fly_in_process(
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
     `warn` is called with a line for each option that may be unintended and for what the vehicle lacks in the
-    wind, `log_sensors` with the bytes of a log
-    of the sensors.
+    wind, `log_sensors` with the bytes of a log of the sensors.
     """
     check_law(mission, options)
     for line in (*check_options(options), *mission_warnings(options.planner, mission)):

@@ -134,3 +134,10 @@ def test_a_flight_in_too_much_wind_is_warned_of_and_not_refused() -> None:
         wind_warnings(load("hover"), options("SIM_WIND_E=13", "SIM_DRAG_SCALE=0.5", vehicle="bebop-real"))
         == []
     )
+
+
+def test_a_mission_made_in_python_is_judged_as_a_file_is() -> None:
+    windy, path = options("SIM_WIND_E=14", "MIS_ROTOR_MARG=16"), "missions/case-c.toml"
+    (in_file,) = wind_warnings(load("case-c"), windy)
+    (made,) = wind_warnings(plumbline.Mission.load("case-c"), windy)
+    assert in_file.startswith(path) and in_file.endswith(made)
