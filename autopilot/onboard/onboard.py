@@ -88,6 +88,7 @@ from autopilot.services.requests import (
     ResetParameters,
     SetHome,
     StartMission,
+    Takeoff,
 )
 from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
@@ -801,6 +802,9 @@ class Onboard:
         simulator_problems = self.core.flight.external_arming_problems.get(_SIMULATOR)
         if simulator_problems and isinstance(request, MOTION_REQUESTS):
             return Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, f"Not flown: {simulator_problems[0]}")
+        if isinstance(request, Takeoff) and request.altitude_m is None:
+            # a height that was set just before is the one that is meant, although its setup may not be ready
+            request = Takeoff(self.parameters["MIS_TAKEOFF_ALT"])
         home = self.core.flight.area.home
         verdict = self.core.handle_request(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:

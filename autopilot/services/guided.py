@@ -241,7 +241,7 @@ class GuidedService:
         self, request: SetpointRequest | Verdict, now_us: int, decide: Decide
     ) -> list[Output]:
         verdict = request if isinstance(request, Verdict) else decide(request)
-        if verdict.result == mavlink.MAV_RESULT_ACCEPTED or verdict.text is None:
+        if verdict.text is None:
             return []
         if now_us - self._warned_us.get(verdict.text, -WARNING_INTERVAL_US) < WARNING_INTERVAL_US:
             return []

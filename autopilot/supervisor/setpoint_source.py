@@ -27,9 +27,21 @@ def source_stream(flight: Flight) -> SetpointStream | None:
 
 
 def active_setpoint(flight: Flight) -> Setpoint | None:
-    """The setpoint that is followed while GUIDED; None before the first."""
+    """The setpoint that is followed while GUIDED; None before the first. A vehicle that has released its load
+    follows a target a cable length above the place where the load would be."""
     stream = source_stream(flight)
-    return flight.setpoints.circle if stream is None else stream.setpoint
+    if stream is None:
+        return flight.setpoints.circle
+    setpoint, cable = stream.setpoint, flight.cable
+    if (
+        cable.released
+        and flight.setpoints.source == SetpointSource.TARGET
+        and isinstance(setpoint, PositionSetpoint)
+    ):
+        x, y, z = setpoint.position
+        length_m = cable.taut_length_m if cable.length_m is None else cable.length_m
+        return replace(setpoint, position=(x, y, z + length_m))
+    return setpoint
 
 
 def is_target_lost(flight: Flight, now_us: int) -> bool:

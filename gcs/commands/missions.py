@@ -78,7 +78,7 @@ def check_command(
     station. Every limit that it breaks is printed, with the time and the excess, or else what the vehicle
     would refuse, such as a path that leaves the fence of a .plan; the exit code is then 1. Otherwise the
     duration of each path, its distance from the requested path, and its peaks of rotor force, tension and
-    tilt are printed, and the steady wind that the vehicle stands. With --as-asked the paths are judged as
+    tilt are printed, and the steady wind that the vehicle withstands. With --as-asked the paths are judged as
     the laws thesis and lqr fly them, without shaping, as with --law of one of these; how closely such a law
     follows them is not judged. With --planner the paths through waypoints are those of your own planner,
     whose errors are printed.

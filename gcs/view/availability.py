@@ -29,13 +29,14 @@ def unavailable_actions(view: VehicleView) -> dict[str, str]:
     not_armable = _TERMINATED.get(phase) or ("not ready to arm" if view.ready_to_arm is False else "")
     takes_off = "the take-off has begun already" if phase in (_TAUTEN, _LIFT) else "in the air"
     idle = on_ground and (view.phase is None or view.mode in _IDLE_MODES)
+    held = "held already" if view.holding else ""
     reasons = {
         "arm": "armed already" if armed else not_armable,
         "disarm": "not armed" if armed is False else "in the air: land first" if on_ground is False else "",
         "takeoff": (takes_off if on_ground is False else "") if armed else not_armable,
         "start": mission or (_NOT_TO_START.get(phase, "") if armed else not_armable),
         "resume": mission or ("" if armed else grounded) or _NOT_TO_START.get(phase, ""),
-        "hold": "on the ground: nothing is under way" if idle else _NOT_TO_HOLD.get(phase, ""),
+        "hold": "on the ground: nothing is under way" if idle else held or _NOT_TO_HOLD.get(phase, ""),
         "land": grounded or _TERMINATED.get(phase, ""),
         "return": grounded or _NOT_TO_RETURN.get(phase, ""),
         "goto": grounded or _NOT_TO_HOLD.get(phase, ""),

@@ -273,7 +273,7 @@ class CheckResult:
     def _wind_lines(self) -> Iterator[str]:
         if self.wind_limit_m_s is not None:
             limit_m_s = floor(10.0 * self.wind_limit_m_s) / 10.0
-            yield f"stands {limit_m_s:.1f} m/s of steady wind: in more, {self.wind_reason}"
+            yield f"withstands {limit_m_s:.1f} m/s of steady wind: in more, {self.wind_reason}"
 
 
 def _path_lines(reports: Iterable[PathReport]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What steady, level wind a vehicle stands in its simulated world, and what it lacks in more.
+"""What steady, level wind a vehicle withstands in its simulated world, and what it lacks in more.
 
 Judged are standing on the ground, pulling the cable taut, holding the load, and the paths of a mission, each
 at its worst and with the wind from the worst direction. Not judged are gusts, a battery that sags, and how
@@ -35,7 +35,7 @@ _BISECTIONS = 40
 
 
 class WindLimit(NamedTuple):
-    """The greatest wind that the vehicle stands, and why not more."""
+    """The greatest wind that the vehicle withstands, and why not more."""
 
     speed_m_s: float
     reason: str
@@ -72,7 +72,7 @@ class Craft:
         self._rotor_drag = truth.air.rotor_drag / truth.gravity + truth.air.rotor_flap
 
     def limit(self, reports: Sequence[PathReport] = ()) -> WindLimit | None:
-        """The greatest wind that the vehicle stands along these paths; None if it stands any."""
+        """The greatest wind that the vehicle withstands along these paths; None if it withstands any."""
         low, high = 0.0, MAX_WIND_M_S
         first = next(self.lacks(high, reports), None)
         if first is None:

@@ -16,7 +16,7 @@ from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence
 from missions.model import Land, ReturnHome, Speed, Step, Takeoff, Waypoint
-from tests.doubles.craft import Craft, at_phase
+from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
 ITEMS = (
     Takeoff(2.0),
@@ -157,3 +157,14 @@ def test_curves_that_the_fence_forbids_are_not_flown() -> None:
     craft.wait(0.1)
     assert craft.flight.mission.plan.prepared == before
     assert "Mission keeps its paths: the curve to item 4 leads outside the fence" in "".join(craft.texts)
+
+
+def test_a_take_off_climbs_to_the_height_that_was_set_just_before() -> None:
+    """As MAVSDK asks for it: the height as a parameter, which is in force only when another process has
+    derived the setup, and then a take-off without a height."""
+    craft = Craft(clock_waits=False)
+    craft.wait(1.0)
+    set_parameter(craft, b"MIS_TAKEOFF_ALT", 4.0)
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, *(math.nan,) * 7) == ACCEPTED
+    assert craft.onboard.work is not None
+    assert craft.flight.mission.takeoff_altitude_m == 4.0

@@ -12,6 +12,7 @@ from autopilot.services.requests import (
     Arm,
     EnableFence,
     FollowSetpoint,
+    Land,
     Orbit,
     ReplaceMission,
     Reposition,
@@ -155,6 +156,20 @@ def test_distance_and_height() -> None:
     high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED
+
+
+@pytest.mark.parametrize(("request_", "phase"), [(ReturnHome(), Phase.RETURN), (Land(), Phase.LOWER)])
+def test_a_hold_at_the_fence_ends_no_return_and_no_landing(request_: Any, phase: Phase) -> None:
+    sky = fenced(radius_m=30.0).airborne()
+    assert sky.ask(Reposition(4.0, 0.0, 2.0, True)).result == ACCEPTED
+    sky.wait(15.0)
+    assert sky.ask(request_).result == ACCEPTED
+    sky.settings = replace(sky.settings, fence=replace(sky.settings.fence, radius_m=3.0))
+    sky.tick()
+    assert sky.texts[-1] == "Fence: beyond the fence, GF_MAX_HOR_DIST 3 m from home"
+    assert sky.flight.phase == phase
+    sky.run(lambda sky: sky.flight.phase == Phase.DISARMED)
+    assert Phase.HOLD not in sky.phases[sky.phases.index(phase) :]
 
 
 def test_places_beyond_it_are_refused() -> None:

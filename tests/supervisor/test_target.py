@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -10,9 +11,10 @@ from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.onboard.snapshot import reported_mode
 from autopilot.services import identity
 from autopilot.services.records import Verdict
-from autopilot.services.requests import FollowTarget, Land, Pause, SetMode
+from autopilot.services.requests import FollowTarget, Land, Pause, Release, SetMode
 from autopilot.supervisor.state import Phase, SetpointSource
 from autopilot.wire.dialect import plumbline as m
+from tests.doubles.motion import CABLE_LENGTH
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
 FOLLOWME = SetMode(identity.AUTO, identity.AUTO_FOLLOW, name="FOLLOWME")
@@ -104,3 +106,46 @@ def test_a_target_that_is_too_far_away_is_refused_and_not_followed() -> None:
     before = sky.view.x_load
     sky.wait(5.0)
     assert norm(sub(sky.view.x_load, before)) < 1e-6
+
+
+def test_beyond_the_fence_no_target_is_followed() -> None:
+    sky = Sky(settings=replace(SETTINGS, fence=replace(SETTINGS.fence, action=2, radius_m=8.0))).airborne()
+    report = FollowTarget((9.0 + PLACE.distance_m, 0.0, 0.0), (3.0, 0.0, 0.0))
+    for _ in range(3):
+        assert sky.ask(FOLLOWME).result == ACCEPTED
+        for k in range(8):
+            report = FollowTarget((9.0 + 3.0 * k + PLACE.distance_m, 0.0, 0.0), (3.0, 0.0, 0.0))
+            refusal = sky.ask(report)
+            assert (
+                refusal.result == m.MAV_RESULT_DENIED and "Target refused: beyond the fence" in refusal.text
+            )
+            sky.wait(1.0)
+        assert reported_mode(sky.flight) == MODE
+        assert norm(sky.view.v_load) < 1e-6 and abs(sky.view.x_load[0]) < 0.1
+    # in other modes such a report is of no interest
+    assert sky.ask(Pause()).result == ACCEPTED
+    assert sky.ask(report) == Verdict(ACCEPTED)
+    assert sky.ask(FOLLOWME) == Verdict(ACCEPTED, WAITS)
+
+
+def test_a_target_that_is_too_fast_is_told() -> None:
+    sky = Sky().airborne()
+    fast = FollowTarget((3.0, 0.0, 0.0), (SETTINGS.setpoints.max_speed_m_s + 1.0, 0.0, 0.0))
+    assert sky.ask(fast) == Verdict(ACCEPTED)
+    assert sky.ask(FOLLOWME).result == ACCEPTED
+    assert sky.ask(fast) == Verdict(ACCEPTED, "Target faster than 5 m/s (MPC_XY_VEL_MAX): it escapes")
+
+
+def test_a_vehicle_that_releases_its_load_over_the_target_stays_above_it() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(FOLLOWME).result == ACCEPTED
+    walk(sky, (3.0, 0.0, 0.0), (0.5, 0.0, 0.0), 15.0)
+    height = sky.view.x_quad[2]
+    assert sky.ask(Release()).result == ACCEPTED
+    lowest = height
+    for _ in range(8):
+        walk(sky, (3.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+        lowest = min(lowest, sky.view.x_quad[2])
+    assert reported_mode(sky.flight) == MODE
+    assert lowest == pytest.approx(height, abs=0.05)
+    assert sky.view.x_quad[2] == pytest.approx(PLACE.height_m + CABLE_LENGTH, abs=0.05)

@@ -13,11 +13,13 @@ from autopilot.supervisor.state import (
     WARNING,
     Event,
     Flight,
+    Phase,
     View,
     first_fence_violation,
     has_fence,
     interrupt_mission,
     is_fence_active,
+    is_landing,
     load_position_below,
 )
 from autopilot.supervisor.table import TRANSITIONS
@@ -30,7 +32,10 @@ STOP_MARGIN = 0.05  # share by which the stopping distance is extended: while th
 
 
 def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
-    """React as GF_ACTION requires when the fence is breached, or the load can no longer stop before it."""
+    """React as GF_ACTION requires when the fence is breached, or the load can no longer stop before it.
+
+    A hold does not end a return or a landing.
+    """
     limits, area = settings.fence, flight.area
     if (
         flight.phase not in CARRYING
@@ -50,7 +55,8 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
     if limits.action == TERMINATE:
         return give_up_flight(flight, f"fence: {why}")
     event, action = FENCE_EVENTS.get(limits.action, (None, ""))
-    if event is None or (flight.phase, event) not in TRANSITIONS:
+    comes_back = event == Event.HOLD and (flight.phase == Phase.RETURN or is_landing(flight))
+    if event is None or comes_back or (flight.phase, event) not in TRANSITIONS:
         return WatchResult(flight, None, ((WARNING, f"Fence: {why}"),))
     return WatchResult(interrupt_mission(flight), event, ((WARNING, f"Fence: {why}, {action}"),))
 

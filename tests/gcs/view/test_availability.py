@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -87,6 +88,14 @@ def test_a_vehicle_on_the_ground_is_armed_for_its_mission_and_a_vehicle_in_the_a
     assert set(ground) == {"disarm", "resume", "hold", "land", "return", "goto"}
     air = unavailable_actions(reported(flight_in(Phase.HOLD, False, PLAN), 5))
     assert air == {"arm": "armed already", "disarm": "in the air: land first", "takeoff": "in the air"}
+
+
+def test_what_is_held_at_rest_is_held_already_and_what_still_stops_is_not() -> None:
+    mode, hold = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, mavlink.PLUMBLINE_PHASE_HOLD
+    for duration_s, expected in ((math.nan, "held already"), (2.0, None)):
+        changes = {"phase": hold, "control_mode": mode, "duration": duration_s}
+        view = view_of(heartbeat(True), mavlink.MAVLink_load_setpoint_message(**SETPOINT | changes))
+        assert unavailable_actions(view).get("hold") == expected
 
 
 def test_a_vehicle_that_is_not_ready_is_not_armed() -> None:
