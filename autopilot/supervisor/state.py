@@ -265,6 +265,11 @@ class Flight:
         """Whether it flies round a circle."""
         return self.phase == Phase.GUIDED and self.setpoints.source == SetpointSource.ORBIT
 
+    @property
+    def follows_target(self) -> bool:
+        """Whether it accompanies a target, or waits for one to do so."""
+        return self.phase == Phase.GUIDED and self.setpoints.source == SetpointSource.TARGET
+
 
 class View(NamedTuple):
     """What the supervisor sees of the world at a tick: estimates, ENU from home."""

@@ -7,43 +7,49 @@ from math import hypot
 
 from autopilot.geometry.linear import norm
 from autopilot.guidance.setpoint_follower import SetpointStream
-from autopilot.guidance.target import first_report
+from autopilot.guidance.target import Target, first_report
 from autopilot.services.records import Verdict
 from autopilot.services.requests import FollowTarget, SetMode
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.requests.guided import start_guided
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
-from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, temporarily_denied
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, temporarily_denied
 from autopilot.supervisor.setpoint_source import TARGET_LOSS_US, WAIT, is_target_lost, waiting_for_target
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Flight, Phase, SetpointSource, View, fence_problem
+from autopilot.supervisor.state import ON_GROUND, Flight, SetpointSource, View, fence_problem
 
 
 def follow_target(flight: Flight, request: FollowTarget, view: View, settings: Settings) -> Decision:
     """Take a report of the target. Ground stations may send it in every mode: it is then only kept. The load
     waits for a target that leads it beyond the fence."""
-    position = request.position
-    if not hypot(*position) <= MAX_DISTANCE_M:
-        return flight, denied(f"Target refused: more than {MAX_DISTANCE_M:g} m from home")
-    known = flight.setpoints.target
-    if known is None or view.now_us - known.at_us > TARGET_LOSS_US:
-        load = commanded_motion(flight, view, settings)[0]
-        target = first_report(position, request.velocity, view.now_us, load)
-    else:
-        target = known.reported(position, request.velocity, view.now_us, settings.target_place)
+    if not hypot(*request.position) <= MAX_DISTANCE_M:
+        return _not_followed(flight, f"more than {MAX_DISTANCE_M:g} m from home", view)
+    target = _reported(flight, request, view, settings)
     setpoint = target.setpoint(settings.target_place)
-    follows = flight.phase == Phase.GUIDED and flight.setpoints.source == SetpointSource.TARGET
-    after = replace(flight, setpoints=replace(flight.setpoints, target=target))
+    known = replace(flight, setpoints=replace(flight.setpoints, target=target))
     fence = fence_problem(flight, setpoint.position, settings)
     if fence:
-        verdict = denied(f"Target refused: {fence}") if follows else ACCEPTED
-        return waiting_for_target(after, view.now_us), verdict
-    stream = SetpointStream(setpoint, view.now_us)
+        return _not_followed(known, fence, view)
     limit_m_s = settings.setpoints.max_speed_m_s
-    is_too_fast = follows and norm(target.velocity) > limit_m_s
+    is_too_fast = flight.follows_target and norm(target.velocity) > limit_m_s
     text = f"Target faster than {limit_m_s:g} m/s (MPC_XY_VEL_MAX): it escapes" if is_too_fast else None
-    followed = replace(after, setpoints=replace(after.setpoints, beside_target=stream))
+    stream = SetpointStream(setpoint, view.now_us)
+    followed = replace(known, setpoints=replace(known.setpoints, beside_target=stream))
     return followed, Verdict(ACCEPTED.result, text)
+
+
+def _reported(flight: Flight, request: FollowTarget, view: View, settings: Settings) -> Target:
+    """The target by this report, and by those before it if it was not lost."""
+    position, velocity, before = request.position, request.velocity, flight.setpoints.target
+    if before is None or view.now_us - before.at_us > TARGET_LOSS_US:
+        return first_report(position, velocity, view.now_us, commanded_motion(flight, view, settings)[0])
+    return before.reported(position, velocity, view.now_us, settings.target_place)
+
+
+def _not_followed(flight: Flight, reason: str, view: View) -> Decision:
+    """The flight that waits for a target which is where the load may not be; told where it is followed."""
+    text = f"Target not followed: {reason}" if flight.follows_target else None
+    return waiting_for_target(flight, view.now_us), Verdict(ACCEPTED.result, text)
 
 
 def follow_me(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
