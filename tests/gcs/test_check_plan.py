@@ -55,10 +55,11 @@ def checked(
 def test_a_mission_within_its_fence_passes(tmp_path: Path) -> None:
     found = checked(tmp_path, box(3.0, 3.0, 6.0), CORNER)
     assert found.exit_code == EXIT_DONE
-    first, *paths, duration, note = found.stdout.splitlines()
+    first, *paths, duration, wind, note = found.stdout.splitlines()
     assert first == "x: vehicle bebop can fly it"
     assert [line.partition(" (")[0] for line in paths] == ["items[0]", "items[1]", "items[2]"]
     assert duration.startswith("in all: about ")
+    assert wind.startswith("withstands ")
     assert note == "note: flown with home at -33.9000000, 18.4000000, 60 m"
 
 
