@@ -249,4 +249,6 @@ class GuidedService:
             text: at for text, at in self._warned_us.items() if now_us - at < WARNING_INTERVAL_US
         }
         self._warned_us[verdict.text] = now_us
-        return [SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text)]
+        is_warning = verdict.warns or verdict.result != mavlink.MAV_RESULT_ACCEPTED
+        severity = mavlink.MAV_SEVERITY_WARNING if is_warning else mavlink.MAV_SEVERITY_INFO
+        return [SendText(severity, verdict.text)]

@@ -264,6 +264,14 @@ def test_a_target_of_any_sender_is_handed_on(rig):
     assert [type(asked) for asked in rig.asked] == [FollowTarget]
 
 
+def test_what_is_said_of_a_report_that_is_accepted_is_a_warning_or_information(rig):
+    for warns, severity in ((False, m.MAV_SEVERITY_INFO), (True, m.MAV_SEVERITY_WARNING)):
+        rig.verdict = lambda _, warns=warns: Verdict(m.MAV_RESULT_ACCEPTED, f"told, {warns}", warns)
+        rig.send(target(3, 47.0, 8.0))
+        said = [r.message for r in rig.poll()["gcs"] if r.message.get_type() == "STATUSTEXT"]
+        assert [(one.severity, one.text) for one in said] == [(severity, f"told, {warns}")]
+
+
 def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):
     rig.poll()
     rig.send(local(1, POSITION, 1.0))

@@ -65,6 +65,8 @@ def test_a_target_that_is_lost_is_waited_for_and_followed_again() -> None:
     assert norm(sky.view.v_load) < 1e-3
     sky.wait(5.0)
     assert norm(sub(sky.view.x_load, waiting_at)) < 1e-3
+    assert sky.ask(FollowTarget(target, None)) == Verdict(ACCEPTED, "Target found: following it")
+    assert sky.ask(FollowTarget(target, None)) == Verdict(ACCEPTED)
     target = walk(sky, target, (0.0, -1.0, 0.0), 25.0)
     assert norm(sub(sky.view.x_load, (target[0], target[1] + PLACE.distance_m, PLACE.height_m))) < 0.02
 
@@ -103,7 +105,7 @@ def test_a_target_that_is_too_far_away_is_not_followed(east_m: float) -> None:
     far = FollowTarget((east_m, 0.0, 0.0), None)
     assert sky.ask(far) == Verdict(ACCEPTED)  # of no interest in this mode
     assert sky.ask(FOLLOWME) == Verdict(ACCEPTED, WAITS)
-    assert sky.ask(far) == Verdict(ACCEPTED, "Target not followed: more than 100000 m from home")
+    assert sky.ask(far) == Verdict(ACCEPTED, "Target not followed: more than 100000 m from home", True)
     assert sky.flight.setpoints.source == SetpointSource.TARGET
     before = sky.view.x_load
     sky.wait(5.0)
@@ -117,7 +119,9 @@ def test_beyond_the_fence_no_target_is_followed() -> None:
         assert sky.ask(FOLLOWME).result == ACCEPTED
         for k in range(8):
             report = FollowTarget((9.0 + 3.0 * k + PLACE.distance_m, 0.0, 0.0), (3.0, 0.0, 0.0))
-            told = Verdict(ACCEPTED, "Target not followed: beyond the fence, GF_MAX_HOR_DIST 8 m from home")
+            told = Verdict(
+                ACCEPTED, "Target not followed: beyond the fence, GF_MAX_HOR_DIST 8 m from home", True
+            )
             assert sky.ask(report) == told
             sky.wait(1.0)
         assert reported_mode(sky.flight) == MODE
@@ -133,7 +137,7 @@ def test_a_target_that_is_too_fast_is_told() -> None:
     fast = FollowTarget((3.0, 0.0, 0.0), (SETTINGS.setpoints.max_speed_m_s + 1.0, 0.0, 0.0))
     assert sky.ask(fast) == Verdict(ACCEPTED)
     assert sky.ask(FOLLOWME).result == ACCEPTED
-    assert sky.ask(fast) == Verdict(ACCEPTED, "Target faster than 5 m/s (MPC_XY_VEL_MAX): it escapes")
+    assert sky.ask(fast) == Verdict(ACCEPTED, "Target faster than 5 m/s (MPC_XY_VEL_MAX): it escapes", True)
 
 
 def test_a_vehicle_that_releases_its_load_over_the_target_stays_above_it() -> None:

@@ -31,11 +31,15 @@ def follow_target(flight: Flight, request: FollowTarget, view: View, settings: S
     if fence:
         return _not_followed(known, fence, view)
     limit_m_s = settings.setpoints.max_speed_m_s
-    is_too_fast = flight.follows_target and norm(target.velocity) > limit_m_s
-    text = f"Target faster than {limit_m_s:g} m/s (MPC_XY_VEL_MAX): it escapes" if is_too_fast else None
     stream = SetpointStream(setpoint, view.now_us)
     followed = replace(known, setpoints=replace(known.setpoints, beside_target=stream))
-    return followed, Verdict(ACCEPTED.result, text)
+    if not flight.follows_target:
+        return followed, ACCEPTED
+    if norm(target.velocity) > limit_m_s:
+        text = f"Target faster than {limit_m_s:g} m/s (MPC_XY_VEL_MAX): it escapes"
+        return followed, Verdict(ACCEPTED.result, text, warns=True)
+    was_awaited = flight.setpoints.beside_target.setpoint is WAIT
+    return followed, Verdict(ACCEPTED.result, "Target found: following it" if was_awaited else None)
 
 
 def _reported(flight: Flight, request: FollowTarget, view: View, settings: Settings) -> Target:
@@ -48,8 +52,10 @@ def _reported(flight: Flight, request: FollowTarget, view: View, settings: Setti
 
 def _not_followed(flight: Flight, reason: str, view: View) -> Decision:
     """The flight that waits for a target which is where the load may not be; told where it is followed."""
-    text = f"Target not followed: {reason}" if flight.follows_target else None
-    return waiting_for_target(flight, view.now_us), Verdict(ACCEPTED.result, text)
+    waiting = waiting_for_target(flight, view.now_us)
+    if not flight.follows_target:
+        return waiting, ACCEPTED
+    return waiting, Verdict(ACCEPTED.result, f"Target not followed: {reason}", warns=True)
 
 
 def follow_me(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
