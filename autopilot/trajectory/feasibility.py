@@ -303,7 +303,7 @@ def _hover_violations(limits: VehicleLimits) -> list[Violation]:
     too_heavy = vehicle.quad_mass_kg * vehicle.gravity_m_s2 >= limits.usable_thrust_n
     text = (
         f"vehicle ({vehicle.quad_mass_kg:g} kg) and load ({vehicle.load_mass_kg:g} kg) weigh {weight:.2f} N; "
-        f"{limits.thrust_text} ({_excess_text(weight, limits.usable_thrust_n)}): it cannot hover; "
+        f"{limits.thrust_text} ({excess_text(weight, limits.usable_thrust_n)}): it cannot hover; "
         f"lower {'quad_mass_kg' if too_heavy else 'load_mass_kg'}, or raise rotor_max_n"
     )
     return [Violation(0, "thrust", weight, limits.usable_thrust_n, 0.0, text)]
@@ -464,20 +464,20 @@ def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimi
         # beyond this the cable would have to push: thrust and tilt then have no meaning
         finding = (
             f"the load would have to fall at {fall.value:.1f} m/s^2 with the cable taut; gravity gives "
-            f"{gravity:.2f} m/s^2 ({_excess_text(fall.value, gravity)})"
+            f"{gravity:.2f} m/s^2 ({excess_text(fall.value, gravity)})"
         )
         yield violation("tension", fall, gravity, finding)
         return
     if thrust.value > usable:
         finding = (
             f"the flight needs {thrust.value:.2f} N of thrust; {limits.thrust_text} "
-            f"({_excess_text(thrust.value, usable)})"
+            f"({excess_text(thrust.value, usable)})"
         )
         yield violation("thrust", thrust, usable, finding)
     if high.value > vehicle.rotor_max_n:
         finding = (
             f"one rotor has to give {high.value:.2f} N; it gives {vehicle.rotor_max_n:.2f} N at most "
-            f"({_excess_text(high.value, vehicle.rotor_max_n)})"
+            f"({excess_text(high.value, vehicle.rotor_max_n)})"
         )
         yield violation("rotor force", high, vehicle.rotor_max_n, finding)
     if low.value < vehicle.rotor_min_n:
@@ -553,7 +553,8 @@ def _item_label(entry: TimelineEntry) -> str:
     return f"items[{entry.item}] ({KINDS[type(entry.step)]})"
 
 
-def _excess_text(value: float, limit: float) -> str:
+def excess_text(value: float, limit: float) -> str:
+    """By how much a value is greater than its limit, in words."""
     if limit <= 0.0:
         return f"{value - limit:.2f} over"
     times = value / limit

@@ -170,7 +170,10 @@ class UdpSocket(OpenSocket):
             raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
 
 
-def open_address(address: Address) -> UdpSocket | TcpSocket:
+VehicleLink = UdpSocket | TcpSocket
+
+
+def open_address(address: Address) -> VehicleLink:
     """The socket for this address of a vehicle."""
     if address.tcp:
         return TcpSocket(address.host, address.port)

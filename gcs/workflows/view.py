@@ -24,12 +24,12 @@ from gcs.shell.link import (
     SITL_TRUTH,
     Address,
     UdpSocket,
+    VehicleLink,
     monotonic_us,
     open_address,
     unix_us,
 )
 from gcs.shell.page_server import PageCallbacks, PageServer, Site
-from gcs.shell.tcp_socket import TcpSocket
 from gcs.view.controls import SLIDERS
 from gcs.view.station import Station
 from gcs.web import LIVE_FILES, LIVE_PAGE, asset
@@ -63,11 +63,10 @@ class UdpLinks:
     """Vehicles that were started separately, at one address or several."""
 
     def __init__(self, addresses: tuple[Address, ...], truth: Address | None) -> None:
-        self._sockets: list[UdpSocket | TcpSocket] = []
-        # socket and peer by system id
-        self._routes: dict[int, tuple[UdpSocket | TcpSocket, tuple[str, int]]] = {}
+        self._sockets: list[VehicleLink] = []
+        self._routes: dict[int, tuple[VehicleLink, tuple[str, int]]] = {}  # socket and peer by system id
         # of `udpout:` and `tcp:` addresses: the vehicle waits until we send first
-        self._outgoing: list[UdpSocket | TcpSocket] = []
+        self._outgoing: list[VehicleLink] = []
         self._truth: UdpSocket | None = None
         self._worlds = TruthSources()
         try:

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from math import cos, degrees, hypot, pi, radians, sin, tan
 from typing import NamedTuple
 
-from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation
+from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, excess_text
 from autopilot.vehicle.file import load_truth_and_belief
 from gcs.errors import InputError
 from gcs.workflows.flight_options import Settings
@@ -99,8 +99,8 @@ class Craft:
         if drag_n > friction_n:
             text = (
                 f"in wind of {wind_m_s:.1f} m/s vehicle and load are blown along the ground by "
-                f"{drag_n:.2f} N; friction holds {friction_n:.2f} N ({_over(drag_n, friction_n)}): it is not "
-                "armed"
+                f"{drag_n:.2f} N; friction holds {friction_n:.2f} N ({excess_text(drag_n, friction_n)}): it "
+                "is not armed"
             )
             yield _lack(
                 0, "friction", drag_n, friction_n, text, "vehicle and load are blown along the ground"
@@ -123,7 +123,7 @@ class Craft:
         if thrust_n > usable_n:
             text = (
                 f"in wind of {wind_m_s:.1f} m/s the vehicle needs {thrust_n:.2f} N of thrust to hold "
-                f"the load; {self._limits.thrust_text} ({_over(thrust_n, usable_n)})"
+                f"the load; {self._limits.thrust_text} ({excess_text(thrust_n, usable_n)})"
             )
             yield _lack(0, "thrust", thrust_n, usable_n, text, "its thrust would not hold the load")
 
@@ -142,7 +142,7 @@ class Craft:
             text = (
                 f"items[{report.item}] ({report.kind}): in wind of {wind_m_s:.1f} m/s from the worst "
                 f"direction one rotor has to give {force_n:.2f} N; it gives {max_n:.2f} N at most "
-                f"({_over(force_n, max_n)})"
+                f"({excess_text(force_n, max_n)})"
             )
             reason = f"a rotor would be at its limit in items[{report.item}] ({report.kind})"
             yield _lack(report.item, "rotor force", force_n, max_n, text, reason)
@@ -175,10 +175,6 @@ class Craft:
 
 def _lack(item: int, quantity: str, value: float, limit: float, text: str, reason: str) -> Lack:
     return Lack(Violation(item, quantity, value, limit, 0.0, text), reason)
-
-
-def _over(value: float, limit: float) -> str:
-    return f"{100.0 * (value / limit - 1.0):.0f} % over"
 
 
 def craft_of(vehicle: str, limits: VehicleLimits, settings: Settings = ()) -> Craft:
