@@ -48,6 +48,9 @@ FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
 _OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, except for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
+MAX_CURVED_S = 1.0  # age of a setpoint after which its velocity no longer changes by its acceleration
+ACCEL_SMOOTHING_S = 0.3  # time constant of the acceleration that follows from the velocities of setpoints
+_MAX_CHANGE = 2.0  # of a path's velocity, over that at the maximum acceleration: not all arrive on time
 NEVER_US = 2**62
 UNSPECIFIED: Vec3 = (nan, nan, nan)
 Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
@@ -57,8 +60,9 @@ Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 class PositionSetpoint:
     """What a stream requests of the load, ENU from home; NaN: nothing is requested on this axis.
 
-    A position with a velocity moves at that velocity from `since_us` on. On an axis on which only an
-    acceleration is requested, nothing holds the load.
+    A position with a velocity moves at that velocity from `since_us` on, and a velocity with an acceleration
+    changes by it, for `MAX_CURVED_S` at most. On an axis on which only an acceleration is requested, nothing
+    holds the load.
     """
 
     position: Vec3 = UNSPECIFIED
@@ -67,6 +71,36 @@ class PositionSetpoint:
     since_us: int = 0
     heading: float = nan  # rad, from east to north
     yaw_rate: float = nan  # rad/s
+
+    def smoother_input(self, now_us: int, limits: FollowLimits) -> Point:
+        """Position, velocity and acceleration that the smoother turns into this motion at `now_us`. NaN stays
+        NaN in the position; an acceleration alone changes neither position nor velocity."""
+        push = _limited(_nan_to_zero(self.accel), limits.accel)
+        a = sub(push, self.acceleration_only_part(push))
+        age_s = max(0.0, (now_us - self.since_us) * 1e-6)
+        curved_s = min(age_s, MAX_CURVED_S)
+        v = _limited(_nan_to_zero(self.velocity), limits.max_speed)
+        x = axpy(curved_s * (age_s - 0.5 * curved_s), a, axpy(age_s, v, self.position))
+        v = axpy(curved_s, a, v)
+        if age_s > MAX_CURVED_S:
+            push, a = sub(push, a), ZERO
+        # the point of which this motion is what `TrackPosition._steady` is
+        lag_s = ORDER / limits.rate
+        x = axpy(_OF_INPUT[2] / limits.rate**2, a, axpy(lag_s, v, x))
+        return x, _limited(axpy(lag_s, a, v), limits.max_speed), push
+
+    def after(self, before: Setpoint | None, max_accel: float) -> PositionSetpoint:
+        """This setpoint as the next of a path: one with position and velocity and no acceleration gets that
+        of the velocities, unless these change by more than on a path within `max_accel` (m/s^2)."""
+        is_of_path = not any(map(isnan, self.position)) and all(map(isnan, self.accel))
+        if not is_of_path or not isinstance(before, PositionSetpoint):
+            return self
+        elapsed_s = (self.since_us - before.since_us) * 1e-6
+        change = sub(self.velocity, before.velocity)
+        if not 0.0 < elapsed_s < MAX_CURVED_S or not norm(change) <= _MAX_CHANGE * max_accel * elapsed_s:
+            return self
+        share = 1.0 - exp(-elapsed_s / ACCEL_SMOOTHING_S)
+        return replace(self, accel=smoothed_rate(_nan_to_zero(before.accel), change, elapsed_s, share))
 
     @property
     def is_fixed_position(self) -> bool:
@@ -97,13 +131,13 @@ class Circle:
     ramp_s: float  # in which the rate is reached
     ends_us: int = NEVER_US  # when it has been flown
 
-    def smoother_input(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
-        """Position, velocity and acceleration that a smoother of this rate turns into the circle."""
+    def smoother_input(self, now_us: int, limits: FollowLimits) -> Point:
+        """Position, velocity and acceleration that the smoother turns into the circle."""
         t = max(0.0, (now_us - self.since_us) * 1e-6)
         ramping = t < self.ramp_s
         progress_s = 0.5 * t * t / self.ramp_s if ramping else t - 0.5 * self.ramp_s
         turning = self.rate * (t / self.ramp_s if ramping else 1.0)
-        share = turning / rate
+        share = turning / limits.rate
         angle = self.start_angle + self.rate * progress_s + ORDER * atan(share)
         radius = self.radius * (1.0 + share * share) ** (0.5 * ORDER)
         x, y = radius * cos(angle), radius * sin(angle)
@@ -266,6 +300,12 @@ def start_following(jet: Jet, rate: float) -> TrackPosition:
     return TrackPosition(jet, (point[0], point[1], point[2]), rate)
 
 
+def smoothed_rate(rate: Vec3, change: Vec3, elapsed_s: float, share: float) -> Vec3:
+    """A derivative that was `rate`, after a change of what it is the derivative of: `share` of the way to the
+    mean of this time."""
+    return axpy(share, sub(scale(1.0 / elapsed_s, change), rate), rate)
+
+
 def approach_velocity(distance: Vec3, accel: float) -> Vec3:
     """Velocity (m/s) of approach to a point that must be reached at rest: K_P times the distance near it, and
     far from it the velocity that a deceleration of `accel` allows."""
@@ -289,19 +329,12 @@ def governor_point(
     x: Vec3, v: Vec3, setpoint: PositionSetpoint | Circle, limits: FollowLimits, now_us: int
 ) -> Point:
     """The governor's point: its position, its velocity, and its acceleration from now on."""
-    if isinstance(setpoint, Circle):
-        place, along, push = setpoint.smoother_input(now_us, limits.rate)
-        distance = sub(place, x)
-    else:
-        along = _limited(_nan_to_zero(setpoint.velocity), limits.max_speed)
-        push = _limited(_nan_to_zero(setpoint.accel), limits.accel)
-        age = (now_us - setpoint.since_us) * 1e-6 + ORDER / limits.rate
-        aim = axpy(age, along, setpoint.position)
-        # on an axis without a requested position, the distance is zero
-        distance = _nan_to_zero(sub(aim, x))
-        if aim[2] < FLOOR_M:
-            distance = (distance[0], distance[1], FLOOR_M - x[2])
-            along = (along[0], along[1], max(along[2], 0.0))
+    aim, along, push = setpoint.smoother_input(now_us, limits)
+    # on an axis without a requested position, the distance is zero
+    distance = _nan_to_zero(sub(aim, x))
+    if aim[2] < FLOOR_M:
+        distance = (distance[0], distance[1], FLOOR_M - x[2])
+        along = (along[0], along[1], max(along[2], 0.0))
     velocity_command = add(
         along, _limited(approach_velocity(distance, BRAKE_SHARE * limits.accel), limits.approach_speed)
     )

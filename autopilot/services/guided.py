@@ -33,7 +33,7 @@ _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis does not exist
 _NOT_OVERRIDDEN = (0, 65535)  # of a channel: given back, ignored
 # bits of the capabilities of FOLLOW_TARGET: what its sender estimates
-_TARGET_POSITION, _TARGET_VELOCITY = 0x1, 0x2
+_TARGET_POSITION, _TARGET_VELOCITY, _TARGET_ACCEL = 0x1, 0x2, 0x4
 _PULSE_CENTRE_US, _PULSE_RANGE_US, _PULSE_MARGIN_US = 1500, 500, 200
 
 _BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
@@ -187,15 +187,21 @@ def read_channels(m: Any) -> FollowStick | Verdict | None:
 
 
 def read_target(m: Any, home: Home) -> FollowTarget | Verdict:
-    """FOLLOW_TARGET. Without a velocity, or without an altitude, it is not reported, or that of home."""
+    """FOLLOW_TARGET. Without a velocity, an acceleration or an altitude, these are not reported; the altitude
+    is then that of home."""
     is_place = abs(m.lat) <= 900_000_000 and abs(m.lon) <= 1_800_000_000
     if not m.est_capabilities & _TARGET_POSITION or not is_place:
         return _refused("Target refused: FOLLOW_TARGET without a position")
     east, north, _ = enu_from_geodetic(m.lat, m.lon, 0, home)
     height = m.alt - home.altitude_m if math.isfinite(m.alt) else 0.0
-    has_velocity = m.est_capabilities & _TARGET_VELOCITY and all(map(math.isfinite, m.vel))
-    velocity = enu_from_ned((m.vel[0], m.vel[1], m.vel[2])) if has_velocity else None
-    return FollowTarget((east, north, height), velocity)
+
+    def reported(capability: int, ned: Any) -> Vec3 | None:
+        if not m.est_capabilities & capability or not all(map(math.isfinite, ned)):
+            return None
+        return enu_from_ned((ned[0], ned[1], ned[2]))
+
+    velocity = reported(_TARGET_VELOCITY, m.vel)
+    return FollowTarget((east, north, height), velocity, reported(_TARGET_ACCEL, m.acc))
 
 
 def _refused(text: str) -> Verdict:

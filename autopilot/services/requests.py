@@ -162,10 +162,11 @@ class FollowStick:
 
 @dataclass(frozen=True, slots=True)
 class FollowTarget:
-    """One report of the motion of a target, ENU from home; a velocity of None is not reported."""
+    """One report of the motion of a target, ENU from home; None: it is not reported."""
 
     position: Vec3
     velocity: Vec3 | None
+    accel: Vec3 | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance.legs import carry_leg
 from autopilot.guidance.setpoint_follower import (
     UNSPECIFIED,
@@ -136,6 +136,58 @@ def test_a_place_that_moves_is_followed_without_lag() -> None:
     *_, leg = led(PositionSetpoint(ZERO, (1.0, 0.0, 0.0)), 10.0)
     # the last update was at 9.98 s
     assert leg.jet(0.0)[0][0] == pytest.approx(9.98, abs=5e-3)
+
+
+def test_a_motion_of_constant_acceleration_is_followed_without_lag() -> None:
+    accel, velocity = (-0.4, 0.2, 0.1), (2.0, -1.0, 0.0)
+
+    def place(t: float) -> Vec3:
+        return add((0.0, 0.0, 3.0), axpy(0.5 * t * t, accel, scale(t, velocity)))
+
+    leg = start_following((place(0.0), velocity, accel, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    for k in range(400):
+        asked = PositionSetpoint(place(0.02 * k), axpy(0.02 * k, accel, velocity), accel, 20_000 * k)
+        leg = leg.redirected(0.02 if k else 0.0, asked, PACE, 20_000 * k)
+    assert norm(sub(leg.jet(0.0)[0], place(0.02 * 399))) < 1e-3
+    # a setpoint that is not renewed goes on at the velocity it has after a second
+    asked = PositionSetpoint((0.0, 0.0, 3.0), velocity, accel, 0)
+    after = axpy(1.0, accel, velocity)
+    x, v, a = asked.smoother_input(5_000_000, PACE)
+    assert v == pytest.approx(after) and a == ZERO
+    assert x == pytest.approx(add(place(1.0), scale(4.0 + 7.0 / PACE.rate, after)))
+
+
+def circling(t: float, knows_accel: bool = False) -> PositionSetpoint:
+    """On a circle of 2 m at 1.2 m/s."""
+    x, y = 2.0 * math.cos(0.6 * t), 2.0 * math.sin(0.6 * t)
+    accel = (-0.36 * x, -0.36 * y, 0.0) if knows_accel else UNSPECIFIED
+    return PositionSetpoint((x, y, 3.0), (-0.6 * y, 0.6 * x, 0.0), accel, round(t * 1e6))
+
+
+@pytest.mark.parametrize(("knows_accel", "within_m"), [(True, 0.1), (False, 0.2)])
+def test_a_curved_path_of_setpoints_is_followed(knows_accel: bool, within_m: float) -> None:
+    """Measured: 0.09 m and 0.18 m; 0.51 m without an acceleration."""
+    leg = start_following(((2.0, 0.0, 3.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    before = None
+    for k in range(1000):
+        asked = circling(0.02 * k, knows_accel).after(before, PACE.accel)
+        leg = leg.redirected(0.02 if k else 0.0, asked, PACE, 20_000 * k)
+        before = asked
+        if k > 500:
+            assert norm(sub(leg.jet(0.0)[0], asked.position)) < within_m
+
+
+def test_a_jump_of_a_velocity_is_no_acceleration() -> None:
+    moving, standing = circling(0.0), PositionSetpoint((2.0, 0.0, 3.0), ZERO, since_us=20_000)
+    assert standing.after(moving, PACE.accel) == standing
+    # nor is anything known from a setpoint of long ago, of the same time, or of another kind
+    for at_us in (0, 1_000_000):
+        later = PositionSetpoint((2.0, 0.0, 3.0), moving.velocity, since_us=at_us)
+        assert later.after(moving, PACE.accel) == later
+    assert circling(0.02).after(PositionSetpoint(ZERO), PACE.accel) == circling(0.02)
+    assert circling(0.02).after(None, PACE.accel) == circling(0.02)
+    velocity_alone = PositionSetpoint(velocity=ZERO, since_us=20_000)
+    assert velocity_alone.after(PositionSetpoint(velocity=ZERO), PACE.accel) == velocity_alone
 
 
 def test_a_circle_is_flown_on_its_radius() -> None:

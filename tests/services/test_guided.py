@@ -233,10 +233,10 @@ def test_a_pulse_of_no_receiver_is_refused():
     assert isinstance(read_channels(channels(pitch=100)), Verdict)
 
 
-def target(capabilities, lat, lon, alt=0.0, velocity=(0.0, 0.0, 0.0)):
+def target(capabilities, lat, lon, alt=0.0, velocity=(0.0, 0.0, 0.0), accel=(0.0, 0.0, 0.0)):
     place = round(lat * 1e7), round(lon * 1e7), alt
     none, upright = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    return m.MAVLink_follow_target_message(0, capabilities, *place, velocity, none, upright, none, none, 0)
+    return m.MAVLink_follow_target_message(0, capabilities, *place, velocity, accel, upright, none, none, 0)
 
 
 def test_a_target_is_reported_with_what_its_sender_estimates():
@@ -244,7 +244,9 @@ def test_a_target_is_reported_with_what_its_sender_estimates():
     asked = read_target(target(3, 47.0001, 8.0001, 502.0, (1.0, 2.0, -0.5)), home)
     assert isinstance(asked, FollowTarget)
     assert asked.position == pytest.approx((7.6, 11.12, 2.0), abs=0.02)
-    assert asked.velocity == (2.0, 1.0, 0.5)
+    assert (asked.velocity, asked.accel) == ((2.0, 1.0, 0.5), None)
+    asked = read_target(target(7, 47.0, 8.0, velocity=(1.0, 2.0, 0.0), accel=(3.0, 4.0, -5.0)), home)
+    assert (asked.velocity, asked.accel) == ((2.0, 1.0, 0.0), (4.0, 3.0, 5.0))
     # MAVSDK sends a velocity that it does not claim to know
     assert read_target(target(1, 47.0, 8.0, 502.0, (1.0, 2.0, 0.0)), home) == FollowTarget(
         (0.0, 0.0, 2.0), None

@@ -101,6 +101,21 @@ def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() ->
     assert norm(sub(sky.view.x_load, (3.0, -1.0, 2.5))) < 0.01
 
 
+def test_a_circle_of_positions_with_velocities_is_flown_on_its_radius() -> None:
+    """Their acceleration follows from the velocities; without it the load would be 0.32 m outside."""
+    sky = Sky().airborne()
+    start_us = sky.view.now_us
+    for k in range(1000):
+        t = (sky.view.now_us - start_us) * 1e-6
+        x, y = 5.0 * math.cos(0.3 * t), 5.0 * math.sin(0.3 * t)
+        assert sky.ask(at(x, y, 2.0, velocity=(-0.3 * y, 0.3 * x, 0.0))).result == ACCEPTED
+        if k == 0:
+            assert sky.ask(OFFBOARD).result == ACCEPTED
+        sky.tick()
+        if k > 700:
+            assert math.hypot(sky.view.x_load[0], sky.view.x_load[1]) == pytest.approx(5.0, abs=0.03)
+
+
 def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
     sky = offboard(at(0.0, 0.0, 2.0))
     assert sky.ask(at(1.0, math.nan, math.nan, relative=True)).result == ACCEPTED

@@ -115,6 +115,7 @@ def follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, setting
         request.heading_rad + _yaw_origin(flight, request, settings),
         request.yaw_rate_rad_s,
     )
+    setpoint = setpoint.after(flight.setpoints.offboard.setpoint, settings.motion.accel_m_s2)
     return _accept_setpoint(flight, setpoint, view, settings), ACCEPTED
 
 

@@ -44,10 +44,10 @@ def follow_target(flight: Flight, request: FollowTarget, view: View, settings: S
 
 def _reported(flight: Flight, request: FollowTarget, view: View, settings: Settings) -> Target:
     """The target by this report, and by those before it if it was not lost."""
-    position, velocity, before = request.position, request.velocity, flight.setpoints.target
+    motion, before = (request.position, request.velocity, request.accel), flight.setpoints.target
     if before is None or view.now_us - before.at_us > TARGET_LOSS_US:
-        return first_report(position, velocity, view.now_us, commanded_motion(flight, view, settings)[0])
-    return before.reported(position, velocity, view.now_us, settings.target_place)
+        return first_report(*motion, view.now_us, commanded_motion(flight, view, settings)[0])
+    return before.reported(*motion, view.now_us, settings.target_place)
 
 
 def _not_followed(flight: Flight, reason: str, view: View) -> Decision:
