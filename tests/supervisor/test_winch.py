@@ -114,3 +114,15 @@ def test_while_the_winch_works_no_stream_takes_over() -> None:
     assert (verdict.result, verdict.text) == (LATER, "Orbit denied while the winch works")
     sky.wait(6.0)
     assert sky.ask(Orbit(2.0, 1.0, None, None, 2.0)).result == ACCEPTED
+
+
+def test_nor_while_it_waits_for_the_load_to_come_to_rest() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(Orbit(2.0, 1.0, None, None, None)).result == ACCEPTED
+    sky.wait(6.0)
+    assert sky.ask(Pause()).result == ACCEPTED
+    assert sky.ask(WinchRequest(0.8)).result == ACCEPTED
+    sky.tick()
+    assert isinstance(sky.flight.legs[-2], Reel) and len(sky.flight.legs) > 2
+    verdict = sky.ask(Orbit(2.0, 1.0, None, None, None))
+    assert (verdict.result, verdict.text) == (LATER, "Orbit denied while the winch works")

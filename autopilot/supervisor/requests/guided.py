@@ -64,7 +64,9 @@ def start_guided(
     flight: Flight, source: SetpointSource, request_name: str, view: View, settings: Settings
 ) -> Decision:
     """Follow the setpoints of another source; `request_name` names the request in a refusal."""
-    if flight.legs and winch_hold_height(flight.legs[0]) is not None:
+    # in a hold the winch may wait for the load to come to rest
+    legs = flight.legs if flight.phase == Phase.HOLD else flight.legs[:1]
+    if any(winch_hold_height(leg) is not None for leg in legs):
         return flight, temporarily_denied(f"{request_name} denied while the winch works")
     guided = replace(interrupt_mission(flight), setpoints=replace(flight.setpoints, source=source))
     after = requested_transition(guided, Event.GUIDE, view, settings)
