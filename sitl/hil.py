@@ -20,7 +20,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
-from autopilot.wire.convert.battery import BatteryReading, battery_status_message
+from autopilot.wire.convert.battery import BATTERY_PERIOD_US, BatteryReading, battery_status_message
 from autopilot.wire.convert.flight import wind_state_message
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import padded_forces, read_hil_actuator_controls
@@ -63,7 +63,6 @@ from sitl.vehicles.truth import truth_of
 from sitl.world import rotors_of
 
 _STATUS_PERIOD_US = 200_000  # in real time; in lockstep one a second is enough
-_BATTERY_PERIOD_US = 200_000
 _BOOT_PERIOD_US = SECOND_US  # of SIM_BOOT, sent with the sensors
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
@@ -404,7 +403,7 @@ class HilSimulator:
         core, now_us = self.core, self.core.now_us
         periods_us = [self._status_us, _BOOT_PERIOD_US]
         if core.truth.drive.battery > 0.0:
-            periods_us.append(_BATTERY_PERIOD_US)
+            periods_us.append(BATTERY_PERIOD_US)
         return min(core.pulse_changes_us, *(next_multiple(now_us, each_us) for each_us in periods_us))
 
     def finish_batch(self, sensors_sent: bool) -> None:
@@ -434,7 +433,7 @@ class HilSimulator:
         if self._announcing_boot or core.now_us % _BOOT_PERIOD_US == 0:
             self._announcing_boot = False
             messages += self._identity()
-        if core.truth.drive.battery > 0.0 and core.now_us % _BATTERY_PERIOD_US == 0:
+        if core.truth.drive.battery > 0.0 and core.now_us % BATTERY_PERIOD_US == 0:
             messages.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # for the autopilot: how punctual the run is
             messages.append(self._status())

@@ -28,7 +28,7 @@ from autopilot.vehicle.battery import (
     terminal_voltage,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert.battery import CRITICAL_CHARGE, LOW_CHARGE
+from autopilot.wire.convert.battery import ChargeLevels
 from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
 
 _FRESH_US = 500_000  # a sensor is healthy while its last reading is no older
@@ -40,11 +40,6 @@ _FIELDS = (
     (PRESSURE, snapshot.BARO),
 )
 _NEVER = (-1, -1, -1, -1)
-# shares of the charge from which a measured battery is told of, and how; the lowest first
-LOW_BATTERY = (
-    (CRITICAL_CHARGE, "Battery nearly empty, {} % left: land"),
-    (LOW_CHARGE, "Battery low, {} % left"),
-)
 
 
 class Condition(NamedTuple):
@@ -79,11 +74,12 @@ def voltage(condition: Condition, battery: Battery) -> float:
     return terminal_voltage(source_voltage(condition.used_as, battery), condition.current, battery)
 
 
-def low_battery_text(before: float, now: float) -> str | None:
+def low_battery_text(before: float, now: float, levels: ChargeLevels) -> str | None:
     """What to tell of a measured battery whose remaining share (NaN: unknown) was `before` and is `now`."""
-    for share, text in LOW_BATTERY:
-        if now <= share and not before <= share:
-            return text.format(round(100.0 * now))
+    if now <= levels.critical and not before <= levels.critical:
+        return f"Battery nearly empty, {round(100.0 * now)} % left: land"
+    if now <= levels.low and not before <= levels.low:
+        return f"Battery low, {round(100.0 * now)} % left"
     return None
 
 

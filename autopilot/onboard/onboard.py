@@ -108,6 +108,7 @@ from autopilot.supervisor.state import (
     interrupt_mission,
     with_battery,
 )
+from autopilot.supervisor.watches.battery import due_event
 from autopilot.trajectory.prepare import AT_HOME, PENDING, PathLimits, PreparedPaths, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
@@ -418,7 +419,7 @@ class Onboard:
         answer = self._put_answer(tick, dt)
         if self._fall is not None or self.core.flight.fall != Fall.NONE:
             self._follow_fall(tick)
-        if self.core.flight.empty_battery_percent is not None:
+        if self.core.flight.low_battery is not None:
             self._forget_silent_battery(now_us)
         for severity, text in report.texts:
             self.endpoint.send_text(severity, text)
@@ -578,18 +579,19 @@ class Onboard:
         before = self._snapshot_source.measured.reading
         self._snapshot_source.measured = MeasuredBattery(self.now_us, reading)
         self._note_battery(reading)
-        text = low_battery_text(before.remaining, reading.remaining)
-        if text is not None:
+        text = low_battery_text(before.remaining, reading.remaining, self.core.settings.battery.levels)
+        # what follows from the charge is told by the supervisor
+        if text is not None and due_event(self.core.flight, self.core.settings) is None:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)
 
     def _forget_silent_battery(self, now_us: int) -> None:
-        """A battery that is not measured any more is not known to be empty."""
+        """A battery that is not measured any more is not known to be low."""
         if now_us - self._snapshot_source.measured.time_us > BATTERY_TIMEOUT_US:
             self._note_battery(NO_READING)
 
     def _note_battery(self, reading: BatteryReading) -> None:
-        """Note whether the measured battery is too empty to fly."""
-        flight = with_battery(self.core.flight, reading)
+        """Note whether the measured battery is low."""
+        flight = with_battery(self.core.flight, reading, self.core.settings.battery.levels)
         if flight is not self.core.flight:
             self.core.replace_flight(flight)
 

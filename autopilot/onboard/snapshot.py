@@ -533,8 +533,8 @@ def _system_status(m: CoreSnapshot) -> tuple[Any, ...]:
 
 @_provides("sensors_present", "sensors_healthy")
 def _sensors(m: CoreSnapshot) -> tuple[Any, ...]:
-    battery_empty = m.flight.empty_battery_percent is not None
-    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us, battery_empty)
+    is_empty = m.flight.is_battery_empty
+    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us, is_empty)
     return present | (snapshot.GEOFENCE if has_fence(m.flight, m.core.settings) else 0), healthy
 
 
@@ -609,6 +609,11 @@ def _wind(m: CoreSnapshot) -> tuple[Any, ...]:
     return (
         estimated_wind(m.core.control.observed.push, m.core.setup.drag) if is_airborne else (nan, nan, nan),
     )
+
+
+@_provides("charge_levels")
+def _charge_levels(m: CoreSnapshot) -> tuple[Any, ...]:
+    return (m.core.settings.battery.levels,)
 
 
 @_provides("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
+from autopilot.wire.convert.battery import CHARGE_LEVELS, ChargeLevels
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import NO_FORCES, Forces
 from autopilot.wire.dialect import plumbline as mavlink
@@ -186,6 +187,7 @@ class Snapshot:
     battery_current: float = math.nan  # A
     battery_used_mah: float = math.nan
     battery_remaining: float = math.nan  # 0 ... 1
+    charge_levels: ChargeLevels = CHARGE_LEVELS
 
     # mission
     mission_current: int = 0

@@ -139,7 +139,7 @@ def _battery(s: Snapshot) -> BatteryReading:
 
 
 def _battery_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (battery_status_message(_battery(s)),)
+    return (battery_status_message(_battery(s), s.charge_levels),)
 
 
 def _extended_sys_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -13,6 +13,7 @@ from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import CRITICAL, IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
+from autopilot.supervisor.watches.battery import watch_battery
 from autopilot.supervisor.watches.failsafe import watch_failsafe, watch_missing_readings
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
@@ -31,6 +32,7 @@ WATCHES: tuple[Watch, ...] = (
     watch_failsafe,
     watch_rotors,
     watch_missing_readings,
+    watch_battery,
     watch_law,
     watch_estimator,
     watch_idle,
@@ -50,7 +52,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     """The flight at `view.now_us`, and what is reported of it; of a failure also that the battery is empty,
     from which it may follow."""
     flight, report = _advance(flight, view, settings)
-    if flight.empty_battery_percent is None or not report.texts:
+    if not flight.is_battery_empty or not report.texts:
         return flight, report
     texts = (
         (severity, f"{text} (battery nearly empty)" if severity <= CRITICAL else text)

@@ -79,7 +79,9 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
         stopped_since_us=-1,
         following=(),
         fall=_fall_after(flight, phase, event),
-        is_failsafe=flight.is_failsafe and phase != Phase.ARMED,  # another flight begins
+        # another flight begins
+        is_failsafe=flight.is_failsafe and phase != Phase.ARMED,
+        answered_charge_state=0 if phase == Phase.ARMED else flight.answered_charge_state,
         returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),
     )
     if phase == Phase.DISARMED:

@@ -44,6 +44,7 @@ from autopilot.supervisor.state import (
     leg_time_s,
     needs_load_estimate,
 )
+from autopilot.supervisor.watches.battery import acts_on_charge, due_event
 from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK_PULL_SHARE, TAUT_PULL_SHARE
 from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
@@ -59,6 +60,7 @@ from autopilot.supervisor.watches.touchdown import (
     VEHICLE_DEPTH,
 )
 from autopilot.trajectory.slack_cable import TOUCH_SPEED
+from autopilot.wire.convert.battery import BATTERY_PERIOD_US
 
 UNCONTROLLED = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
@@ -142,6 +144,8 @@ def next_stretch(
     end_times.append(end_us)
     if _is_decided_at_every_tick(flight, leg, settings):
         end_times.append(now_us)
+    if acts_on_charge(settings):  # sweeps read the charge when something is decided
+        end_times.append((now_us // BATTERY_PERIOD_US + 1) * BATTERY_PERIOD_US)
     anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
     return Stretch(
         mode=leg.control_mode,
@@ -188,6 +192,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or flight.out_of_control_since_us >= 0
         or not can_fly(flight, settings)
         or flight.phase == Phase.GUIDED
+        or due_event(flight, settings) is not None
         or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)
         or not flight.heading.is_settled
         or (settings.fence.action != NO_ACTION and flight.phase in CARRYING and has_fence(flight, settings))

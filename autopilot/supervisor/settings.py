@@ -19,6 +19,7 @@ from autopilot.vehicle.rotors import (
     mixer_table,
     thrust_and_moment_per_force,
 )
+from autopilot.wire.convert.battery import ChargeLevels
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
 HEIGHT_OVER_TARGET = 2  # FLW_TGT_ALT_M
@@ -48,6 +49,14 @@ class FailsafeSettings:
     load_error_limit_m: float
     tilt_limit_rad: float
     sensor_age_limit_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySettings:
+    """At which charge a measured battery counts as low, and what follows."""
+
+    levels: ChargeLevels
+    action: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +140,7 @@ class Settings:
     motion: MotionSettings
     heading: HeadingLimits
     failsafe: FailsafeSettings
+    battery: BatterySettings
     setpoints: SetpointSettings
     target_place: TargetPlace
     fence: FenceSettings
@@ -176,6 +186,10 @@ def settings_from(
             load_error_limit_m=table["FS_LOAD_ERR"],
             tilt_limit_rad=radians(table["FS_TILT_DEG"]),
             sensor_age_limit_s=table["FS_SENSOR_S"],
+        ),
+        battery=BatterySettings(
+            levels=ChargeLevels(table["BAT_LOW_THR"], table["BAT_CRIT_THR"], table["BAT_EMERGEN_THR"]),
+            action=int(table["COM_LOW_BAT_ACT"]),
         ),
         setpoints=SetpointSettings(
             offboard_loss_us=round(1e6 * table["COM_OF_LOSS_T"]),

@@ -18,7 +18,7 @@ from autopilot.guidance.target import Target
 from autopilot.services.snapshot import HEIGHT_LIMIT_PARAMETER
 from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, PreparedPaths
-from autopilot.wire.convert.battery import BatteryReading, battery_percent, charge_state
+from autopilot.wire.convert.battery import BatteryReading, ChargeLevels, battery_percent, charge_state
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence, read_fence, read_rally
@@ -171,6 +171,13 @@ class MissionProgress:
         return self.final_item is not None
 
 
+class LowBattery(NamedTuple):
+    """How low a measured battery is."""
+
+    charge_state: int  # MAV_BATTERY_CHARGE_STATE: LOW, CRITICAL or EMERGENCY
+    percent: int  # of the charge that is left
+
+
 @dataclass(frozen=True, slots=True)
 class CableState:
     """What is known of cable, winch and gripper."""
@@ -252,13 +259,19 @@ class Flight:
     rotors_lost: int = 0  # bit i: rotor i+1 does not obey its commands
     out_of_control_since_us: int = -1  # since when it is off its path and not controlled, -1: it is not
     fall: Fall = Fall.NONE
-    # per cent of the charge that a measured battery has left if it is too empty to fly; None: it is not
-    empty_battery_percent: int | None = None
+    low_battery: LowBattery | None = None  # None: it is not, or not measured
+    answered_charge_state: int = 0  # MAV_BATTERY_CHARGE_STATE to which this flight has reacted
     heading: Heading = HEADING_EAST
     returning: bool = False  # home, or landing there
     is_failsafe: bool = False  # it was not commanded to do what it does, but reacts to a failure
     # reasons not to arm that are not part of the flight's state, by source: the storage, the clock
     external_arming_problems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def is_battery_empty(self) -> bool:
+        """Whether too little is left of a measured battery to fly."""
+        low = self.low_battery
+        return low is not None and low.charge_state >= mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
 
     @property
     def is_circling(self) -> bool:
@@ -326,13 +339,12 @@ def without_load(flight: Flight) -> Flight:
     return replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1))
 
 
-def with_battery(flight: Flight, reading: BatteryReading) -> Flight:
+def with_battery(flight: Flight, reading: BatteryReading, levels: ChargeLevels) -> Flight:
     """The flight with a battery that measures this, NaN: nothing."""
-    empty = charge_state(reading) == mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
-    percent = battery_percent(reading) if empty else None
-    return (
-        flight if percent == flight.empty_battery_percent else replace(flight, empty_battery_percent=percent)
-    )
+    state = charge_state(reading, levels)
+    is_low = state >= mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    low = LowBattery(state, battery_percent(reading)) if is_low else None
+    return flight if low == flight.low_battery else replace(flight, low_battery=low)
 
 
 def can_fly(flight: Flight, settings: Settings) -> bool:

@@ -294,7 +294,8 @@ class SweepFlight:
         """What the autopilot learns of the battery, which the simulator sends it over the wire."""
         if self.cell.truth.drive.battery > 0.0:
             reading = BatteryReading(remaining=self._share_left)
-            self.core.replace_flight(with_battery(self.core.flight, reading))
+            levels = self.core.settings.battery.levels
+            self.core.replace_flight(with_battery(self.core.flight, reading, levels))
 
     # ---- what the ground station does
 

@@ -6,7 +6,7 @@ import pytest
 
 from autopilot.supervisor.state import Phase
 from autopilot.wire.codec import decode
-from autopilot.wire.convert.battery import read_battery_status
+from autopilot.wire.convert.battery import CHARGE_LEVELS, ChargeLevels, read_battery_status
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
@@ -112,6 +112,27 @@ def test_one_that_is_not_measured_any_more_is_not_known_to_be_empty():
     assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED
     craft.wait(2.5)
     assert craft.command(ARM, 1.0) == ACCEPTED
+
+
+def test_levels_and_action_are_parameters():
+    """The flight of 100 mAh ends on the ground before its battery does."""
+    levels = {"BAT_LOW_THR": 0.8, "BAT_CRIT_THR": 0.7, "BAT_EMERGEN_THR": 0.6}
+    craft = with_charge(65.0)
+    moment = craft.onboard.log_sample().snapshot
+    assert moment.sensors_healthy & SENSOR and moment.charge_levels == CHARGE_LEVELS
+    craft = with_charge(100.0, SIM_BAT_CAP=100.0, COM_LOW_BAT_ACT=2.0, **levels)
+    assert craft.onboard.log_sample().snapshot.charge_levels == ChargeLevels(0.8, 0.7, 0.6)
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, float("nan"), 0, 0, 1.5) == ACCEPTED
+    assert craft.command(ARM, 1.0) == ACCEPTED
+    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED)
+    told = [text for text in craft.texts if "attery" in text]
+    assert told == [
+        "Battery low, 80 % left",
+        "Failsafe: battery nearly empty, 70 % left, landing",
+    ]
+    # it used a third of the charge on the way, and is not armed again
+    assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert "battery nearly empty" in craft.texts[-1]
 
 
 def test_a_flight_that_its_battery_ends_names_it():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from autopilot.wire.convert.battery import (
     BatteryReading,
+    ChargeLevels,
     battery_status_message,
     charge_state,
     read_battery_status,
@@ -49,6 +50,12 @@ def test_the_charge_state_is_that_of_the_stated_charge(remaining, state):
     message = battery_status_message(BatteryReading(remaining=remaining))
     assert message.charge_state == state
     assert charge_state(read_battery_status(message)) == state
+
+
+def test_the_levels_of_a_battery_may_be_others():
+    levels, reading = ChargeLevels(0.6, 0.5, 0.4), BatteryReading(remaining=0.5)
+    assert battery_status_message(reading, levels).charge_state == mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    assert charge_state(reading, levels) == mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
 
 
 def test_cells_that_are_measured_one_by_one_are_added_up():

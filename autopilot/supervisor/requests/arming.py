@@ -48,8 +48,8 @@ def arming_problems(flight: Flight, view: View, settings: Settings) -> tuple[str
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found = f"moving at {norm(view.v_quad):.1f} m/s (at most {GROUND_SPEED_M_S})"
         problems.append(f"{found}: hold it still, or wait for less wind")
-    if flight.empty_battery_percent is not None:
-        problems.append(f"battery nearly empty, {flight.empty_battery_percent} % left")
+    if flight.low_battery is not None and flight.is_battery_empty:
+        problems.append(f"battery nearly empty, {flight.low_battery.percent} % left")
     weight_n = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
     if weight_n >= settings.rotors.greatest_thrust_n:
         problems.append(

@@ -10,13 +10,19 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 _INT16, _UINT16 = 2**15 - 1, 2**16 - 1
 _CELLS = 10  # entries of BATTERY_STATUS.voltages
-# shares of the charge, PX4's defaults of BAT_LOW_THR, BAT_CRIT_THR and BAT_EMERGEN_THR
-LOW_CHARGE, CRITICAL_CHARGE, EMERGENCY_CHARGE = 0.15, 0.07, 0.05
-_CHARGE_STATES = (  # the lowest first
-    (EMERGENCY_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
-    (CRITICAL_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL),
-    (LOW_CHARGE, mavlink.MAV_BATTERY_CHARGE_STATE_LOW),
-)
+
+
+class ChargeLevels(NamedTuple):
+    """Shares of the charge at which it counts as low: BAT_LOW_THR, BAT_CRIT_THR and BAT_EMERGEN_THR, with
+    PX4's defaults."""
+
+    low: float = 0.15
+    critical: float = 0.07
+    emergency: float = 0.05
+
+
+CHARGE_LEVELS = ChargeLevels()
+BATTERY_PERIOD_US = 200_000  # between two readings of a simulated battery
 
 
 class BatteryReading(NamedTuple):
@@ -54,17 +60,21 @@ def percent_by_used(reading: BatteryReading, full_percent: float, capacity_mah: 
     return percent if abs(percent - stated) <= 0.5 + 100.0 / capacity_mah else stated
 
 
-def charge_state(reading: BatteryReading) -> int:
+def charge_state(reading: BatteryReading, levels: ChargeLevels = CHARGE_LEVELS) -> int:
     """MAV_BATTERY_CHARGE_STATE of the remaining charge in per cent; UNDEFINED if that is unknown."""
     if isnan(reading.remaining):
         return mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
-    stated = battery_percent(reading) * 0.01
-    return next(
-        (state for share, state in _CHARGE_STATES if stated <= share), mavlink.MAV_BATTERY_CHARGE_STATE_OK
-    )
+    stated = battery_percent(reading) / 100.0
+    if stated <= levels.emergency:
+        return mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
+    if stated <= levels.critical:
+        return mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    if stated <= levels.low:
+        return mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    return mavlink.MAV_BATTERY_CHARGE_STATE_OK
 
 
-def battery_status_message(reading: BatteryReading) -> Any:
+def battery_status_message(reading: BatteryReading, levels: ChargeLevels = CHARGE_LEVELS) -> Any:
     """BATTERY_STATUS of a pack whose cells are not measured singly: the first entry is its voltage, the
     second what exceeds the range of the first."""
     first = battery_mv(reading)
@@ -81,7 +91,7 @@ def battery_status_message(reading: BatteryReading) -> Any:
         current_consumed=-1 if isnan(reading.used_mah) else saturated(reading.used_mah, 0, 2**31 - 1),
         energy_consumed=-1,
         battery_remaining=battery_percent(reading),
-        charge_state=charge_state(reading),
+        charge_state=charge_state(reading, levels),
     )
 
 
@@ -92,5 +102,5 @@ def read_battery_status(m: Any) -> BatteryReading:
         sum(known_mv) * 1e-3 if known_mv else nan,
         m.current_battery * 0.01 if m.current_battery >= 0 else nan,
         float(m.current_consumed) if m.current_consumed >= 0 else nan,
-        m.battery_remaining * 0.01 if m.battery_remaining >= 0 else nan,
+        m.battery_remaining / 100.0 if m.battery_remaining >= 0 else nan,
     )

@@ -141,6 +141,13 @@ def test_same_end_of_a_flight_that_empties_its_battery(short: str) -> None:
     assert states[-1, 10:].max() < 0.1
 
 
+def test_same_bits_where_a_low_battery_ends_the_mission(short: str) -> None:
+    settings = {"SIM_BATTERY": 1.0, "SIM_BAT_CAP": 60.0, "COM_LOW_BAT_ACT": 3.0, "BAT_CRIT_THR": 0.7}
+    found, _ = flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": PLUMBLINE, **settings}))
+    assert found.outcome == "interrupted"
+    assert "Failsafe: battery nearly empty, 70 % left, returning" in found.texts
+
+
 def test_same_bits_with_receiver_and_camera(short: str) -> None:
     gust = {"SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0, "SIM_GUST_FOR_S": 1.0}
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))

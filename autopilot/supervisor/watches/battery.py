@@ -1,0 +1,48 @@
+"""The measured battery: what follows when it is low, once for each level (COM_LOW_BAT_ACT, as in PX4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import IN_AIR, Event, Flight, Phase, View, interrupt_mission, is_landing
+from autopilot.supervisor.table import TRANSITIONS
+from autopilot.supervisor.watches.watch_result import WatchResult
+from autopilot.wire.dialect import plumbline as mavlink
+
+_CRITICAL = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+_EMERGENCY = mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
+_LAND, _RETURN = (Event.LAND, "landing"), (Event.RETURN, "returning")
+# by COM_LOW_BAT_ACT and MAV_BATTERY_CHARGE_STATE; without an entry nothing follows
+_REACTIONS = {
+    2: {_CRITICAL: _LAND, _EMERGENCY: _LAND},
+    3: {_CRITICAL: _RETURN, _EMERGENCY: _LAND},
+}
+
+
+def acts_on_charge(settings: Settings) -> bool:
+    """Whether anything follows from the charge."""
+    return settings.battery.action in _REACTIONS
+
+
+def due_event(flight: Flight, settings: Settings) -> tuple[Event, str] | None:
+    """The event that is to follow from the charge, and its name; None: it has followed, or none does."""
+    low = flight.low_battery
+    if low is None or low.charge_state <= flight.answered_charge_state or flight.phase not in IN_AIR:
+        return None
+    return _REACTIONS.get(settings.battery.action, {}).get(low.charge_state)
+
+
+def watch_battery(flight: Flight, view: View, settings: Settings) -> WatchResult:
+    """Return or land when little is left of the charge. A command that comes later is obeyed."""
+    reaction, low = due_event(flight, settings), flight.low_battery
+    if reaction is None or low is None:
+        return WatchResult(flight)
+    flight = replace(flight, answered_charge_state=low.charge_state)
+    event, action = reaction
+    if is_landing(flight) or (event == Event.RETURN and flight.phase == Phase.RETURN):
+        return WatchResult(flight)
+    if (flight.phase, event) not in TRANSITIONS:
+        return WatchResult(flight)
+    text = f"Failsafe: battery nearly empty, {low.percent} % left, {action}"
+    return WatchResult(interrupt_mission(flight), event, ((mavlink.MAV_SEVERITY_ERROR, text),))
