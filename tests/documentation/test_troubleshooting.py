@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import autopilot
@@ -19,6 +20,7 @@ ROOMS = (autopilot, gcs, missions, plumbline, sitl)
 SHORTEST = 5  # fewest characters of a piece of a quotation that is searched for
 
 
+@cache
 def literals() -> str:
     """All texts of the code, those of f-strings with `\\0` where a value is inserted."""
     found = []
