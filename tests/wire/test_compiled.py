@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ def class_of(kind: str) -> Any:
     return getattr(mavlink, f"MAVLink_{kind.lower()}_message")
 
 
+@cache
 def numbers_of(kind: str) -> st.SearchStrategy[tuple[list[Any], Any]]:
     """The numbers of a message in the order of the wire, and pymavlink's object of them."""
     message_type = class_of(kind)
