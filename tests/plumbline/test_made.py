@@ -235,6 +235,7 @@ def test_objects_fly_as_the_files_do(tmp_path: Path) -> None:
     assert Vehicle.load(flown.summary["vehicle"]) == vehicle
 
 
+@pytest.mark.usefixtures("swept_here")
 def test_a_sweep_takes_objects() -> None:
     vehicle = Vehicle.load("bebop").replace(load_mass_kg=0.08)
     sensors = Sensors.load("ideal")

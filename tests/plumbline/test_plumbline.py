@@ -186,7 +186,7 @@ def test_a_report_replaces_another_flight_only_when_asked(flight: plumbline.Flig
 def test_a_report_of_the_same_flight_keeps_every_file_of_it_and_one_of_another_none(
     flight: plumbline.Flight, tmp_path: Path
 ) -> None:
-    flight.report(tmp_path, pictures=True)
+    flight.report(tmp_path)
     kept = ("flight.ulg", "autopilot.log", "sitl.log", "flight.mcap", "flight.common.tlog", "error.png")
     for name in kept:
         (tmp_path / name).write_bytes(b"of this flight")
@@ -205,6 +205,7 @@ def test_a_report_where_the_log_is_a_folder(flight: plumbline.Flight, tmp_path: 
         flight.report(tmp_path)
 
 
+@pytest.mark.usefixtures("swept_here")
 def test_a_sweep_is_a_table() -> None:
     vary = {"SIM_ACT_DELAY_MS": (0, 12.0)}
     found = plumbline.sweep("hover", vary=vary, seeds=range(1, 3), sensors="ideal", jobs=1, quiet=True)
@@ -213,6 +214,7 @@ def test_a_sweep_is_a_table() -> None:
     assert found["outcome"].tolist()[:2] == ["completed"] * 2
 
 
+@pytest.mark.usefixtures("swept_here")
 def test_settings_that_are_drawn() -> None:
     vary: Mapping[str | tuple[str, ...], str | Sequence[float]] = {
         ("SIM_LOAD_MASS", "veh_load_mass"): "0.06:0.08",
@@ -347,6 +349,7 @@ WRONG: dict[str, tuple[Any, str]] = {
 }
 
 
+@pytest.mark.usefixtures("swept_here")
 @pytest.mark.parametrize(("call", "says"), WRONG.values(), ids=WRONG)
 def test_what_is_wrong_is_one_line(call: Any, says: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(plumbline.Error) as told:
