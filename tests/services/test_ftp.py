@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
+from autopilot.services import ftp
 from autopilot.services.file_tree import FileTree, checksum
 from autopilot.services.files import Card, ErrorCode, FileError, Limits, MemoryCard, path_of
 from autopilot.services.ftp import (
@@ -114,7 +115,7 @@ class Client:
             free += 1
         self.service.forget(STRANGER.link)
         self.peer = own
-        return MAX_SESSIONS - free
+        return ftp.MAX_SESSIONS - free
 
     def names(self, path: bytes) -> list[str]:
         names: list[str] = []
@@ -528,12 +529,30 @@ PACKET = st.builds(
     offset=st.integers(0, 300) | st.integers(0, 2**32 - 1),
     data=DATA,
 )
-STEP = st.tuples(PACKET, st.booleans(), st.sampled_from([GCS, OTHER]), st.sampled_from([0, TICK_US, IDLE_US]))
+OPENING = st.builds(
+    lambda seq, session, opcode, path: Packet(seq, session, opcode, len(path), data=path),
+    st.integers(0, 65535),
+    st.integers(0, 5),
+    st.sampled_from([Op.OPEN_RO, Op.OPEN_WO, Op.CREATE]),
+    st.sampled_from([b"/fs/microsd/a", b"@MADE/file"]),
+)
+STEP = st.tuples(
+    PACKET | OPENING, st.booleans(), st.sampled_from([GCS, OTHER]), st.sampled_from([0, TICK_US, IDLE_US])
+)
+
+
+@pytest.fixture
+def few_sessions(monkeypatch: pytest.MonkeyPatch) -> int:
+    """So few sessions at the same time that some steps reach their number, and that they are counted fast."""
+    monkeypatch.setattr(ftp, "MAX_SESSIONS", 2)
+    return 2
 
 
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=st.lists(STEP, max_size=40))
-def test_no_requests_break_it_and_no_session_is_left(steps: list[Any], tmp_path_factory: Any) -> None:
+def test_no_requests_break_it_and_no_session_is_left(
+    steps: list[Any], few_sessions: int, tmp_path_factory: Any
+) -> None:
     limits = Limits(file_bytes=10_000, total_bytes=20_000, files=20)
     disk = DirectoryCard(tmp_path_factory.mktemp("card"), limits)
     clients = [Client(MemoryCard(limits)), Client(disk)]
@@ -544,7 +563,7 @@ def test_no_requests_break_it_and_no_session_is_left(steps: list[Any], tmp_path_
             before = client.open_sessions()
             replies = client.send(whole)
             assert len(replies) <= 1
-            assert client.open_sessions() <= min(before + 1, MAX_SESSIONS)
+            assert client.open_sessions() <= min(before + 1, few_sessions)
             client.now_us += pause_us
             client.poll()
     for client in clients:
