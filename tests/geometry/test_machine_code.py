@@ -40,7 +40,7 @@ e1, e2, e3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 work = {
     "s2": lambda: s2.unit_derivatives(e3, e1, e2),
     "so3": lambda: so3.quat_exp(e1),
-    "wrong": lambda: so3.quat_exp("text"),
+    "wrong": lambda: so3.quat_exp(1.0),
 }
 print("ready", flush=True)
 input()
