@@ -18,15 +18,23 @@ def rows() -> list[list[str]]:
     return [row for row in cells if row[2] not in ("test", "---")]
 
 
-def test_each_row_has_a_test_that_exists() -> None:
-    there = {
+def defined_among(names: set[str]) -> set[str]:
+    """Those of the names that a test has; only files in which one is defined are parsed."""
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")]
+    defined = re.compile(rf"\bdef +({'|'.join(sorted(names))})\b")
+    return {
         node.name
-        for path in (ROOT / "tests").rglob("test_*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+        for text in texts
+        if defined.search(text)
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef) and node.name in names
     }
-    for what, promised, named in rows():
+
+
+def test_each_row_has_a_test_that_exists() -> None:
+    of_row = [(what, promised, named, re.findall(r"`(test_\w+)`", named)) for what, promised, named in rows()]
+    there = defined_among({name for *_, tests in of_row for name in tests})
+    for what, promised, named, tests in of_row:
         assert promised, what
-        tests = re.findall(r"`(test_\w+)`", named)
         assert set(tests) <= there, f"{what}: {set(tests) - there}"
         assert tests or named == "the same" or what in WITHOUT, what
