@@ -235,9 +235,9 @@ def test_a_mission_file_of_ours_is_one_by_its_content(name: str, tmp_path: Path)
 def test_a_flight_that_a_fence_stops_says_so_when_its_time_is_over(tmp_path: Path) -> None:
     """The load settles inside the fence, but would stop beyond it: the vehicle holds."""
     path = plan(tmp_path, (Takeoff(0.6), Waypoint(0.5, 0.0, 0.6), ReturnHome()), fence=circle(0.5004))
-    mission, conditions = load(path), Conditions(limit_s=40.0)
+    mission, conditions = load(path), Conditions(limit_s=15.0)
     reason = (
-        "Fence: would stop outside the fence, holding; not landed after 40 s of flight: still in phase hold"
+        "Fence: would stop outside the fence, holding; not landed after 15 s of flight: still in phase hold"
     )
     outcome = fly(mission, conditions, NoLog())
     assert (outcome.name, outcome.reason) == ("timeout", f"{reason}, item 1")
