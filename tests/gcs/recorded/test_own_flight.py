@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,7 +30,7 @@ from gcs.recorded.identification import (
     wind_warning,
 )
 from gcs.recorded.motion import motion_of
-from gcs.recorded.recording import read_recording
+from gcs.recorded.recording import Recording, read_recording
 from gcs.recorded.scoring import score_ahead
 from gcs.shell import display as display_module
 from gcs.workflows.recorded import name_of
@@ -47,6 +48,21 @@ def flown_mission(mission: str, folder: Path, **settings: float) -> Path:
         outcome = fly(load_mission(mission), Conditions(settings=settings), TlogWriter(file))
     assert outcome.name == "completed"
     return path
+
+
+@cache
+def recorded(path: Path) -> Recording:
+    """The recording in a log of this module: each is read once, which takes longer than what follows."""
+    found = read_recording(path, load_map("telemetry"))
+    for column in found[1:]:
+        if column is not None:
+            column.flags.writeable = False
+    return found
+
+
+@pytest.fixture(autouse=True)
+def read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gcs.recorded.recording.read_recording", lambda path, columns: recorded(path))
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +98,7 @@ def test_length_mass_and_drag_of_the_truth_are_identified(
 
 def test_the_push_of_a_strong_wind_is_identified(tmp_path: Path) -> None:
     wind_m_s, columns, truth = 14.0, load_map("telemetry"), load_vehicle("bebop")
-    motion = motion_of(
-        read_recording(flown_mission("case-b", tmp_path, SIM_WIND_N=wind_m_s), columns), columns
-    )
+    motion = motion_of(recorded(flown_mission("case-b", tmp_path, SIM_WIND_N=wind_m_s)), columns)
     found = identify_load(motion, columns.load_model(truth.cable_length_m), columns.identify.parameters)
     length, _, push_x, push_y = found
     push_m_s2 = truth.load_drag_quadratic_n_s2_m2 * wind_m_s**2 / truth.load_mass_kg
@@ -96,7 +110,7 @@ def test_the_push_of_a_strong_wind_is_identified(tmp_path: Path) -> None:
 
 def test_the_length_is_a_distance_and_shows_no_wrong_clock(flown: Path) -> None:
     """It is the one that predicts positions best, and is named so."""
-    recording, columns = read_recording(flown, load_map("telemetry")), load_map("telemetry")
+    recording, columns = recorded(flown), load_map("telemetry")
     motion = motion_of(recording._replace(time_s=1.2 * recording.time_s), columns)
     length = load_vehicle("bebop").cable_length_m
     (found,) = identify_load(motion, columns.load_model(length), ["length_m"])
@@ -106,7 +120,7 @@ def test_the_length_is_a_distance_and_shows_no_wrong_clock(flown: Path) -> None:
 
 
 def test_drag_and_mass_are_identified_from_few_rows_and_any_guess(circled: Path) -> None:
-    recording = read_recording(circled, load_map("telemetry"))
+    recording = recorded(circled)
     every = slice(None, None, 8)  # of 125 rows/s
     few = recording._replace(
         time_s=recording.time_s[every],
@@ -158,7 +172,7 @@ def test_a_load_that_was_not_measured_in_every_row_is_scored_in_the_others(
     flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def read_with_gap(path: Path, columns: Any) -> Any:
-        found = read_recording(path, columns)
+        found = recorded(path)
         load = found.load.copy()
         load[1000:1003] = np.nan
         return found._replace(load=load)
@@ -188,7 +202,7 @@ def test_a_long_replay_tells_what_it_is_doing(
 def test_of_many_rows_a_second_not_every_fifteenth_begins_a_prediction(flown: Path) -> None:
     """125 rows/s: predictions that begin 0.1 s apart took a minute more for half an hour of flight."""
     columns = load_map("telemetry")
-    motion = motion_of(read_recording(flown, columns), columns)
+    motion = motion_of(recorded(flown), columns)
     model = columns.load_model(load_vehicle("bebop").cable_length_m)
     rows = filter_rows(motion, model)
     estimates = filtered_estimates(rows, model, load=True, tilt=True)
