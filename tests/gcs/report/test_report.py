@@ -5,6 +5,7 @@ import hashlib
 import io
 import json
 import math
+import multiprocessing
 import os
 import re
 import signal
@@ -510,7 +511,16 @@ def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
     assert told == [(record, True, False)]
 
 
-def test_pictures_beside_the_one_of_the_page_are_drawn_on_demand_and_are_of_the_last_flight(tmp_path):
+def draw_by(monkeypatch, draw):
+    """Draw pictures by `draw` (target): for tests of who draws which of them, and when."""
+    for picture in PICTURES:
+        monkeypatch.setattr(picture, "draw", lambda view, target: draw(target))
+
+
+def test_pictures_beside_the_one_of_the_page_are_drawn_on_demand_and_are_of_the_last_flight(
+    tmp_path, monkeypatch
+):
+    draw_by(monkeypatch, lambda target: target.write_bytes(b"drawn"))
     made = flights.flight(1.0, flights.still).write(tmp_path / "flight.tlog")
     build_report(made, tmp_path, META, picture_format="png")
     earlier = [tmp_path / name for name in ("flight.mcap", "flight.common.tlog")]
@@ -540,18 +550,18 @@ def test_pictures_for_papers_are_the_same_each_time_and_go_with_the_report(tmp_p
 
 
 def test_a_helper_that_dies_leaves_its_pictures_to_us(tmp_path, monkeypatch):
-    ours = os.getpid()
+    ours, helpers = os.getpid(), []
 
-    def only_here(draw):
-        def drawn(view, path):
-            if os.getpid() != ours:
-                signal.raise_signal(signal.SIGKILL)
-            draw(view, path)
+    def only_here(target):
+        if os.getpid() != ours:
+            signal.raise_signal(signal.SIGKILL)
+        helpers.extend(multiprocessing.active_children())
+        for helper in helpers:  # it takes a picture of its own
+            helper.join(60.0)
+        target.write_bytes(b"drawn here")
 
-        return drawn
-
-    for picture in PICTURES:
-        monkeypatch.setattr(picture, "draw", only_here(picture.draw))
+    draw_by(monkeypatch, only_here)
     made = flights.case_b(duration_s=2.0).write(tmp_path / "flight.tlog")
     build_report(made, tmp_path, picture_format="png")
-    assert all((tmp_path / picture.file).stat().st_size for picture in PICTURES)
+    assert [helper.exitcode for helper in helpers] == [-signal.SIGKILL]
+    assert all((tmp_path / picture.file).read_bytes() == b"drawn here" for picture in PICTURES)
