@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from functools import cache
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -13,9 +14,9 @@ from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions
-from gcs.mission_files import load
 from gcs.sweep.flight import StartTimes, fly, start_times
 from gcs.workflows.unused_settings import UNUSED_BY_LAW, unused_settings
+from missions.fileformat import parse_mission
 
 OF_LAWS = [(law, name) for law, names in UNUSED_BY_LAW.items() for name in sorted(names)]
 BELIEF = autopilot_parameters(load_belief("bebop"))
@@ -55,20 +56,52 @@ OF_WORLD: dict[str, tuple[float, dict[str, float]]] = {
 }
 
 
+# shorter than the missions hover and load-attitude, and all that these show is seen here too: positions and
+# attitudes of the load, to all sides, are tracked
+HOVER = """
+title = "Hover"
+description = "A mission for tests."
+
+[[items]]
+type = "takeoff"
+altitude_m = 1.0
+
+[[items]]
+type = "delay"
+duration_s = 3.0
+
+[[items]]
+type = "land"
+"""
+_LEAN = """
+[[items]]
+type = "attitude"
+controlled = "load"
+tilt_north_deg = {0}
+tilt_east_deg = {0}
+duration_s = 0.6
+
+"""
+_END = HOVER[HOVER.rindex("[[items]]") :]
+LEAN = HOVER.removesuffix(_END) + _LEAN.format(7.0) + _LEAN.format(-7.0) + _END
+MISSIONS = {name: parse_mission(text, name, name) for name, text in (("hover", HOVER), ("lean", LEAN))}
+
+
 @cache
 def start(mission: str) -> StartTimes:
-    return start_times(load(mission), Conditions(settings={"CTL_LAW": float(LAWS.index("plumbline"))}))
+    plumbline_law = {"CTL_LAW": float(LAWS.index("plumbline"))}
+    return start_times(MISSIONS[mission], Conditions(settings=plumbline_law))
 
 
 @cache
 def flown(mission: str, law: str, settings: tuple[tuple[str, float], ...]) -> str:
     """The result of a flight in all digits."""
     conditions = Conditions(settings={**dict(settings), "CTL_LAW": float(LAWS.index(law))})
-    return repr(fly(load(mission), conditions, start(mission)))
+    return repr(fly(MISSIONS[mission], conditions, start(mission)))
 
 
 @pytest.mark.parametrize(("law", "name"), OF_LAWS)
-@pytest.mark.parametrize("mission", ["hover", "load-attitude"])
+@pytest.mark.parametrize("mission", MISSIONS)
 def test_a_parameter_of_another_law_has_no_effect(mission: str, law: str, name: str) -> None:
     parameter = BELIEF.describe(name)
     value = 0.8 * parameter.default
@@ -152,11 +185,13 @@ def test_the_command_line_tells_it_before_anything_flies(tmp_path, command):
     assert all(f" has no effect: {why}" in line for line, why in zip(lines, told, strict=True))
 
 
-def test_scripts_are_warned() -> None:
+def test_scripts_are_warned(tmp_path: Path) -> None:
+    mission = tmp_path / "hover.toml"
+    mission.write_text(HOVER, encoding="utf-8")
     with pytest.warns(UserWarning) as told:
-        plumbline.fly("hover", settings={"NGC_KX": 5.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0})
+        plumbline.fly(mission, settings={"NGC_KX": 5.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0})
         plumbline.sweep(
-            "hover", vary={"SIM_GUST_FOR_S": "1:2:2"}, settings={"PLB_ZETA": 0.8}, kind="arrow", jobs=1
+            mission, vary={"SIM_GUST_FOR_S": "1:2:2"}, settings={"PLB_ZETA": 0.8}, kind="arrow", jobs=1
         )
     assert [str(one.message) for one in told] == [
         "settings: NGC_KX has no effect: law plumbline does not use it",
@@ -165,4 +200,4 @@ def test_scripts_are_warned() -> None:
     assert {one.filename for one in told} == {__file__}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        plumbline.fly("hover", settings={"PLB_ZETA": 0.8})
+        plumbline.fly(mission, settings={"PLB_ZETA": 0.8})
