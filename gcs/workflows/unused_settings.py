@@ -100,7 +100,8 @@ def unused_settings(
     given: dict[str, set[float]] = {}
     for name, value in settings:
         given.setdefault(name, set()).add(value)
-    fitted = {table for table in _TABLES if getattr(load_profile(sensors), table) is not None}
+    profile = load_profile(sensors)
+    fitted = {table for table in _TABLES if getattr(profile, table) is not None}
     lines = {}
     for name, values in given.items():
         table = next((one for one in tables if name in one), None)
