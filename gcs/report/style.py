@@ -58,6 +58,7 @@ _STYLE: Any = {
     "axes.titlelocation": "left",
     "axes.titlesize": 11,
     "axes.titleweight": "bold",
+    "axes.titley": 1.0,  # where it is anyway: matplotlib would look for ticks above the axes each time
     "figure.facecolor": "white",
     "font.family": "DejaVu Sans",
     "font.size": 10,
