@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,12 @@ def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPl
     plan = SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
     directory = tmp_path_factory.mktemp("whole")
     return plan, directory, swept(plan, directory)
+
+
+@cache
+def page_of(plan: SweepPlan, directory: Path) -> Path:
+    """The page of a sweep that stays as it is, written once."""
+    return write_report(directory, plan)
 
 
 def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.SweepResult]) -> None:
@@ -248,7 +255,7 @@ def test_a_report_without_flights_says_so(
 
 def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.SweepResult]) -> None:
     plan, directory, _ = whole
-    page = write_report(directory, plan).read_text(encoding="utf-8")
+    page = page_of(plan, directory).read_text(encoding="utf-8")
     assert (directory / "curve-sim_act_delay_ms.png").stat().st_size > 5000
     assert "SIM_ACT_DELAY_MS" in page and "0 … 4" in page and "data:image/png" in page
 
@@ -306,7 +313,7 @@ def test_flights_that_stand_out_are_those_of_the_table(
 def open_page(browser: Browser, whole: tuple[SweepPlan, Path, object], width: int) -> None:
     """Open the page of the sweep and wait until its maps are drawn."""
     plan, directory, _ = whole
-    browser.open(write_report(directory, plan).as_uri(), width, 844)
+    browser.open(page_of(plan, directory).as_uri(), width, 844)
     browser.wait("document.documentElement.dataset.ready === '1'")
 
 
@@ -363,7 +370,7 @@ def test_the_step_response_is_in_table_record_and_page(steps: tuple[SweepPlan, P
     (flights,) = flights_by_law(Store(directory, plan).read(), plan)
     record: Any = law_record(flights)
     assert (record["law"], record["flights"], record["completed"]) == ("thesis", 6, 4)
-    page = write_report(directory, plan).read_text(encoding="utf-8")
+    page = page_of(plan, directory).read_text(encoding="utf-8")
     for name, decimals in (("rise_time_90_s", 3), ("overshoot_pct", 1), ("settling_time_5pct_s", 3)):
         middle = statistics.median(row[name] for row in rows[:4])
         assert record["medians"][name] == pytest.approx(middle)
@@ -389,7 +396,7 @@ def test_flights_that_never_settle_count_in_the_median(
     (flights,) = flights_by_law(Store(directory, plan).read(), plan)
     medians = law_record(flights)["medians"]
     assert medians["settling_time_5pct_s"] is None, "the mission is no step"
-    assert "overshoot" not in write_report(directory, plan).read_text(encoding="utf-8")
+    assert "overshoot" not in page_of(plan, directory).read_text(encoding="utf-8")
 
 
 def test_a_map_shows_the_step_response(browser: Browser, steps: tuple[SweepPlan, Path]) -> None:
