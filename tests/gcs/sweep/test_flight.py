@@ -8,27 +8,23 @@ order within a tick, and the times at which the ground station acts.
 from __future__ import annotations
 
 import io
-import json
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.own.own_code import OwnCode
 from autopilot.wire.tlog import TlogWriter, read_tlog
-from gcs.analysis.record import FlightMeta, flight_record
+from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.telemetry import telemetry_of
-from gcs.cli import gcs
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.mission_files import load
 from gcs.sweep.flight import TRACE_COLUMNS, FlightResult, fly, start_times
 from missions.fileformat import load_mission
-from missions.model import Takeoff
+from missions.model import Mission, Takeoff
 from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
 from tests.gcs import tolerances
@@ -177,23 +173,19 @@ def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> No
     flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
 
 
-def test_figures_of_a_released_load_are_those_of_the_record(delivery: str, tmp_path: Path) -> None:
+def record_of(mission: Mission, conditions: Conditions) -> Record:
+    """The record of a flight with messages."""
+    log = io.BytesIO()
+    fly_with_wire(mission, conditions, TlogWriter(log))
+    log.seek(0)
+    return flight_record(telemetry_of(read_tlog(log)), FlightMeta())
+
+
+def test_figures_of_a_released_load_are_those_of_the_record(delivery: str) -> None:
     """The record samples what the sweep takes at every tick, in single precision."""
-    words = [
-        "fly",
-        delivery,
-        "--seed",
-        "1",
-        "--set",
-        "SIM_WIND_E=3",
-        "--out",
-        str(tmp_path),
-        "--quiet",
-        "--json",
-    ]
-    record = json.loads(CliRunner().invoke(gcs, words, prog_name="gcs").stdout)
     conditions = Conditions(sensors="lab", seed=1, settings={"CTL_LAW": PLUMBLINE, "SIM_WIND_E": 3.0})
     mission = load_mission(delivery)
+    record = record_of(mission, conditions)
     found = asdict(fly(mission, conditions, start_times(mission, conditions)))
     shared = {name: record[name] for name in found if isinstance(record.get(name), float)}
     assert len(shared) == 13
@@ -205,10 +197,7 @@ def test_the_charge_left_is_that_of_the_record(short: str) -> None:
     mission = load(short)
     battery = {"SIM_BATTERY": 1.0, "SIM_BAT_CAP": 310.0, "SIM_BAT_CHARGE": 80.0}
     conditions = Conditions(settings={"CTL_LAW": PLUMBLINE, **battery})
-    log = io.BytesIO()
-    fly_with_wire(mission, conditions, TlogWriter(log))
-    log.seek(0)
-    record = flight_record(telemetry_of(read_tlog(log)), FlightMeta())
+    record = record_of(mission, conditions)
     found = fly(mission, conditions, start_times(mission, conditions))
     assert found.outcome == "completed"
     assert 50.0 < found.battery_left_pct < 75.0
@@ -225,10 +214,7 @@ def test_the_step_response_is_that_of_the_record(request: pytest.FixtureRequest,
     both interpolate."""
     mission = load(request.getfixturevalue(name) if name == "stepped" else name)
     conditions = Conditions(sensors="lab", seed=3, settings={"CTL_LAW": PLUMBLINE})
-    log = io.BytesIO()
-    fly_with_wire(mission, conditions, TlogWriter(log))
-    log.seek(0)
-    record = flight_record(telemetry_of(read_tlog(log)), FlightMeta())
+    record = record_of(mission, conditions)
     found = fly(mission, conditions, start_times(mission, conditions))
     for key in ("rise_time_90_s", "settling_time_5pct_s"):
         assert getattr(found, key) == pytest.approx(record[key], abs=TELEMETRY_S + tolerances.CROSSING_S), key
