@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ast
-import copy
 import sys
+from collections import Counter
 from collections.abc import Collection, Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -22,10 +22,11 @@ def negated(node: ast.expr) -> ast.expr:
 
 
 def flips(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef]]:
-    """Every altered copy of one of the module's functions, with a name that says what was altered."""
+    """Every altered form of one of the module's functions, with a name that says what was altered; until the
+    next one is asked for, the function itself has this form."""
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     for function in functions:
-        for index, node in enumerate(ast.walk(function)):
+        for node in list(ast.walk(function)):
             sites: list[Any] = []
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
                 sites = ["left", "right"]
@@ -33,14 +34,13 @@ def flips(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef]]:
                 sites = ["operand"]
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 sites = list(TERMS.get(node.func.id, ()))
+            # a list of terms, and the place of one of them in it
+            terms: Any = node.args if isinstance(node, ast.Call) else vars(node)
             for site in sites:
-                altered = copy.deepcopy(function)
-                twin: Any = list(ast.walk(altered))[index]
-                if isinstance(site, int):
-                    twin.args[site] = negated(twin.args[site])
-                else:
-                    setattr(twin, site, negated(getattr(twin, site)))
-                yield f"{function.name}: {ast.unparse(node)} [{site}]", ast.fix_missing_locations(altered)
+                name, right = f"{function.name}: {ast.unparse(node)} [{site}]", terms[site]
+                terms[site] = negated(right)
+                yield name, function
+                terms[site] = right
 
 
 def fails(proof: Any, laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> bool:
@@ -51,13 +51,13 @@ def fails(proof: Any, laws: SimpleNamespace, model: SimpleNamespace, vehicle: Ve
     return False
 
 
-def called(proof: Any, laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> set[Any]:
-    """Module and name of each function that a proof calls: flips of others cannot make it fail."""
-    found = set()
+def called(proof: Any, laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> Counter[Any]:
+    """How often a proof calls each function, by module and name: flips of others cannot make it fail."""
+    found: Counter[Any] = Counter()
 
     def note(frame: Any, event: str, _: Any) -> None:
         if event == "call":
-            found.add((frame.f_code.co_filename, frame.f_code.co_name))
+            found[frame.f_code.co_filename, frame.f_code.co_name] += 1
 
     before = sys.getprofile()
     sys.setprofile(note)
@@ -76,9 +76,10 @@ def surviving(
     vehicle: Vehicle,
 ) -> tuple[list[str], int]:
     """Flips that no proof detects, and the number of flips tried. The proof that detected the previous flip
-    is tried first."""
+    is tried first, then short ones before long ones."""
     laws = plain_laws(texts)
     order = [(proof, called(proof, laws, model, vehicle)) for proof in proofs]
+    order.sort(key=lambda one: one[1].total())
     survivors, count, spared = [], 0, set()
     for module, text in texts.items():
         for name, altered in flips(ast.parse(text)):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -33,7 +34,7 @@ from autopilot.control.laws.plumbline import PlumblineLaw
 from autopilot.control.load_attitude import DirectionCommand, held_attitude_force
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
 from autopilot.control.records import Cable, HeadingReference, Jet, Reference, State, Vehicle
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import Vec3, add, axpy
 from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
@@ -49,6 +50,7 @@ from missions.model import Signals
 from sitl.plant.by_value import advance, initial_state
 from sitl.plant.records import PlantState, Truth
 from sitl.vehicles.truth import load_truth
+from tests.control import model as independent
 from tests.control.flips import surviving
 from tests.control.model import cross
 from tests.control.plain_laws import plain_laws, sources
@@ -757,10 +759,46 @@ def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace
                 true = u + kept * (true - u)
 
 
+PREDICTED_S, PREDICTED_LAG_S = 0.034, 0.02
+
+
+@cache
+def after_the_delay(
+    state: State, rotors: tuple[float, ...], rows: tuple[tuple[float, ...], ...], vehicle: Vehicle
+) -> tuple[State, tuple[Array, Array, Array], Array]:
+    """By the model, PREDICTED_S later under these commands: the state; position, velocity and attitude of a
+    vehicle alone; and what its rotors give."""
+    lag, h = PREDICTED_LAG_S, 0.002 / 8
+    y = independent.pack(
+        state.x_load,
+        state.v_load,
+        state.q_cable,
+        cross(state.q_cable, state.q_cable_dot),
+        state.R,
+        state.omega_body,
+    )
+    r = np.array(rotors)
+    x, v = np.array(state.x_quad), np.array(state.v_quad)
+    free, spin = np.array(state.R), np.array(state.omega_body)
+    J = np.array(vehicle.inertia)
+    for i in range(round(PREDICTED_S / h)):
+        # the oldest command is in force for 2 ms of 4
+        u = np.array(rows[-9 + int((i * h + 0.002) / TICK + 1e-6)])
+        half = u + math.exp(-0.5 * h / lag) * (r - u)
+        y = independent.rk4(y, float(half[0]), half[1:], vehicle, h)
+        a = half[0] * free[:, 2] / vehicle.quad_mass - np.array([0.0, 0.0, vehicle.gravity])
+        x, v = x + h * v + 0.5 * h * h * a, v + h * a
+        middle = spin + 0.5 * h * (half[1:] - cross(spin, J * spin)) / J
+        spin = spin + h * (half[1:] - cross(middle, J * middle)) / J
+        free = free @ independent.rodrigues(h * middle)
+        r = u + math.exp(-h / lag) * (r - u)
+    return independent.state_of(y, vehicle), (x, v, free), r
+
+
 def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The state after the delay under the commands on their way, against the model; taut and slack."""
-    delay, lag, fine = 0.034, 0.02, 8
-    constants = law.actuation_constants(delay, lag, TICK)
+    delay = PREDICTED_S
+    constants = law.actuation_constants(delay, PREDICTED_LAG_S, TICK)
     for seed in range(2):
         rng = np.random.default_rng([36, seed])
         belief = actuation.steady_actuation(5.0)
@@ -776,23 +814,9 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
         state = model.state_of(y, vehicle)
         found = law.predict(state, 1.0, belief, constants, TICK, ZERO, ZERO, CALM_AIR, vehicle)
 
-        h = 0.002 / fine
-        r = np.array([belief.thrust, *belief.moment])
-        x, v = np.array(state.x_quad), np.array(state.v_quad)
-        free, spin = np.array(state.R), np.array(state.omega_body)
-        J = np.array(vehicle.inertia)
-        for i in range(round(delay / h)):
-            # the oldest command is in force for 2 ms of 4
-            u = rows[-9 + int((i * h + 0.002) / TICK + 1e-6)]
-            half = u + math.exp(-0.5 * h / lag) * (r - u)
-            y = model.rk4(y, float(half[0]), half[1:], vehicle, h)
-            a = half[0] * free[:, 2] / vehicle.quad_mass - np.array([0.0, 0.0, vehicle.gravity])
-            x, v = x + h * v + 0.5 * h * h * a, v + h * a
-            middle = spin + 0.5 * h * (half[1:] - cross(spin, J * spin)) / J
-            spin = spin + h * (half[1:] - cross(middle, J * middle)) / J
-            free = free @ model.rodrigues(h * middle)
-            r = u + math.exp(-h / lag) * (r - u)
-        true = model.state_of(y, vehicle)
+        rotors = (belief.thrust, *belief.moment)
+        true, alone_there, r = after_the_delay(state, rotors, tuple(map(tuple, rows)), vehicle)
+        x, v, free = alone_there
         agree([found.thrust, *found.moment], r, ROUNDING)
         for name in State._fields[:8]:
             # nine steps of the midpoint rule, each off by a 24th of 4 ms cubed times f''/m_Q, 4000 m/s^4
@@ -826,6 +850,13 @@ def what_is_predicted_comes(law: SimpleNamespace, model: SimpleNamespace, vehicl
         agree([stays.thrust, *stays.moment], r, ROUNDING)
 
 
+@cache
+def upright(v: Vec3, vehicle: Vehicle) -> State:
+    """Upright over its load, with which it moves at v."""
+    pose = independent.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
+    return independent.state_of(pose, vehicle)
+
+
 def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Drag is learned on a vehicle that moves to and fro across its cable with three times the assumed drag,
     on one with no assumed drag, and on one without drag; at 0.2 m/s only half of the difference is."""
@@ -838,9 +869,8 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
         observed = law.nominal_in_flight(vehicle)
         for k in range(300):
             v = model.vec(way(k))
-            pose = model.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
             force = np.array(law.drag_force(v, true)) + wind
-            state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
+            state = upright(v, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
             observed = law.observe(observed, state, 1.0, lift, ZERO, constants, believed, vehicle, 0.5)
         return observed, force - np.array(law.drag_force(v, believed))
 
@@ -865,8 +895,7 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
     for k in range(100):
         v = (0.02 * k, 0.0, 0.0)
         force = np.add(law.drag_force(v, BEBOP_DRAG), (1.5, 0.0, 0.0))
-        pose = model.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
-        state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
+        state = upright(v, vehicle)._replace(a_quad=model.vec(force / vehicle.quad_mass))
         observed = law.observe(observed, state, 1.0, lift, ZERO, constants, BEBOP_DRAG, vehicle, 0.5)
     agree(observed.drag, (0.0, 0.0), 1e-12)
     weight = 1.0 - (1.0 - TICK / 4.0) ** 100
@@ -917,8 +946,7 @@ def sudden_gusts_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehi
     prompt, slow = (1.0 - (1.0 - s) ** ticks for s in (share, share * 0.02 / 0.4))
     for gust in (0.9, 6.0):
         push = np.array([0.6, -0.8, 0.0]) * gust * slowed.max_lag
-        pose = model.pack(ZERO, ZERO, [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
-        state = model.state_of(pose, vehicle)._replace(a_quad=model.vec(push / vehicle.quad_mass))
+        state = upright(ZERO, vehicle)._replace(a_quad=model.vec(push / vehicle.quad_mass))
         observed = still
         for _ in range(ticks):
             observed = law.observe(observed, state, 1.0, lift, ZERO, slowed, Drag(0.0, 0.0), vehicle, 0.5)
@@ -928,43 +956,61 @@ def sudden_gusts_are_followed(law: SimpleNamespace, model: SimpleNamespace, vehi
         agree(observed.push, observed.steady_push, ROUNDING)
 
 
+TORQUE_BESIDE, TORQUE_TILT = (0.01, -0.006, 0.004), 0.004
+
+
+@cache
+def turned_to_and_fro(vehicle: Vehicle) -> list[tuple[tuple[tuple[State, Vec3], ...], Array]]:
+    """A fast and a slow motion to and fro: at each tick the state and the moment of the rotors, and what
+    tilted discs are swept by in the end. No law has a part in them."""
+    rng = np.random.default_rng(41)
+    J, beside = np.array(vehicle.inertia), np.array(TORQUE_BESIDE)
+
+    def motion(way: Callable[[int], list[float]]) -> tuple[tuple[tuple[State, Vec3], ...], Array]:
+        ticks, omega, M = [], 3.0 * rng.normal(size=3), np.zeros(3)
+        for k in range(1500):
+            v = np.array(way(k))
+            R = independent.rodrigues([0.4 * math.sin(0.01 * k), 0.3, 0.5])
+            u = R.T @ v
+            swept = np.array([u[1], -u[0], 0.0])
+            pose = independent.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), R, omega)
+            ticks.append((independent.state_of(pose, vehicle), independent.vec(M)))
+            M = J * (0.2 * rng.normal(size=3) - 5.0 * (omega - [0.5, 2.0, -1.5]))
+            omega = omega + TICK * (M + beside + TORQUE_TILT * swept - cross(omega, J * omega)) / J
+        return tuple(ticks), swept
+
+    return [
+        motion(lambda k: [1.5 * math.sin(0.02 * k), math.cos(0.03 * k), 0.3]),
+        motion(lambda k: [0.2 * math.sqrt(2.0) * math.sin(0.02 * k), 0.0, 0.0]),
+    ]
+
+
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """The torque on a vehicle that moves to and fro, leans and turns, with rotor discs that tilt and a cable
     off its centre."""
     constants = law.observer_constants(0.3, 0.1, 1.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
-    rng = np.random.default_rng(41)
-    J, beside, tilt = np.array(vehicle.inertia), np.array([0.01, -0.006, 0.004]), 0.004
+    beside, tilt = np.array(TORQUE_BESIDE), TORQUE_TILT
     lift = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
-    def learned(way: Callable[[int], Any]) -> tuple[Any, State, Array, Array]:
-        observed, omega, M = law.nominal_in_flight(vehicle), 3.0 * rng.normal(size=3), np.zeros(3)
-        for k in range(1500):
-            v = np.array(way(k))
-            R = model.rodrigues([0.4 * math.sin(0.01 * k), 0.3, 0.5])
-            u = R.T @ v
-            swept = np.array([u[1], -u[0], 0.0])
-            pose = model.pack(ZERO, v, [0.0, 0.0, -1.0], np.zeros(3), R, omega)
-            state = model.state_of(pose, vehicle)
-            observed = law.observe(
-                observed, state, 1.0, lift, model.vec(M), constants, BEBOP_DRAG, vehicle, 0.5
-            )
-            M = J * (0.2 * rng.normal(size=3) - 5.0 * (omega - [0.5, 2.0, -1.5]))
-            omega = omega + TICK * (M + beside + tilt * swept - cross(omega, J * omega)) / J
-        return observed, state, swept, beside + tilt * swept
+    def learned(motion: tuple[tuple[State, Vec3], ...]) -> Any:
+        observed = law.nominal_in_flight(vehicle)
+        for state, M in motion:
+            observed = law.observe(observed, state, 1.0, lift, M, constants, BEBOP_DRAG, vehicle, 0.5)
+        return observed
 
-    observed, state, _, torque = learned(lambda k: [1.5 * math.sin(0.02 * k), math.cos(0.03 * k), 0.3])
-    agree(observed.torque.total, torque, 1e-4)
+    (fast_motion, swept), (slow_motion, slowly_swept) = turned_to_and_fro(vehicle)
+    observed, state = learned(fast_motion), fast_motion[-1][0]
+    agree(observed.torque.total, beside + tilt * swept, 1e-4)
     # 4 % of the torque that follows the motion remains in this: 0.2 m/s of 1 m/s, squared
     agree(observed.torque.steady, beside, 0.04 * 1.5 * tilt)
     assert observed.torque.correlation / observed.torque.square == pytest.approx(tilt, rel=0.02)
-    slow, _, swept, _ = learned(lambda k: [0.2 * math.sqrt(2.0) * math.sin(0.02 * k), 0.0, 0.0])
-    agree(np.array(slow.torque.total) - slow.torque.steady, 0.5 * tilt * swept, 0.1 * tilt * 0.2)
+    slow = learned(slow_motion)
+    agree(np.array(slow.torque.total) - slow.torque.steady, 0.5 * tilt * slowly_swept, 0.1 * tilt * 0.2)
     # one that is there from the first tick on does not follow the motion, long before its mean is known
     young = law.nominal_in_flight(vehicle)
     gradual = law.observer_constants(0.3, 0.1, 4.0, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
     for k in range(100):
-        pose = model.pack(ZERO, [0.02 * k, 0.0, 0.0], [0.0, 0.0, -1.0], np.zeros(3), np.eye(3), ZERO)
-        moving = model.state_of(pose, vehicle)
+        moving = upright((0.02 * k, 0.0, 0.0), vehicle)
         young = law.observe(young, moving, 1.0, lift, (-0.01, 0.02, 0.0), gradual, BEBOP_DRAG, vehicle, 0.5)
     agree(young.torque.total, young.torque.steady, 1e-12)
     assert young.torque.weight == pytest.approx(1.0 - (1.0 - TICK / 4.0) ** 100)
@@ -1003,28 +1049,39 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
         assert unmoved.torque.total == ZERO
 
 
+WIND_PUSH = np.array([0.6, -0.8, 0.0])
+
+
+@cache
+def blown_in_many_attitudes(vehicle: Vehicle, frame_share: float) -> list[tuple[State, float, Vec3]]:
+    """States, thrusts, and the push of the wind, which no law has a part in."""
+    rng, ticks = np.random.default_rng(37), []
+    for _ in range(600):
+        q = independent.unit([0.3 * rng.normal(), 0.3 * rng.normal(), -1.0])
+        w = cross(q, rng.normal(size=3))
+        R, f = independent.rodrigues(0.2 * rng.normal(size=3)), 5.0 + 0.5 * rng.normal()
+        pose = independent.pack(ZERO, rng.normal(size=3), q, w, R, ZERO)
+        axis = R[:, 2]
+        push = WIND_PUSH - (1.0 - frame_share) * (WIND_PUSH @ axis) * axis
+        ticks.append((independent.state_of(pose, vehicle), f, independent.vec(push)))
+    return ticks
+
+
 def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """With a swinging load half as heavy again as assumed, under the assumed drag and a level wind that
     pushes the rotors, in their plane, the frame, or both; the vehicle leans in every direction in turn."""
     heavy = vehicle._replace(load_mass=1.5 * vehicle.load_mass)
     constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     assert law.vehicle_on_ground(law.nominal_on_ground(vehicle), vehicle)
-    wind = np.array([0.6, -0.8, 0.0])
+    wind = WIND_PUSH
     for frame_share in (0.0, 0.4, 1.0):
-        rng = np.random.default_rng(37)
         observed = law.nominal_in_flight(vehicle)
         assert not law.vehicle_on_ground(observed, vehicle)
-        for _ in range(600):
-            q = model.unit([0.3 * rng.normal(), 0.3 * rng.normal(), -1.0])
-            w = cross(q, rng.normal(size=3))
-            R, f = model.rodrigues(0.2 * rng.normal(size=3)), 5.0 + 0.5 * rng.normal()
-            state = model.state_of(model.pack(ZERO, rng.normal(size=3), q, w, R, ZERO), vehicle)
-            axis = np.array(R)[:, 2]
-            push = wind - (1.0 - frame_share) * (wind @ axis) * axis
-            air = np.array(law.drag_force(state.v_quad, BEBOP_DRAG))
-            motion = law.load_motion(state, f, 0.0, model.vec(push + air), heavy)
-            a = np.array(motion.a_load) - vehicle.cable_length * np.array(motion.q_ddot)
-            state = state._replace(a_quad=model.vec(a))
+        for unpushed, f, push in blown_in_many_attitudes(vehicle, frame_share):
+            air = law.drag_force(unpushed.v_quad, BEBOP_DRAG)
+            motion = law.load_motion(unpushed, f, 0.0, add(push, air), heavy)
+            a = axpy(-vehicle.cable_length, motion.q_ddot, motion.a_load)
+            state = unpushed._replace(a_quad=a)
             observed = law.observe(observed, state, 1.0, f, ZERO, constants, BEBOP_DRAG, vehicle, frame_share)
         # eight time constants: exp(-8) of the error is left
         assert observed.load_mass == pytest.approx(heavy.load_mass, rel=1e-3)
