@@ -343,9 +343,10 @@ class FlightCore:
 
     def decide(self, now_us: int, period_us: int) -> Report:
         """The supervisor's part of a tick, after the estimate and before the law."""
-        self.flight, report = advance(self.flight, self.view(now_us, with_pull=True), self.settings)
+        view = self.view(now_us, with_pull=True)
+        self.flight, report = advance(self.flight, view, self.settings)
         self._dirty = True
-        self._plan_setpoints(now_us, period_us)
+        self._plan_setpoints(now_us, period_us, bool(view.estimate_problems))
         self._use_rotors()
         return report
 
@@ -427,8 +428,9 @@ class FlightCore:
             settings = replace(settings, cable_length_m=length, min_move_s=min_move_s)
         self.settings = settings
 
-    def _plan_setpoints(self, now_us: int, period_us: int) -> None:
-        """Compute the stretch that begins with this tick, and its setpoints."""
+    def _plan_setpoints(self, now_us: int, period_us: int, is_blind: bool) -> None:
+        """Compute the stretch that begins with this tick, and its setpoints; `is_blind`: the supervisor
+        decides at the next tick as well, since the estimate is not good enough."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
         self.planned, self.reeling = None, NOT_REELING
@@ -449,6 +451,8 @@ class FlightCore:
                 max_ticks = SETPOINTS_BRAKING
             elif leg.duration_s == inf:
                 max_ticks = min(max_ticks, SETPOINTS_ENDLESS)
+            if is_blind:
+                max_ticks = 1
             ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)

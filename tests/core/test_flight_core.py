@@ -14,6 +14,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Land, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, Craft
 
+LOAD_TRACKER = 4.0  # of SIM_SENS_FAIL
+
 
 @pytest.mark.parametrize("command", ["hold", "return"])
 def test_a_stop_is_laid_out_in_portions(command: str) -> None:
@@ -36,3 +38,21 @@ def test_a_stop_is_laid_out_in_portions(command: str) -> None:
             portions += craft.onboard.core.rows.targets is not before
     assert portions >= stop.duration_s / (SETPOINTS_BRAKING * 0.004) - 2.0
     assert norm(craft.truth.v_load) < 0.1
+
+
+def test_no_more_is_laid_out_than_is_flown_while_the_estimate_is_not_good_enough() -> None:
+    """The supervisor decides at every tick then, and lays out the next setpoint again."""
+    craft = Craft(Takeoff(1.5), Waypoint(6.0, 0.0, 1.5), Land())
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION and norm(c.truth.v_load) > 0.8)
+    lost = mavlink.MAVLink_param_set_message(
+        1, 1, b"SIM_SENS_FAIL", LOAD_TRACKER, mavlink.MAV_PARAM_TYPE_REAL32
+    )
+    craft.send(lost)
+    craft.run(lambda c: isinstance(c.flight.legs[0], Brake | PathStop))
+    stop, ticks = craft.flight.legs[0], 0
+    while craft.flight.legs[0] is stop:
+        assert len(craft.onboard.core.rows.targets) == 1
+        craft.tick()
+        ticks += 1
+    assert ticks > 100
