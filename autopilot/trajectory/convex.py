@@ -34,11 +34,11 @@ from autopilot.trajectory.rotor_demand import (
     demand_derivatives,
     rotor_commands,
 )
-from autopilot.trajectory.splines import DEGREE, Array, Basis
+from autopilot.trajectory.spline_band import BAND, sums_of
+from autopilot.trajectory.splines import Array, Basis
 
 SAMPLES = 4  # to an interval
 TOLERANCE = 0.035  # ranges of a rotor by which a path may exceed its bounds between the samples
-_BAND = DEGREE + 1
 _ROUNDS = 12
 _EXCESS_WEIGHT = 3e4  # of a rotor's range for one second; a distance of d costs 1 per second
 _CONSTRAINT_WEIGHT = 1e5  # of one metre
@@ -122,7 +122,7 @@ class Problem:
         self.values, self.first = basis.band(self.times, 8)
         lo, hi = basis.free.start, basis.free.stop
         self.lo, self.size = lo, hi - lo
-        self._columns = self.first[:, None] + np.arange(_BAND) - lo
+        self._columns = self.first[:, None] + np.arange(BAND) - lo
         self._is_free = (self._columns >= 0) & (self._columns < self.size)
         self._derivative_matrices = [self._matrix(self.values[order]) for order in range(8)]
         self._hessian = self._cost_matrix()
@@ -142,7 +142,7 @@ class Problem:
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
         """(n, size) matrix of one derivative by the free coefficients of one axis."""
-        rows = np.repeat(np.arange(len(values)), _BAND).reshape(self._columns.shape)
+        rows = np.repeat(np.arange(len(values)), BAND).reshape(self._columns.shape)
         keep = self._is_free
         entries = (values[keep], (rows[keep], self._columns[keep]))
         return sparse.csr_matrix(entries, shape=(len(values), self.size))
@@ -168,7 +168,7 @@ class Problem:
             return sparse.csr_matrix((0, 3 * self.size)), np.zeros(0)
         values, first = self.basis.band(constraints.time, 7)
         weights = values[constraints.order, np.arange(len(constraints.time))]
-        columns = first[:, None] + np.arange(_BAND)
+        columns = first[:, None] + np.arange(BAND)
         data, row_indices, column_indices = [], [], []
         constant = np.zeros(len(constraints.time))
         for i in range(len(constraints.time)):
@@ -189,7 +189,7 @@ class Problem:
 
     def jets(self, coefficients: Array) -> Array:
         """(8, n, 3) at the samples: the path and seven derivatives."""
-        return band_jets(self.values, self.first, coefficients)
+        return sums_of(self.values, self.first, coefficients)
 
     def _cost(self, jets: Array) -> float:
         deviation = jets[0] - self.objective.target
@@ -380,12 +380,6 @@ class Problem:
 def sample_times(basis: Basis) -> Array:
     """Equally spaced times (s) over the spline, both ends included."""
     return np.linspace(basis.breaks[0], basis.breaks[-1], SAMPLES * basis.intervals + 1)
-
-
-def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> Array:
-    """(orders, n, 3) of the spline with `coefficients` (count, 3)."""
-    nearby = coefficients[first[:, None] + np.arange(_BAND)]
-    return np.asarray(np.einsum("oik,ikd->oid", values, nearby))
 
 
 def excess(path_demand: Array, spacing: float | Array, bounds: Bounds) -> Array:

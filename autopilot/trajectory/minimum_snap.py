@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from autopilot.trajectory.convex import band_jets
 from autopilot.trajectory.ramp import PARTS, WAYS, ramp
-from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, power_table
+from autopilot.trajectory.spline_band import BAND, DEGREE, sums_of
+from autopilot.trajectory.splines import ORDERS, Array, Basis, PieceTable, power_table
 
 Indices = NDArray[np.int64]
 
@@ -43,7 +43,6 @@ _FINE_S = 0.01
 _END_SHARE = 0.1
 # 50 to an interval: a flight of hours needs no more memory than one of minutes
 _MAX_FINE_SAMPLES = 20_000
-_BAND = DEGREE + 1
 REST = np.zeros((2, 3))
 
 
@@ -94,8 +93,8 @@ class _Grid:
     def matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
         """(n, count) matrix of one derivative at n times by the coefficients of one axis."""
         n = len(values)
-        columns = first[:, None] + np.arange(_BAND)
-        rows = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+        columns = first[:, None] + np.arange(BAND)
+        rows = np.repeat(np.arange(n), BAND).reshape(n, BAND)
         return sparse.csr_matrix(
             (values.ravel(), (rows.ravel(), columns.ravel())), shape=(n, self.basis.count)
         )
@@ -148,7 +147,7 @@ class MinimumSnap:
         """Times (n,) from its beginning and jets (7, n, 3) along the path, relative to its first point."""
         times = _sample_times(float(self.basis.breaks[-1]))
         values, first = self.basis.band(times, 7)
-        return times, band_jets(values, first, self.coefficients)
+        return times, sums_of(values, first, self.coefficients)
 
     def table(self) -> PieceTable:
         """The path as a table, as it is flown."""

@@ -18,7 +18,8 @@ from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.convex import excess
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, TURN, Bounds, demand, rotor_commands
-from autopilot.trajectory.splines import DEGREE, PieceTable, interpolating_spline, power_table
+from autopilot.trajectory.spline_band import DEGREE
+from autopilot.trajectory.splines import PieceTable, interpolating_spline, power_table
 from autopilot.trajectory.waypoint_path import PathSegment, limits_used, sample_path
 
 Array = NDArray[np.float64]

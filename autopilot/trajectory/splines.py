@@ -5,8 +5,8 @@ seven and the last seven follow from position and six derivatives at the two end
 the paths before and after it without a jump of a rotor force. The rest are free: an optimisation chooses them
 (`autopilot.trajectory.shaping`, `autopilot.trajectory.waypoint_path`).
 
-SciPy's splines and its optimiser are named in full (`scipy.interpolate.BSpline`): SciPy loads them when they
-are first used, which takes a quarter of a second, and most missions need neither.
+SciPy's splines and its optimiser are named in full (`scipy.interpolate.make_interp_spline`): SciPy loads them
+when they are first used, which takes a quarter of a second, and most missions need neither.
 
 For flight a spline is converted to a table: for each interval the coefficients of (t - t_k)^n, so that
 `evaluate_piece` is Horner's rule for all derivatives at the same time.
@@ -24,11 +24,10 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
 from autopilot.trajectory.signals import Jet
+from autopilot.trajectory.spline_band import DEGREE, band_of, sums_of
 
 Array = NDArray[np.float64]
 
-DEGREE = 9
-_BAND = DEGREE + 1
 ORDERS = 7  # position and six derivatives are matched at the ends
 
 PieceTable = Array
@@ -48,25 +47,15 @@ class Basis:
         # times are counted in intervals: knots are then exact integers, each of exactly one piece
         self.spacing = (end - begin) / intervals
         inner = np.arange(intervals + 1, dtype=np.float64)
-        knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
-        # of ten B-splines in a row, which are all that are not zero in an interval, no two have one column
-        columns = np.arange(self.count)[:, None] % _BAND == np.arange(_BAND)
-        self._splines = scipy.interpolate.BSpline(knots, columns.astype(np.float64), DEGREE)
-
-    def _band(self, u: Array, first: NDArray[np.int64], order: int) -> Array:
-        """(n, 10): a derivative by u of the B-splines `first` ... `first` + 9."""
-        columns = (first[:, None] + np.arange(_BAND)) % _BAND
-        return np.take_along_axis(self._splines(u, nu=order), columns, axis=1)
+        self._knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
 
     def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
         """(orders, n, 10): derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
         times; (n,): the index of the first of these."""
         u = (times - self.breaks[0]) / self.spacing
         first = np.clip(u.astype(np.int64), 0, self.intervals - 1)
-        values = np.empty((orders, times.size, _BAND))
-        for order in range(orders):
-            values[order] = self._band(u, first, order) / self.spacing**order
-        return values, first
+        scales = np.array([self.spacing**order for order in range(orders)])
+        return band_of(u, first, self._knots, scales), first
 
     def end_coefficients(self, before: Array, after: Array) -> Array:
         """(count, 3) coefficients: those that follow from the jets (7, 3) at the two ends; the others 0."""
@@ -74,21 +63,22 @@ class Basis:
         last = self.intervals - 1
         ends = (0.0, 0, before, slice(0, ORDERS)), (last + 1.0, last, after, slice(-ORDERS, None))
         for at, first, jet, part in ends:
-            u, interval = np.array([at]), np.array([first])
-            rows = np.vstack([self._band(u, interval, n) for n in range(ORDERS)])[:, part]
+            band = band_of(np.array([at]), np.array([first]), self._knots, np.ones(ORDERS))
+            rows = band[:, 0, part]
             scaled = jet * self.spacing ** np.arange(ORDERS)[:, None]
             coefficients[part] = np.linalg.solve(rows, scaled)
         return coefficients
 
     def pieces(self, coefficients: Array, origin: Array) -> PieceTable:
         """The table of the spline with these coefficients (count, 3), moved by `origin` (3,)."""
-        spline = scipy.interpolate.BSpline(self._splines.t, coefficients, DEGREE)
-        left = np.arange(self.intervals, dtype=np.float64)
+        first = np.arange(self.intervals)
+        band = band_of(first.astype(np.float64), first, self._knots, np.ones(DEGREE + 1))
+        derivatives = sums_of(band, first, coefficients)
         table = np.empty((self.intervals, COLUMNS))
         table[:, 0], table[:, 1] = self.breaks[:-1], self.breaks[1:]
         by_power = table[:, 2:].reshape(self.intervals, 3, DEGREE + 1)
         for n in range(DEGREE + 1):
-            by_power[:, :, n] = spline(left, nu=n) / (factorial(n) * self.spacing**n)
+            by_power[:, :, n] = derivatives[n] / (factorial(n) * self.spacing**n)
         by_power[:, :, 0] += origin
         return table
 
