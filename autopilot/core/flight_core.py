@@ -116,6 +116,7 @@ class PlannedSetpoints(NamedTuple):
     """The setpoints in `CoreRows.targets`: those of the first of these legs, from a tick on."""
 
     legs: tuple[Leg, ...]
+    following: tuple[Leg, ...]  # legs into which the law looks ahead
     leg_start_us: int
     first_us: int
     period_us: int
@@ -343,10 +344,9 @@ class FlightCore:
 
     def decide(self, now_us: int, period_us: int) -> Report:
         """The supervisor's part of a tick, after the estimate and before the law."""
-        view = self.view(now_us, with_pull=True)
-        self.flight, report = advance(self.flight, view, self.settings)
+        self.flight, report = advance(self.flight, self.view(now_us, with_pull=True), self.settings)
         self._dirty = True
-        self._plan_setpoints(now_us, period_us, bool(view.estimate_problems))
+        self._plan_setpoints(now_us, period_us)
         self._use_rotors()
         return report
 
@@ -428,12 +428,11 @@ class FlightCore:
             settings = replace(settings, cable_length_m=length, min_move_s=min_move_s)
         self.settings = settings
 
-    def _plan_setpoints(self, now_us: int, period_us: int, is_blind: bool) -> None:
-        """Compute the stretch that begins with this tick, and its setpoints; `is_blind`: the supervisor
-        decides at the next tick as well, since the estimate is not good enough."""
+    def _plan_setpoints(self, now_us: int, period_us: int) -> None:
+        """Compute the stretch that begins with this tick, and its setpoints."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
-        self.planned, self.reeling = None, NOT_REELING
+        before, self.planned, self.reeling = self._planned_for_leg(), None, NOT_REELING
         if stretch.mode == UNCONTROLLED:
             pack(stretch, self.rows.stretch, 0)
             return
@@ -444,6 +443,18 @@ class FlightCore:
                 state.x_quad, state.v_quad, state.x_load, state.v_load, self.setup.vehicle.gravity
             )
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
+        elif (
+            before is not None
+            and isinstance(leg, Brake | PathStop)
+            and flight.following is before.following
+            and stretch.period_us == before.period_us
+            and 0 <= (at := before.row_at(now_us)) < len(before.times_s)
+        ):
+            # the supervisor may decide at every tick of a stop, which is not laid out anew each time
+            targets, references = (
+                rows[at : len(before.times_s)] for rows in (self.rows.targets, self.rows.references)
+            )
+            self.planned = before._replace(first_us=now_us, times_s=before.times_s[at:])
         else:
             legs = (*flight.legs, *flight.following)
             max_ticks = self._setpoints_per_call
@@ -451,8 +462,6 @@ class FlightCore:
                 max_ticks = SETPOINTS_BRAKING
             elif leg.duration_s == inf:
                 max_ticks = min(max_ticks, SETPOINTS_ENDLESS)
-            if is_blind:
-                max_ticks = 1
             ticks = max(1, min(max_ticks, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
@@ -466,7 +475,12 @@ class FlightCore:
             # the remaining setpoints are those of legs that follow
             leg_rows = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
             self.planned = PlannedSetpoints(
-                flight.legs, flight.leg_start_us, now_us, stretch.period_us, times[:leg_rows]
+                flight.legs,
+                flight.following,
+                flight.leg_start_us,
+                now_us,
+                stretch.period_us,
+                times[:leg_rows],
             )
         stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
         pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
