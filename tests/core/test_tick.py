@@ -234,7 +234,7 @@ def set_parameter(craft: Craft, name: str, value: float) -> None:
 
 def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_tick_on() -> None:
     """The earlier commands to the rotors are kept: the rotors are not assumed to have stood still."""
-    craft = Craft(Takeoff(1.0), Delay(60.0), Land(), SIM_ACT_DELAY_MS=20.0)
+    craft = Craft(Takeoff(1.0), Delay(60.0), Land(), watched=True, SIM_ACT_DELAY_MS=20.0)
     craft.begin()
     craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
     craft.wait(2.0)
@@ -279,7 +279,7 @@ def test_what_describes_the_vehicle_for_a_whole_flight_is_set_on_the_ground_only
 
 
 def test_another_law_is_not_taken_in_flight() -> None:
-    craft = Craft(Takeoff(1.0), Delay(60.0), Land())
+    craft = Craft(Takeoff(1.0), Delay(60.0), Land(), watched=True)
     craft.begin()
     craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
     law, kind = craft.onboard.core.setup.law, type(craft.onboard.core.law_rows)

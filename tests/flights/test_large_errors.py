@@ -68,7 +68,7 @@ def test_a_load_that_a_gust_throws_off_its_path_returns(
         file.write_text(vehicle)
         vehicle = str(file)
     reeling = {"WNC_LEN_MAX": 6.0, "WNC_SPEED": 0.6}
-    craft = Craft(*steps, vehicle=vehicle, SIM_GUST_E=gust_m_s, SIM_GUST_FOR_S=2.0, **reeling)
+    craft = Craft(*steps, vehicle=vehicle, watched=True, SIM_GUST_E=gust_m_s, SIM_GUST_FOR_S=2.0, **reeling)
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     craft.run(lambda c: c.flight.mission.step == len(steps) - 2)

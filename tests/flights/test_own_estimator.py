@@ -73,7 +73,7 @@ class Undecided:
 
 def craft(estimator: str | type, *steps: Any) -> Craft:
     named = estimator if isinstance(estimator, str) else f"{__file__}:{estimator.__name__}"
-    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(estimator=named))
+    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(estimator=named), watched=True)
 
 
 def test_the_example_lifts_holds_and_lands() -> None:
@@ -87,7 +87,7 @@ def test_the_example_lifts_holds_and_lands() -> None:
 
 def test_one_that_says_what_the_built_in_filter_says_flies_the_same_flight() -> None:
     errors = []
-    for flown in (craft(Same), Craft(Takeoff(1.0), Delay(1.0), Land())):
+    for flown in (craft(Same), Craft(Takeoff(1.0), Delay(1.0), Land(), watched=True)):
         flown.begin()
         flown.run(at_phase(Phase.DISARMED))
         errors.append((flown.worst_error, flown.truth.x_load, flown.onboard.now_us))

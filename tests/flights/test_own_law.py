@@ -128,7 +128,7 @@ class Lifted(LoadPid):
 
 def craft(law: str | type, *steps: Any) -> Craft:
     reference = law if isinstance(law, str) else f"{__file__}:{law.__name__}"
-    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(reference))
+    return Craft(*(steps or (Takeoff(1.0), Delay(1.0), Land())), own=OwnCode(reference), watched=True)
 
 
 @pytest.mark.parametrize("law", [*EXAMPLES, AllModes, AsAttitude, AsRates, AsWrench])

@@ -41,7 +41,7 @@ class Fails(MinimumSnap):
 
 def craft(kind: type, **settings: Any) -> Craft:
     module = __file__ if kind.__module__ == __name__ else kind.__module__
-    return Craft(*CORNER, own=OwnCode(planner=f"{module}:{kind.__name__}"), **settings)
+    return Craft(*CORNER, own=OwnCode(planner=f"{module}:{kind.__name__}"), watched=True, **settings)
 
 
 def test_its_path_is_flown_past_the_waypoint() -> None:

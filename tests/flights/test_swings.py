@@ -19,7 +19,7 @@ IN_PAIRS, CUT_SHORT = 0.85, 0.6
 
 @pytest.mark.parametrize("name", ["quad-attitude", "load-attitude"])
 def test_attitude_missions_are_flown_with_margin(name: str) -> None:
-    craft = Craft(*load_mission(name).steps)
+    craft = Craft(*load_mission(name).steps, watched=True)
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     assert least_tension(craft, at_phase(Phase.LOWER)) > IN_PAIRS
@@ -32,7 +32,7 @@ def test_attitude_missions_are_flown_with_margin(name: str) -> None:
 @pytest.mark.parametrize("controlled", ["vehicle", "load"])
 def test_a_swing_that_nothing_takes_away_is_caught(controlled: str) -> None:
     """One run alone leaves the load swinging and moving at more than 1 m/s."""
-    craft = Craft(Takeoff(1.5), AttitudeRun(controlled, 0.17, 0.0, 1.5), Land())  # type: ignore[arg-type]
+    craft = Craft(Takeoff(1.5), AttitudeRun(controlled, 0.17, 0.0, 1.5), Land(), watched=True)  # type: ignore[arg-type]
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     assert least_tension(craft, at_phase(Phase.LOWER)) > CUT_SHORT

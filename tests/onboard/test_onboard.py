@@ -130,7 +130,7 @@ def test_other_messages_are_no_tick() -> None:
 
 
 def test_a_control_rate_that_does_not_fit_is_said_with_both_rates_and_nothing_arms() -> None:
-    craft = Craft(CTL_RATE_HZ=400.0)
+    craft = Craft(watched=True, CTL_RATE_HZ=400.0)
     craft.wait(0.5)
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == DENIED
     assert any("400 Hz" in text for text in craft.texts), craft.texts
@@ -146,7 +146,7 @@ def test_a_tick_lost_at_the_start_does_not_change_what_the_sensor_rate_is() -> N
 
 
 def test_half_the_control_rate_flies() -> None:
-    craft = Craft(Takeoff(1.0), Delay(1.0), Land(), CTL_RATE_HZ=125.0)
+    craft = Craft(Takeoff(1.0), Delay(1.0), Land(), watched=True, CTL_RATE_HZ=125.0)
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.LOWER)
     assert "Flight given up" not in " ".join(craft.texts)
@@ -158,7 +158,7 @@ def test_half_the_control_rate_flies() -> None:
 
 def test_lost_ticks_and_a_sample_that_is_no_number_do_not_end_a_flight() -> None:
     """In real time the world continues without an answer."""
-    craft = Craft(Takeoff(1.0), Delay(3.0), Land())
+    craft = Craft(Takeoff(1.0), Delay(3.0), Land(), watched=True)
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
     for k in range(500):
@@ -260,7 +260,7 @@ def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it(
 
 def test_the_same_sensors_give_the_same_answers_and_the_same_telemetry() -> None:
     def run(seed: int) -> tuple[list[bytes], list[Any]]:
-        craft = Craft(Takeoff(1.0), Waypoint(0.5, 0.0, 1.0), Land(), seed=seed)
+        craft = Craft(Takeoff(1.0), Waypoint(0.5, 0.0, 1.0), Land(), watched=True, seed=seed)
         craft.begin()
         craft.wait(3.0)
         return craft.answers, [m.to_dict() for m in craft.heard]
