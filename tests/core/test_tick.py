@@ -30,7 +30,7 @@ from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterError
 from missions.model import Delay, Land, Takeoff
-from tests.doubles.craft import Craft
+from tests.doubles.craft import Craft, at_phase
 from tests.doubles.estimate_problems import estimate_problems
 from tests.doubles.plain_python import in_plain_python
 
@@ -236,7 +236,7 @@ def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_
     """The earlier commands to the rotors are kept: the rotors are not assumed to have stood still."""
     craft = Craft(Takeoff(1.0), Delay(60.0), Land(), watched=True, SIM_ACT_DELAY_MS=20.0)
     craft.begin()
-    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     craft.wait(2.0)
     vehicle = craft.onboard.core.setup.vehicle
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
@@ -267,7 +267,7 @@ def test_what_describes_the_vehicle_for_a_whole_flight_is_set_on_the_ground_only
     assert craft.onboard.parameters[name] == value
     set_parameter(craft, name, before)
     craft.begin()
-    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     set_parameter(craft, name, value)
     craft.wait(0.5)
     assert craft.onboard.parameters[name] == before
@@ -281,7 +281,7 @@ def test_what_describes_the_vehicle_for_a_whole_flight_is_set_on_the_ground_only
 def test_another_law_is_not_taken_in_flight() -> None:
     craft = Craft(Takeoff(1.0), Delay(60.0), Land(), watched=True)
     craft.begin()
-    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     law, kind = craft.onboard.core.setup.law, type(craft.onboard.core.law_rows)
     set_parameter(craft, "CTL_LAW", 0.0)
     craft.wait(0.5)

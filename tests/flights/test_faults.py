@@ -493,7 +493,7 @@ def test_a_ground_station_that_falls_silent_leads_to_what_was_set(
 def test_a_ground_station_that_falls_silent_before_the_load_is_lifted(action: int, phase: Phase) -> None:
     craft = Craft(*ROUTE, NAV_DLL_ACT=action, COM_DL_LOSS_T=PATIENCE_S)
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.TAUTEN)
+    craft.run(at_phase(Phase.TAUTEN))
     craft.send(HEARTBEAT)
     craft.wait(1.1 * PATIENCE_S)
     assert craft.flight.phase == phase

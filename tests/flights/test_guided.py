@@ -10,7 +10,7 @@ from autopilot.supervisor.state import Phase, setpoint
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from missions import model
-from tests.doubles.craft import Craft
+from tests.doubles.craft import Craft, at_phase
 from tests.doubles.motion import TICK_S
 from tests.doubles.sky import ACCEPTED
 
@@ -20,7 +20,7 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
     craft.wait(1.0)
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
-    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    craft.run(at_phase(Phase.HOLD))
 
     def say(n: float, e: float, d: float) -> None:
         craft.send(
@@ -58,7 +58,7 @@ def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
     craft.wait(1.0)
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 3.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
-    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    craft.run(at_phase(Phase.HOLD))
     hold, mission, offboard = (1.0, 4.0, 3.0), (1.0, 4.0, 4.0), (1.0, 6.0)
     worst, lowest = 0.0, math.inf
 
@@ -98,7 +98,7 @@ def test_a_target_that_turns_is_followed_in_the_simulator() -> None:
     craft.wait(1.0)
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
-    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    craft.run(at_phase(Phase.HOLD))
     assert craft.command(m.MAV_CMD_DO_SET_MODE, 1.0, 4.0, 8.0) == ACCEPTED
     assert craft.texts[-1] == "FOLLOWME: waiting for FOLLOW_TARGET"
     home = Home()

@@ -16,7 +16,7 @@ from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff, Waypoint
-from tests.doubles.craft import Craft
+from tests.doubles.craft import Craft, OfFlight, at_phase
 from tests.doubles.motion import TICK_S
 from tests.doubles.sky import ACCEPTED
 
@@ -38,7 +38,7 @@ def flying(**settings: float) -> Craft:
     craft.wait(1.0)
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
-    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    craft.run(at_phase(Phase.HOLD))
     craft.wait(2.0)
     return craft
 
@@ -221,7 +221,7 @@ def test_a_vehicle_that_landed_takes_off_again_with_the_heading_it_has() -> None
     assert craft.command(m.MAV_CMD_CONDITION_YAW, 0.0) == ACCEPTED
     craft.wait(5.0)
     assert craft.command(m.MAV_CMD_NAV_LAND) == ACCEPTED
-    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED)
+    craft.run(at_phase(Phase.DISARMED))
     assert nose(craft) == pytest.approx(0.5 * math.pi, abs=0.05)
     assert craft.command(m.MAV_CMD_CONDITION_YAW, 0.0) == m.MAV_RESULT_TEMPORARILY_REJECTED
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0) == ACCEPTED
@@ -247,13 +247,13 @@ def test_items_of_a_mission_turn_the_nose_and_stop_nothing() -> None:
         *(Waypoint(4.0, 2.0, 1.5, hold_s=6.0), seen, Waypoint(2.0, 2.0, 1.5, hold_s=6.0), Land()),
     )
     craft.begin()
-    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     assert nose(craft) == pytest.approx(0.0, abs=0.05)
-    craft.run(lambda craft: craft.flight.mission.step == 2)
+    craft.run(OfFlight(lambda flight: flight.mission.step == 2))
     assert norm(craft.truth.v_load) > 0.3, "flown through, as without the item"
-    craft.run(lambda craft: craft.flight.mission.step == 4)
+    craft.run(OfFlight(lambda flight: flight.mission.step == 4))
     assert abs(wrap_pi(nose(craft) - math.radians(-90.0))) < 0.05, "south"
-    craft.run(lambda craft: craft.flight.mission.step == 5)
+    craft.run(OfFlight(lambda flight: flight.mission.step == 5))
     east, north, _ = craft.truth.x_quad
     assert abs(wrap_pi(nose(craft) - math.atan2(12.0 - north, 4.0 - east))) < 0.05, "to the place"
     assert not any("kept" in text for text in craft.texts)

@@ -11,7 +11,7 @@ from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from missions.model import Delay, Land, Step, Takeoff, Waypoint
-from tests.doubles.craft import ACCEPTED, Craft
+from tests.doubles.craft import ACCEPTED, Craft, OfFlight, at_phase
 
 SET_CURRENT = mavlink.MAV_CMD_DO_SET_MISSION_CURRENT
 HEIGHT_M = 1.0
@@ -38,14 +38,14 @@ def waiting(times: float, step: int = 1) -> Craft:
     """A craft with this jump in its mission, which flies this step of it."""
     craft = Craft(*LAP, jump(times), Delay(1.0), Land())
     craft.begin()
-    craft.run(lambda craft: craft.flight.phase == Phase.MISSION and craft.flight.mission.step == step)
+    craft.run(OfFlight(lambda flight: flight.phase == Phase.MISSION and flight.mission.step == step))
     return craft
 
 
 def rest_of(craft: Craft) -> list[int]:
     """The items that are reached until the landing."""
     craft.heard.clear()
-    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED, 120.0)
+    craft.run(at_phase(Phase.DISARMED), 120.0)
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     return reached[: reached.index(BEHIND + 1) + 1]
 
@@ -81,7 +81,7 @@ def test_the_jumps_that_were_taken_stay_taken_unless_the_mission_is_reset() -> N
     assert (current(craft), craft.flight.mission.step) == (FIRST, 3)
     assert craft.command(SET_CURRENT, FIRST, 1.0) == ACCEPTED
     assert (current(craft), craft.flight.mission.step) == (FIRST, 1)
-    craft.run(lambda craft: craft.flight.mission.step == 4)
+    craft.run(OfFlight(lambda flight: flight.mission.step == 4))
     assert craft.command(SET_CURRENT, -1.0, 1.0) == ACCEPTED
     assert (current(craft), craft.flight.mission.step) == (SECOND, 2)
     assert rest_of(craft) == [SECOND, FIRST, SECOND, BEHIND, BEHIND + 1]

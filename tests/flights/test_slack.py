@@ -85,7 +85,7 @@ EIGHT = Signals(
 def test_a_hold_in_full_flight_stops_along_the_path(after_s: float) -> None:
     craft = Craft(Takeoff(2.0), EIGHT, Land(), **PLUMBLINE)
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     craft.wait(after_s)
     fast = norm(craft.truth.v_load)
     assert craft.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == 0

@@ -124,7 +124,7 @@ def test_a_mission_lowers_its_load_by_the_winch() -> None:
         return c.flight.phase == Phase.DISARMED
 
     craft.tick()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     refused = craft.command(mavlink.MAV_CMD_DO_WINCH, 1.0, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, 0.1)
     assert refused == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     craft.tick()

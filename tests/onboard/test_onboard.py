@@ -148,7 +148,7 @@ def test_a_tick_lost_at_the_start_does_not_change_what_the_sensor_rate_is() -> N
 def test_half_the_control_rate_flies() -> None:
     craft = Craft(Takeoff(1.0), Delay(1.0), Land(), watched=True, CTL_RATE_HZ=125.0)
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.LOWER)
+    craft.run(at_phase(Phase.LOWER))
     assert "Flight given up" not in " ".join(craft.texts)
     forces = [controls(answer).forces for answer in craft.answers[-400:]]
     changes = [a != b for a, b in pairwise(forces)]
@@ -160,7 +160,7 @@ def test_lost_ticks_and_a_sample_that_is_no_number_do_not_end_a_flight() -> None
     """In real time the world continues without an answer."""
     craft = Craft(Takeoff(1.0), Delay(3.0), Land(), watched=True)
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     for k in range(500):
         if k % 50 in (10, 11):
             craft.simulator.advance()  # this tick's datagram is lost
@@ -184,7 +184,7 @@ def test_lost_ticks_and_a_sample_that_is_no_number_do_not_end_a_flight() -> None
 def test_trackers_that_fall_silent_are_told_and_the_vehicle_goes_down() -> None:
     craft = Craft(Takeoff(1.0), Delay(30.0), Land())
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     now = craft.onboard.now_us
     for k in range(1, 200):
         answer = craft.onboard.receive_sensors(sensors(now + k * TICK_US))
@@ -204,7 +204,7 @@ def test_trackers_that_fall_silent_are_told_and_the_vehicle_goes_down() -> None:
 def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
     craft = Craft(Takeoff(1.0), Delay(30.0), Land())
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     setup = craft.onboard.core.setup
     name, kind = b"QP_KX", mavlink.MAV_PARAM_TYPE_REAL32
     craft.send(mavlink.MAVLink_param_set_message(1, 1, name, 5.0, kind))
@@ -219,7 +219,7 @@ def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
 def test_a_mission_is_not_uploaded_over_the_one_being_flown() -> None:
     craft = Craft(Takeoff(1.0), Delay(30.0), Land())
     craft.begin()
-    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.run(at_phase(Phase.MISSION))
     plan = craft.flight.mission.plan
     craft.send(mavlink.MAVLink_mission_count_message(1, 1, 2, 0))
     craft.tick()

@@ -17,7 +17,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff
 from sitl.messages import pressure_pa
-from tests.doubles.craft import Craft
+from tests.doubles.craft import Craft, at_phase
 
 POSE_TRACKER, LOAD_TRACKER, GNSS_RECEIVER, BAROMETER = (1 << bit for bit in (1, 2, 4, 5))
 ESTIMATOR_STATUS, GPS_RAW_INT = (
@@ -153,7 +153,7 @@ def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:
     assert craft.onboard.now_us - taken_off_us <= 4000
     armed_us = moment(craft).sortie.armed_us
     assert 1_000_000 < armed_us <= taken_off_us
-    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED)
+    craft.run(at_phase(Phase.DISARMED))
     assert moment(craft).sortie == Sortie(armed_us, taken_off_us, craft.onboard.now_us)
     # the next flight begins anew
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_ACCEPTED
