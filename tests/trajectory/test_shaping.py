@@ -228,8 +228,8 @@ def test_a_swing_beyond_the_rotors_is_named() -> None:
 
 
 def test_of_a_path_that_is_far_beyond_the_rotors_no_figure_is_told() -> None:
-    waves = Term("y", 5.0, 0.0, 4.0, 2.0, 4.0, (Sine(1.0),))
-    shaped = shape(Signals(11.0, (waves,)), BODY, BOUNDS)
+    waves = Term("y", 5.0, 0.0, 2.0, 0.5, 2.0, (Sine(1.0),))
+    shaped = shape(Signals(5.0, (waves,)), BODY, BOUNDS)
     assert shaped.reason == "it exceeds the bounds of rotors, cable or rate of turn by far"
 
 
