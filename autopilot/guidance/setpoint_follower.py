@@ -31,7 +31,7 @@ from math import atan, ceil, comb, cos, exp, inf, isnan, nan, radians, sin, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry import so3
-from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, column, mul, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, column, dot, mul, norm, scale, sub
 from autopilot.guidance.heading import MAX_STEP_S
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -39,6 +39,7 @@ ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
 K_P = 1.2  # 1/s, requested speed per metre of distance of the governor's point
 K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is a reserve
+FORWARD_SHARE = 0.5  # of the acceleration, with which the point accelerates as its place does
 SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
 SETTLING_PERIODS = 40.0  # periods 1/w of the smoother, after which it has arrived apart from rounding
 MAX_LEAN_DEG = 60.0  # greatest lean that is requested of the vehicle
@@ -49,8 +50,7 @@ _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(
 _OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, except for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
 MAX_CURVED_S = 1.0  # age of a setpoint after which its velocity no longer changes by its acceleration
-ACCEL_SMOOTHING_S = 0.3  # time constant of the acceleration that follows from the velocities of setpoints
-_MAX_CHANGE = 2.0  # of a path's velocity, over that at the maximum acceleration: not all arrive on time
+ACCEL_SMOOTHING_S = 0.4  # time constant of an acceleration of velocities, and of the rate of accelerations
 NEVER_US = 2**62
 UNSPECIFIED: Vec3 = (nan, nan, nan)
 Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
@@ -61,8 +61,8 @@ class PositionSetpoint:
     """What a stream requests of the load, ENU from home; NaN: nothing is requested on this axis.
 
     A position with a velocity moves at that velocity from `since_us` on, and a velocity with an acceleration
-    changes by it, for `MAX_CURVED_S` at most. On an axis on which only an acceleration is requested, nothing
-    holds the load.
+    changes by it, and by the rate of it, for `MAX_CURVED_S` at most. On an axis on which only an acceleration
+    is requested, nothing holds the load.
     """
 
     position: Vec3 = UNSPECIFIED
@@ -71,36 +71,49 @@ class PositionSetpoint:
     since_us: int = 0
     heading: float = nan  # rad, from east to north
     yaw_rate: float = nan  # rad/s
+    accel_rate: Vec3 = ZERO  # m/s^3
 
     def smoother_input(self, now_us: int, limits: FollowLimits) -> Point:
         """Position, velocity and acceleration that the smoother turns into this motion at `now_us`. NaN stays
         NaN in the position; an acceleration alone changes neither position nor velocity."""
         push = _limited(_nan_to_zero(self.accel), limits.accel)
-        a = sub(push, self.acceleration_only_part(push))
+        alone, j = self.acceleration_only_part(push), self.accel_rate
+        x, v, a = self.position, _limited(_nan_to_zero(self.velocity), limits.max_speed), sub(push, alone)
         age_s = max(0.0, (now_us - self.since_us) * 1e-6)
-        curved_s = min(age_s, MAX_CURVED_S)
-        v = _limited(_nan_to_zero(self.velocity), limits.max_speed)
-        x = axpy(curved_s * (age_s - 0.5 * curved_s), a, axpy(age_s, v, self.position))
-        v = axpy(curved_s, a, v)
+        t = min(age_s, MAX_CURVED_S)
+        x = axpy(t * t * t / 6.0, j, axpy(0.5 * t * t, a, axpy(t, v, x)))
+        v, a = axpy(0.5 * t * t, j, axpy(t, a, v)), axpy(t, j, a)
         if age_s > MAX_CURVED_S:
-            push, a = sub(push, a), ZERO
-        # the point of which this motion is what `TrackPosition._steady` is
-        lag_s = ORDER / limits.rate
-        x = axpy(_OF_INPUT[2] / limits.rate**2, a, axpy(lag_s, v, x))
-        return x, _limited(axpy(lag_s, a, v), limits.max_speed), push
+            x, a, j = axpy(age_s - t, v, x), ZERO, ZERO
+        # (1 + D/w)^7 of this motion, as far as it is known
+        _, c1, c2, c3, *_ = (c / limits.rate**k for k, c in enumerate(_OF_INPUT))
+        x = axpy(c3, j, axpy(c2, a, axpy(c1, v, x)))
+        v = axpy(c2, j, axpy(c1, a, v))
+        return x, _limited(v, limits.max_speed), add(axpy(c1, j, a), alone)
 
     def after(self, before: Setpoint | None, max_accel: float) -> PositionSetpoint:
-        """This setpoint as the next of a path: one with position and velocity and no acceleration gets that
-        of the velocities, unless these change by more than on a path within `max_accel` (m/s^2)."""
-        is_of_path = not any(map(isnan, self.position)) and all(map(isnan, self.accel))
-        if not is_of_path or not isinstance(before, PositionSetpoint):
+        """This setpoint as the next of a path: one with position and velocity gets the acceleration of the
+        velocities if it has none, and the rate of the accelerations, unless the velocity changes by more than
+        on a path within `max_accel` (m/s^2)."""
+        if not isinstance(before, PositionSetpoint) or any(map(isnan, self.position)):
             return self
         elapsed_s = (self.since_us - before.since_us) * 1e-6
         change = sub(self.velocity, before.velocity)
-        if not 0.0 < elapsed_s < MAX_CURVED_S or not norm(change) <= _MAX_CHANGE * max_accel * elapsed_s:
+        max_change = max_accel * (elapsed_s + ACCEL_SMOOTHING_S)
+        if not 0.0 < elapsed_s < MAX_CURVED_S or not norm(change) <= max_change:
             return self
         share = 1.0 - exp(-elapsed_s / ACCEL_SMOOTHING_S)
-        return replace(self, accel=smoothed_rate(_nan_to_zero(before.accel), change, elapsed_s, share))
+        a, j = _nan_to_zero(before.accel), before.accel_rate
+        if not any(map(isnan, self.accel)):
+            rate = smoothed_rate(j, sub(self.accel, a), elapsed_s, share)
+            return replace(self, accel_rate=_limited(rate, max_accel / ACCEL_SMOOTHING_S))
+        if not all(map(isnan, self.accel)):
+            return self
+        # smoothing lags by its time constant, for which the rate makes up
+        smoothed_before = axpy(-ACCEL_SMOOTHING_S, j, a)
+        smoothed = smoothed_rate(smoothed_before, change, elapsed_s, share)
+        rate = smoothed_rate(j, sub(smoothed, smoothed_before), elapsed_s, share)
+        return replace(self, accel=axpy(ACCEL_SMOOTHING_S, rate, smoothed), accel_rate=rate)
 
     @property
     def is_fixed_position(self) -> bool:
@@ -335,29 +348,32 @@ def governor_point(
     if aim[2] < FLOOR_M:
         distance = (distance[0], distance[1], FLOOR_M - x[2])
         along = (along[0], along[1], max(along[2], 0.0))
-    velocity_command = add(
-        along, _limited(approach_velocity(distance, BRAKE_SHARE * limits.accel), limits.approach_speed)
-    )
+    push_alone = coasting = ZERO
     if isinstance(setpoint, PositionSetpoint):
         # the velocity to which an acceleration alone leads in the time in which velocities are reached
-        velocity_command = add(
-            velocity_command,
-            _limited(setpoint.acceleration_only_part(axpy(1.0 / K_V, push, v)), limits.max_speed),
-        )
-        push = sub(push, setpoint.acceleration_only_part(push))
+        push_alone = setpoint.acceleration_only_part(push)
+        coasting = _limited(setpoint.acceleration_only_part(axpy(1.0 / K_V, push, v)), limits.max_speed)
+    # as the place accelerates; what is left of the acceleration brings the point to it, however it moves
+    push = _limited(sub(push, push_alone), FORWARD_SHARE * limits.accel)
+    accel_left = limits.accel - norm(push)
+    # a velocity that leads away from the place is overcome
+    away_speed = max(-dot(along, distance) / max(norm(distance), 1e-9), 0.0)
+    approach = _limited(
+        approach_velocity(distance, BRAKE_SHARE * accel_left), limits.approach_speed + away_speed
+    )
+    velocity_command = add(add(along, coasting), approach)
     # descend no faster than can be stopped at the floor
     height = max(x[2] - FLOOR_M, 0.0)
     min_velocity_z = -norm(approach_velocity((0.0, 0.0, height), BRAKE_SHARE * limits.accel))
     near_floor = min(velocity_command[2], v[2]) < min_velocity_z
     velocity_command = (velocity_command[0], velocity_command[1], max(velocity_command[2], min_velocity_z))
-    accel_command = axpy(K_V, sub(velocity_command, v), push)
+    correction = scale(K_V, sub(velocity_command, v))
+    accel = add(push, _limited(correction, accel_left))
     if not near_floor:
-        return x, v, _limited(accel_command, limits.accel)
+        return x, v, accel
     # braking above the floor comes first, the remaining acceleration is for the rest
-    lift = max(-limits.accel, min(accel_command[2], limits.accel))
-    level = _limited(
-        (accel_command[0], accel_command[1], 0.0), sqrt(limits.accel * limits.accel - lift * lift)
-    )
+    lift = max(-limits.accel, min(push[2] + correction[2], limits.accel))
+    level = _limited((accel[0], accel[1], 0.0), sqrt(limits.accel * limits.accel - lift * lift))
     return x, v, (level[0], level[1], lift)
 
 

@@ -71,10 +71,12 @@ class Target:
         turning = self.course_rate if hypot(vx, vy) > _MIN_TURNING_SPEED else 0.0
         to_x, to_y = place.distance_m * cos(direction), place.distance_m * sin(direction)
         rises = 1.0 if place.height_over_target else 0.0
+        ax, ay = ax - turning**2 * to_x, ay - turning**2 * to_y
         return PositionSetpoint(
             (x + to_x, y + to_y, height),
             (vx - turning * to_y, vy + turning * to_x, rises * vz),
-            (ax - turning**2 * to_x, ay - turning**2 * to_y, rises * az),
+            (ax, ay, rises * az),
+            accel_rate=(-turning * ay, turning * ax, 0.0),
             since_us=self.at_us,
             heading=direction + pi if place.distance_m >= _MIN_FACING_M else nan,
         )

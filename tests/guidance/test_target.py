@@ -111,17 +111,17 @@ def test_an_acceleration_that_is_not_reported_follows_from_the_velocities() -> N
 
 @pytest.mark.parametrize("angle_deg", [180.0, 90.0, 0.0])
 def test_the_place_beside_a_target_that_turns_moves_round_with_it(angle_deg: float) -> None:
-    """Velocity and acceleration of the place are the derivatives of its position."""
+    """Velocity, acceleration and its rate are the derivatives of the position of the place."""
     place = replace(BEHIND, angle=radians(angle_deg))
 
-    def place_at(t: float) -> tuple[Vec3, Vec3, Vec3]:
+    def place_at(t: float) -> tuple[Vec3, ...]:
         position, velocity, accel = round_a_circle(20.0, 0.15, t)
         course = atan2(velocity[1], velocity[0])
         setpoint = Target(position, velocity, course, 0, accel, 0.15).setpoint(place)
-        return setpoint.position, setpoint.velocity, setpoint.accel
+        return setpoint.position, setpoint.velocity, setpoint.accel, setpoint.accel_rate
 
     h = 1e-4
-    for order in (0, 1):
+    for order in (0, 1, 2):
         change = sub(place_at(3.0 + h)[order], place_at(3.0 - h)[order])
         assert scale(0.5 / h, change) == pytest.approx(place_at(3.0)[order + 1], abs=1e-6)
 

@@ -113,7 +113,7 @@ def test_a_circle_of_positions_with_velocities_is_flown_on_its_radius() -> None:
             assert sky.ask(OFFBOARD).result == ACCEPTED
         sky.tick()
         if k > 700:
-            assert math.hypot(sky.view.x_load[0], sky.view.x_load[1]) == pytest.approx(5.0, abs=0.03)
+            assert math.hypot(sky.view.x_load[0], sky.view.x_load[1]) == pytest.approx(5.0, abs=0.02)
 
 
 def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
