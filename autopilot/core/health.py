@@ -76,6 +76,8 @@ def voltage(condition: Condition, battery: Battery) -> float:
 
 def low_battery_text(before: float, now: float, levels: ChargeLevels) -> str | None:
     """What to tell of a measured battery whose remaining share (NaN: unknown) was `before` and is `now`."""
+    if now <= levels.emergency and not before <= levels.emergency:
+        return f"Battery empty, {round(100.0 * now)} % left: land at once"
     if now <= levels.critical and not before <= levels.critical:
         return f"Battery nearly empty, {round(100.0 * now)} % left: land"
     if now <= levels.low and not before <= levels.low:

@@ -82,7 +82,8 @@ def _enter_phase(flight: Flight, phase: Phase, event: Event, view: View, setting
         # another flight begins
         is_failsafe=flight.is_failsafe and phase != Phase.ARMED,
         answered_charge_state=0 if phase == Phase.ARMED else flight.answered_charge_state,
-        returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),
+        returning=phase == Phase.RETURN
+        or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN) and event != Event.LAND),
     )
     if phase == Phase.DISARMED:
         return _reset_on_disarm(entered)

@@ -269,9 +269,9 @@ class Flight:
 
     @property
     def is_battery_empty(self) -> bool:
-        """Whether too little is left of a measured battery to fly."""
+        """Whether so little is left of a measured battery that no flight may begin."""
         low = self.low_battery
-        return low is not None and low.charge_state >= mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY
+        return low is not None and low.charge_state >= mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
 
     @property
     def is_circling(self) -> bool:

@@ -57,7 +57,8 @@ def test_a_battery_that_falls_silent_is_that_of_the_model_again():
     [
         ({"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 50.0}, []),
         ({"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 15.0}, ["Battery low, 15 % left"]),
-        ({"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 5.0}, ["Battery nearly empty, 5 % left: land"]),
+        ({"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 5.0}, ["Battery empty, 5 % left: land at once"]),
+        ({"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 7.0}, ["Battery nearly empty, 7 % left: land"]),
         ({"BAT_CAPACITY": 10.0, "BAT_HOVER_W": 1e5}, []),
     ],
 )
@@ -80,7 +81,7 @@ def with_charge(percent, **settings):
     return craft
 
 
-@pytest.mark.parametrize("percent", [0.0, 5.0])
+@pytest.mark.parametrize("percent", [0.0, 5.0, 7.0])
 def test_a_vehicle_whose_battery_is_empty_is_not_armed_but_by_force(percent):
     craft = with_charge(percent)
     moment = craft.onboard.log_sample().snapshot
@@ -93,7 +94,7 @@ def test_a_vehicle_whose_battery_is_empty_is_not_armed_but_by_force(percent):
 
 
 def test_one_that_is_low_is_armed():
-    craft = with_charge(6.0)
+    craft = with_charge(8.0)
     assert craft.onboard.log_sample().snapshot.sensors_healthy & SENSOR
     assert craft.command(ARM, 1.0) == ACCEPTED
 
@@ -129,6 +130,7 @@ def test_levels_and_action_are_parameters():
     assert told == [
         "Battery low, 80 % left",
         "Failsafe: battery nearly empty, 70 % left, landing",
+        "Battery empty, 60 % left: land at once",
     ]
     # it used a third of the charge on the way, and is not armed again
     assert craft.command(ARM, 1.0) == mavlink.MAV_RESULT_DENIED

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import pytest
 
 from autopilot.guidance.legs import Hold
-from autopilot.services.requests import Arm, Pause, ReturnHome
+from autopilot.onboard.snapshot import reported_mode
+from autopilot.services import identity
+from autopilot.services.requests import Arm, Pause, Reposition, ReturnHome
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import next_stretch
 from autopilot.supervisor.settings import BatterySettings, Settings
@@ -83,8 +86,26 @@ def test_what_is_under_way_already_is_not_begun_again() -> None:
     legs = sky.flight.legs
     assert discharge(sky, 7) == [] and not sky.flight.is_failsafe
     assert sky.flight.legs == legs[-len(sky.flight.legs) :]
+    # a hold ends the return; what is due then is begun again
+    assert sky.ask(Pause()).result == ACCEPTED
+    assert discharge(sky, 7) == ["Failsafe: battery nearly empty, 7 % left, returning"]
     sky.run(lambda sky: sky.flight.phase == Phase.LOWER)
     assert discharge(sky, 5) == [] and sky.flight.phase == Phase.LOWER
+
+
+def test_the_landing_of_a_return_that_is_ended_is_reported_as_a_landing() -> None:
+    """The landing with which a return ends belongs to it."""
+    sky = Sky(settings=acting(RETURN)).airborne()
+    assert sky.ask(Reposition(5.0, 0.0, None, True)).result == ACCEPTED
+    sky.wait(8.0)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.wait(1.0)
+    assert reported_mode(sky.flight) == (identity.AUTO, identity.AUTO_RTL)
+    landed = copy(sky)
+    landed.run(lambda sky: sky.flight.phase == Phase.LOWER)
+    assert reported_mode(landed.flight) == (identity.AUTO, identity.AUTO_RTL)
+    assert discharge(sky, 5) == ["Failsafe: battery nearly empty, 5 % left, landing"]
+    assert reported_mode(sky.flight) == (identity.AUTO, identity.AUTO_LAND)
 
 
 def test_the_next_flight_is_another_one() -> None:

@@ -116,6 +116,13 @@ def test_while_the_winch_works_no_stream_takes_over() -> None:
     assert sky.ask(Orbit(2.0, 1.0, None, None, 2.0)).result == ACCEPTED
 
 
+def test_it_is_not_reeled_once_a_mission_waits_to_begin() -> None:
+    sky = Sky(Takeoff(2.0), Delay(5.0), Land()).airborne()
+    sky.flight = replace(sky.flight, mission=replace(sky.flight.mission, waiting=True))
+    verdict = sky.ask(WinchRequest(0.8))
+    assert (verdict.result, verdict.text) == (LATER, "Winch denied: pause the mission first")
+
+
 def test_nor_while_it_waits_for_the_load_to_come_to_rest() -> None:
     sky = Sky().airborne()
     assert sky.ask(Orbit(2.0, 1.0, None, None, None)).result == ACCEPTED

@@ -81,7 +81,7 @@ def winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Dec
         return flight, denied("Winch denied: the load is released, nothing hangs on the cable")
     if not settings.winch.usable:
         return flight, denied("Winch denied: the law lqr flies one length of the cable")
-    if flight.phase == Phase.MISSION:
+    if flight.phase == Phase.MISSION or flight.mission.waiting:
         return flight, temporarily_denied("Winch denied: pause the mission first")
     if flight.phase != Phase.HOLD or not isinstance(flight.legs[-1], Hold):
         return flight, temporarily_denied("Winch denied: hold the load in the air first")

@@ -26,11 +26,15 @@ def acts_on_charge(settings: Settings) -> bool:
 
 
 def due_event(flight: Flight, settings: Settings) -> tuple[Event, str] | None:
-    """The event that is to follow from the charge, and its name; None: it has followed, or none does."""
+    """The event that is to follow from the charge, and its name; None: it has followed, or none does, since
+    the flight ends so already."""
     low = flight.low_battery
     if low is None or low.charge_state <= flight.answered_charge_state or flight.phase not in IN_AIR:
         return None
-    return _REACTIONS.get(settings.battery.action, {}).get(low.charge_state)
+    reaction = _REACTIONS.get(settings.battery.action, {}).get(low.charge_state)
+    if reaction is None or is_landing(flight) or (flight.phase, reaction[0]) not in TRANSITIONS:
+        return None
+    return None if reaction == _RETURN and flight.phase == Phase.RETURN else reaction
 
 
 def watch_battery(flight: Flight, view: View, settings: Settings) -> WatchResult:
@@ -40,9 +44,5 @@ def watch_battery(flight: Flight, view: View, settings: Settings) -> WatchResult
         return WatchResult(flight)
     flight = replace(flight, answered_charge_state=low.charge_state)
     event, action = reaction
-    if is_landing(flight) or (event == Event.RETURN and flight.phase == Phase.RETURN):
-        return WatchResult(flight)
-    if (flight.phase, event) not in TRANSITIONS:
-        return WatchResult(flight)
     text = f"Failsafe: battery nearly empty, {low.percent} % left, {action}"
     return WatchResult(interrupt_mission(flight), event, ((mavlink.MAV_SEVERITY_ERROR, text),))
