@@ -82,6 +82,7 @@ _REQUIREMENTS = (
     _Requirement(("SIM_CBL_CD",), ("SIM_CABLE_DIAM",), "the cable has no diameter; set SIM_CABLE_DIAM"),
     _Requirement(_LOAD_TURNS, ("SIM_LOAD_GYR",), "the load does not turn; set SIM_LOAD_GYR"),
     _Requirement(_BATTERY, ("SIM_BATTERY",), "no battery limits the rotors; set SIM_BATTERY to 1"),
+    _Requirement(("COM_LOW_BAT_ACT",), ("SIM_BATTERY",), "no battery is measured; set SIM_BATTERY to 1"),
     _Requirement(("SIM_BLADE_STIFF",), ("SIM_ROTOR_FLAP",), "the rotors do not flap; set SIM_ROTOR_FLAP"),
 )
 

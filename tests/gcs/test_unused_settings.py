@@ -50,6 +50,7 @@ OF_WORLD: dict[str, tuple[float, dict[str, float]]] = {
     "SIM_BAT_HOVER_W": (80.0, FED),
     "SIM_BAT_CHARGE": (30.0, {"SIM_BATTERY": 1.0}),
     "SIM_ESC_RPM_CTL": (1.0, FED),
+    "COM_LOW_BAT_ACT": (2.0, {"SIM_BATTERY": 1.0, "SIM_BAT_CAP": 200.0, "BAT_CRIT_THR": 0.97}),
     "SIM_BLADE_STIFF": (1.0, {"SIM_ROTOR_FLAP": 0.01}),
     "SIM_GPS_MP_M": (0.1, {}),
     "SIM_MAG_MOT": (0.1, {}),
