@@ -28,8 +28,9 @@ from autopilot.vehicle.battery import (
     terminal_voltage,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert.battery import ChargeLevels
+from autopilot.wire.convert.battery import BatteryReading, ChargeLevels, battery_percent, charge_state
 from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
+from autopilot.wire.dialect import plumbline as mavlink
 
 _FRESH_US = 500_000  # a sensor is healthy while its last reading is no older
 _MEAN_HZ, _SQUARE_HZ = 5.0, 2.0
@@ -40,6 +41,11 @@ _FIELDS = (
     (PRESSURE, snapshot.BARO),
 )
 _NEVER = (-1, -1, -1, -1)
+_LOW_BATTERY = {  # what is told of a measured battery, by MAV_BATTERY_CHARGE_STATE, which counts up to empty
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW: "Battery low, {} % left",
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL: "Battery nearly empty, {} % left: land",
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY: "Battery empty, {} % left: land at once",
+}
 
 
 class Condition(NamedTuple):
@@ -74,15 +80,12 @@ def voltage(condition: Condition, battery: Battery) -> float:
     return terminal_voltage(source_voltage(condition.used_as, battery), condition.current, battery)
 
 
-def low_battery_text(before: float, now: float, levels: ChargeLevels) -> str | None:
-    """What to tell of a measured battery whose remaining share (NaN: unknown) was `before` and is `now`."""
-    if now <= levels.emergency and not before <= levels.emergency:
-        return f"Battery empty, {round(100.0 * now)} % left: land at once"
-    if now <= levels.critical and not before <= levels.critical:
-        return f"Battery nearly empty, {round(100.0 * now)} % left: land"
-    if now <= levels.low and not before <= levels.low:
-        return f"Battery low, {round(100.0 * now)} % left"
-    return None
+def low_battery_text(before: BatteryReading, now: BatteryReading, levels: ChargeLevels) -> str | None:
+    """What to tell of a measured battery that was found as `before` and is `now`."""
+    state = charge_state(now, levels)
+    if state <= charge_state(before, levels) or state not in _LOW_BATTERY:
+        return None
+    return _LOW_BATTERY[state].format(battery_percent(now))
 
 
 @kernel

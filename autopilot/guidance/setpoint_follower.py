@@ -26,6 +26,7 @@ continues from the jet of the one before.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import atan, ceil, comb, cos, exp, inf, isnan, nan, radians, sin, sqrt
 
@@ -85,11 +86,8 @@ class PositionSetpoint:
         v, a = axpy(0.5 * t * t, j, axpy(t, a, v)), axpy(t, j, a)
         if age_s > MAX_CURVED_S:
             x, a, j = axpy(age_s - t, v, x), ZERO, ZERO
-        # (1 + D/w)^7 of this motion, as far as it is known
-        _, c1, c2, c3, *_ = (c / limits.rate**k for k, c in enumerate(_OF_INPUT))
-        x = axpy(c3, j, axpy(c2, a, axpy(c1, v, x)))
-        v = axpy(c2, j, axpy(c1, a, v))
-        return x, _limited(v, limits.max_speed), add(axpy(c1, j, a), alone)
+        x, v, a = _input_of((x, v, a, j), limits.rate)
+        return x, _limited(v, limits.max_speed), add(a, alone)
 
     def after(self, before: Setpoint | None, max_accel: float) -> PositionSetpoint:
         """This setpoint as the next of a path: one with position and velocity gets the acceleration of the
@@ -304,13 +302,19 @@ def start_following(jet: Jet, rate: float) -> TrackPosition:
     The point is at (1 + D/w)^7 x, as far as the jet determines it. A point that disagreed with the jet in its
     acceleration alone would jerk the load: the smoother answers with ten times as much.
     """
+    return TrackPosition(jet, _input_of(jet, rate), rate)
+
+
+def _input_of(motion: Sequence[Vec3], rate: float) -> Point:
+    """(1 + D/w)^7 of a motion and its first two derivatives, as far as the derivatives of the motion that are
+    given determine it."""
     point = []
     for n in range(3):
-        input_point = ZERO
-        for k in range(ORDER - n):
-            input_point = axpy(_OF_INPUT[k] / rate**k, jet[n + k], input_point)
-        point.append(input_point)
-    return TrackPosition(jet, (point[0], point[1], point[2]), rate)
+        derivative = ZERO
+        for k in range(len(motion) - n):
+            derivative = axpy(_OF_INPUT[k] / rate**k, motion[n + k], derivative)
+        point.append(derivative)
+    return point[0], point[1], point[2]
 
 
 def smoothed_rate(rate: Vec3, change: Vec3, elapsed_s: float, share: float) -> Vec3:

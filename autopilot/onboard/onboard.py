@@ -579,7 +579,7 @@ class Onboard:
         before = self._snapshot_source.measured.reading
         self._snapshot_source.measured = MeasuredBattery(self.now_us, reading)
         self._note_battery(reading)
-        text = low_battery_text(before.remaining, reading.remaining, self.core.settings.battery.levels)
+        text = low_battery_text(before, reading, self.core.settings.battery.levels)
         # what follows from the charge is told by the supervisor
         if text is not None and due_event(self.core.flight, self.core.settings) is None:
             self.endpoint.send_text(mavlink.MAV_SEVERITY_WARNING, text)

@@ -61,6 +61,7 @@ from autopilot.supervisor.watches.touchdown import (
 )
 from autopilot.trajectory.slack_cable import TOUCH_SPEED
 from autopilot.wire.convert.battery import BATTERY_PERIOD_US
+from autopilot.wire.periods import next_multiple
 
 UNCONTROLLED = 0  # mode in which no rotor is controlled, besides the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
@@ -145,7 +146,7 @@ def next_stretch(
     if _is_decided_at_every_tick(flight, leg, settings):
         end_times.append(now_us)
     if acts_on_charge(settings):  # sweeps read the charge when something is decided
-        end_times.append((now_us // BATTERY_PERIOD_US + 1) * BATTERY_PERIOD_US)
+        end_times.append(next_multiple(now_us, BATTERY_PERIOD_US))
     anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
     return Stretch(
         mode=leg.control_mode,

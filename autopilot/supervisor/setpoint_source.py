@@ -44,10 +44,15 @@ def active_setpoint(flight: Flight) -> Setpoint | None:
     return setpoint
 
 
+def is_target_awaited(flight: Flight) -> bool:
+    """Whether the place beside the target is not known, and the load waits for it."""
+    return flight.setpoints.beside_target.setpoint is WAIT
+
+
 def is_target_lost(flight: Flight, now_us: int) -> bool:
     """Whether a target that was known has not been reported for too long."""
-    stream = flight.setpoints.beside_target
-    return stream.setpoint is not WAIT and not stream.is_fresh(now_us, TARGET_LOSS_US)
+    is_fresh = flight.setpoints.beside_target.is_fresh(now_us, TARGET_LOSS_US)
+    return not is_fresh and not is_target_awaited(flight)
 
 
 def waiting_for_target(flight: Flight, now_us: int) -> Flight:

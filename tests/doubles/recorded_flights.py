@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from autopilot.wire.codec import FrameWriter, Received
+from autopilot.wire.codec import FrameWriter, Received, message_at
 from autopilot.wire.convert.battery import BatteryReading, battery_status_message
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.telemetry import telemetry_of
@@ -186,12 +186,13 @@ class Flight:
         return path
 
     def telemetry(self) -> Telemetry:
-        return telemetry_of((us, _received(frame)) for us, frame in self.records())
+        return telemetry_of((us, _message(frame)) for us, frame in self.records())
 
 
-def _received(frame: bytes) -> Received:
-    """The message of a frame that was written here, and so needs no check."""
-    return Received(int.from_bytes(frame[7:10], "little"), frame[5], frame[6], frame[4], frame)
+def _message(frame: bytes) -> Received:
+    message, _ = message_at(frame, 0)
+    assert message is not None
+    return message
 
 
 Path3 = Callable[[np.ndarray], np.ndarray]  # times (n,) since the mission began -> (n, 3) ENU from the anchor

@@ -14,7 +14,12 @@ from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.requests.guided import start_guided
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, temporarily_denied
-from autopilot.supervisor.setpoint_source import TARGET_LOSS_US, WAIT, is_target_lost, waiting_for_target
+from autopilot.supervisor.setpoint_source import (
+    TARGET_LOSS_US,
+    is_target_awaited,
+    is_target_lost,
+    waiting_for_target,
+)
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import ON_GROUND, Flight, SetpointSource, View, fence_problem
 
@@ -38,8 +43,8 @@ def follow_target(flight: Flight, request: FollowTarget, view: View, settings: S
     if norm(target.velocity) > limit_m_s:
         text = f"Target faster than {limit_m_s:g} m/s (MPC_XY_VEL_MAX): it escapes"
         return followed, Verdict(ACCEPTED.result, text, warns=True)
-    was_awaited = flight.setpoints.beside_target.setpoint is WAIT
-    return followed, Verdict(ACCEPTED.result, "Target found: following it" if was_awaited else None)
+    found = is_target_awaited(flight)
+    return followed, Verdict(ACCEPTED.result, "Target found: following it" if found else None)
 
 
 def _reported(flight: Flight, request: FollowTarget, view: View, settings: Settings) -> Target:
@@ -63,8 +68,7 @@ def follow_me(flight: Flight, request: SetMode, view: View, settings: Settings) 
     name = request.name or "FOLLOWME"
     if flight.phase in ON_GROUND:
         return flight, temporarily_denied(f"{name} denied: take off first")
-    waits = flight.setpoints.beside_target.setpoint is WAIT
-    is_known = not waits and not is_target_lost(flight, view.now_us)
+    is_known = not is_target_awaited(flight) and not is_target_lost(flight, view.now_us)
     ready = flight if is_known else waiting_for_target(flight, view.now_us)
     after, verdict = start_guided(ready, SetpointSource.TARGET, name, view, settings)
     if verdict.result != ACCEPTED.result:
