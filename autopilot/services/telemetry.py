@@ -336,7 +336,7 @@ def _load_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _winch_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     if (s.main_mode, s.sub_mode) == FOLLOW_MODE:
-        return ()  # FollowMe of MAVSDK takes it for the autopilot's: the mode has ended, and it crashes later
+        return ()  # FollowMe of MAVSDK takes it for the autopilot's: the mode has ended, no more targets
     return (winch_heartbeat_message(s),)
 
 

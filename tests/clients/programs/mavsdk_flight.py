@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from mavsdk import ComponentType, Configuration, Mavsdk, MavsdkError
 from mavsdk.plugins.action import Action
@@ -45,6 +45,7 @@ LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
 RETURN_M = 3.0
 DEGREE_M = 111_319.5  # of latitude
 NAN = math.nan
+Plugin = TypeVar("Plugin")
 
 
 class Pilot:
@@ -53,13 +54,23 @@ class Pilot:
     def __init__(self, system: Any) -> None:
         self.told: dict[str, Any] = {}
         self.system = system
-        self.action = Action(system)
-        self.telemetry = Telemetry(system)
+        self._plugins: dict[type, Any] = {}
+        self.action = self.plugin(Action)
+        self.telemetry = self.plugin(Telemetry)
         self.texts: list[str] = []
         self.telemetry.subscribe_status_text(lambda text, *_: self.texts.append(text.text))
         self.modes: list[str] = []
         self.telemetry.subscribe_flight_mode(lambda mode, *_: self.modes.append(FlightMode(mode).name))
         self._turn = threading.Event()
+
+    def plugin(self, kind: type[Plugin]) -> Plugin:
+        """The plug-in of that kind, which lives as long as the application.
+
+        MAVSDK 4.1.0 dies of a segmentation fault when Python's garbage collector destroys one in flight.
+        """
+        if kind not in self._plugins:
+            self._plugins[kind] = kind(self.system)  # type: ignore[call-arg]
+        return cast(Plugin, self._plugins[kind])
 
     def until(self, what: str, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
         """Wait until telemetry shows the condition."""
@@ -104,7 +115,7 @@ class Pilot:
         assert health.is_global_position_ok
         assert health.is_home_position_ok
         assert health.is_armable
-        version = self.again(Info(self.system).get_version)
+        version = self.again(self.plugin(Info).get_version)
         self.told["version"] = [version.flight_sw_major, version.flight_sw_minor]
 
     def telemetry_seen(self) -> None:
@@ -164,7 +175,7 @@ class Pilot:
         self.told["origin"] = [origin.latitude_deg, origin.longitude_deg]
 
     def parameters(self) -> None:
-        param = Param(self.system)
+        param = self.plugin(Param)
         everything = param.get_all_params()
         real, whole = ({p.name for p in some} for some in (everything.float_params, everything.int_params))
         self.told["parameters"] = {"real": "MIS_SPEED" in real, "whole": "MIS_SHAPE" in whole}
@@ -179,7 +190,7 @@ class Pilot:
         assert self.action.get_return_to_launch_altitude() == RETURN_M
 
     def missions(self) -> None:
-        raw = MissionRaw(self.system)
+        raw = self.plugin(MissionRaw)
         x, y = self.home_e7()
         items = [
             RawItem(seq, 6, 16, int(seq == 0), 1, 0.0, 0.0, 0.0, NAN, x + 100 * seq, y - 70 * seq, 1.5, 0)
@@ -193,7 +204,7 @@ class Pilot:
         assert raw.download_mission() == []
 
     def fences(self) -> None:
-        raw = MissionRaw(self.system)
+        raw = self.plugin(MissionRaw)
         home = self.home_e7()
         corners = ((-2, -2), (-2, 4), (4, 4), (4, -2))
         fence = [
@@ -205,7 +216,7 @@ class Pilot:
         rally = [RawItem(0, 3, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0, *home, 2.0, 2)]
         raw.upload_rally_points(rally)
         assert [(i.x, i.y) for i in raw.download_rallypoints()] == [home]
-        Geofence(self.system).clear_geofence()
+        self.plugin(Geofence).clear_geofence()
 
     def take_off(self) -> None:
         self.again(self.action.arm)
@@ -249,7 +260,7 @@ class Pilot:
             )  # fmt: skip
 
         plan = MissionPlan([item(1.0, 0.0), item(1.0, 1.5, fly_through=False), item(0.0, 1.5)])
-        self.mission = Mission(self.system)
+        self.mission = self.plugin(Mission)
         self.again(lambda: self.mission.upload_mission(plan))
         back = self.again(lambda: self.mission.download_mission().mission_items)
         assert len(back) == 3
@@ -290,7 +301,7 @@ class Pilot:
     def dated(self) -> None:
         """In the air: the times since arming and take-off."""
         heard: list[Any] = []
-        info = Info(self.system)
+        info = self.plugin(Info)
         info.subscribe_flight_information(lambda flight, *_: heard.append(flight))
         self.until("when it was armed", lambda: bool(heard) and heard[-1].duration_since_arming_ms > 0)
         assert 0 < heard[-1].duration_since_takeoff_ms <= heard[-1].duration_since_arming_ms
@@ -298,7 +309,7 @@ class Pilot:
 
     def offboard(self) -> None:
         """Places, then velocities, as the examples of MAVSDK do it."""
-        offboard = Offboard(self.system)
+        offboard = self.plugin(Offboard)
         offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -2.0, NAN))
         offboard.start()
         self.mode("OFFBOARD")
@@ -322,7 +333,7 @@ class Pilot:
 
     def yaw(self) -> None:
         """A place with a yaw, then every MAVSDK setpoint that turns the nose."""
-        home, offboard = self.telemetry.home(), Offboard(self.system)
+        home, offboard = self.telemetry.home(), self.plugin(Offboard)
         self.heading(90.0)
         height = home.absolute_altitude_m + 2.5
         self.action.goto_location(home.latitude_deg, home.longitude_deg, height, 0.0)
@@ -347,7 +358,7 @@ class Pilot:
 
     def accelerate(self) -> None:
         """An acceleration alone, there and back to rest."""
-        offboard, seen = Offboard(self.system), self.telemetry.position_velocity_ned
+        offboard, seen = self.plugin(Offboard), self.telemetry.position_velocity_ned
         offboard.set_acceleration_ned(AccelerationNed(0.0, 0.3, 0.0))
         offboard.start()
         self.mode("OFFBOARD")
@@ -359,7 +370,7 @@ class Pilot:
 
     def body_rates(self) -> None:
         """A yaw rate with a thrust, then an attitude with a yaw."""
-        offboard, rates = Offboard(self.system), self.telemetry.attitude_angular_velocity_body
+        offboard, rates = self.plugin(Offboard), self.telemetry.attitude_angular_velocity_body
         offboard.set_attitude_rate(AttitudeRate(0.0, 0.0, 20.0, 0.5))
         offboard.start()
         self.mode("OFFBOARD")
@@ -371,7 +382,7 @@ class Pilot:
 
     def follow(self) -> None:
         """The load at 8.5 m, 6 m behind somebody who walks north."""
-        follower, seen = FollowMe(self.system), self.telemetry.position_velocity_ned
+        follower, seen = self.plugin(FollowMe), self.telemetry.position_velocity_ned
         self.until("its parameters", lambda: follower.get_config().max_tangential_vel_m_s == 5.0)
         follower.set_config(FollowConfig(8.5, 6.0, 0.1, FollowConfig.FollowAltitudeMode(0), 5.0, 180.0))
         follower.start()
@@ -395,7 +406,7 @@ class Pilot:
 
     def winch(self) -> None:
         """Lower and raise the load by the plug-in that communicates with the winch component."""
-        winch, lengths = Winch(self.system), []
+        winch, lengths = self.plugin(Winch), []
         winch.subscribe_status(lambda status, *_: lengths.append(status.line_length_m))
         self.until("a winch", lambda: bool(lengths))
         self.told["components"] = sorted(self.system.component_ids())
@@ -433,14 +444,14 @@ class Pilot:
 
     def gripper(self) -> None:
         """Release the load and take it again, on the ground."""
-        gripper = Gripper(self.system)
+        gripper = self.plugin(Gripper)
         self.again(lambda: gripper.release(1))
         self.again(lambda: gripper.grab(1))
 
     def log(self) -> None:
         """The log of the finished flight, by the log protocol; its folder by FTP."""
-        names = [entry.name for entry in Ftp(self.system).list_directory("/fs/microsd/log").entries]
-        logs = LogFiles(self.system)
+        names = [entry.name for entry in self.plugin(Ftp).list_directory("/fs/microsd/log").entries]
+        logs = self.plugin(LogFiles)
         sizes = [-1, 0]
         while sizes[-1] != sizes[-2]:  # it is written for a second after disarming
             self._turn.wait(1.0)
