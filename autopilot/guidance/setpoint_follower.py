@@ -237,10 +237,19 @@ class TrackPosition:
         rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
         return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
+    def _point_at(self, t: float) -> tuple[Vec3, Vec3]:
+        """Position and velocity of the point `t` seconds into this leg."""
+        x, v, a = self.point
+        return axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
+
     def coasting(self, t: float, rate: float) -> TrackPosition:
         """The motion from `t` seconds into this leg on, with its point continuing at its present velocity."""
-        x, v, a = self.point
-        return TrackPosition(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
+        return TrackPosition(self.jet(t), (*self._point_at(t), ZERO), rate)
+
+    def remaining(self, t: float) -> TrackPosition:
+        """The same motion from `t` seconds into this leg on."""
+        point = (*self._point_at(t), self.point[2])
+        return TrackPosition(self.jet(t), point, self.rate, _round_to_us(max(self.duration_s - t, 0.0)))
 
     def stopped(self, t: float, accel: float) -> tuple[tuple[TrackPosition, ...], Vec3]:
         """The legs from `t` seconds into this leg on to rest, and the place of that rest.
@@ -249,8 +258,7 @@ class TrackPosition:
         last whole microseconds, as the clock counts, and the last leg lasts until only rounding is left of
         the motion.
         """
-        x, v, a = self.point
-        x, v = axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
+        x, v = self._point_at(t)
         level, drop = (v[0], v[1], 0.0), (0.0, 0.0, v[2])
         min_duration_s = norm(v) / accel
         level_s = drop_s = _ceil_to_us(min_duration_s)
@@ -283,8 +291,7 @@ class TrackPosition:
         self, t: float, setpoint: PositionSetpoint | Circle, limits: FollowLimits, now_us: int
     ) -> TrackPosition:
         """The motion from `t` seconds into this leg on, towards what is requested at `now_us`."""
-        x, v, a = self.point
-        point = governor_point(axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), setpoint, limits, now_us)
+        point = governor_point(*self._point_at(t), setpoint, limits, now_us)
         return TrackPosition(self.jet(t), point, limits.rate)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.guidance.legs import winch_hold_height
+from autopilot.guidance.legs import PathStop, Reel, winch_hold_height
 from autopilot.supervisor.heading import advance_heading
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
@@ -87,7 +87,8 @@ def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flig
             flight.legs and leg_time_s(flight, view.now_us) < flight.legs[0].duration_s
         ):
             break
-        flight = _with_reeled_length(flight)
+        flight, stopped = _with_reeled_length(flight)
+        texts += stopped
         if len(flight.legs) > 1:
             ended = flight.leg_start_us + round(flight.legs[0].duration_s * 1e6)
             flight = replace(flight, legs=flight.legs[1:], leg_start_us=ended)
@@ -100,11 +101,17 @@ def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flig
     return flight, Report(texts, reached)
 
 
-def _with_reeled_length(flight: Flight) -> Flight:
-    """The flight at the end of its present leg, with the cable length at which this leg ends."""
+def _with_reeled_length(flight: Flight) -> tuple[Flight, tuple[Text, ...]]:
+    """The flight at the end of its present leg, with the cable length at which this leg ends, and what is
+    told of a winch that stops before it has reached its length."""
     leg = flight.legs[0] if flight.legs else None
     top = None if leg is None else winch_hold_height(leg)
     if leg is None or top is None:
-        return flight
+        return flight, ()
     length = top - leg.jet(leg.duration_s)[0][2]
-    return replace(flight, cable=replace(flight.cable, length_m=length, reel_rate=0.0, reel_accel=0.0))
+    texts: tuple[Text, ...] = ()
+    reels_on = any(isinstance(later, Reel) for later in flight.legs[1:2])
+    if isinstance(leg, PathStop) and not reels_on:
+        texts = ((INFO, f"Winch stopped at {length:.2f} m"),)
+    cable = replace(flight.cable, length_m=length, reel_rate=0.0, reel_accel=0.0)
+    return replace(flight, cable=cable), texts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isinf
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
@@ -105,14 +106,22 @@ def _stopping_place(view: View) -> Vec3:
 
 
 def stopping_legs(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
-    """Legs that bring the load from its present motion to rest (none if it rests), and where it will rest."""
+    """Legs that bring the load from its present motion to rest (none if it rests), and where it will rest; of
+    a stop that is being flown, the rest of it."""
     x, v, a = commanded_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, TrackPosition):
-            return leg.stopped(t, settings.motion.accel_m_s2)
+            if isinf(leg.duration_s):
+                return leg.stopped(t, settings.motion.accel_m_s2)
+            stop = [leg.remaining(t)]
+            for later in flight.legs[1:]:
+                if not isinstance(later, TrackPosition):
+                    break
+                stop.append(later)
+            return tuple(stop), stop[-1].point[0]
         slow = path_stop_leg(leg, t, settings.motion.accel_m_s2, settings.min_move_s)
         return (slow,), slow.end
     accel, min_duration_s = settings.motion.accel_m_s2, settings.min_move_s

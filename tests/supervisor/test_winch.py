@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from autopilot.core.flight_core import commanded_rate, with_cable_now
 from autopilot.guidance.legs import Hold, PathStop, Reel, winch_hold_height
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
-from autopilot.supervisor.state import Flight, Phase
+from autopilot.supervisor.state import Flight, Phase, leg_time_s
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Winch
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered
@@ -85,9 +86,11 @@ def test_a_mission_paused_while_reeling_goes_on_to_the_same_length() -> None:
     assert paused is not None
     assert 0.75 < paused < 1.4
     assert sky.flight.cable.reel_rate == 0.0
+    assert [text for text in sky.texts if "Winch" in text] == [f"Winch stopped at {paused:.2f} m"]
     assert sky.ask(StartMission(None)).result == ACCEPTED
     tick(7.0)
     assert sky.flight.cable.length_m == pytest.approx(1.5, abs=1e-9)
+    assert len([text for text in sky.texts if "Winch" in text]) == 1
 
 
 def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
@@ -133,3 +136,24 @@ def test_nor_while_it_waits_for_the_load_to_come_to_rest() -> None:
     assert isinstance(sky.flight.legs[-2], Reel) and len(sky.flight.legs) > 2
     verdict = sky.ask(Orbit(2.0, 1.0, None, None, None))
     assert (verdict.result, verdict.text) == (LATER, "Orbit denied while the winch works")
+
+
+def test_a_request_that_is_repeated_does_not_begin_the_wait_anew() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(Orbit(2.0, 1.0, None, None, None)).result == ACCEPTED
+    sky.wait(6.0)
+    assert sky.ask(Pause()).result == ACCEPTED
+
+    def wait_s() -> float:
+        stop = sky.flight.legs[:-2]
+        return sum(leg.duration_s for leg in stop) - leg_time_s(sky.flight, sky.now_us)
+
+    begun_us, waits, places = sky.now_us, [], []
+    for _ in range(6):
+        verdict = sky.ask(WinchRequest(0.8))
+        assert verdict.text == "Winch: 0.70 m to 1.50 m, when the load is at rest"
+        waits.append(wait_s() + (sky.now_us - begun_us) * 1e-6)
+        places.append(sky.flight.legs[-2].jet(0.0)[0])
+        sky.wait(0.52)
+    assert waits == pytest.approx([waits[0]] * 6, abs=2e-5)
+    assert np.ptp(places, axis=0) == pytest.approx([0.0] * 3, abs=1e-9)

@@ -104,5 +104,7 @@ def winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Dec
     reel = reel_leg(here, length, target_m, speed, settings.winch.accel_m_s2)
     there = reel.end
     text = f"Winch: {length:.2f} m to {target_m:.2f} m"
+    if legs:
+        text += ", when the load is at rest"
     after = replace(flight, legs=(*legs, reel, Hold(there)), leg_start_us=view.now_us)
     return after, Verdict(mavlink.MAV_RESULT_ACCEPTED, text)
