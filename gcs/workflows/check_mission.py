@@ -37,6 +37,7 @@ from gcs.mission_items import (
     step_in_file,
 )
 from gcs.workflows.before_flight import law_problem, unused_planner_text
+from gcs.workflows.charge import charge_after, charge_warning
 from gcs.workflows.flight_inputs import vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.flyable import violations, winch_items
@@ -208,12 +209,16 @@ def winch_notes(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
             )
 
 
+def _flown_alone(mission: Mission, table: AutopilotParameters) -> tuple[TimelineEntry, ...]:
+    """The items after a release."""
+    entries = expected_entries(mission, table)
+    releases = [index for index, entry in enumerate(entries) if isinstance(entry.step, Release)]
+    return entries[releases[0] + 1 :] if releases else ()
+
+
 def notes_after_release(mission: Mission, table: AutopilotParameters) -> Iterator[str]:
     """A line about the items after a release, which path reports do not include."""
-    entries = expected_entries(mission, table)
-    released = [entry.item for entry in entries if isinstance(entry.step, Release)]
-    if released and released[0] + 1 < len(entries):
-        rest = entries[released[0] + 1 :]
+    if rest := _flown_alone(mission, table):
         items = " to ".join(dict.fromkeys(f"items[{entry.item}]" for entry in (rest[0], rest[-1])))
         yield (
             f"note: {items}: about {sum(entry.duration_s for entry in rest):.0f} s, flown without the load, "
@@ -249,6 +254,7 @@ class CheckResult:
     # the greatest steady wind in which it can be flown, and why not in more; None if there is no such limit
     wind_limit_m_s: float | None = None
     wind_reason: str = ""
+    battery_left_pct: float | None = None  # at the end; None without a simulated battery
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -261,7 +267,8 @@ class CheckResult:
             return self.problems
         can_fly = f"{self.mission}: vehicle {self.vehicle} can fly it"
         paths = _path_lines(self.paths)
-        return (can_fly, *paths, *self._duration_lines(), *self._wind_lines(), *self.warnings)
+        about_all = (*self._duration_lines(), *self._wind_lines(), *self._battery_lines())
+        return (can_fly, *paths, *about_all, *self.warnings)
 
     def _duration_lines(self) -> Iterator[str]:
         if self.expected_s is not None and self.time_limit_s is not None:
@@ -274,6 +281,10 @@ class CheckResult:
         if self.wind_limit_m_s is not None:
             limit_m_s = floor(10.0 * self.wind_limit_m_s) / 10.0
             yield f"withstands {limit_m_s:.1f} m/s of steady wind: in more, {self.wind_reason}"
+
+    def _battery_lines(self) -> Iterator[str]:
+        if self.battery_left_pct is not None:
+            yield f"battery: about {self.battery_left_pct:.0f} % of its charge is left at the end"
 
 
 def _path_lines(reports: Iterable[PathReport]) -> Iterator[str]:
@@ -303,6 +314,23 @@ def _in_file_terms(found: CheckResult, mission: Mission, notes: tuple[str, ...])
         warnings=(*notes, *(in_file_terms(text, mission) for text in found.warnings)),
         refusals=tuple(in_mission_terms(text, mission) for text in found.refusals),
     )
+
+
+def _with_charge(found: CheckResult, mission: Mission, table: AutopilotParameters) -> CheckResult:
+    """The result, and what the mission leaves of the battery."""
+    expected_s = found.expected_s or 0.0
+    alone_s = sum(entry.duration_s for entry in _flown_alone(mission, table))
+    charge = charge_after(found.vehicle, expected_s - alone_s, alone_s)
+    if charge is None:
+        return found
+    if charge.lasts_s is not None:
+        lasts, takes = limit_text(charge.lasts_s), limit_text(expected_s)
+        text = f"the battery is empty after about {lasts} in the air, and the flight takes about {takes}"
+        empty = Violation(0, "charge", expected_s, charge.lasts_s, charge.lasts_s, text)
+        return replace(found, violations=(empty,), expected_s=None, time_limit_s=None)
+    warning = charge_warning(charge.left, table)
+    warnings = found.warnings + ((warning,) if warning else ())
+    return replace(found, battery_left_pct=100.0 * charge.left, warnings=warnings)
 
 
 def check_mission(
@@ -365,4 +393,5 @@ def check_mission(
         result = replace(result, expected_s=flown_s(mission, reports, table), time_limit_s=limit_s)
         if wind := craft.limit(reports):
             result = replace(result, wind_limit_m_s=wind.speed_m_s, wind_reason=wind.reason)
+        result = _with_charge(result, mission, table)
     return _in_file_terms(result, mission, notes)

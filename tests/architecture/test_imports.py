@@ -156,6 +156,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.sensors.overrides",
         "sitl.vehicles",
     ),
+    "gcs.workflows.charge": (*GCS, "gcs", "sitl.plant.drive", "sitl.vehicles"),
     "gcs.workflows.wind": (*GCS, "gcs", "sitl.plant.cable_drag", "sitl.plant.records", "sitl.vehicles"),
     "gcs.workflows.own_planner": (*GCS, "gcs", "autopilot.own", "autopilot.shell.watched_calls"),
     "gcs.workflows.refusals": (*GCS, "gcs", "autopilot.services.requests", "autopilot.supervisor"),
