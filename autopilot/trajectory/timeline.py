@@ -231,7 +231,7 @@ def _travel_and_wait(
             waiting = DETECTION_S + tauten_duration_s(cable, vertical.tauten_m_s)
             speed = min(speed, vertical.lift_m_s)
         case Land():
-            waiting = DETECTION_S + set_down_duration_s(cable)
+            waiting = DETECTION_S + (0.0 if before.released else set_down_duration_s(cable))
             speed = min(speed, vertical.lift_m_s)
         case Waypoint(hold_s=hold):
             waiting = hold

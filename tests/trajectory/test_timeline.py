@@ -11,6 +11,7 @@ from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.trajectory.peaks import survey_transfer
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.ramp import PEAK_RAMP_ACCEL
+from autopilot.trajectory.slack_cable import set_down_duration_s
 from autopilot.trajectory.timeline import (
     ANYWHERE,
     RELEASE_S,
@@ -18,6 +19,7 @@ from autopilot.trajectory.timeline import (
     MissionState,
     VerticalSpeeds,
     expected_duration_s,
+    expected_timeline,
     min_move_duration,
     return_place,
     state_after,
@@ -222,6 +224,14 @@ def test_a_long_cable_is_tautened_and_set_down_for_minutes():
     assert expected_duration_s(hover, cable_m=0.7) == usual < 40.0
     slow = expected_duration_s(hover, cable_m=10.0, vertical=VerticalSpeeds(0.02, 0.8))
     assert slow - expected_duration_s(hover, cable_m=10.0) == pytest.approx(4.0 / 0.02 - 4.0 / 0.15)
+
+
+def test_a_vehicle_without_its_load_lands_at_once():
+    def landing_s(*steps: Step) -> float:
+        mission = Mission("m", "", "", (), (Takeoff(2.0), *steps, Waypoint(0.0, 0.0, 2.0), Land()))
+        return expected_timeline(mission, cable_m=2.0)[-1].duration_s
+
+    assert landing_s() - landing_s(Release()) == pytest.approx(set_down_duration_s(2.0))
 
 
 def test_half_the_speed_takes_twice_as_long():
