@@ -19,12 +19,14 @@ from autopilot.supervisor.requests.verdicts import ACCEPTED as YES
 from autopilot.supervisor.settings import Settings, settings_from
 from autopilot.supervisor.state import (
     IN_AIR,
+    LANDING,
     ON_GROUND,
     ActionWhenArmed,
     Flight,
     MissionPlan,
     MissionProgress,
     Phase,
+    is_landing,
 )
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -170,6 +172,26 @@ def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothi
         assert (after.phase in IN_AIR) == bool(after.legs) or after.phase == Phase.MISSION, request
         for k in range(2, 30):  # after every decision the flight can continue
             after, _ = advance(after, seen._replace(now_us=k * 100_000), SETTINGS)
+
+
+@pytest.mark.parametrize("phase", sorted(LANDING))
+def test_while_readings_are_missing_no_request_ends_a_landing(phase: Phase) -> None:
+    blind = seen_in(phase)._replace(estimate_problems=("no vehicle pose from a tracker",))
+    refused = set()
+    for request in REQUESTS:
+        if isinstance(request, R.Release | R.Terminate | R.Arm):
+            continue
+        before = flight_in(phase, False, PLAN)
+        after, verdict = decide(before, request, blind, SETTINGS)
+        assert is_landing(after), request
+        if decide(before, request, seen_in(phase), SETTINGS)[0].phase != phase:
+            refused.add(type(request))
+            assert verdict.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED, request
+            assert verdict.text == "Denied: no vehicle pose from a tracker, the landing continues"
+    assert {R.Pause, R.SetMode} <= refused or phase != Phase.LOWER
+    before = flight_in(Phase.LOWER, False, PLAN)
+    released, _ = decide(before, R.Release(), blind, SETTINGS)
+    assert released.cable.released, "the load can still be dropped"
 
 
 # ---- arming

@@ -49,19 +49,26 @@ from autopilot.supervisor.requests.payload import grab, release_load, winch
 from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
 from autopilot.supervisor.requests.takeoff import takeoff
 from autopilot.supervisor.requests.target import follow_target
-from autopilot.supervisor.requests.verdicts import Decision, Handler
+from autopilot.supervisor.requests.verdicts import Decision, Handler, temporarily_denied
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, View
+from autopilot.supervisor.state import IN_AIR, Flight, View, is_landing
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import LookAt, TurnHeading
 
 
 def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """The flight after the request, and the verdict on it; an unknown request is unsupported."""
+    """The flight after the request, and the verdict on it; an unknown request is unsupported.
+
+    While readings are missing, nothing that would end the landing is accepted, except a release of the load.
+    """
     handler = HANDLERS.get(type(request))
     if handler is None:
         return flight, Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
     after, verdict = handler(flight, request, view, settings)
+    ends_landing = is_landing(flight) and after.phase in IN_AIR and not is_landing(after)
+    if view.estimate_problems and ends_landing and not isinstance(request, Release):
+        # the next tick would begin the landing anew
+        return flight, temporarily_denied(f"Denied: {view.estimate_problems[0]}, the landing continues")
     if after.is_failsafe and after.legs is not flight.legs:  # now it does as commanded
         after = replace(after, is_failsafe=False)
     return after, verdict
