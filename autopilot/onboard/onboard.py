@@ -530,7 +530,7 @@ class Onboard:
             self._ground.lost = True
             self.core.replace_flight(replace(self.core.flight, is_failsafe=True))
             self.endpoint.state_changed()
-            self.endpoint.send_text(mavlink.MAV_SEVERITY_CRITICAL, LOST_TEXT.format(reaction[1]))
+            self.endpoint.send_text(mavlink.MAV_SEVERITY_ERROR, LOST_TEXT.format(reaction[1]))
 
     def _set_ground_missing(self, missing: bool) -> None:
         """Let a silent ground station prevent arming: the flight would end at once."""

@@ -154,12 +154,12 @@ def landed_state(flight: Flight) -> int:
     return _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR)
 
 
-def system_status(flight: Flight, ready: bool) -> int:
+def system_status(flight: Flight) -> int:
     """MAV_STATE of the flight."""
     if flight.phase == Phase.FAILSAFE or flight.fall == Fall.FALLING:
         return mavlink.MAV_STATE_FLIGHT_TERMINATION
     if flight.phase == Phase.DISARMED:
-        return mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_CALIBRATING
+        return mavlink.MAV_STATE_STANDBY
     return mavlink.MAV_STATE_CRITICAL if flight.is_failsafe else mavlink.MAV_STATE_ACTIVE
 
 
@@ -169,12 +169,12 @@ def mission_state(flight: Flight, items: int) -> int:
         return mavlink.MISSION_STATE_NO_MISSION
     if flight.mission.active:
         return mavlink.MISSION_STATE_ACTIVE
-    begins_when_armed = flight.phase in ON_GROUND and flight.action_when_armed == ActionWhenArmed.MISSION
-    if flight.mission.done and not (flight.mission.waiting or begins_when_armed):
+    on_ground, mission = flight.phase in ON_GROUND, flight.mission
+    begins_flight = flight.action_when_armed == ActionWhenArmed.MISSION
+    if mission.done and not (mission.waiting or (on_ground and begins_flight)):
         return mavlink.MISSION_STATE_COMPLETE
-    if flight.phase not in ON_GROUND and (flight.mission.step > 0 or flight.mission.step_anchor is not None):
-        return mavlink.MISSION_STATE_PAUSED
-    return mavlink.MISSION_STATE_NOT_STARTED
+    was_begun = begins_flight or mission.step > 0 or mission.step_anchor is not None
+    return mavlink.MISSION_STATE_PAUSED if was_begun and not on_ground else mavlink.MISSION_STATE_NOT_STARTED
 
 
 def is_tracked(estimator: EstimatorState) -> bool:
@@ -528,7 +528,7 @@ def _flight_status_fields(m: CoreSnapshot) -> tuple[Any, ...]:
 
 @_provides("system_status")
 def _system_status(m: CoreSnapshot) -> tuple[Any, ...]:
-    return (system_status(m.flight, m.flight.phase == Phase.DISARMED and m.ready),)
+    return (system_status(m.flight),)
 
 
 @_provides("sensors_present", "sensors_healthy")

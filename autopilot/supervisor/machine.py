@@ -99,13 +99,20 @@ def _fall_after(flight: Flight, phase: Phase, event: Event) -> Fall:
 
 def _reset_on_disarm(flight: Flight) -> Flight:
     """The flight with its rotors stopped: nothing selected, the mission rewound."""
+    mission = flight.mission
     return replace(
         flight,
         action_when_armed=ActionWhenArmed.NOTHING,
         heading=flight.heading.at_rest(),
         rotors_lost=0,  # whether they turn is detected after the next start
         mission=replace(
-            flight.mission, active=False, waiting=False, step=0, step_anchor=None, stopped_run=None
+            mission,
+            active=False,
+            waiting=False,
+            step=0,
+            step_anchor=None,
+            stopped_run=None,
+            final_item=mission.plan.sequence[0] if mission.done and mission.plan.sequence else None,
         ),
         cable=replace(flight.cable, reel_target_m=None, failed_lifts=0, slack_step=-1),
     )

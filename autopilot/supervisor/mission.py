@@ -20,8 +20,8 @@ from autopilot.supervisor.setpoint_source import is_source_lost
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CRITICAL,
+    IN_AIR,
     INFO,
-    UNARMED,
     ActionWhenArmed,
     Event,
     Flight,
@@ -66,6 +66,8 @@ def with_plan(flight: Flight, plan: MissionPlan) -> Flight:
     """The flight with another mission, rewound; without steps there is nothing to wait for."""
     waiting = flight.mission.waiting and bool(plan.steps)
     flight = replace(flight, mission=replace(flight.mission, plan=plan, waiting=waiting))
+    if flight.phase in IN_AIR and not waiting:  # this flight did not begin with it
+        flight = replace(flight, action_when_armed=ActionWhenArmed.NOTHING)
     return with_current_step(flight, 0)
 
 
@@ -79,10 +81,10 @@ def with_current_step(flight: Flight, step: int) -> Flight:
 
 
 def present_item(flight: Flight) -> int:
-    """The mission item that is flown; of a complete mission the one that it ended with, until the vehicle
-    stands disarmed on the ground, from where the next flight begins with the first."""
+    """The mission item that is flown; of a complete mission the one that it ended with, and after this flight
+    the first, with which the mission begins again."""
     mission, sequence = flight.mission, flight.mission.plan.sequence
-    if mission.final_item is not None and flight.phase not in UNARMED:
+    if mission.final_item is not None:
         return mission.final_item
     return sequence[min(mission.step, len(sequence) - 1)] if sequence else 0
 

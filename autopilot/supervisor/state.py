@@ -148,7 +148,8 @@ class MissionProgress:
     step: int = 0  # of the plan: the present one, or the one to begin with
     active: bool = False
     waiting: bool = False  # begins when its paths are prepared
-    final_item: int | None = None  # of a mission that is complete: the item that it ended with
+    # of a mission that is complete: the item that it ended with, after the flight the first; else None
+    final_item: int | None = None
     step_anchor: Vec3 | None = None  # where the present step began
     stopped_run: PathResume | None = None  # how signals or a trajectory continue that were interrupted
     takeoff_altitude_m: float = 0.0

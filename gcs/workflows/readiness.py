@@ -26,5 +26,5 @@ def wait_until_ready(session: Session) -> bool:
     except (RefusedError, NoVehicleError):
         pass  # its reasons will arrive with the refusal to arm
     reasons = "; ".join(view.problems_since(before))
-    notify("waiting for the vehicle to be ready" + (f": {reasons}" if reasons else ""))
+    notify(f"waiting: {reasons}" if reasons else "waiting for the vehicle to be ready")
     return session.watch(lambda: view.ready_to_arm is True, READY_S, "waiting for the vehicle to be ready")

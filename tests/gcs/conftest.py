@@ -169,7 +169,7 @@ class ScriptedVehicle:
             if message.command == mavlink.MAV_CMD_MISSION_START:
                 self.started_us = self.now_us
             if message.command == mavlink.MAV_CMD_RUN_PREARM_CHECKS:
-                self.say("load position not settled")
+                self.say("Not ready to arm: load position not settled")
             if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == 253:
                 for severity, text in self.kept_texts:
                     self.say(text, severity)

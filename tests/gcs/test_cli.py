@@ -834,7 +834,7 @@ def test_arming_waits_for_a_vehicle_that_is_not_ready_yet_and_says_for_what(live
     vehicle.ready_from_us = 1_000_000
     result = run("arm", "--connect", port)
     assert (result.exit_code, result.stdout) == (EXIT_DONE, "arm: accepted\n")
-    assert result.stderr == "gcs: waiting for the vehicle to be ready: load position not settled\n"
+    assert result.stderr == "gcs: waiting: Not ready to arm: load position not settled\n"
     assert vehicle.armed
     assert vehicle.now_us >= vehicle.ready_from_us
 

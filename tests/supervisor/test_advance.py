@@ -158,6 +158,29 @@ def test_a_complete_mission_that_is_to_begin_again_is_not_complete() -> None:
     assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_ACTIVE
 
 
+def test_a_complete_mission_stays_at_its_first_item_in_a_flight_without_it() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    said = set()
+    sky.ask(TakeoffRequest(2.0))
+    sky.ask(Arm(arm=True, force=False))
+    while sky.flight.phase != Phase.HOLD:
+        sky.tick()
+        status = flight_status(sky.flight, 3)
+        said.add((status.mission_current, status.mission_state))
+    assert said == {(0, mavlink.MISSION_STATE_COMPLETE)}
+
+
+def test_a_mission_that_is_interrupted_while_it_takes_off_is_paused() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.LIFT)
+    assert sky.ask(Pause()).result == ACCEPTED
+    sky.wait(1.0)
+    assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_PAUSED
+    sky.flight = with_plan(sky.flight, sky.flight.mission.plan)
+    assert flight_status(sky.flight, 3).mission_state == mavlink.MISSION_STATE_NOT_STARTED
+
+
 def test_a_speed_is_changed_back() -> None:
     sky = Sky()
     for asked, flown in ((0.7, 0.7), (None, sky.settings.motion.speed_m_s)):

@@ -47,10 +47,10 @@ def discharge(sky: Sky, percent: int) -> list[str]:
         (AS_WARN, 3, Phase.HOLD, None),
         (LAND, 15, Phase.HOLD, None),
         (LAND, 7, Phase.LOWER, "Failsafe: battery nearly empty, 7 % left, landing"),
-        (LAND, 4, Phase.LOWER, "Failsafe: battery nearly empty, 4 % left, landing"),
+        (LAND, 4, Phase.LOWER, "Failsafe: battery empty, 4 % left, landing"),
         (RETURN, 8, Phase.HOLD, None),
         (RETURN, 7, Phase.RETURN, "Failsafe: battery nearly empty, 7 % left, returning"),
-        (RETURN, 5, Phase.LOWER, "Failsafe: battery nearly empty, 5 % left, landing"),
+        (RETURN, 5, Phase.LOWER, "Failsafe: battery empty, 5 % left, landing"),
     ],
 )
 def test_what_follows_is_chosen_by_a_parameter(
@@ -74,7 +74,7 @@ def test_each_level_is_answered_once_and_commands_are_obeyed() -> None:
     assert discharge(sky, 7) == ["Failsafe: battery nearly empty, 7 % left, returning"]
     assert sky.ask(Pause()).result == ACCEPTED
     assert discharge(sky, 6) == [] and sky.flight.phase == Phase.HOLD and not sky.flight.is_failsafe
-    assert discharge(sky, 5) == ["Failsafe: battery nearly empty, 5 % left, landing"]
+    assert discharge(sky, 5) == ["Failsafe: battery empty, 5 % left, landing"]
     assert sky.ask(Pause()).result == ACCEPTED
     assert discharge(sky, 3) == [] and sky.flight.phase == Phase.HOLD
 
@@ -104,7 +104,7 @@ def test_the_landing_of_a_return_that_is_ended_is_reported_as_a_landing() -> Non
     landed = copy(sky)
     landed.run(lambda sky: sky.flight.phase == Phase.LOWER)
     assert reported_mode(landed.flight) == (identity.AUTO, identity.AUTO_RTL)
-    assert discharge(sky, 5) == ["Failsafe: battery nearly empty, 5 % left, landing"]
+    assert discharge(sky, 5) == ["Failsafe: battery empty, 5 % left, landing"]
     assert reported_mode(sky.flight) == (identity.AUTO, identity.AUTO_LAND)
 
 

@@ -209,7 +209,7 @@ def test_no_arming_outside() -> None:
     )
     assert sky.ask(Arm(True, False)).text == "Arming denied: outside the fence"
     _, verdict = decide(sky.flight, RunPrearmChecks(), sky.view, sky.settings)
-    assert verdict.text == "outside the fence"
+    assert verdict.text == "Not ready to arm: outside the fence"
 
 
 def test_a_return_does_not_lead_to_a_rally_point_that_the_fence_forbids() -> None:

@@ -214,7 +214,7 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
     after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
     assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
     _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
-    assert (told.result, told.text, told.warns) == (ACCEPTED, why, True)
+    assert (told.result, told.text, told.warns) == (ACCEPTED, f"Not ready to arm: {why}", True)
     forced, verdict = decide(Flight(), R.Arm(True, True), seen, SETTINGS)
     assert (forced.phase, verdict) == (Phase.ARMED, YES)
 
@@ -274,7 +274,7 @@ def test_after_a_termination_the_vehicle_is_armed_later_and_needs_no_disarming()
         verdict = sky.ask(R.Arm(True, force))
         assert (sky.flight, verdict.result) == (given_up, LATER)
         assert verdict.text == "Arming denied: flight terminated, wait 2.0 s"
-    assert sky.ask(R.RunPrearmChecks()).text.startswith("flight terminated, wait 2.0 s")
+    assert sky.ask(R.RunPrearmChecks()).text.startswith("Not ready to arm: flight terminated, wait 2.0 s")
     assert (sky.ask(R.Arm(False, False)), sky.flight) == (YES, given_up)
     sky.run(lambda s: s.flight.phase == Phase.DISARMED, 2.1)
 
@@ -314,6 +314,28 @@ def test_where_no_mission_is_its_item_is_not_what_is_missing(first: int | None) 
     assert start == decide(flight, R.SetMode(identity.AUTO, identity.AUTO_MISSION), view(), SETTINGS)
     after, verdict = start
     assert (after, verdict.result, verdict.text) == (flight, DENIED, "Mission denied: there is none")
+
+
+@pytest.mark.parametrize(
+    ("height_m", "text"),
+    [(0.2, "load height 0.20 m, min 0.3 m"), (1e6, "load height 1e+06 m, max 100000 m")],
+)
+def test_a_take_off_to_a_height_that_cannot_be_meant_is_denied(height_m: float, text: str) -> None:
+    verdict = Sky().ask(R.Takeoff(height_m))
+    assert (verdict.result, verdict.text) == (DENIED, f"Take-off denied: {text}")
+
+
+def test_without_a_mission_there_is_nothing_to_continue() -> None:
+    sky = Sky().airborne()
+    verdict = sky.ask(R.Continue())
+    assert (verdict.result, verdict.text) == (DENIED, "Nothing to continue: no mission is stored")
+
+
+def test_a_landing_that_is_asked_for_on_the_ground_disarms() -> None:
+    sky = Sky()
+    sky.ask(R.Arm(True, False))
+    assert sky.ask(R.Land()).result == ACCEPTED
+    assert sky.flight.phase == Phase.DISARMED
 
 
 def test_a_mission_that_is_gone_is_not_begun_by_arming() -> None:

@@ -113,6 +113,8 @@ def start_mission(flight: Flight, request: StartMission, view: View, settings: S
 
 def continue_mission(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Continue the mission at its present item."""
+    if not flight.mission.plan.steps:
+        return flight, denied("Nothing to continue: no mission is stored")
     return start_mission(flight, StartMission(None), view, settings)
 
 

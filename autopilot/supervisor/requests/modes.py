@@ -8,12 +8,12 @@ from typing import Any
 
 from autopilot.services import identity
 from autopilot.services.records import Verdict
-from autopilot.services.requests import EnableFence, SetHome, SetMode, Takeoff
-from autopilot.supervisor.machine import requested_transition, start_phase_legs, try_transition
+from autopilot.services.requests import EnableFence, SetHome, SetMode, StartMission, Takeoff
+from autopilot.supervisor.machine import requested_transition, start_phase_legs, transition, try_transition
 from autopilot.supervisor.phase_legs import leads_home
 from autopilot.supervisor.requests.guided import offboard, position_control
 from autopilot.supervisor.requests.limits import MAX_DISTANCE_M
-from autopilot.supervisor.requests.mission import continue_mission
+from autopilot.supervisor.requests.mission import start_mission
 from autopilot.supervisor.requests.takeoff import takeoff
 from autopilot.supervisor.requests.target import follow_me
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, Handler, denied, wrong_phase
@@ -51,7 +51,9 @@ def pause(flight: Flight, request: Any, view: View, settings: Settings) -> Decis
 
 
 def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """Set the load down where it is, and the vehicle beside it; on the ground, select nothing."""
+    """Set the load down where it is, and the vehicle beside it; on the ground, select nothing, and disarm."""
+    if flight.phase == Phase.ARMED:
+        return transition(flight, Event.DISARM, view, settings), ACCEPTED
     if flight.phase in ON_GROUND:
         return hold(flight, request, view, settings)
     not_returning = replace(flight, returning=False)
@@ -85,6 +87,10 @@ def enable_fence(flight: Flight, request: EnableFence, view: View, settings: Set
     return replace(flight, area=area), Verdict(ACCEPTED.result, f"Fence {'on' if request.on else 'off'}")
 
 
+def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    return start_mission(flight, StartMission(None), view, settings)
+
+
 def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     return takeoff(flight, Takeoff(None), view, settings)
 
@@ -92,7 +98,7 @@ def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) 
 MODES: dict[tuple[int, int], Handler] = {
     (identity.AUTO, identity.AUTO_TAKEOFF): _mode_takeoff,
     (identity.AUTO, identity.AUTO_LOITER): hold,
-    (identity.AUTO, identity.AUTO_MISSION): continue_mission,
+    (identity.AUTO, identity.AUTO_MISSION): _mode_mission,
     (identity.AUTO, identity.AUTO_RTL): return_home,
     (identity.AUTO, identity.AUTO_LAND): land,
     identity.FOLLOW_MODE: follow_me,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from autopilot.services.requests import Takeoff
 from autopilot.supervisor.machine import transition
-from autopilot.supervisor.requests.limits import MIN_ALTITUDE_M
+from autopilot.supervisor.requests.limits import MAX_DISTANCE_M, MIN_ALTITUDE_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -36,6 +36,8 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
     altitude = settings.motion.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
     if not altitude >= MIN_ALTITUDE_M:
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {MIN_ALTITUDE_M} m")
+    if altitude > MAX_DISTANCE_M:
+        return flight, denied(f"Take-off denied: load height {altitude:g} m, max {MAX_DISTANCE_M:g} m")
     problem = takeoff_problem(flight, altitude, view, settings)
     if problem:
         return flight, denied(f"Take-off denied: {problem}")

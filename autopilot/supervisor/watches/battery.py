@@ -44,5 +44,6 @@ def watch_battery(flight: Flight, view: View, settings: Settings) -> WatchResult
         return WatchResult(flight)
     flight = replace(flight, answered_charge_state=low.charge_state)
     event, action = reaction
-    text = f"Failsafe: battery nearly empty, {low.percent} % left, {action}"
+    level = "empty" if low.charge_state == _EMERGENCY else "nearly empty"
+    text = f"Failsafe: battery {level}, {low.percent} % left, {action}"
     return WatchResult(interrupt_mission(flight), event, ((mavlink.MAV_SEVERITY_ERROR, text),))
