@@ -220,6 +220,8 @@ class Area:
     last_breach: str = ""  # the same of the last breach, over or not
     breaches: int = 0
     breach_us: int = 0  # when the last one began
+    leads_out: bool = False  # the commanded motion leads beyond the fence
+    inside_since_us: int = -1  # since when nothing violates the fence; -1: something does
 
     @classmethod
     def of(cls, lists: Mapping[int, Sequence[WireItem]], home: Home) -> Area:

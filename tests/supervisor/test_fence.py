@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.linear import add, norm, sub
 from autopilot.services.requests import (
     Arm,
     EnableFence,
@@ -23,7 +23,8 @@ from autopilot.services.requests import (
     Takeoff,
 )
 from autopilot.supervisor.requests.decide import decide
-from autopilot.supervisor.state import Phase
+from autopilot.supervisor.state import Phase, View
+from autopilot.supervisor.watches.fence import CLEAR_US
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
 from autopilot.wire.items import LocatedStep
@@ -35,6 +36,7 @@ SQUARE = Polygon(True, ((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)))
 FENCE = Fence((SQUARE, Disc(False, (0.0, 3.0), 1.0)))
 DENIED = m.MAV_RESULT_DENIED
 NOTHING = (float("nan"),) * 3
+LED_OUT = "Fence: would stop outside the fence, holding"
 EAST = FollowSetpoint(NOTHING, (2.0, 0.0, 0.0), NOTHING, False)
 
 
@@ -63,7 +65,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     sky = fenced().airborne()
     farthest = eastward(sky, 12.0)
     assert sky.flight.phase == Phase.HOLD
-    assert sky.texts[-1] == "Fence: would stop outside the fence, holding"
+    assert sky.texts[-1] == LED_OUT
     # stopped shortly before the fence: measured 4.89 m
     assert 3.5 < farthest < 5.0
     assert sky.flight.area.breaches == 1
@@ -156,6 +158,82 @@ def test_distance_and_height() -> None:
     high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED
+
+
+class NoisySky(Sky):
+    """A sky in which the estimate of the load's place is `offset_m` farther east."""
+
+    offset_m = 0.0
+
+    def obey(self) -> View:
+        there = super().obey()
+        return there._replace(x_load=add(there.x_load, (self.offset_m, 0.0, 0.0)))
+
+
+def noisy(action: int) -> NoisySky:
+    """Load and vehicle that hold 5 mm before the line."""
+    settings = replace(SETTINGS, fence=replace(SETTINGS.fence, action=action))
+    sky = NoisySky(settings=settings).airborne()
+    assert sky.ask(Reposition(4.995, 0.0, 2.0, True)).result == ACCEPTED
+    sky.wait(15.0)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=FENCE))
+    return sky
+
+
+@pytest.mark.parametrize(("action", "text"), [(1, "outside the fence"), (2, "outside the fence, holding")])
+def test_a_breach_ends_when_nothing_has_crossed_the_line_for_some_time(action: int, text: str) -> None:
+    sky = noisy(action)
+    for _ in range(20):  # in and out again, for up to 4 s
+        sky.offset_m = 0.01
+        sky.wait(0.5)
+        assert sky.flight.area.breach
+        sky.offset_m = 0.0
+        sky.wait(4.0)
+        assert sky.flight.area.breach == "outside the fence"
+    assert sky.texts.count(f"Fence: {text}") == 1
+    assert (sky.flight.area.breaches, sky.flight.phase) == (1, Phase.HOLD)
+    sky.wait(CLEAR_US * 1e-6 - 3.9)
+    assert not sky.flight.area.breach
+    sky.offset_m = 0.01
+    sky.tick()
+    assert sky.texts.count(f"Fence: {text}") == sky.flight.area.breaches == 2
+
+
+def test_who_leads_the_load_out_again_is_stopped_again_before_the_breach_is_over() -> None:
+    sky = fenced().airborne()
+    west = FollowSetpoint(NOTHING, (-0.5, 0.0, 0.0), NOTHING, False)
+    for breaches in (1, 2, 3):
+        sky.ask(EAST)
+        assert sky.ask(SetMode(6, 0)).result == ACCEPTED
+        while sky.flight.phase == Phase.GUIDED:
+            sky.ask(EAST)
+            sky.tick()
+        assert (sky.texts[-1], sky.flight.area.breaches) == (LED_OUT, breaches)
+        sky.wait(1.0)
+        assert sky.ask(west).result == sky.ask(SetMode(6, 0)).result == ACCEPTED
+        for _ in range(40):
+            sky.ask(west)
+            sky.tick()
+        assert sky.flight.area.breach and not sky.flight.area.leads_out
+        assert sky.flight.phase == Phase.GUIDED
+    assert sky.texts.count(LED_OUT) == 3
+
+
+def test_noise_does_not_stop_a_load_that_is_led_back_over_the_line() -> None:
+    """By setpoints, from outside."""
+    sky = NoisySky().airborne()
+    assert sky.ask(Reposition(5.3, 0.0, 2.0, True)).result == ACCEPTED
+    sky.wait(15.0)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=FENCE))
+    sky.tick()
+    west = FollowSetpoint(NOTHING, (-0.3, 0.0, 0.0), NOTHING, False)
+    assert sky.ask(west).result == sky.ask(SetMode(6, 0)).result == ACCEPTED
+    for k in range(150):
+        sky.offset_m = 0.02 * (k % 2)
+        sky.ask(west)
+        sky.tick()
+    assert sky.view.x_load[0] < 4.9
+    assert (sky.flight.phase, sky.flight.area.breaches) == (Phase.GUIDED, 1)
 
 
 @pytest.mark.parametrize(("request_", "phase"), [(ReturnHome(), Phase.RETURN), (Land(), Phase.LOWER)])
