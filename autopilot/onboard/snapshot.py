@@ -235,6 +235,7 @@ class FlightStatus(NamedTuple):
     mission_total: int
     mission_state: int
     reel_rate: float
+    released: bool
 
 
 def flight_status(flight: Flight, items: int) -> FlightStatus:
@@ -256,6 +257,7 @@ def flight_status(flight: Flight, items: int) -> FlightStatus:
         items,
         mission_state(flight, items),
         flight.cable.reel_rate,
+        flight.cable.released,
     )
 
 

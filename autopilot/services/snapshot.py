@@ -194,6 +194,7 @@ class Snapshot:
     mission_total: int = 0
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
     reel_rate: float = 0.0  # m/s at which the winch lets out the cable
+    released: bool = False  # the gripper has let go of cable and load
     plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none
 
     instant: Row | None = None  # the packed `Instant`, if available: machine code makes frames of it

@@ -303,7 +303,7 @@ def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     length = s.distance if s.taut else s.cable_length  # a slack cable is longer than its ends are apart
-    return (winch_status_message(s.now_us, length, s.tension, s.reel_rate),)
+    return (winch_status_message(s.now_us, length, s.tension, s.reel_rate, s.released),)
 
 
 def _autopilot_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -222,6 +222,11 @@ class VehicleView:
         return (motion.y, motion.x, -motion.z), math.hypot(motion.vx, motion.vy, motion.vz)
 
     @property
+    def load_released(self) -> bool | None:
+        winch = self.latest.get("WINCH_STATUS")
+        return None if winch is None else bool(winch.status & mavlink.MAV_WINCH_STATUS_ABANDON_LINE)
+
+    @property
     def rotor_use(self) -> float | None:
         """The greatest rotor force over its limit; None for a vehicle without limits."""
         rotors = self.latest.get("ROTOR_STATE")

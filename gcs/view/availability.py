@@ -40,6 +40,7 @@ def unavailable_actions(view: VehicleView) -> dict[str, str]:
         "land": grounded or _TERMINATED.get(phase, ""),
         "return": grounded or _NOT_TO_RETURN.get(phase, ""),
         "goto": grounded or _NOT_TO_HOLD.get(phase, ""),
+        "release": "the load is released already" if view.load_released else "",
     }
     return {action: reason for action, reason in reasons.items() if reason}
 

@@ -206,6 +206,13 @@ def test_the_winch_reports_the_length_of_the_cable_and_its_tension_as_a_weight(s
     assert winch.line_length == pytest.approx(0.7)
 
 
+@pytest.mark.parametrize("released", [False, True])
+def test_the_winch_says_whether_cable_and_load_are_let_go_of(snap, released):
+    (winch,) = sent(mavlink.MAVLINK_MSG_ID_WINCH_STATUS, snap(released=released))
+    assert bool(winch.status & mavlink.MAV_WINCH_STATUS_ABANDON_LINE) == released
+    assert winch.status & mavlink.MAV_WINCH_STATUS_HEALTHY
+
+
 def test_servo_outputs_stay_within_what_a_servo_means(snap):
     (servo,) = sent(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, snap(**FLYING))
     assert (servo.servo1_raw, servo.servo2_raw, servo.servo3_raw, servo.servo4_raw) == (

@@ -316,10 +316,13 @@ def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thru
     return _ATTITUDE_TARGET, attitude_target_values(now_us, quat_wxyz, omega_body, thrust_fraction)
 
 
-def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Fields:
+def winch_status_message(
+    now_us: int, cable_length: float, tension: float, rate: float = 0.0, released: bool = False
+) -> Fields:
     """WINCH_STATUS: `tension` in N, sent as the weight of that many kg; `rate` in m/s at which the cable gets
-    longer; voltage and current are unknown."""
+    longer; `released`: cable and load are let go of. Voltage and current are unknown."""
     moving = mavlink.MAV_WINCH_STATUS_MOVING if rate != 0.0 else 0
+    abandoned = mavlink.MAV_WINCH_STATUS_ABANDON_LINE if released else 0
     return _WINCH_STATUS, (
         now_us,
         cable_length,
@@ -327,6 +330,6 @@ def winch_status_message(now_us: int, cable_length: float, tension: float, rate:
         tension / _STANDARD_GRAVITY,
         math.nan,
         math.nan,
-        mavlink.MAV_WINCH_STATUS_HEALTHY | moving,
+        mavlink.MAV_WINCH_STATUS_HEALTHY | moving | abandoned,
         0x7FFF,
     )

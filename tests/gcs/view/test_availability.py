@@ -9,9 +9,11 @@ import pytest
 
 from autopilot.onboard.snapshot import flight_status
 from autopilot.services import identity, requests
+from autopilot.services.records import Verdict
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import Flight, MissionPlan, Phase
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert.telemetry import winch_status_message
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.vehicle_view import VehicleView
 from gcs.view.availability import unavailable_actions
@@ -28,6 +30,7 @@ REQUESTS: dict[str, tuple[Any, ...]] = {
     "land": (requests.Land(),),
     "return": (requests.SetMode(identity.AUTO, identity.AUTO_RTL),),
     "goto": (requests.Reposition(0.5, 0.5, 2.0, True),),
+    "release": (requests.Release(),),
 }
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
@@ -61,7 +64,8 @@ def reported(flight: Flight, items: int) -> VehicleView:
     setpoint = mavlink.MAVLink_load_setpoint_message(**SETPOINT | {"phase": status.phase})
     current = mavlink.MAVLink_mission_current_message(status.seq, items, status.mission_state)
     beat = heartbeat(status.armed, status.main_mode, status.sub_mode)
-    return view_of(beat, setpoint, current, landed(status.landed_state), sys_status(True))
+    winch = winch_status_message(0, 0.7, 0.0, status.reel_rate, status.released)
+    return view_of(beat, setpoint, current, landed(status.landed_state), sys_status(True), winch)
 
 
 SETPOINT: dict[str, Any] = dict.fromkeys(mavlink.MAVLink_load_setpoint_message.fieldnames, 0)
@@ -88,6 +92,18 @@ def test_a_vehicle_on_the_ground_is_armed_for_its_mission_and_a_vehicle_in_the_a
     assert set(ground) == {"disarm", "resume", "hold", "land", "return", "goto"}
     air = unavailable_actions(reported(flight_in(Phase.HOLD, False, PLAN), 5))
     assert air == {"arm": "armed already", "disarm": "in the air: land first", "takeoff": "in the air"}
+
+
+@pytest.mark.parametrize("phase", Phase)
+def test_a_load_that_is_released_is_not_released_again(phase: Phase) -> None:
+    before = flight_in(phase, False, PLAN)
+    after, _ = decide(before, requests.Release(), seen_in(phase), SETTINGS)
+    assert "release" not in unavailable_actions(reported(before, 5))
+    assert unavailable_actions(reported(after, 5))["release"] == "the load is released already"
+    assert decide(after, requests.Release(), seen_in(phase), SETTINGS) == (
+        after,
+        Verdict(ACCEPTED, "Gripper: the load is released already"),
+    )
 
 
 def test_what_is_held_at_rest_is_held_already_and_what_still_stops_is_not() -> None:
