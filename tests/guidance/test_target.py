@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import atan2, cos, degrees, isnan, pi, radians, remainder, sin, tau
+from random import Random
 
 import pytest
 
@@ -117,7 +119,7 @@ def test_the_place_beside_a_target_that_turns_moves_round_with_it(angle_deg: flo
     def place_at(t: float) -> tuple[Vec3, ...]:
         position, velocity, accel = round_a_circle(20.0, 0.15, t)
         course = atan2(velocity[1], velocity[0])
-        setpoint = Target(position, velocity, course, 0, accel, 0.15).setpoint(place)
+        setpoint = Target(position, velocity, course, 0, accel, 0.15, moves=True).setpoint(place)
         return setpoint.position, setpoint.velocity, setpoint.accel, setpoint.accel_rate
 
     h = 1e-4
@@ -127,5 +129,68 @@ def test_the_place_beside_a_target_that_turns_moves_round_with_it(angle_deg: flo
 
 
 def test_the_turning_of_a_slow_target_is_noise() -> None:
-    slow = Target(ZERO, (0.5, 0.0, 0.0), 0.0, 0, ZERO, 1.0)
+    slow = Target(ZERO, (0.5, 0.0, 0.0), 0.0, 0, ZERO, 1.0, moves=True)
     assert slow.setpoint(BEHIND).velocity == (0.5, 0.0, 0.0)
+
+
+def reports(
+    target: Target, velocity: Vec3, seconds: int, noise: float = 0.0, rng: Random | None = None
+) -> Iterator[Target]:
+    """A report a second of a target at this velocity, with noise in the level velocities."""
+    for _ in range(seconds):
+        level = ((v + rng.gauss(0.0, noise) if rng else v) for v in velocity[:2])
+        now_us = target.at_us + SECOND_US
+        target = target.reported(add(target.position, velocity), (*level, velocity[2]), None, now_us, BEHIND)
+        yield target
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("moved", [False, True])
+def test_noise_of_its_velocity_moves_no_place_beside_a_target_that_stands(noise: float, moved: bool) -> None:
+    """A boat at its mooring, for twenty minutes."""
+    for seed in range(20):
+        moored = first_report((10.0, 0.0, 0.0), None, None, 0, (10.0, 7.0, 2.0))
+        if moved:
+            *_, moored = reports(moored, (0.0, -2.0, 0.0), 5)
+            *_, moored = reports(moored, ZERO, 10)
+        before = moored.setpoint(BEHIND)
+        for target in reports(moored, ZERO, 1200, noise, Random(seed)):
+            setpoint = target.setpoint(BEHIND)
+            assert (setpoint.position, setpoint.heading) == (before.position, before.heading)
+            assert not target.moves and setpoint.accel == ZERO
+
+
+@pytest.mark.parametrize(("noise", "within_deg"), [(0.0, 1e-9), (0.1, 20.0), (0.2, 40.0)])
+def test_the_course_of_a_target_that_walks_is_followed(noise: float, within_deg: float) -> None:
+    """At 0.5 m/s, from rest; measured 16 deg and 33 deg at most."""
+    for seed in range(20):
+        start = first_report((10.0, 0.0, 0.0), None, None, 0, (10.0, 7.0, 2.0))
+        for k, target in enumerate(reports(start, (0.0, 0.5, 0.0), 100, noise, Random(seed))):
+            error = remainder(target.course - 0.5 * pi, tau)
+            if k >= 20 or (not noise and k >= 10):
+                assert abs(degrees(error)) <= within_deg
+        assert target.moves
+
+
+def test_a_target_that_moves_stands_only_at_a_lower_speed_than_the_one_at_which_it_starts() -> None:
+    speed = (0.35, 0.0, 0.0)
+    *_, started = reports(first_report(ZERO, None, None, 0, ZERO), speed, 30)
+    *_, slowed = reports(east_going(0.0), (0.5, 0.0, 0.0), 30)
+    *_, slowed = reports(slowed, speed, 30)
+    assert (started.moves, slowed.moves) == (False, True)
+    for target in (started, slowed):
+        assert target.setpoint(BEHIND).velocity == pytest.approx(speed, abs=1e-3)
+
+
+def test_a_target_that_stops_at_once_stands_at_once() -> None:
+    """What is left of its mean velocity moves nothing."""
+    for target in reports(east_going(2.0), ZERO, 30):
+        assert target.setpoint(BEHIND).velocity == ZERO
+        assert target.course == 0.0
+    assert not target.moves
+
+
+def test_a_target_that_only_rises_is_followed_at_once() -> None:
+    over_target = replace(BEHIND, height_over_target=True)
+    *_, rising = reports(east_going(0.0), (0.0, 0.0, 1.0), 1)
+    assert rising.setpoint(over_target).velocity == (0.0, 0.0, 1.0)
