@@ -75,11 +75,11 @@ class PositionSetpoint:
     accel_rate: Vec3 = ZERO  # m/s^3
 
     def smoother_input(self, now_us: int, limits: FollowLimits) -> Point:
-        """Position, velocity and acceleration that the smoother turns into this motion at `now_us`. NaN stays
-        NaN in the position; an acceleration alone changes neither position nor velocity."""
-        push = _limited(_nan_to_zero(self.accel), limits.accel)
-        alone, j = self.acceleration_only_part(push), self.accel_rate
-        x, v, a = self.position, _limited(_nan_to_zero(self.velocity), limits.max_speed), sub(push, alone)
+        """Position, velocity and acceleration that the smoother turns into this motion at `now_us`, without
+        what is requested by an acceleration alone. NaN stays NaN in the position."""
+        push, j = self._push(limits), self.accel_rate
+        x, v = self.position, _limited(_nan_to_zero(self.velocity), limits.max_speed)
+        a = sub(push, self.acceleration_only_part(push))
         age_s = max(0.0, (now_us - self.since_us) * 1e-6)
         t = min(age_s, MAX_CURVED_S)
         x = axpy(t * t * t / 6.0, j, axpy(0.5 * t * t, a, axpy(t, v, x)))
@@ -87,7 +87,14 @@ class PositionSetpoint:
         if age_s > MAX_CURVED_S:
             x, a, j = axpy(age_s - t, v, x), ZERO, ZERO
         x, v, a = _input_of((x, v, a, j), limits.rate)
-        return x, _limited(v, limits.max_speed), add(a, alone)
+        return x, _limited(v, limits.max_speed), a
+
+    def push_alone(self, limits: FollowLimits) -> Vec3:
+        """The acceleration on the axes on which nothing else is requested."""
+        return self.acceleration_only_part(self._push(limits))
+
+    def _push(self, limits: FollowLimits) -> Vec3:
+        return _limited(_nan_to_zero(self.accel), limits.accel)
 
     def after(self, before: Setpoint | None, max_accel: float) -> PositionSetpoint:
         """This setpoint as the next of a path: one with position and velocity gets the acceleration of the
@@ -359,13 +366,13 @@ def governor_point(
     if aim[2] < FLOOR_M:
         distance = (distance[0], distance[1], FLOOR_M - x[2])
         along = (along[0], along[1], max(along[2], 0.0))
-    push_alone = coasting = ZERO
+    coasting = ZERO
     if isinstance(setpoint, PositionSetpoint):
         # the velocity to which an acceleration alone leads in the time in which velocities are reached
-        push_alone = setpoint.acceleration_only_part(push)
-        coasting = _limited(setpoint.acceleration_only_part(axpy(1.0 / K_V, push, v)), limits.max_speed)
+        reached = axpy(1.0 / K_V, setpoint.push_alone(limits), v)
+        coasting = _limited(setpoint.acceleration_only_part(reached), limits.max_speed)
     # as the place accelerates; what is left of the acceleration brings the point to it, however it moves
-    push = _limited(sub(push, push_alone), FORWARD_SHARE * limits.accel)
+    push = _limited(push, FORWARD_SHARE * limits.accel)
     accel_left = limits.accel - norm(push)
     # a velocity that leads away from the place is overcome
     away_speed = max(-dot(along, distance) / max(norm(distance), 1e-9), 0.0)
