@@ -30,8 +30,7 @@ from autopilot.control.thesis_cascade import (
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 
-# tan 45 deg
-_TILT_TANGENT = 1.0
+MAX_LEAN_TANGENT = 1.0  # tan 45 deg
 # least and greatest upward force, in weights
 _MIN_LIFT = 0.2
 _MAX_LIFT = 1.6
@@ -78,7 +77,7 @@ def limited_force(F: Vec3, weight: float) -> Vec3:
     """F with an upward part of 0.2 to 1.6 weights, for which the vehicle leans no more than 45 deg."""
     up = min(_MAX_LIFT * weight, max(_MIN_LIFT * weight, F[2]))
     sideways = norm((F[0], F[1], 0.0))
-    shrink = min(1.0, _TILT_TANGENT * leaning_lift(up, weight) / max(sideways, 1e-9))
+    shrink = min(1.0, MAX_LEAN_TANGENT * leaning_lift(up, weight) / max(sideways, 1e-9))
     return (shrink * F[0], shrink * F[1], up)
 
 

@@ -14,9 +14,11 @@ for each newton of thrust and m/s across it (`sitl.plant.air`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from math import cos, degrees, hypot, pi, radians, sin, tan
+from math import atan, cos, degrees, hypot, pi, radians, sin, tan
 from typing import NamedTuple
 
+from autopilot.control.quad_position import MAX_LEAN_TANGENT
+from autopilot.supervisor.requests.arming import GROUND_SPEED_M_S
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, excess_text
 from autopilot.vehicle.file import load_truth_and_belief
 from gcs.errors import InputError
@@ -24,13 +26,11 @@ from gcs.workflows.flight_options import Settings
 from missions.model import KINDS, AttitudeRun
 from sitl.plant.cable_drag import DRAG_COEFFICIENT
 from sitl.plant.records import Truth
-from sitl.vehicles.sim_parameters import apply, sim_parameters
+from sitl.vehicles.sim_parameters import apply, definitions, sim_parameters
 from sitl.vehicles.truth import truth_of
 
 WIND_PARAMETERS = ("SIM_WIND_E", "SIM_WIND_N")
-MAX_WIND_M_S = 50.0  # that these can have
-_MAX_LEAN = radians(45.0)  # of `autopilot.control.quad_position`, which flies while the cable is slack
-_ARMING_SPEED_M_S = 0.3  # a vehicle that is blown along faster is not armed
+_MAX_LEAN = atan(MAX_LEAN_TANGENT)  # of the law that flies while the cable is slack
 _BISECTIONS = 40
 
 
@@ -51,11 +51,11 @@ class Lack(NamedTuple):
 def split_wind(settings: Settings) -> tuple[float, list[tuple[str, float]]]:
     """The speed (m/s) of the wind among the settings, and the other settings; InputError if it is out of
     range."""
-    given = list(settings)
+    given, max_wind_m_s = list(settings), _max_wind_m_s()
     wind = dict(one for one in given if one[0] in WIND_PARAMETERS)
     for name, value in wind.items():
-        if not abs(value) <= MAX_WIND_M_S:
-            raise InputError(f"--set {name} = {value:g} m/s; must be -{MAX_WIND_M_S:g} ... {MAX_WIND_M_S:g}")
+        if not abs(value) <= max_wind_m_s:
+            raise InputError(f"--set {name} = {value:g} m/s; must be -{max_wind_m_s:g} ... {max_wind_m_s:g}")
     return hypot(0.0, *wind.values()), [one for one in given if one[0] not in WIND_PARAMETERS]
 
 
@@ -73,7 +73,7 @@ class Craft:
 
     def limit(self, reports: Sequence[PathReport] = ()) -> WindLimit | None:
         """The greatest wind that the vehicle withstands along these paths; None if it withstands any."""
-        low, high = 0.0, MAX_WIND_M_S
+        low, high = 0.0, _max_wind_m_s()
         first = next(self.lacks(high, reports), None)
         if first is None:
             return None
@@ -93,7 +93,7 @@ class Craft:
 
     def _on_ground(self, wind_m_s: float) -> Iterator[Lack]:
         t = self._truth
-        across_m_s = max(wind_m_s - _ARMING_SPEED_M_S, 0.0)
+        across_m_s = max(wind_m_s - GROUND_SPEED_M_S, 0.0)
         drag_n = self._drag_n(across_m_s, t.load_drag, t.load_drag_quadratic)
         friction_n = t.friction * self._weight_n(t.load_mass)
         if drag_n > friction_n:
@@ -171,6 +171,13 @@ class Craft:
             leans_more = weight_n * tan(lean) < level_n + thrust_n * self._rotor_drag * air_m_s
             low, high = (lean, high) if leans_more else (low, lean)
         return low, weight_n * cos(low) + level_n * sin(low)
+
+
+def _max_wind_m_s() -> float:
+    """The greatest wind that the simulator can be given."""
+    limits = definitions().parameters[WIND_PARAMETERS[0]].range
+    assert limits is not None
+    return limits[1]
 
 
 def _lack(item: int, quantity: str, value: float, limit: float, text: str, reason: str) -> Lack:
