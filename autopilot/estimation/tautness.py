@@ -110,16 +110,28 @@ def orthogonal_axis(q: Vec3, across: Vec3) -> Vec3:
 
 
 @kernel
-def load_height_var(load: LoadEstimate, history: History) -> float:
-    """Variance of the height (m^2) of a load at the end of its taut cable."""
+def load_vertical_var(
+    load: LoadEstimate, history: History, vehicle: int, cable: int, of_length: float, noise_var: float
+) -> float:
+    """Variance of the height or the climb rate of a load at the end of its taut cable, and of a noise.
+
+    `vehicle` is the row of the height or climb rate of the vehicle, `cable` the first of the direction of the
+    cable or of its rate, and `of_length` what the height changes by with the length.
+    """
     P, along, L = history.covariance, cross(load.q_cable, load.across), load.length
-    rows = (POSITION + 2, DIRECTION, DIRECTION + 1, LENGTH)
-    factors = (1.0, L * load.across[2], L * along[2], load.q_cable[2])
-    variance = 0.0
+    rows = (vehicle, cable, cable + 1, LENGTH)
+    factors = (1.0, L * load.across[2], L * along[2], of_length)
+    variance = noise_var
     for i in range(4):
         for j in range(4):
             variance += factors[i] * factors[j] * P[rows[i], rows[j]]
     return variance
+
+
+@kernel
+def load_height_var(load: LoadEstimate, history: History) -> float:
+    """Variance of the height (m^2) of a load at the end of its taut cable."""
+    return load_vertical_var(load, history, POSITION + 2, DIRECTION, load.q_cable[2], 0.0)
 
 
 @kernel

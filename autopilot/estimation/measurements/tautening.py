@@ -34,9 +34,10 @@ from autopilot.estimation.tautness import (
     has_risen,
     is_never_observed,
     load_height_var,
+    load_vertical_var,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, cross
+from autopilot.geometry.linear import Vec3
 
 GROUND_LOAD_HEIGHT_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
 GROUND_LOAD_SPEED_STD = 0.05  # m/s, of its velocity
@@ -53,12 +54,8 @@ def _may_rest(load: LoadEstimate, history: History) -> bool:
     hang long before anything else shows it."""
     if has_risen(load, history):
         return False
-    P, along, L = history.covariance, cross(load.q_cable, load.across), load.length
-    rows, factors = (VELOCITY + 2, RATE, RATE + 1), (1.0, L * load.across[2], L * along[2])
-    variance = GROUND_LOAD_SPEED_STD * GROUND_LOAD_SPEED_STD
-    for i in range(3):
-        for j in range(3):
-            variance += factors[i] * factors[j] * P[rows[i], rows[j]]
+    noise_var = GROUND_LOAD_SPEED_STD * GROUND_LOAD_SPEED_STD
+    variance = load_vertical_var(load, history, VELOCITY + 2, RATE, 0.0, noise_var)
     return load.v_load[2] * load.v_load[2] <= HELD_SIGMAS * HELD_SIGMAS * variance
 
 
