@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +10,6 @@ from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
-import click
 from platformdirs import user_state_path
 
 from autopilot.onboard.onboard import SIMULATOR_SYSTEM, Onboard
@@ -40,21 +38,14 @@ from autopilot.shell.options import (
     EXIT_USAGE,
     MAX_DATAGRAM_BYTES,
     Address,
-    NonEmptyPath,
-    ProgramCommand,
     Stop,
     StopRequest,
-    address_option,
     address_text,
-    home_option,
-    ignore_option,
     os_error_text,
     print_errors,
     reduce_latency,
     send,
     set_timeout,
-    setting_option,
-    signing_key_option,
 )
 from autopilot.shell.setting_names import check_names
 from autopilot.shell.steady_clock import SteadyClock
@@ -66,7 +57,7 @@ from autopilot.shell.watched_calls import watched_calls
 from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
-from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -354,11 +345,6 @@ def _store_signing_key(store: Storage, key: bytes) -> None:
         raise AutopilotError(f"the signing key cannot be stored: {os_error_text(error)}") from None
 
 
-def _address_or_none(text: str) -> Address | None:
-    """PORT, HOST:PORT or `none`."""
-    return None if text == "none" else address_option(text)
-
-
 def links_text(stations: Sequence[Address], programs: Sequence[Address], tcp: Address | None) -> str:
     """Where ground stations and programs can connect, for the terminal."""
     kinds = (("ground stations at UDP", stations), ("API clients at UDP", programs))
@@ -368,99 +354,7 @@ def links_text(stations: Sequence[Address], programs: Sequence[Address], tcp: Ad
     return ", ".join(sends + listens) or "no link to a ground station"
 
 
-@click.command("autopilot", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--sim",
-    type=address_option,
-    metavar="[HOST:]PORT",
-    default="127.0.0.1:4560",
-    show_default=True,
-    help="Address of the simulator.",
-)
-@click.option(
-    "--gcs",
-    type=_address_or_none,
-    metavar="[HOST:]PORT",
-    multiple=True,
-    default=("127.0.0.1:14550",),
-    show_default=True,
-    help="Ground station to send to; repeatable, `none` for none.",
-)
-@click.option(
-    "--api",
-    type=_address_or_none,
-    metavar="[HOST:]PORT",
-    multiple=True,
-    default=("127.0.0.1:14540",),
-    show_default=True,
-    help="API client to send to; repeatable, `none` for none.",
-)
-@click.option(
-    "--tcp",
-    type=address_option,
-    metavar="[HOST:]PORT",
-    help="Listen for TCP connections of ground stations, e.g. at 127.0.0.1:5760.",
-)
-@click.option(
-    "--ground-lockstep",
-    type=address_option,
-    metavar="[HOST:]PORT",
-    help="One ground station in lockstep, instead of --gcs and --api.",
-)
-@click.option(
-    "--vehicle",
-    default="bebop",
-    show_default=True,
-    metavar="NAME|FILE",
-    help=f"The vehicle that the autopilot assumes: {VEHICLES.choice()}.",
-)
-@click.option(
-    "--law",
-    metavar="NAME|FILE:CLASS",
-    help=f"Control law: {', '.join(LAWS)}, or your own (docs/laws.md).  [default: CTL_LAW]",
-)
-@click.option(
-    "--estimator",
-    default="",
-    metavar="FILE:CLASS",
-    help="Your own estimator (docs/estimators.md).",
-)
-@click.option(
-    "--planner",
-    default="",
-    metavar="FILE:CLASS",
-    help="Your own path planner (docs/planners.md).",
-)
-@click.option(
-    "--set",
-    "settings",
-    type=setting_option,
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.",
-)
-@ignore_option
-@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
-@click.option(
-    "--storage",
-    type=NonEmptyPath(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Folder that stores mission and parameters.  [default: the user's state directory]",
-)
-@click.option(
-    "--signing-key",
-    type=signing_key_option,
-    metavar="FILE",
-    help="Accept only messages signed with this key (64 hexadecimal digits or a pass phrase), and store it.",
-)
-@click.option(
-    "--allow-setup-signing",
-    is_flag=True,
-    help="Accept a first signing key from any sender of SETUP_SIGNING.",
-)
-@click.option("--quiet", is_flag=True, help="Print errors only.")
-@click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
-def main(
+def fly(
     sim: Address,
     gcs: tuple[Address | None, ...],
     api: tuple[Address | None, ...],
@@ -478,13 +372,12 @@ def main(
     allow_setup_signing: bool,
     quiet: bool,
 ) -> None:
-    """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
+    """Run the program with these options of its command (`autopilot.shell.command`)."""
 
     def notify(text: str) -> None:
         if not quiet:
             print(f"autopilot: {text}", flush=True)
 
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to finish
     program: Program | None = None
     origin = home or Home()
     lockstep = ground_lockstep is not None
@@ -560,7 +453,3 @@ def main(
     if program is not None:
         cost = "" if lockstep else program.cost.summary()
         notify("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
-
-
-if __name__ == "__main__":
-    main()

@@ -371,7 +371,7 @@ BAD = {
     "gcs/report/page.py": "import logging.handlers",
 }
 GOOD = {
-    "autopilot/__main__.py": "from autopilot.shell.program import main",
+    "autopilot/__main__.py": "from autopilot.shell.command import main",
     "autopilot/shell/program.py": "import socket, time\nfrom autopilot.core.flight_core import FlightCore",
     "autopilot/core/tick.py": (
         "from autopilot.control.laws.interface import kernels_of\nfrom autopilot.supervisor import quiescence"

@@ -1,5 +1,5 @@
 """Commands that only talk to a vehicle do not load numba, which takes longer than all else that they do; nor
-does `gcs fly` before it has started its programs."""
+does `gcs fly` before it has started its programs, or `autopilot` before it knows its options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import pytest
 
 COMMANDS = ("status", "control", "param", "capture", "report", "compare", "new", "warmup", "view", "recorded")
 WORKFLOWS = ("status", "parameters", "readiness", "warmup", "vehicle_processes", "before_flight", "fly")
-MODULES = [*(f"gcs.commands.{name}" for name in COMMANDS), *(f"gcs.workflows.{name}" for name in WORKFLOWS)]
+MODULES = [
+    "autopilot.shell.command",
+    *(f"gcs.commands.{name}" for name in COMMANDS),
+    *(f"gcs.workflows.{name}" for name in WORKFLOWS),
+]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from autopilot.shell.program import main as autopilot
+from autopilot.shell.command import main as autopilot
 from gcs.cli import gcs
 from sitl.shell.program import main as sitl
 

@@ -8,8 +8,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from autopilot.shell.command import main as autopilot
 from autopilot.shell.options import address_option
-from autopilot.shell.program import main as autopilot
 from gcs.cli import gcs
 from gcs.shell.link import free_port
 from sitl.shell.program import main as sitl

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.shell import program
+from autopilot.shell.command import main
 from autopilot.shell.options import Stop
 from autopilot.shell.storage import PARAMETER_FILE, Storage
 from autopilot.wire.dialect import plumbline as m
@@ -47,7 +48,7 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
     def start(*options: str) -> Craft:
         places = ("--storage", str(tmp_path), "--ground-lockstep", str(free_port()))
-        result = CliRunner().invoke(program.main, [*places, *options, "--quiet"])
+        result = CliRunner().invoke(main, [*places, *options, "--quiet"])
         assert (result.exit_code, result.stdout) == (0, ""), result.output
         craft = Craft()
         craft.onboard = found.pop()
@@ -141,7 +142,7 @@ def test_links_and_storage_are_told_at_the_start(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(program, "Program", Ended)
     interrupt = signal.getsignal(signal.SIGINT)
     options = ["--storage", str(tmp_path), "--ground-lockstep", str(port := free_port())]
-    result = CliRunner().invoke(program.main, options)
+    result = CliRunner().invoke(main, options)
     signal.signal(signal.SIGINT, interrupt)
     told = f"autopilot: sends to ground stations at UDP 127.0.0.1:{port}; storage {tmp_path}\n"
     assert told in result.stdout

@@ -6,7 +6,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from autopilot.shell.program import main as autopilot
+from autopilot.shell.command import main as autopilot
 from autopilot.shell.setting_names import check_names
 from sitl.shell.program import main as sitl
 
