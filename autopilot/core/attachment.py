@@ -1,8 +1,8 @@
 """A cable that is attached away from the vehicle's centre of mass, by the parameters VEH_ATT_.
 
 Estimator and laws assume a cable attached at the vehicle's position. Therefore the readings of this position
-are shifted to the point of attachment, and that point is estimated, flown and reported as the vehicle's
-position. The moment of the cable's pull is compensated by the rotors' moments.
+and of the direction to the load are shifted to the point of attachment, and that point is estimated, flown
+and reported as the vehicle's position. The moment of the cable's pull is compensated by the rotors' moments.
 
 | symbol | code | frame, unit | |
 |---|---|---|---|
@@ -18,12 +18,14 @@ plant has both.
 
 from __future__ import annotations
 
+from math import sqrt
+
 from autopilot.control.records import State, Vehicle
-from autopilot.estimation.inbox import FIX, HEIGHT, KIND, POSE, READING
-from autopilot.estimation.records import Array, EstimatorState, GnssReading, PoseReading
+from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, KIND, POSE, READING
+from autopilot.estimation.records import Array, DirectionReading, EstimatorState, GnssReading, PoseReading
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import Vec3, add, apply, apply_transposed, column, cross, dot, scale
+from autopilot.geometry.linear import Vec3, add, apply, apply_transposed, column, cross, dot, norm, scale, sub
 from autopilot.geometry.packed import pack, unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -36,9 +38,27 @@ def off_centre(vehicle: Vehicle) -> bool:
 
 
 @kernel
+def direction_from_attachment(seen: Vec3, distance: float, attachment: Vec3) -> Vec3:
+    """The direction (body, as long as `seen`) from the attachment to a load at this `distance` (m) from it,
+    which is `seen` from the centre of mass: at s seen, with |s seen - rho| = distance.
+
+    A direction that is zero is unchanged, and so is one to a load that is nearer than the centre of mass: a
+    line of sight may pass by all points at that distance.
+    """
+    seen2, along = dot(seen, seen), dot(seen, attachment)
+    beyond = distance * distance - dot(attachment, attachment)
+    if not (beyond > 0.0 and seen2 > 0.0):
+        return seen
+    s = (along + sqrt(along * along + seen2 * beyond)) / seen2
+    return scale(sqrt(seen2) / distance, sub(scale(s, seen), attachment))
+
+
+@kernel
 def shift_to_attachment(inbox: Array, count: int, estimator: EstimatorState, attachment: Vec3) -> None:
-    """Shift the readings of the vehicle's position and velocity, in the inbox, to the cable's attachment."""
+    """Shift the readings of the vehicle's position and velocity and of the direction to the load, in the
+    inbox, to the cable's attachment."""
     omega = estimator.vehicle.omega_body
+    distance = norm(sub(estimator.load.x_load, estimator.vehicle.x_quad))
     arm = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), attachment)
     arm_velocity = apply(rotation_from_quat(estimator.vehicle.quat_wxyz), cross(omega, attachment))
     for i in range(count):
@@ -54,6 +74,10 @@ def shift_to_attachment(inbox: Array, count: int, estimator: EstimatorState, att
             pack(with_field(fix, "velocity", add(fix.velocity, arm_velocity)), inbox[i], READING)
         elif inbox[i, KIND] == HEIGHT:
             inbox[i, READING] += arm[2]
+        elif inbox[i, KIND] == DIRECTION:
+            sight = unpack(DirectionReading, inbox[i], READING)
+            direction = direction_from_attachment(sight.direction_body, distance, attachment)
+            pack(with_field(sight, "direction_body", direction), inbox[i], READING)
 
 
 @kernel

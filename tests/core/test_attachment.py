@@ -9,8 +9,14 @@ from scipy.spatial.transform import Rotation
 from autopilot.control.believed import believed_vehicle
 from autopilot.control.records import State
 from autopilot.core.attachment import cable_moment, shift_to_attachment
-from autopilot.estimation.inbox import FIX, HEIGHT, POSE, READING, new_inbox, put_reading
-from autopilot.estimation.records import GnssReading, PoseReading, blank_state
+from autopilot.estimation.inbox import DIRECTION, FIX, HEIGHT, POSE, READING, new_inbox, put_reading
+from autopilot.estimation.records import (
+    DirectionReading,
+    EstimatorState,
+    GnssReading,
+    PoseReading,
+    blank_state,
+)
 from autopilot.geometry.packed import unpack
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.file import load_vehicle
@@ -75,3 +81,39 @@ def test_readings_are_told_of_where_the_cable_is_attached():
         assert speed == pytest.approx(np.array((0.1, 0.2, 0.3)) + beside, abs=1e-14)
     assert (moved.quat_wxyz, moved.position_std) == (QUAT, 1e-3)
     assert inbox[2, READING] == pytest.approx(3.0 + arm[2], abs=1e-14)
+
+
+def estimator_with_load(x_load: tuple[float, float, float]) -> EstimatorState:
+    """An estimate of the attachment at the origin and of the load at `x_load` (m)."""
+    blank = blank_state()
+    return blank._replace(load=blank.load._replace(x_load=x_load))
+
+
+def shifted_direction(estimator: EstimatorState, seen: tuple[float, float, float]) -> tuple[float, ...]:
+    """The direction to the load that the estimator gets where the camera sees this one (body)."""
+    inbox = new_inbox()
+    put_reading(inbox, 0, DIRECTION, 0, DirectionReading(0.0, seen, 4e-3))
+    shift_to_attachment(inbox, 1, estimator, RHO)
+    shifted = unpack(DirectionReading, inbox[0], READING)
+    assert shifted.direction_std == 4e-3
+    return shifted.direction_body
+
+
+@pytest.mark.parametrize("from_attachment", [(0.0, 0.0, -0.7), (0.2, -0.1, -0.6), (-0.3, 0.4, -0.2)])
+def test_the_direction_to_the_load_is_that_from_the_attachment(from_attachment):
+    """The camera sees the load from the centre of mass: 1 cm beside it are 14 mrad at 0.7 m of cable."""
+    seen = np.add(from_attachment, RHO)
+    unit = tuple((seen / np.linalg.norm(seen)).tolist())
+    expected = np.array(from_attachment) / np.linalg.norm(from_attachment)
+    estimator = estimator_with_load(from_attachment)
+    assert shifted_direction(estimator, unit) == pytest.approx(expected, abs=1e-14)
+    # what is not a direction is not made one
+    too_long = tuple((5.0 * np.array(unit)).tolist())
+    assert np.linalg.norm(shifted_direction(estimator, too_long)) == pytest.approx(5.0, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("x_load", "seen"), [((0.0, 0.0, 0.0), (0.6, 0.0, -0.8)), ((0.0, 0.0, -0.7), (0.0, 0.0, 0.0))]
+)
+def test_a_direction_stays_where_load_and_vehicle_are_at_one_place_and_where_it_is_none(x_load, seen):
+    assert shifted_direction(estimator_with_load(x_load), seen) == seen
