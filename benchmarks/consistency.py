@@ -8,6 +8,10 @@ error of the estimate with the filter's covariance ten times a second. Prints, f
 and each part of the error state, the share of instants inside the bounds that contain 95 % of a consistent
 filter's errors, and in brackets the NEES (error^T P^-1 error) per degree of freedom, 1 for a consistent
 filter. While the cable is slack, position and speed of the load replace direction and rate.
+
+Position and velocity are those of the point that the autopilot takes for the cable's attachment (VEH_ATT_);
+direction and rate are those of the line from this point to the load, which the sensors show and the laws use.
+If the cable is attached elsewhere, it has another direction.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from autopilot.core.tick import CoreConstants
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -37,7 +42,8 @@ from autopilot.estimation.records import (
     EstimatorState,
 )
 from autopilot.geometry.packed import unpack
-from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
+from autopilot.geometry.s2 import tangent
+from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply, rotation_from_quat
 from autopilot.supervisor.state import Phase
 from gcs.closed_loop import Conditions
 from gcs.experiments.marked_text import write_between
@@ -70,23 +76,31 @@ def error_of(flight: SweepFlight, estimate: EstimatorState) -> Array:
     plant = unpack(World, flight.world.world, 0).plant
     biases = unpack(ImuState, flight.world.errors[IMU], 0)
     vehicle, load = estimate.vehicle, estimate.load
+    attachment = unpack(CoreConstants, flight.core.rows.constants, 0).vehicle.attachment
+    R = np.array(rotation_from_quat(plant.quat_wxyz))
+    x_attachment = plant.x_quad + R @ attachment
+    v_attachment = plant.v_quad + R @ np.cross(plant.omega_body, attachment)
+    line = plant.x_load - x_attachment
+    distance = np.linalg.norm(line)
+    q = line / distance
+    q_dot = np.array(tangent(tuple(q), tuple(plant.v_load - v_attachment))) / distance
     axes = np.array([load.across, np.cross(load.q_cable, load.across)])
     rotation = quat_log(quat_multiply(plant.quat_wxyz, quat_conjugate(vehicle.quat_wxyz)))
     return np.concatenate(
         [
-            np.subtract(plant.x_quad, vehicle.x_quad),
-            np.subtract(plant.v_quad, vehicle.v_quad),
+            x_attachment - vehicle.x_quad,
+            v_attachment - vehicle.v_quad,
             rotation,
             np.subtract(biases.gyro_bias, vehicle.gyro_bias),
             np.subtract(biases.accel_bias, vehicle.accel_bias),
-            axes @ np.subtract(plant.q_cable, load.q_cable),
-            axes @ np.subtract(plant.q_cable_dot, load.q_cable_dot),
+            axes @ (q - load.q_cable),
+            axes @ (q_dot - load.q_cable_dot),
         ]
     )
 
 
 def add_nees(flight: SweepFlight, found: dict[str, list[tuple[float, int]]]) -> float:
-    """Add the NEES of this instant to `found`; returns the error of the cable's direction, rad."""
+    """Add the NEES of this instant to `found`; returns the error of the direction to the load, rad."""
     estimate = unpack(EstimatorState, flight.core.rows.estimator, 0)
     error, P = error_of(flight, estimate), flight.core.rows.history.covariance
     slack = estimate.load.taut == 0.0
