@@ -199,6 +199,37 @@ def test_a_breach_ends_when_nothing_has_crossed_the_line_for_some_time(action: i
     assert sky.texts.count(f"Fence: {text}") == sky.flight.area.breaches == 2
 
 
+def breached() -> Sky:
+    """Held inside the fence, shortly after a breach."""
+    sky = fenced().airborne()
+    eastward(sky, 6.0)
+    assert sky.flight.phase == Phase.HOLD
+    assert sky.flight.area.breach
+    return sky
+
+
+def test_a_breach_ends_with_the_fence() -> None:
+    sky = breached()
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=Fence()))
+    sky.tick()
+    assert sky.flight.area.breach == ""
+    sky = breached()
+    sky.settings = replace(sky.settings, fence=replace(sky.settings.fence, action=0))
+    sky.tick()
+    assert sky.flight.area.breach == ""
+
+
+@pytest.mark.parametrize("is_inside", [True, False])
+def test_a_breach_of_a_vehicle_that_has_landed_lasts_as_long_as_it_stands_outside(is_inside: bool) -> None:
+    sky = breached()
+    east = 0.0 if is_inside else 50.0
+    fence = Fence((Disc(True, (east, 0.0), 20.0),))
+    sky.flight = replace(sky.flight, phase=Phase.DISARMED, legs=())
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence))
+    sky.tick()
+    assert bool(sky.flight.area.breach) != is_inside
+
+
 def test_who_leads_the_load_out_again_is_stopped_again_before_the_breach_is_over() -> None:
     sky = fenced().airborne()
     west = FollowSetpoint(NOTHING, (-0.5, 0.0, 0.0), NOTHING, False)

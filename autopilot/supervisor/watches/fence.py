@@ -10,11 +10,13 @@ from autopilot.supervisor.motion import commanded_motion, stopping_legs, tracks_
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CARRYING,
+    ON_GROUND,
     WARNING,
     Event,
     Flight,
     Phase,
     View,
+    fence_problem,
     first_fence_violation,
     has_fence,
     interrupt_mission,
@@ -37,16 +39,17 @@ CLEAR_US = 5_000_000
 def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
     """React as GF_ACTION requires when the fence is breached, or the load can no longer stop before it.
 
-    The breach lasts until nothing has violated the fence for CLEAR_US. Meanwhile positions that cross the
-    line are noise, and only a commanded motion that leads out again calls for another reaction. A hold does
-    not end a return or a landing.
+    The breach lasts until nothing has violated the fence for CLEAR_US, or the vehicle has landed inside, or
+    the fence is gone. Meanwhile positions that cross the line are noise, and only a commanded motion that
+    leads out again calls for another reaction. A hold does not end a return or a landing.
     """
     area = flight.area
-    if (
-        flight.phase not in CARRYING
-        or not is_fence_active(flight, settings)
-        or not has_fence(flight, settings)
-    ):
+    is_fenced = is_fence_active(flight, settings) and has_fence(flight, settings)
+    if not is_fenced or flight.phase not in CARRYING:
+        here = view.x_quad if flight.cable.released else view.x_load
+        is_over = not is_fenced or (flight.phase in ON_GROUND and not fence_problem(flight, here, settings))
+        if is_over and area.breach:
+            flight = replace(flight, area=replace(area, breach=""))
         return WatchResult(flight)
     if isinstance(flight.legs[0], CatchLoad | LevelHold):
         return WatchResult(flight)
