@@ -225,6 +225,18 @@ def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
 
 
+@pytest.mark.parametrize(
+    ("repeat_from", "why"),
+    [(1, "the jump without end before it is not left"), (None, "nothing is flown from there")],
+)
+def test_an_item_behind_what_is_flown_is_refused_with_the_reason(repeat_from: int | None, why: str) -> None:
+    sky = Sky(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0)).airborne()
+    plan = replace(sky.flight.mission.plan, item_count=5, repeat_from=repeat_from)
+    sky.flight = with_plan(sky.flight, plan)
+    verdict = sky.ask(SetCurrent(4))
+    assert (verdict.result, verdict.text) == (mavlink.MAV_RESULT_DENIED, f"Mission item 4 denied: {why}")
+
+
 def test_arming_an_armed_vehicle_is_accepted_and_changes_nothing() -> None:
     sky = Sky().airborne()
     before = sky.flight
