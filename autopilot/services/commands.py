@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
 from autopilot.services import snapshot
-from autopilot.services.identity import SUPPORTED_MODES, Flavour, Identity, Mode
+from autopilot.services.identity import AUTO, AUTO_TAKEOFF, SUPPORTED_MODES, Flavour, Identity, Mode
 from autopilot.services.records import Announce, Decide, Output, Peer, RefusalCleared, Send, SendText, Verdict
 from autopilot.services.requests import (
     MAX_SPEED_M_S,
@@ -54,7 +54,7 @@ from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import turn_heading
 from autopilot.wire.parameter_table import decimal_from_float32
-from missions.model import LookAt
+from missions.model import LookAt, TurnHeading
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -62,11 +62,9 @@ UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
 _REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
-# A command repeated with `confirmation` within this time is the same command, whose ACK was lost
-REPEAT_US = 3_000_000
-# the same for the command that was accepted last: by the clock of a simulation that is faster than the
-# wall clock, a client that missed the ACK repeats it late
-LAST_REPEAT_US = 60_000_000
+# For this time a client that missed the ACK may repeat its command: QGroundControl after 3 s, others earlier
+REPEAT_US = 4_000_000
+DUPLICATE_US = 1_000_000  # for this time a frame that the network has duplicated may arrive again
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all
 _SPEEDS, _VERTICAL_SPEEDS = range(4), (2, 3)  # SPEED_TYPE
@@ -594,16 +592,41 @@ def _call_of_int(m: Any) -> Call:
     return Call(m.command, p, x, y, m.z, m.frame)
 
 
+def _is_relative(request: Request) -> bool:
+    """Whether the request moves the vehicle on if it is executed again; all others lead to one state."""
+    match request:
+        case TurnHeading(relative=relative):
+            return relative
+        case Winch(length_m):
+            return length_m != 0.0 and math.isfinite(length_m)
+        case StartMission(first):
+            return first is not None  # the mission begins again
+    return False
+
+
+def _is_takeoff(request: Request) -> bool:
+    """Whether the request is refused once the vehicle executes it."""
+    return isinstance(request, Takeoff) or (
+        isinstance(request, SetMode) and (request.main, request.sub) == (AUTO, AUTO_TAKEOFF)
+    )
+
+
 class _ExecutedCommand(NamedTuple):
-    """An accepted command and its time: a repetition is answered, not executed."""
+    """An accepted command, and when it, or its last repetition, arrived in which frame."""
 
     call: str
-    verdict: Verdict
     at_us: int
+    frame: bytes
+    confirmation: int
 
 
 class CommandService:
-    """Commands in, COMMAND_ACK out; the `decide` given with each message decides on the request."""
+    """Commands in, COMMAND_ACK out; the `decide` given with each message decides on the request.
+
+    A client that missed the ACK repeats its command. To execute it again leads to the same state, so this is
+    done: the vehicle may have left that state since. Only relative commands are recognised as repetitions,
+    and answered without being executed.
+    """
 
     def __init__(self, home: Home, identity: Identity) -> None:
         self.context = Context(home, identity.flavour, identity.rotors)
@@ -611,34 +634,50 @@ class CommandService:
         self._last: tuple[Peer, int] | None = None
 
     def _decide_and_answer(
-        self, call: str, command: int, request: Request, peer: Peer, now_us: int, decide: Decide
+        self, call: str, command: int, request: Request, message: Any, peer: Peer, now_us: int, decide: Decide
     ) -> list[Output]:
         """Have a request decided; return the answer."""
+        if _is_relative(request) and self._is_repetition(call, command, message, peer, now_us):
+            self._record_executed(call, command, message, peer, now_us)
+            return [_ack(command, ACCEPTED, peer)]
         verdict = decide(request)
-        if verdict.result in _REFUSED and self._is_repetition(call, command, peer, now_us):
+        if verdict.result in _REFUSED and _is_takeoff(request) and self._is_last(call, command, peer, now_us):
             return [_ack(command, ACCEPTED, peer)]
         if verdict.result == ACCEPTED and not isinstance(request, EndpointRequest):
-            self._record_executed(peer, command, call, verdict, now_us)
+            self._record_executed(call, command, message, peer, now_us)
+            self._last = (peer, command)
         return _answer(command, verdict, peer)
 
-    def _record_executed(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
-        self._executed = {k: d for k, d in self._executed.items() if now_us - d.at_us <= LAST_REPEAT_US}
-        self._executed[peer, command] = _ExecutedCommand(call, verdict, now_us)
-        self._last = (peer, command)
+    def _record_executed(self, call: str, command: int, message: Any, peer: Peer, now_us: int) -> None:
+        self._executed = {k: d for k, d in self._executed.items() if now_us - d.at_us <= REPEAT_US}
+        frame, confirmation = bytes(message.get_msgbuf()), _confirmation(message)
+        self._executed[peer, command] = _ExecutedCommand(call, now_us, frame, confirmation)
+
+    def _is_repetition(self, call: str, command: int, message: Any, peer: Peer, now_us: int) -> bool:
+        """Whether an executed command arrives again: the same frame, or one that the client has marked by
+        counting `confirmation` up."""
+        done = self._executed.get((peer, command))
+        if done is None or done.call != call:
+            return False
+        age_us = now_us - done.at_us
+        is_duplicate = message.get_msgbuf() == done.frame and age_us <= DUPLICATE_US
+        return is_duplicate or (_confirmation(message) > done.confirmation and age_us <= REPEAT_US)
+
+    def _is_last(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
+        """Whether the command that was accepted last has arrived again; some clients (MAVSDK) do not mark a
+        repetition."""
+        done = self._executed.get((peer, command))
+        if self._last != (peer, command) or done is None:
+            return False
+        return done.call == call and now_us - done.at_us <= REPEAT_US
 
     def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_LONG."""
-        call = _call_of_long(message)
-        if message.confirmation:
-            done = self._executed.get((peer, call.command))
-            limit_us = LAST_REPEAT_US if self._last == (peer, call.command) else REPEAT_US
-            if done and done.call == repr(call) and now_us - done.at_us <= limit_us:
-                return [_ack(call.command, done.verdict.result, peer)]
-        return self._execute(call, peer, now_us, decide)
+        return self._execute(_call_of_long(message), message, peer, now_us, decide)
 
     def receive_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_INT."""
-        return self._execute(_call_of_int(message), peer, now_us, decide)
+        return self._execute(_call_of_int(message), message, peer, now_us, decide)
 
     def receive_set_mode(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute SET_MODE, which is older than the command and is acknowledged like it."""
@@ -648,7 +687,7 @@ class CommandService:
         command = mavlink.MAV_CMD_DO_SET_MODE
         if isinstance(request, Verdict):
             return _answer(command, request, peer)
-        return self._decide_and_answer(repr(request), command, request, peer, now_us, decide)
+        return self._decide_and_answer(repr(request), command, request, message, peer, now_us, decide)
 
     def receive_set_current(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
@@ -656,25 +695,22 @@ class CommandService:
         outputs: list[Output] = [Announce(peer.link, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
         return _text_outputs(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict) + outputs
 
-    def _execute(self, call: Call, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+    def _execute(self, call: Call, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         parser = PARSERS.get(call.command)
         if parser is None:
             return [_ack(call.command, UNSUPPORTED, peer)]
         request = parser(call, self.context)
         if isinstance(request, Verdict):
             return _answer(call.command, request, peer)
-        outputs = self._decide_and_answer(repr(call), call.command, request, peer, now_us, decide)
+        outputs = self._decide_and_answer(repr(call), call.command, request, message, peer, now_us, decide)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
         return outputs
 
-    def _is_repetition(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
-        """Whether the command that was accepted last has arrived again: its ACK was lost, and some clients do
-        not mark a repetition. The supervisor may refuse it by now because its execution has begun."""
-        done = self._executed.get((peer, command))
-        if self._last != (peer, command) or done is None:
-            return False
-        return done.call == call and now_us - done.at_us <= REPEAT_US
+
+def _confirmation(message: Any) -> int:
+    """How often a client has repeated a command; 0 of messages that do not state it."""
+    return getattr(message, "confirmation", 0)
 
 
 def _text_outputs(command: int, verdict: Verdict) -> list[Output]:

@@ -127,6 +127,12 @@ def start_mission(target: Target) -> CommandOperation:
     return CommandOperation(target, "start", mavlink.MAV_CMD_MISSION_START)
 
 
+def fly_mission(target: Target) -> CommandOperation:
+    """Fly the mission from its current item, which is the first after an upload; a mission that is flown
+    already does not begin again."""
+    return CommandOperation(target, "start", mavlink.MAV_CMD_MISSION_START, (UNUSED,))
+
+
 def pause(target: Target) -> CommandOperation:
     """Hold the load where it is."""
     return CommandOperation(target, "pause", mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0.0,))

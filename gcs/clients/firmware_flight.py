@@ -103,6 +103,8 @@ class FirmwareFlight(FlightClient):
                 )
             case Stage.ARM:
                 return replace(row, operations=_arm)
+            case Stage.START:
+                return replace(row, operations=_start)
         return row
 
     def _set_arming_mode(self, client: FlightClient) -> list[Operation]:
@@ -132,6 +134,12 @@ def _upload(client: FlightClient) -> list[Operation]:
     assert client.connection.target is not None
     target = client.connection.target
     return [RepeatedOperation(lambda: MissionUpload(target, client.items), RETRY_PAUSE_US, READY_LIMIT_US)]
+
+
+def _start(client: FlightClient) -> list[Operation]:
+    """ArduPilot refuses a first item that is not 0."""
+    assert client.connection.target is not None
+    return [command.start_mission(client.connection.target)]
 
 
 def _arm(client: FlightClient) -> list[Operation]:

@@ -537,8 +537,9 @@ _TABLE = {
     Stage.UPLOAD: StageRow(Stage.READY, operations=_upload),
     Stage.READY: StageRow(Stage.ARM, is_done=_is_ready, limit_us=READY_LIMIT_US),
     Stage.ARM: StageRow(Stage.START, operations=_arm),
+    # repeated late, by the clock of a simulation that is faster than the wall clock, it begins nothing again
     Stage.START: StageRow(
-        Stage.FLY, stage_if_refused=Stage.DISARM, operations=_one_operation(command.start_mission)
+        Stage.FLY, stage_if_refused=Stage.DISARM, operations=_one_operation(command.fly_mission)
     ),
     Stage.DISARM: StageRow(Stage.OVER, operations=_one_operation(command.disarm)),
 }

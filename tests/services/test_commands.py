@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from pathlib import Path
 
 import pytest
 
-from autopilot.services.commands import FORCE_ARM, LAST_REPEAT_US, PARSERS, REPEAT_US
+from autopilot.services.commands import DUPLICATE_US, FORCE_ARM, PARSERS, REPEAT_US
 from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, PX4, Identity
 from autopilot.services.records import (
     ParameterChanged,
@@ -43,6 +44,7 @@ from autopilot.services.requests import (
     TurnHeading,
     Winch,
 )
+from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter
@@ -465,11 +467,92 @@ def test_set_current_message_is_answered_by_mission_current(rig_with, flavour, t
     assert rig.asked == [SetCurrent(5)]
 
 
-def test_a_repeated_command_is_acknowledged_but_done_once(rig):
-    rig.replies(long(22, (NAN,) * 7))
-    rig.verdict = lambda request: Verdict(DENIED, "already flying")
-    assert acks(rig.replies(long(22, (NAN,) * 7, confirmation=1))) == [(22, OK)]
+# executed twice, they lead elsewhere
+RELATIVE = [
+    pytest.param(long(42600, (1, 1, 0.1, 0.3)), id="winch"),
+    pytest.param(long(115, (20, 0, 1, 1)), id="yaw"),
+    pytest.param(long(300, (0,)), id="mission start"),
+]
+# executed twice, they lead to the same state
+ABSOLUTE = [
+    pytest.param(long(400, (1,)), id="arm"),
+    pytest.param(long(21), id="land"),
+    pytest.param(long(193, (0,)), id="pause"),
+    pytest.param(long(176, (1, 4, 3)), id="hold"),
+    pytest.param(long(42600, (1, 5)), id="winch stop"),
+    pytest.param(long(42600, (1, 6)), id="winch retract"),
+    pytest.param(long(115, (20, 0, 1, 0)), id="yaw from north"),
+    pytest.param(long(300, (NAN,)), id="mission start at the current item"),
+]
+
+
+def repeated(command, confirmation):
+    again = copy.copy(command)
+    again.confirmation = confirmation
+    return again
+
+
+@pytest.mark.parametrize("command", RELATIVE)
+def test_a_relative_command_that_is_repeated_as_its_ack_was_lost_is_done_once(rig, command):
+    """QGroundControl repeats after 3 s."""
+    for confirmation in range(3):
+        assert acks(rig.replies(repeated(command, confirmation))) == [(command.command, OK)]
+        rig.now_us += 3_500_000
     assert len(rig.asked) == 1
+
+
+@pytest.mark.parametrize("command", RELATIVE)
+def test_a_relative_command_whose_first_frame_was_lost_is_done_after_an_equal_one(rig, command):
+    rig.replies(command)
+    rig.now_us += REPEAT_US + 1
+    rig.replies(repeated(command, 1))
+    assert len(rig.asked) == 2, "too late for a repetition"
+    rig.replies(repeated(command, 1))
+    assert len(rig.asked) == 3, "a repetition would have counted on"
+
+
+@pytest.mark.parametrize("command", RELATIVE)
+def test_a_relative_command_that_is_given_twice_is_done_twice(rig, command):
+    for _ in range(2):
+        assert acks(rig.replies(command)) == [(command.command, OK)]
+    assert len(rig.asked) == 2
+
+
+@pytest.mark.parametrize("as_message", ["long", "int"])
+def test_a_frame_that_the_network_has_duplicated_is_done_once_and_told_once(rig, as_message):
+    rig.verdict = lambda request: Verdict(OK, "Winch: 1.20 m to 1.30 m")
+    parameters = (1.0, 1.0, 0.1, 0.3)
+    command = long(42600, parameters) if as_message == "long" else as_int(42600, 0, parameters)
+    frame = FrameWriter(255, 190).frame(command)
+    heard = []
+    for _ in range(3):
+        rig.send_bytes(frame)
+        heard += [r.message for r in rig.poll()["gcs"]]
+    assert len(rig.asked) == 1
+    assert acks(heard) == [(42600, OK)] * 3
+    assert [m.text for m in heard if m.get_type() == "STATUSTEXT"] == ["Winch: 1.20 m to 1.30 m"]
+    rig.now_us += DUPLICATE_US + 1
+    rig.send_bytes(frame)
+    assert len(rig.asked) == 2, "its number has come round"
+
+
+@pytest.mark.parametrize("command", ABSOLUTE)
+def test_a_command_that_leads_to_a_state_is_done_as_often_as_it_comes(rig, command):
+    """The vehicle may have left that state: it disarms by itself, for example, or lands in a failsafe."""
+    rig.replies(command)
+    assert acks(rig.replies(repeated(command, 1))) == [(command.command, OK)]
+    assert len(rig.asked) == 2
+    rig.verdict = lambda request: Verdict(DENIED, "Hold denied while in failsafe")
+    assert acks(rig.replies(repeated(command, 2))) == [(command.command, DENIED)]
+
+
+@pytest.mark.parametrize("take_off", [long(22, (NAN,) * 7), long(176, (1, 4, 2))], ids=["command", "mode"])
+def test_a_repeated_take_off_that_has_begun_is_not_refused(rig, take_off):
+    rig.replies(take_off)
+    rig.verdict = lambda request: Verdict(DENIED, "Take-off denied: it has begun already")
+    assert acks(rig.replies(repeated(take_off, 1))) == [(take_off.command, OK)]
+    rig.now_us += REPEAT_US
+    assert acks(rig.replies(repeated(take_off, 2))) == [(take_off.command, DENIED)]
 
 
 def test_a_command_that_comes_again_because_its_ack_was_lost_is_not_refused(rig):
@@ -491,31 +574,13 @@ def test_a_command_after_another_one_is_no_repetition(rig):
     assert acks(rig.replies(long(22, (NAN,) * 7))) == [(22, DENIED)]
 
 
-def test_a_marked_repetition_of_the_last_command_may_come_late(rig):
-    """By the clock of a simulation that is faster than the wall clock."""
-    rig.replies(long(300, (0,)))
-    rig.now_us += LAST_REPEAT_US // 2
-    assert acks(rig.replies(long(300, (0,), confirmation=1))) == [(300, OK)]
-    assert len(rig.asked) == 1
-    rig.replies(long(193, (0,)))
-    rig.now_us += REPEAT_US + 1
-    rig.replies(long(300, (0,), confirmation=1))
-    assert len(rig.asked) == 3, "after another command it is meant"
-
-
-def test_a_command_said_twice_is_done_twice(rig):
-    rig.replies(long(193, (0,)))
-    rig.replies(long(193, (0,)))
-    assert rig.asked == [Pause(), Pause()]
-
-
 @pytest.mark.parametrize("other", ["parameters", "asker", "late", "first refused"])
 def test_a_repetition_is_the_same_command_from_the_same_asker_soon_after(rig, other):
     if other == "first refused":
         rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
     rig.replies(long(300, (0,)))
     if other == "late":
-        rig.now_us += LAST_REPEAT_US + 1
+        rig.now_us += REPEAT_US + 1
     params = (1,) if other == "parameters" else (0,)
     rig.replies(long(300, params, confirmation=1), system=245 if other == "asker" else 255)
     assert len(rig.asked) == 2

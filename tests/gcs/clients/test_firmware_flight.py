@@ -75,7 +75,7 @@ class Scripted:
                     return FAILED
                 self.armed = m.param1 == 1.0
             case mavlink.MAV_CMD_MISSION_START:
-                if not self.armed:
+                if not self.armed or m.param1 != 0.0:
                     return FAILED
                 self.mode, self.began_us = AUTO, self.now_us
         return ACCEPTED

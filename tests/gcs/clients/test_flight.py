@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from autopilot.wire.dialect import plumbline as mavlink
@@ -336,6 +338,15 @@ def test_a_command_without_answer_is_lost(world, fly):
     client, _ = fly()
     assert client.outcome.name == "lost"
     assert client.outcome.reason.startswith("start: no answer")
+
+
+def test_a_repeated_start_does_not_begin_the_mission_again(world, fly):
+    """A vehicle that is faster than the wall clock flies for long before the repetition arrives."""
+    world.vehicle.silent_commands = {mavlink.MAV_CMD_MISSION_START}
+    fly()
+    starts = [one for one in world.vehicle.commands if one.command == mavlink.MAV_CMD_MISSION_START]
+    assert len(starts) > 1
+    assert all(math.isnan(one.param1) for one in starts)
 
 
 def test_interrupted_by_the_user(world, fly, items):
