@@ -10,7 +10,9 @@ are checked):
                an item before it    nothing (a duplicate)                 -> receiving
                an item after it     ask again for the missing one         -> receiving
                COUNT, same peer     begin again                           -> receiving
-               anything, other peer DENIED for its COUNT, else nothing    -> receiving
+               COUNT or clear, other peer: DENIED, or if this one was silent for TAKEOVER_US: ACK
+                                    OPERATION_CANCELLED to it             -> idle, and served there
+               an item, other peer  nothing                               -> receiving
                ACK from the peer    the peer has given up                 -> idle
                silence              ask again; after MAX_REQUESTS: ACK OPERATION_CANCELLED -> idle
 
@@ -53,6 +55,7 @@ MAX_REQUESTS = 20  # requests for one item: a link that loses a third each way f
 # Requests for one item after which the silence before the next one doubles each time: a client on a busy
 # machine answers late, and later still by the clock of a simulation that is faster than the wall clock
 QUICK_REQUESTS, MAX_RETRY_US = 10, 4_000_000
+TAKEOVER_US = 5_000_000  # a client that was silent for this time gives way to another one
 # Requests for the first item as MISSION_ITEM_INT, after which the client is assumed to know only MISSION_ITEM
 # (DroneKit). Never in the other order: MAVSDK cancels on a MISSION_REQUEST.
 INT_REQUESTS = 6
@@ -89,6 +92,7 @@ class _Upload:
 
     peer: Peer
     count: int
+    heard_us: int  # when its client last sent the count or an item
     retry_us: int
     kind: int = _MISSION
     requests: int = 1  # how often the next item was requested
@@ -166,9 +170,13 @@ class MissionService:
         kind, count = message.mission_type, message.count
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        ended = self._end_silent_upload(peer, now_us)
         if self._upload and self._upload.peer != peer:
             return _refused_as_busy(self._upload, peer, kind)
         self._upload = None
+        return [*ended, *self._begin_upload(kind, count, peer, now_us, decide)]
+
+    def _begin_upload(self, kind: int, count: int, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         if count > MAX_ITEMS:
             why = f"Mission of {count} items; at most {MAX_ITEMS} are kept"
             return [
@@ -181,7 +189,7 @@ class MissionService:
         if count == 0:
             done = self._replace_area(kind, ()) if kind in _AREAS else self._replace_mission(StoredMission())
             return [*done, self._accepting_ack(peer, kind)]
-        self._upload = _Upload(peer, count, now_us + RETRY_US, kind)
+        self._upload = _Upload(peer, count, now_us, now_us + RETRY_US, kind)
         return [self._item_request()]
 
     def receive_item_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -216,16 +224,26 @@ class MissionService:
         if upload is None or now_us < upload.retry_us:
             return []
         if upload.requests == MAX_REQUESTS:
-            self._end_upload(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
-            why = f"Mission upload given up: item {len(upload.items)} of {upload.count} did not come"
-            cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind)
-            return [SendText(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
+            return self._cancel_upload(upload, now_us)
         if not upload.items and upload.requests >= INT_REQUESTS:
             upload.as_float = True
         upload.requests += 1
         upload.lossy = True
         upload.retry_us = now_us + _retry_interval_us(upload.requests)
         return [self._item_request()]
+
+    def _cancel_upload(self, upload: _Upload, now_us: int) -> list[Output]:
+        self._end_upload(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
+        why = f"Mission upload given up: item {len(upload.items)} of {upload.count} did not come"
+        cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind)
+        return [SendText(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
+
+    def _end_silent_upload(self, peer: Peer, now_us: int) -> list[Output]:
+        """Cancel an upload whose client was silent for long, as another one (`peer`) wants to transfer."""
+        upload = self._upload
+        if upload is None or upload.peer == peer or now_us - upload.heard_us < TAKEOVER_US:
+            return []
+        return self._cancel_upload(upload, now_us)
 
     def _receive_item(
         self,
@@ -243,6 +261,7 @@ class MissionService:
             return self._answer_item_without_upload(message, peer, now_us)
         if message.mission_type != upload.kind:
             return []
+        upload.heard_us = now_us
         expected = len(upload.items)
         if message.seq < expected:
             return []
@@ -386,14 +405,15 @@ class MissionService:
         kind = message.mission_type
         if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        ended = self._end_silent_upload(peer, now_us)
         if self._upload and self._upload.peer != peer:
             return _refused_as_busy(self._upload, peer, kind)
         refused = [] if kind in _AREAS else self._refusal((), 0, peer, decide, kind)
         if refused:
-            return refused
+            return [*ended, *refused]
         if self._upload and kind in (self._upload.kind, _ALL):
             self._upload = None
-        done: list[Output] = []
+        done = ended
         for area in _AREAS:
             if kind in (area, _ALL):
                 done += self._replace_area(area, ())

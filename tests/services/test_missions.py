@@ -20,6 +20,7 @@ from autopilot.services.missions import (
     MAX_RETRY_US,
     QUICK_REQUESTS,
     RETRY_US,
+    TAKEOVER_US,
 )
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ChangeAltitude, ReplaceMission, Reposition
@@ -244,6 +245,31 @@ def test_one_upload_at_a_time(rig, items, as_message, other):
     rig.replies(m.MAVLink_mission_ack_message(1, 1, 0), **other)
     assert said(rig.replies(as_message(0, sent[0]))) == [(INT, 1)]
     assert said(rig.replies(as_message(1, sent[1]))) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+
+
+@pytest.mark.parametrize("kind", [m.MAV_MISSION_TYPE_MISSION, m.MAV_MISSION_TYPE_RALLY])
+def test_an_abandoned_upload_gives_way_to_another_client_after_five_seconds(rig, items, as_message, kind):
+    other = {"system": 245, "link": "other"}
+    rig.replies(count(3))
+    rig.run(TAKEOVER_US // 2)
+    rig.replies(as_message(0, items(3)[0]))
+    rig.run(TAKEOVER_US - 200_000)
+    assert said(rig.replies(count(2, kind), **other)) == [(ACK, m.MAV_MISSION_DENIED)]
+    rig.run(200_000)
+    rig.send(count(2, kind), **other)
+    out = rig.poll()
+    assert said([r.message for r in out["other"]]) == [(INT, 0)]
+    assert said([r.message for r in out["gcs"]]) == [(ACK, m.MAV_MISSION_OPERATION_CANCELLED)]
+    texts = "".join(r.message.text for r in out["gcs"] if r.message.get_type() == "STATUSTEXT")
+    assert texts == "Mission upload given up: item 1 of 3 did not come"
+    assert said(rig.replies(count(3))) == [(ACK, m.MAV_MISSION_DENIED)], "now the other one uploads"
+
+
+def test_an_abandoned_upload_gives_way_to_a_clearing(rig, items):
+    rig.replies(count(3))
+    rig.run(TAKEOVER_US)
+    cleared = rig.replies(m.MAVLink_mission_clear_all_message(1, 1), system=245, link="other")
+    assert said(cleared) == [(ACK, m.MAV_MISSION_ACCEPTED)]
 
 
 def test_the_vehicle_speaks_to_the_uploader_alone(rig, items):
