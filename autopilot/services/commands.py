@@ -693,7 +693,7 @@ class CommandService:
         """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
         verdict = decide(SetCurrent(message.seq))
         outputs: list[Output] = [Announce(peer.link, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
-        return _text_outputs(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict) + outputs
+        return _text_outputs(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict, peer) + outputs
 
     def _execute(self, call: Call, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         parser = PARSERS.get(call.command)
@@ -713,11 +713,12 @@ def _confirmation(message: Any) -> int:
     return getattr(message, "confirmation", 0)
 
 
-def _text_outputs(command: int, verdict: Verdict) -> list[Output]:
+def _text_outputs(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
     accepted = verdict.result == ACCEPTED
     outputs: list[Output] = [RefusalCleared(command)] if accepted else []
     if verdict.text is not None and (verdict.warns or not accepted):
-        outputs.append(SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text, command))
+        asker = None if accepted else peer.link
+        outputs.append(SendText(mavlink.MAV_SEVERITY_WARNING, verdict.text, command, asker))
     elif verdict.text is not None:
         outputs.append(SendText(mavlink.MAV_SEVERITY_INFO, verdict.text))
     return outputs
@@ -735,4 +736,4 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
 
 def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
     """The reason first, so that it has arrived when the ACK is shown."""
-    return [*_text_outputs(command, verdict), _ack(command, verdict.result, peer)]
+    return [*_text_outputs(command, verdict, peer), _ack(command, verdict.result, peer)]

@@ -86,6 +86,7 @@ from autopilot.services.telemetry import (
     WINCH_HEARTBEAT,
     Stream,
 )
+from autopilot.services.text_limiter import WARNING_INTERVAL_US, TextLimiter
 from autopilot.services.timesync import answer_ping, answer_timesync
 from autopilot.services.virtual_files import generated_files, information_message, metadata_message
 from autopilot.wire.codec import FrameWriter, Received, decode
@@ -99,6 +100,7 @@ from autopilot.wire.statustext import TextWriter
 LINK_SILENCE_US = 30_000_000  # after this silence a link that was not configured is forgotten
 REACHED_REPETITIONS = 10  # repetitions of the end of a mission, as in PX4
 REACHED_INTERVAL_US = 1_000_000  # between two repetitions
+REASON_INTERVAL_US = 1_000_000  # between two equal refusals to the client that asks
 MAX_GARBAGE_BYTES = 64  # bytes of a datagram that may belong to no message before the rest of it is skipped
 MAX_LINKS = 16  # links that were not configured; a new one replaces the one silent longest
 LINK_REPLACEMENT_US = 20_000  # least time between two replacements: a new link costs as much as ten messages
@@ -165,6 +167,7 @@ class VehicleEndpoint:
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
         self._texts = TextWriter()
+        self._refusals = TextLimiter()
         self.kept_texts = KeptTexts(self._texts)
         self._now_us = 0  # of the last call; texts are dated by it
         self._paused_us = 0  # time for which the vehicle's clock was paused while that of the services ran
@@ -536,13 +539,8 @@ class VehicleEndpoint:
                         state.queue.append((source or self._own_source, message))
                 case RefusalCleared(subject):
                     self.kept_texts.clear_refusals(subject)
-                case SendText(severity, text, subject):
-                    self.kept_texts.keep(severity, text, self._now_us + self._paused_us, subject)
-                    if self.on_text is not None:
-                        self.on_text(severity, text)
-                    for message in self._texts.messages(severity, text):
-                        for state in self._links.values():
-                            state.queue.append((self._own_source, message))
+                case SendText():
+                    self._send_text(output)
                 case Announce(link, keys):
                     for key in keys:
                         self._announce(link, key)
@@ -550,6 +548,27 @@ class VehicleEndpoint:
                     events.append(output)
                     continue
             self._has_queued = True
+
+    def _send_text(self, text: SendText) -> None:
+        """Send a text to all links, a refusal only to those that have not just had it."""
+        now_us = self._now_us + self._paused_us
+        self.kept_texts.keep(text.severity, text.text, now_us, text.subject)
+        if self.on_text is not None and self._is_news(text, None, now_us):
+            self.on_text(text.severity, text.text)
+        states = [state for link, state in self._links.items() if self._is_news(text, link, now_us)]
+        if not states:
+            return
+        for message in self._texts.messages(text.severity, text.text):
+            for state in states:
+                state.queue.append((self._own_source, message))
+
+    def _is_news(self, text: SendText, link: Link | None, now_us: int) -> bool:
+        """Whether a text is sent to a link (None: to the log). A client that asks again expects the reason
+        and gets it sooner than the others."""
+        if text.asker is None:
+            return True
+        interval_us = REASON_INTERVAL_US if link == text.asker else WARNING_INTERVAL_US
+        return self._refusals.allows((link, text.text), now_us, interval_us)
 
     # ---- links
 

@@ -20,10 +20,10 @@ from autopilot.services.requests import (
     FollowStick,
     FollowTarget,
 )
+from autopilot.services.text_limiter import TextLimiter
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
-WARNING_INTERVAL_US = 5_000_000
 MAX_BODY_RATE_RAD_S = 10.0  # of a body rate
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
 _NO_YAW, _NO_YAW_RATE = 0x400, 0x800
@@ -214,7 +214,7 @@ class GuidedService:
     def __init__(self, home: Home, system: int) -> None:
         self._home = home
         self._system = system
-        self._warned_us: dict[str, int] = {}
+        self._limiter = TextLimiter()
 
     def receive_local(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """SET_POSITION_TARGET_LOCAL_NED."""
@@ -247,14 +247,8 @@ class GuidedService:
         self, request: SetpointRequest | Verdict, now_us: int, decide: Decide
     ) -> list[Output]:
         verdict = request if isinstance(request, Verdict) else decide(request)
-        if verdict.text is None:
+        if verdict.text is None or not self._limiter.allows(verdict.text, now_us):
             return []
-        if now_us - self._warned_us.get(verdict.text, -WARNING_INTERVAL_US) < WARNING_INTERVAL_US:
-            return []
-        self._warned_us = {
-            text: at for text, at in self._warned_us.items() if now_us - at < WARNING_INTERVAL_US
-        }
-        self._warned_us[verdict.text] = now_us
         is_warning = verdict.warns or verdict.result != mavlink.MAV_RESULT_ACCEPTED
         severity = mavlink.MAV_SEVERITY_WARNING if is_warning else mavlink.MAV_SEVERITY_INFO
         return [SendText(severity, verdict.text)]

@@ -314,7 +314,7 @@ class MissionService:
             steps = located_steps(items, self.home)
         except MissionItemError as error:
             self._end_upload(error.result, now_us)
-            text = SendText(mavlink.MAV_SEVERITY_WARNING, str(error), _upload_of(kind))
+            text = SendText(mavlink.MAV_SEVERITY_WARNING, str(error), _upload_of(kind), upload.peer.link)
             return [text, _ack(upload.peer, error.result, kind)]
         refused = self._refusal(steps, upload.count, upload.peer, decide)
         if refused:
@@ -434,7 +434,7 @@ class MissionService:
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return []
         warning, what = mavlink.MAV_SEVERITY_WARNING, _upload_of(kind)
-        texts: list[Output] = [SendText(warning, verdict.text, what)] if verdict.text else []
+        texts: list[Output] = [SendText(warning, verdict.text, what, peer.link)] if verdict.text else []
         return [*texts, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
     def _replace_area(self, kind: int, items: tuple[WireItem, ...]) -> list[Output]:
@@ -526,7 +526,7 @@ def _refused_as_busy(upload: _Upload, peer: Peer, kind: int) -> list[Output]:
     """The answer to a client that would upload or clear while another one uploads."""
     other = upload.peer
     text = f"Upload denied: system {other.system}, component {other.component} uploads; try again"
-    refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind))
+    refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind), peer.link)
     return [refusal, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
 

@@ -43,13 +43,15 @@ class Send:
 class SendText:
     """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug).
 
-    A refusal states what it is `subject`, a command or an upload: it is a warning until that is accepted
-    (`RefusalCleared`).
+    A refusal states its `subject`, a command or an upload: it is a warning until that is accepted
+    (`RefusalCleared`). It also states the link of the `asker`: a refusal that recurs is sent less often than
+    the other texts.
     """
 
     severity: int
     text: str
     subject: Hashable = None
+    asker: Link | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -586,6 +586,46 @@ def test_a_repetition_is_the_same_command_from_the_same_asker_soon_after(rig, ot
     assert len(rig.asked) == 2
 
 
+def test_a_refusal_that_recurs_is_answered_each_time_and_told_now_and_then(rig):
+    """The client that asks gets the reason again sooner than the others."""
+    rig.endpoint.add_link("other")
+    logged = []
+    rig.endpoint.on_text = lambda severity, text: logged.append(text)
+    heard = {"gcs": [], "other": []}
+    asked = 0
+    while rig.now_us < 10_000_000:
+        rig.send(long(176, (1, 77)))
+        asked += 1
+        for link, received in rig.poll().items():
+            heard[link] += [
+                r.message for r in received if r.message.get_type() in ("STATUSTEXT", "COMMAND_ACK")
+            ]
+    refusal = "Mode 77/0 unknown; use LOITER MISSION RTL LAND"
+    assert acks(heard["gcs"]) == [(176, DENIED)] * asked
+    assert [m.text for m in heard["gcs"] if m.get_type() == "STATUSTEXT"] == [refusal] * 10
+    assert [m.text for m in heard["other"]] == [refusal] * 2
+    assert logged == [refusal] * 2
+
+
+def test_another_refusal_and_a_new_link_are_told_at_once(rig):
+    rig.send(long(176, (1, 77)))
+    rig.poll()
+    rig.endpoint.add_link("new")
+    rig.send(long(176, (1, 77)), long(176, (1, 78)))
+    texts = {
+        link: [r.message.text for r in received if r.message.get_type() == "STATUSTEXT"]
+        for link, received in rig.poll().items()
+    }
+    first, second = (f"Mode {mode}/0 unknown; use LOITER MISSION RTL LAND" for mode in (77, 78))
+    assert texts == {"gcs": [second], "new": [first, second]}
+
+
+def test_the_reasons_of_prearm_checks_are_told_as_often_as_asked(rig):
+    rig.verdict = lambda request: Verdict(OK, "battery nearly empty", warns=True)
+    for _ in range(3):
+        assert [m.get_type() for m in rig.replies(long(401))] == ["STATUSTEXT", "COMMAND_ACK"]
+
+
 def test_heartbeat_at_once_when_the_supervisor_did_something(rig):
     rig.poll()
     rig.poll()

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.services.guided import (
-    WARNING_INTERVAL_US,
     read_attitude,
     read_channels,
     read_global,
@@ -29,6 +28,7 @@ from autopilot.services.requests import (
     Pause,
     Reposition,
 )
+from autopilot.services.text_limiter import WARNING_INTERVAL_US
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.services.endpoint import REACHED_INTERVAL_US, REACHED_REPETITIONS
+from autopilot.services.endpoint import REACHED_INTERVAL_US, REACHED_REPETITIONS, REASON_INTERVAL_US
 from autopilot.services.identity import ARDUPILOT, PX4, Identity
 from autopilot.services.missions import (
     ACK_INTERVAL_US,
@@ -241,6 +241,7 @@ def test_one_upload_at_a_time(rig, items, as_message, other):
         assert said([ack]) == [(ACK, m.MAV_MISSION_DENIED)]
         told = "".join(text.text for text in texts)
         assert told == "Upload denied: system 255, component 190 uploads; try again"
+        rig.now_us += REASON_INTERVAL_US
     assert said(rig.replies(as_message(0, items(1)[0]), **other)) == []
     rig.replies(m.MAVLink_mission_ack_message(1, 1, 0), **other)
     assert said(rig.replies(as_message(0, sent[0]))) == [(INT, 1)]
