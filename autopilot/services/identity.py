@@ -58,6 +58,17 @@ _SUGGESTED_MODES = (
     (POSCTL, 0),
     (OFFBOARD, 0),
 )
+# PX4's names of these modes for the users of ground stations
+_DISPLAY_NAMES = {
+    (AUTO, AUTO_TAKEOFF): "Takeoff",
+    (AUTO, AUTO_LOITER): "Hold",
+    (AUTO, AUTO_MISSION): "Mission",
+    (AUTO, AUTO_RTL): "Return",
+    (AUTO, AUTO_LAND): "Land",
+    FOLLOW_MODE: "Follow Target",
+    (OFFBOARD, 0): "Offboard",
+    (POSCTL, 0): "Position",
+}
 # MAV_STANDARD_MODE of a pair
 _STANDARD_MODES = {
     (AUTO, AUTO_TAKEOFF): mavlink.MAV_STANDARD_MODE_TAKEOFF,
@@ -286,8 +297,9 @@ def identity_of(table: AutopilotParameters) -> Identity:
 
 
 def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_available_modes_message, ...]:
-    """AVAILABLE_MODES for each mode that can be flown."""
+    """AVAILABLE_MODES for each mode that can be flown, with the name that PX4 or ArduPilot sends."""
     modes = identity.flavour.available_modes
+    names = _DISPLAY_NAMES if identity.flavour.modes_are_packed else {}
     return tuple(
         mavlink.MAVLink_available_modes_message(
             number_modes=len(modes),
@@ -295,7 +307,7 @@ def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_availa
             standard_mode=mode.standard,
             custom_mode=mode.custom_mode,
             properties=_AUTOMATIC if mode.main == AUTO else 0,
-            mode_name=mode.name.capitalize().encode(),
+            mode_name=names.get(mode.pair, mode.name).encode(),
         )
         for i, mode in enumerate(modes, 1)
     )

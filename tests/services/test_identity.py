@@ -65,6 +65,18 @@ def test_the_modes_told_are_those_that_are_flown(flavour):
     assert pairs == set(SUPPORTED_MODES) - hidden
 
 
+@pytest.mark.parametrize(
+    ("flavour", "names"),
+    [
+        (PX4, "Position,Takeoff,Hold,Mission,Return,Land,Follow Target,Offboard"),
+        (ARDUPILOT, "GUIDED,LOITER,BRAKE,AUTO,RTL,LAND,POSHOLD,FOLLOW"),
+    ],
+)
+def test_the_modes_have_the_names_that_the_users_of_that_autopilot_know(flavour, names):
+    told = available_modes_messages(Identity(flavour=flavour))
+    assert ",".join(one.mode_name for one in told) == names
+
+
 def test_what_is_called_flown_is_what_the_supervisor_flies():
     assert set(SUPPORTED_MODES) == set(MODES)
 
