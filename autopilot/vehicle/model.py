@@ -327,6 +327,17 @@ class Vehicle(BaseModel):
                 f"inertia_kg_m2 = {[x, y, z]}; each must be <= the sum of the other two, or no body has it; "
                 "check their order, about the forward, left and upward axis, and that all are in kg m^2"
             )
+        reach = max(
+            hypot(self.rotor_reach_m, self.rotor_height_m),
+            hypot(self.gear_height_m, self.gear_spread_m, self.gear_spread_m),
+        )
+        greatest = self.quad_mass_kg * reach**2  # all of the mass at the tips of the rotors, or at the feet
+        if max(x, y, z) > greatest:
+            raise ValueError(
+                f"inertia_kg_m2 = {[x, y, z]}; a body of {self.quad_mass_kg:g} kg within {reach:.2g} m has "
+                f"{greatest:.2g} at most; check that all are in kg m^2, quad_mass_kg, and arm_m, from which "
+                "rotor_reach_m follows where it is left out"
+            )
         curved = self.thrust_curve != self.thrust_curve_known
         if not self.limited and (self.battery or self.esc_steps or curved):
             raise ValueError(

@@ -93,18 +93,11 @@ def _too_little_power(hover_w: float, mass_kg: float) -> str:
 
 def vehicle_warnings(vehicle: str) -> list[str]:
     """A line each if the file of the vehicle chooses a law (in flights of `gcs` that of `--law` flies), if
-    the vehicle is harder to turn than any body of its mass and size, if its cable is shorter than its arms,
-    and if no vehicle of its mass hovers with the power of its battery."""
+    its cable is shorter than its arms, and if no vehicle of its mass hovers with the power of its battery."""
     found, believed = load_truth_and_belief(vehicle)
     warnings = []
     if "CTL_LAW" in believed.parameters:
         warnings.append(f"{vehicle}: parameters.CTL_LAW has no effect; --law names the law")
-    greatest = found.quad_mass_kg * found.rotor_reach_m**2  # all of the mass at the tips of the rotors
-    if max(found.inertia_kg_m2) > greatest:
-        warnings.append(
-            f"{vehicle}: inertia_kg_m2 = {list(found.inertia_kg_m2)}: a body of {found.quad_mass_kg:g} kg "
-            f"within {found.rotor_reach_m:g} m has {greatest:.2g} at most; check quad_mass_kg and arm_m"
-        )
     if found.cable_length_m < found.arm_m:
         warnings.append(
             f"{vehicle}: cable_length_m = {found.cable_length_m:g} is less than arm_m, {found.arm_m:g}: the "

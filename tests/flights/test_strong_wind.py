@@ -91,7 +91,7 @@ def test_a_vehicle_that_wind_carries_off_while_it_pulls_its_cable_taut_lands_at_
     craft = Craft(Takeoff(1.5), Land(), vehicle=vehicle, sensors=sensors, SIM_WIND_E=wind)
     craft.begin()
     craft.run(at_phase(Phase.SET_DOWN), 5.0)
-    assert "Failsafe: carried off by the wind while tautening the cable" in "".join(craft.texts)
+    assert "Failsafe: drifts away while tautening the cable" in "".join(craft.texts)
     craft.run(at_phase(Phase.DISARMED), 10.0)
     assert craft.truth.x_load[0] < 25.0
 

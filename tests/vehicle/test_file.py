@@ -200,6 +200,12 @@ BROKEN = [
     ),
     (
         "[2.23e-3, 2.99e-3, 4.8e-3]",
+        "[2.23, 2.99, 4.8]",
+        "inertia_kg_m2 = [2.23, 2.99, 4.8]; a body of 0.4 kg within 0.2 m has 0.016 at most; check that all "
+        "are in kg m^2, quad_mass_kg, and arm_m",
+    ),
+    (
+        "[2.23e-3, 2.99e-3, 4.8e-3]",
         "[[2.23e-3, 0.0, 0.0], [0.0, 2.99e-3, 0.0], [0.0, 0.0, 4.8e-3]]",
         "inertia_kg_m2 = [[0.00223, 0.0, 0.0], [0.0, 0.00299, ...; must be three numbers; of a matrix give "
         "the diagonal, in axes in which the rest is 0 (moments of",
@@ -306,6 +312,10 @@ def test_what_the_file_may_say_both_programs_can_take(numbers, forces, inertia):
     if inertia < 1.0:  # of a small body, whose feet are near
         numbers = {**numbers, "gear_height_m": 0.001, "gear_spread_m": 0.001}
         numbers["quad_mass_kg"] = min(numbers["quad_mass_kg"], 1.0)
+        numbers["rotor_reach_m"] = max(numbers["rotor_reach_m"], 0.1)
+    else:  # of a large one
+        numbers["quad_mass_kg"] = max(numbers["quad_mass_kg"], 1.0)
+        numbers["rotor_reach_m"] = 10.0
     vehicle = Vehicle(**numbers, rotor_min_n=low, rotor_max_n=high, inertia_kg_m2=(inertia,) * 3)
     believed = autopilot_parameters(vehicle)
     assert believed["VEH_QUAD_MASS"] == vehicle.quad_mass_kg

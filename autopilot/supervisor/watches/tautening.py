@@ -1,5 +1,5 @@
-"""Pulling the cable taut: the rising vehicle is kept over its load until the cable pulls. A vehicle that the
-wind carries off meanwhile, or that drags its load along, lands."""
+"""Pulling the cable taut: the rising vehicle is kept over its load until the cable pulls. A vehicle that
+drifts away meanwhile, in strong wind for example, or that drags its load along, lands."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ HIDDEN_S = 2.0  # where the pull decides, the setpoint rises on for this time, a
 
 
 def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResult:
-    """Lift when the cable pulls; land if it never does although the vehicle rises, or if the wind is too
-    strong."""
+    """Lift when the cable pulls; land if it never does although the vehicle rises, or if the vehicle
+    drifts away."""
     if flight.phase != Phase.TAUTEN or flight.out_of_control_since_us >= 0:  # `failsafe` cares for the latter
         return WatchResult(flight)
     error, limit_m = path_error(flight, view), settings.failsafe.load_error_limit_m
@@ -58,7 +58,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     # on a short cable, a load that was not dragged as far may hold the vehicle yet
     may_be_held = max(norm(way), settings.cable_length_m) <= limit_m
     if error.distance_m > limit_m and error.approach_m_s <= -MIN_SPEED and not may_be_held:
-        return _carried_off(flight, off_path_text(error, settings))
+        return _drifts_away(flight, off_path_text(error, settings))
     if len(flight.legs) != 1:
         return WatchResult(flight)
     flight = _note_pull(flight, view, settings)
@@ -77,7 +77,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     # for example because the load was not seen well from the ground
     if not norm(sub(over, at)) <= max_load_offset(settings):
         if norm(way) > limit_m and dot(way, view.v_quad) >= MIN_DRAG_SPEED * norm(way):
-            return _carried_off(flight, f"load dragged by {norm(way):.1f} m (FS_LOAD_ERR {limit_m:g})")
+            return _drifts_away(flight, f"load dragged by {norm(way):.1f} m (FS_LOAD_ERR {limit_m:g})")
         if _pulls_beside_load(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             causes = _causes(error, view, settings, "VEH_CABLE_LEN")
@@ -95,9 +95,12 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     return WatchResult(flight)
 
 
-def _carried_off(flight: Flight, how_far: str) -> WatchResult:
-    """Land, as the wind is too strong."""
-    text = f"Failsafe: carried off by the wind while tautening the cable, {how_far}, landing"
+def _drifts_away(flight: Flight, how_far: str) -> WatchResult:
+    """Land. The wind is not measured: it cannot be told from a vehicle that flies unlike the assumed one."""
+    text = (
+        f"Failsafe: drifts away while tautening the cable, {how_far}, landing; wind too strong, or the "
+        "vehicle differs from its file"
+    )
     return WatchResult(interrupt_mission(flight), Event.LAND, ((MAV_SEVERITY_ERROR, text),))
 
 
