@@ -76,7 +76,20 @@ The vehicle must be able to stand, and its load to lie half a cable length besid
 1.16 times as long as the attachment is above the resting load. The feet are at most 15 radii of gyration from
 the centre of mass, where the square of this radius is the least moment of inertia over the mass: the push of
 the ground turns a lighter body so fast that it tumbles. Where the sizes of the gear are left out, they grow
-with `arm_m`: an arm of 2.8 m with the cable and the inertia of `bebop` is refused for both reasons.
+with `arm_m`: an arm of 2.8 m with the cable and the inertia of `bebop` is refused for both reasons. No moment
+of inertia may be greater than that of the whole mass at the tips of the rotors, or at the feet if these are
+farther.
+
+## How exact lengths and masses must be
+
+The autopilot learns the weight of the load, but neither the length of the cable nor the weight of the
+vehicle. In `hover` with `lab`, three flights each, a vehicle of 1.2 kg with 0.25 kg on 1.5 m of cable flew
+with a true cable of 1.48 m and not with 1.46 m; `bebop`, which assumes 0.70 m, flew with 0.69 m and not with
+0.68 m. The cable of a tracked load counts as taut from 98.5 % of the assumed length on, so a true cable that
+is shorter by more than 1 % may never do; the text names the length at which it pulls. One that is longer by
+up to 25 % is flown, with a greater error. The same vehicle flew with `VEH_QUAD_MASS` 1.00 to 1.35; with 1.4
+the pull of the load that it measures is too small to notice
+([troubleshooting.md](troubleshooting.md#cable-never-taut-landing-)).
 
 ## Rotors
 

@@ -659,7 +659,7 @@ def test_a_load_that_swings_unnoticed_ends_the_climb() -> None:
     sky.obey = hanging_light  # type: ignore[method-assign]
     sky.run(lambda s: s.flight.phase != Phase.TAUTEN and s.now_us > 1_000_000, limit_s=60.0)
     assert sky.flight.phase == Phase.SET_DOWN
-    assert sky.texts[-1] == "Cable never taut, landing; check VEH_CABLE_LEN and VEH_LOAD_MASS"
+    assert sky.texts[-1] == "Cable never taut, landing; check VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS"
 
 
 def with_long_cable(cable_m: float) -> Sky:
@@ -711,6 +711,26 @@ def test_a_gust_may_hide_the_pull_of_a_load_without_a_tracker() -> None:
 
     rise = 2.0 * SETTINGS.motion.taut_speed_m_s
     assert highest(tracked=False) - highest(tracked=True) == pytest.approx(rise, abs=0.01)
+
+
+def test_a_cable_that_pulls_but_is_too_short_to_count_as_taut_is_named() -> None:
+    """The vehicle is above its load and can rise no further."""
+    sky = Sky()
+    sky.ask(Arm(True, False))
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    ideal, short_m = Sky.obey, 0.97 * SETTINGS.cable_length_m
+
+    def held() -> View:
+        seen = ideal(sky)._replace(taut=False)
+        x, y, z = seen.x_quad
+        if z < short_m + 0.02:
+            return seen
+        at = (x, y, short_m + 0.02)
+        return seen._replace(x_quad=at, x_load=(x, y, 0.02), pull_n=SETTINGS.load_weight_n)
+
+    sky.obey = held  # type: ignore[method-assign]
+    sky.run(lambda s: s.flight.phase != Phase.TAUTEN and s.now_us > 1_000_000)
+    assert sky.texts[-1] == f"Cable pulls at {short_m:.2f} m, landing; check VEH_CABLE_LEN"
 
 
 def test_a_load_that_hangs_on_a_shorter_cable_than_is_believed_ends_the_climb() -> None:

@@ -113,7 +113,7 @@ def test_wind_is_named_where_the_vehicle_leans_against_it(tilt_deg: float) -> No
     ideal = sky.obey
     sky.obey = lambda: ideal()._replace(taut=False, tilt_rad=math.radians(tilt_deg))  # type: ignore[method-assign]
     sky.run(lambda s: s.flight.phase == Phase.SET_DOWN)
-    causes = "check VEH_CABLE_LEN and VEH_LOAD_MASS"
+    causes = "check VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS"
     if tilt_deg > 20.0:
         causes = f"too much wind (0.0 m off its path, tilted by 41 deg)? Else {causes}"
     assert sky.texts[-1] == f"Cable never taut, landing; {causes}"

@@ -78,21 +78,29 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> WatchResu
     if not norm(sub(over, at)) <= max_load_offset(settings):
         if norm(way) > limit_m and dot(way, view.v_quad) >= MIN_DRAG_SPEED * norm(way):
             return _drifts_away(flight, f"load dragged by {norm(way):.1f} m (FS_LOAD_ERR {limit_m:g})")
-        if _pulls_beside_load(flight, view, settings):
-            length = norm(sub(view.x_quad, view.x_load))
-            causes = _causes(error, view, settings, "VEH_CABLE_LEN")
-            text = f"Cable pulls at {length:.2f} m, landing; {causes}"
-            return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
+        late = view.now_us - flight.phase_start_us > _late_s(settings) * 1e6
+        if late and _pulls_although_short(view, settings):
+            return _never_taut(flight, view, error, settings)
         if not is_too_late:
             return WatchResult(_moved_over_load(flight, view, creep, at, over))
     last_height = last_setpoint_height(creep, settings) + HEIGHT_SIGMAS * view.height_std
     if not view.load_tracked:
         last_height += HIDDEN_S * creep.velocity[2]
     if flight.condition_since_us < 0 and (at[2] > last_height or is_too_late):
-        causes = _causes(error, view, settings, "VEH_CABLE_LEN and VEH_LOAD_MASS")
-        text = f"Cable never taut, landing; {causes}"
-        return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
+        return _never_taut(flight, view, error, settings)
     return WatchResult(flight)
+
+
+def _never_taut(flight: Flight, view: View, error: PathError, settings: Settings) -> WatchResult:
+    """Land, as the cable did not come taut, or pulls although it is too short to count as taut."""
+    if _pulls_although_short(view, settings):
+        length = norm(sub(view.x_quad, view.x_load))
+        causes = _causes(error, view, settings, "VEH_CABLE_LEN")
+        text = f"Cable pulls at {length:.2f} m, landing; {causes}"
+    else:
+        causes = _causes(error, view, settings, "VEH_CABLE_LEN, VEH_LOAD_MASS and VEH_QUAD_MASS")
+        text = f"Cable never taut, landing; {causes}"
+    return WatchResult(interrupt_mission(flight), Event.LAND, ((CRITICAL, text),))
 
 
 def _drifts_away(flight: Flight, how_far: str) -> WatchResult:
@@ -123,15 +131,13 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     return with_condition(flight, pulls, view.now_us)
 
 
-def _pulls_beside_load(flight: Flight, view: View, settings: Settings) -> bool:
-    """Whether the load is beside the vehicle because it swings on a cable that is shorter than assumed: the
-    cable pulls, long after it should have come taut, and is shorter than a taut cable would be by more than
-    the error of a height that a receiver measures."""
+def _pulls_although_short(view: View, settings: Settings) -> bool:
+    """Whether the cable pulls but is shorter than a taut cable would be, by more than the error of a height
+    that a receiver measures. Its load may be beside the vehicle because it swings."""
     distance = norm(sub(view.x_quad, view.x_load))
     if not distance + HEIGHT_SIGMAS * view.height_std < settings.cable_length_m:
         return False
-    late = view.now_us - flight.phase_start_us > _late_s(settings) * 1e6
-    return late and not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
+    return not view.taut and cable_pull_share(view, settings) > TAUT_PULL_SHARE
 
 
 def _late_s(settings: Settings) -> float:
