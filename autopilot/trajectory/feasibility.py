@@ -67,6 +67,7 @@ _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
 # A path is too fast for its cable if this share of the length needs less than this share of the force.
 _SHORTER_CABLE, _SMALLER_FORCE = 0.25, 0.5
+_GREAT_DRAG_SHARE = 0.5  # of the weight: greater drag of the vehicle is worth a check
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
 _MULTIPLE_FROM = 3.0  # from here on an excess is reported as a multiple
@@ -266,7 +267,8 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                 elif path_violations:
                     found += path_violations
                 else:
-                    text = f"{_item_label(entry)}: {problem}; {_bounds_text(entry.step, limits)}"
+                    drag_advice = _drag_advice(entry, extremes, limits)
+                    text = f"{_item_label(entry)}: {problem}; {_bounds_text(entry.step, limits, drag_advice)}"
                     found.append(Violation(entry.item, "shaping", inf, limits.max_shaping_m, 0.0, text))
                 continue
         extremes = _survey(entry, limits, shaped or entry.item in flown_through)
@@ -282,7 +284,7 @@ def _flown_through(mission: Mission, limits: VehicleLimits) -> frozenset[int]:
     return frozenset(item for item, path in enumerate(prepared.paths) if isinstance(path, PathSegment))
 
 
-def _bounds_text(step: LoadPath, limits: VehicleLimits) -> str:
+def _bounds_text(step: LoadPath, limits: VehicleLimits, drag_advice: str) -> str:
     """The bounds of a shaped path in words, and what to change if it cannot keep them."""
     advice = "lower amplitude_m, lengthen rise_s or period_s"
     if isinstance(step, Trajectory):
@@ -290,7 +292,8 @@ def _bounds_text(step: LoadPath, limits: VehicleLimits) -> str:
     reserve = f"{100.0 * limits.rotor_margin:.0f} % of the rotors' range free at either limit"
     return (
         f"a path must leave {reserve} (MIS_ROTOR_MARG), the cable taut and the tilt below "
-        f"{degrees(limits.tilt_max_rad):.0f} deg; {advice}, or let it be flown slower (MIS_INFEASIBLE 1)"
+        f"{degrees(limits.tilt_max_rad):.0f} deg; {drag_advice}{advice}, or let it be flown slower "
+        "(MIS_INFEASIBLE 1)"
     )
 
 
@@ -434,10 +437,10 @@ def _survey(entry: TimelineEntry, limits: VehicleLimits, shaped: bool = False) -
 
 
 def _violations_along(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
-    length_advice = _length_advice(entry, extremes, limits)
+    cause_advice = _drag_advice(entry, extremes, limits) or _length_advice(entry, extremes, limits)
 
     def violation(quantity: str, worst: Extreme, limit: float, finding: str, advice: str = "") -> Violation:
-        advice = advice or f"{length_advice}{_advice(entry, worst.time_s)}"
+        advice = advice or f"{cause_advice}{_advice(entry, worst.time_s)}"
         text = f"{_item_label(entry)}: at {worst.time_s:.1f} s {finding}; {advice}"
         return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
@@ -501,11 +504,38 @@ def _height_advice(step: Step) -> str:
     return f"lower {'length_m' if isinstance(step, Winch) else 'amplitude_m of z'}"
 
 
+def _drag_advice(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> str:
+    """The advice to check the drag of the vehicle if only this makes the step impossible, and is great beside
+    the weight. Else an empty string."""
+    body, speed_m_s = limits.body, extremes.speed.value
+    linear_n, quadratic_n = body.drag_linear * speed_m_s, body.drag_quadratic * speed_m_s**2
+    weight_n = (body.quad_mass + body.load_mass) * body.gravity
+    if linear_n + quadratic_n < _GREAT_DRAG_SHARE * weight_n:
+        return ""
+    without_drag = replace(
+        limits,
+        vehicle=limits.vehicle.model_copy(
+            update={"quad_drag_n_s_m": 0.0, "quad_drag_quadratic_n_s2_m2": 0.0}
+        ),
+    )
+    still = _survey(entry, without_drag)
+    if still is None or any(_violations_along(entry, still, without_drag)):
+        return ""
+    key = "quad_drag_n_s_m" if linear_n > quadratic_n else "quad_drag_quadratic_n_s2_m2"
+    return (
+        f"check {key}: the drag is {linear_n + quadratic_n:.2f} N at {speed_m_s:.2f} m/s, the weight "
+        f"{weight_n:.2f} N; or "
+    )
+
+
 def _length_advice(entry: TimelineEntry, extremes: Peaks, limits: VehicleLimits) -> str:
     """The advice to shorten the cable if the forces are a multiple of the limits because of its length: the
     vehicle has to swing about the load. Else an empty string."""
     worst = extremes.rotor_high.value
     if not (isinstance(entry.step, LoadPath) and worst > _MULTIPLE_FROM * limits.vehicle.rotor_max_n):
+        return ""
+    # the load alone accelerates faster than the vehicle can, on any cable
+    if extremes.accel.value * (limits.body.quad_mass + limits.body.load_mass) > limits.usable_thrust_n:
         return ""
     length_m = limits.body.cable_length
     shorter = limits.body._replace(cable_length=_SHORTER_CABLE * length_m)

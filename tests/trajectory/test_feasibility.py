@@ -130,6 +130,32 @@ def test_a_cable_too_long_for_a_path_is_named() -> None:
     assert found and not any("cable_length_m" in violation.text for violation in found)
 
 
+def test_a_path_that_no_cable_makes_possible_gets_no_advice_about_the_cable() -> None:
+    """The load on 8 m of cable swings too slowly for it too, but no vehicle accelerates as fast."""
+    far = mission(Signals(7.0, (Term("x", 500.0, rise_s=1.2),)))
+    found = check(far, LIMITS)
+    assert found and all(
+        violation.text.endswith("lower amplitude_m of x or lengthen its rise_s") for violation in found
+    )
+    assert not any("cable_length_m" in violation.text for violation in found)
+
+
+def test_drag_that_makes_everything_impossible_is_named() -> None:
+    def draggy(**drag: float) -> VehicleLimits:
+        return replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update=drag))
+
+    up = Mission("up", "Up", "", (), (Takeoff(2.0), Delay(1.0), Land()))
+    for key in ("quad_drag_n_s_m", "quad_drag_quadratic_n_s2_m2"):
+        found = check(up, draggy(**{key: 60.0}))
+        assert found and all(f"; check {key}: the drag is " in violation.text for violation in found)
+    shaped = check(load_mission("case-a"), draggy(quad_drag_n_s_m=6.0), shaped=True)
+    assert shaped and all("; check quad_drag_n_s_m: " in violation.text for violation in shaped)
+    # a fast transfer is impossible without drag too
+    hasty = replace(draggy(quad_drag_n_s_m=0.2), accel_m_s2=14.0)
+    found = check(mission(Speed(20.0), Waypoint(30.0, 0.0, 2.0)), hasty)
+    assert found and not any("quad_drag" in violation.text for violation in found)
+
+
 def test_a_jump_of_position_and_of_velocity() -> None:
     jump = Term("x", 0.5, 1.0, 0.0, None, 0.0)
     kick = Term("y", 0.5, 2.0, 0.0, 6.0, 0.0, (Sine(3.0, 0.0, 2.0),))
