@@ -20,7 +20,12 @@ def check_options(options: FlightOptions) -> list[str]:
     custom code cannot fly; else a line for each option that may be unintended."""
     if _only_shipped_inputs(options):
         return []
-    from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings, vehicle_warnings
+    from gcs.workflows.flight_inputs import (
+        check_flight_inputs,
+        sensor_warnings,
+        setting_warnings,
+        vehicle_warnings,
+    )
     from gcs.workflows.unused_settings import unused_settings
 
     settings = list(map(parse_setting, options.settings))
@@ -28,7 +33,7 @@ def check_options(options: FlightOptions) -> list[str]:
     warnings = [f"--set {line}" for line in setting_warnings(options.vehicle, settings)]
     unused = unused_settings(options.vehicle, options.sensors, (options.law,), settings)
     warnings += [f"--set {line}" for line in unused.values()]
-    warnings += vehicle_warnings(options.vehicle)
+    warnings += vehicle_warnings(options.vehicle) + sensor_warnings(options.sensors)
     if any(options.own):
         from autopilot.own.misspellings import misspelling_warnings
 

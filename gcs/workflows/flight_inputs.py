@@ -24,6 +24,8 @@ from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 
+_MAX_THRUST_RATIO = 20.0  # thrust over weight; racing multirotors without a load have up to 15
+_G_N = 9.80665e-3  # weight of a gram
 _MIN_HOVER_W_KG = 60.0  # rotors that are large for their load need 70, those of usual vehicles 100 to 250
 
 
@@ -93,11 +95,27 @@ def _too_little_power(hover_w: float, mass_kg: float) -> str:
 
 def vehicle_warnings(vehicle: str) -> list[str]:
     """A line each if the file of the vehicle chooses a law (in flights of `gcs` that of `--law` flies), if
-    its cable is shorter than its arms, and if no vehicle of its mass hovers with the power of its battery."""
+    its rotors give many times its weight or have more drag torque than any propeller, if its cable is shorter
+    than its arms, and if no vehicle of its mass hovers with the power of its battery."""
     found, believed = load_truth_and_belief(vehicle)
     warnings = []
     if "CTL_LAW" in believed.parameters:
         warnings.append(f"{vehicle}: parameters.CTL_LAW has no effect; --law names the law")
+    weight_n = (found.quad_mass_kg + found.load_mass_kg) * found.gravity_m_s2
+    if found.limited and found.greatest_thrust_n > _MAX_THRUST_RATIO * weight_n:
+        warnings.append(
+            f"{vehicle}: rotor_max_n = {found.rotor_max_n:g}: all rotors give "
+            f"{found.greatest_thrust_n / weight_n:.0f} times the weight of vehicle and load; "
+            f"{found.rotor_max_n * _G_N:.3g} if {found.rotor_max_n:g} g of thrust are meant"
+        )
+    # Torque over force is (C_Q / C_T) times the diameter: 0.05 to 0.1 of it at rest. At the radius, the drag
+    # of the blades would be as great as their lift.
+    if found.torque_ratio_m > found.rotor_radius_m:
+        warnings.append(
+            f"{vehicle}: torque_ratio_m = {found.torque_ratio_m:g} is more than the radius of a rotor, "
+            f"{found.rotor_radius_m:.2g} m: usual is 0.1 to 0.2 of it, {0.1 * found.rotor_radius_m:.2g} to "
+            f"{0.2 * found.rotor_radius_m:.2g}; check it, and arm_m"
+        )
     if found.cable_length_m < found.arm_m:
         warnings.append(
             f"{vehicle}: cable_length_m = {found.cable_length_m:g} is less than arm_m, {found.arm_m:g}: the "
@@ -110,6 +128,21 @@ def vehicle_warnings(vehicle: str) -> list[str]:
             f"{vehicle}: battery_hover_w = {found.battery_hover_w:g}: {lacking}: it would fly too long"
         )
     return warnings
+
+
+def sensor_warnings(sensors: str) -> list[str]:
+    """A line for each sensor of the profile whose readings arrive too late to be used."""
+    from autopilot.estimation.inbox import MAX_READING_AGE_S  # imports all flight software
+
+    profile = load_profile(sensors)
+    # ages are counted from the instant that the inertial unit's newest sample shows
+    limit_ms = 1e3 * MAX_READING_AGE_S + profile.imu.latency_ms
+    return [
+        f"{sensors}: {name}.latency_ms = {table.latency_ms:g}: the autopilot uses no reading that is older "
+        f"than {limit_ms:g} ms, and so none of this sensor"
+        for name, table in profile.timed.items()
+        if table.latency_ms > limit_ms
+    ]
 
 
 def split_settings(

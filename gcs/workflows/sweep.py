@@ -33,7 +33,7 @@ from gcs.sweep.standouts import (
 )
 from gcs.sweep.store import TABLE_FILE, Store
 from gcs.workflows.before_flight import mission_warnings
-from gcs.workflows.flight_inputs import setting_warnings, vehicle_warnings
+from gcs.workflows.flight_inputs import sensor_warnings, setting_warnings, vehicle_warnings
 from gcs.workflows.flight_options import FlightOptions, parse_setting
 from gcs.workflows.unused_settings import unused_settings
 from gcs.workflows.warmup import warm_up
@@ -179,7 +179,11 @@ def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Exe
 def _print_warnings(plan: SweepPlan) -> None:
     """Print what can be flown but may be unintended; of several values of a parameter only the first."""
     own = [line for law in plan.laws for line in misspelling_warnings(plan.own(law))]
-    others = [*mission_warnings(plan.planner, load(plan.mission)), *vehicle_warnings(plan.vehicle)]
+    others = [
+        *mission_warnings(plan.planner, load(plan.mission)),
+        *vehicle_warnings(plan.vehicle),
+        *sensor_warnings(plan.sensors),
+    ]
     for line in dict.fromkeys([*own, *others]):
         notify(line)
     settings, varied = list(plan.settings), varied_values(plan.varied)

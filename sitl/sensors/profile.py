@@ -335,6 +335,11 @@ class Profile(_Table):
             raise ValueError("has neither mocap nor gnss; one of them must tell where the vehicle is")
         return self
 
+    @property
+    def timed(self) -> dict[str, Stamped]:
+        """Its sensors whose readings carry the time of measurement, by name."""
+        return {name: table for name, table in self if isinstance(table, Stamped)}
+
 
 class ReportedStd(NamedTuple):
     """The deviations that readings state, per axis; nan where a sensor is not fitted."""

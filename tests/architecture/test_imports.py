@@ -142,6 +142,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.workflows.flight_inputs": (
         *GCS,
         "gcs",
+        "autopilot.estimation.inbox",
         "autopilot.own",
         "autopilot.shell.watched_calls",
         "autopilot.vehicle.rates",

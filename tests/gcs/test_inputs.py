@@ -13,7 +13,12 @@ from autopilot.vehicle.shipped import VEHICLES
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_inputs import check_flight_inputs, setting_warnings, vehicle_warnings
+from gcs.workflows.flight_inputs import (
+    check_flight_inputs,
+    sensor_warnings,
+    setting_warnings,
+    vehicle_warnings,
+)
 from sitl.sensors.shipped import PROFILES
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
@@ -215,8 +220,31 @@ def test_a_law_in_the_file_of_a_vehicle_is_said_to_have_no_effect(tmp_path):
     assert vehicle_warnings("bebop") == []
 
 
-def test_no_shipped_vehicle_has_a_warning():
+def test_no_shipped_vehicle_or_profile_has_a_warning():
     assert not any(vehicle_warnings(name) for name in VEHICLES.names())
+    assert not any(sensor_warnings(name) for name in PROFILES.names())
+
+
+def test_a_rotor_whose_force_or_torque_is_in_another_unit_is_told(tmp_path):
+    file, bebop = tmp_path / "mine.toml", plumbline.Vehicle.load("bebop")
+    bebop.replace(rotor_max_n=200.0).save(file)  # the thrust of a Bebop's rotor in grams
+    told = (
+        "rotor_max_n = 200: all rotors give 163 times the weight of vehicle and load; 1.96 if 200 g of thrust"
+    )
+    assert vehicle_warnings(str(file)) == [f"{file}: {told} are meant"]
+    bebop.replace(torque_ratio_m=0.9).save(file)
+    (line,) = vehicle_warnings(str(file))
+    assert "torque_ratio_m = 0.9 is more than the radius of a rotor, 0.076 m" in line
+
+
+def test_a_sensor_whose_readings_arrive_too_late_is_told(tmp_path):
+    file = tmp_path / "late.toml"
+    lab = PROFILES.read("lab").text
+    for latency_ms, told in ((300.0, []), (301.0, ["mocap", "load_tracker"])):
+        file.write_text(lab.replace("latency_ms = 4.0", f"latency_ms = {latency_ms}"))
+        lines = sensor_warnings(str(file))
+        assert [line.removeprefix(f"{file}: ").split(".")[0] for line in lines] == told
+    assert "latency_ms = 301: the autopilot uses no reading that is older than 300 ms" in lines[0]
 
 
 def test_a_cable_that_is_shorter_than_the_arms_is_told(tmp_path):
