@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import groupby
-from math import dist, floor
+from math import cos, dist, floor, inf, pi
 
 from autopilot.trajectory.feasibility import PathReport, VehicleLimits, Violation, paths
 from autopilot.trajectory.route import PlanError, Planner
@@ -50,6 +50,7 @@ from missions.model import (
     Mission,
     Release,
     ReturnHome,
+    Signals,
     Speed,
     Takeoff,
     Waypoint,
@@ -61,6 +62,7 @@ from missions.model import (
 # of 1 m/s (docs/realism.md).
 MIN_CONTROL_SHARE = 0.25
 MIN_REACHED_SHARE = 0.9  # of a speed that the mission sets: a way that stays below it is reported
+MIN_MOVED_SHARE = 0.9  # of a rise or fall within its item: one that is cut off earlier is reported
 MORE_MARGIN = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
@@ -141,6 +143,34 @@ def _ways_by_set_speed(entries: Iterable[TimelineEntry]) -> Iterator[tuple[float
             ways.append(entry)
     if asked_m_s and ways:
         yield asked_m_s, ways
+
+
+def cut_off_notes(mission: Mission) -> Iterator[str]:
+    """A line about each term of signals whose rise or fall the end of its item cuts off, or that never
+    begins."""
+    for item, step in enumerate(mission.steps):
+        if not isinstance(step, Signals):
+            continue
+        for number, term in enumerate(step.terms):
+            label = f"note: items[{item}].terms[{number}]"
+            end = f"duration_s {step.duration_s:g} of the item"
+            top_s = term.start_s + term.rise_s
+            edge_s = inf if term.hold_s is None else top_s + term.hold_s
+            if term.start_s >= step.duration_s:
+                yield f"{label}: has no effect: start_s = {term.start_s:g} is not before the {end}"
+                continue
+            for name, begin_s, length_s in (
+                ("rise", term.start_s, term.rise_s),
+                ("fall", edge_s, term.fall_s),
+            ):
+                if not begin_s < step.duration_s < begin_s + length_s:
+                    continue
+                share = 0.5 - 0.5 * cos(pi * (step.duration_s - begin_s) / length_s)
+                if share < MIN_MOVED_SHARE:
+                    yield (
+                        f"{label}: {name}_s = {length_s:g} is cut off by the {end}, after "
+                        f"{100.0 * share:.2g} % of its {name}"
+                    )
 
 
 def margin_warnings(reports: Sequence[PathReport], vehicle: str, belief: Vehicle) -> Iterator[str]:
@@ -371,6 +401,7 @@ def check_mission(
         *(f"warning: {text}" for text in answer.warnings),
         *slowness_notes(reports),
         *unreached_speed_notes(mission, reports, table),
+        *cut_off_notes(mission),
         *margin_warnings(reports, vehicle, limits.vehicle),
         *(f"warning: {text}" for text in vehicle_warnings(vehicle)),
         *timeout_warnings(mission, reports, table),

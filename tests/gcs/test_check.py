@@ -7,6 +7,7 @@ from importlib.resources import files
 from math import radians
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -30,6 +31,7 @@ from gcs.workflows.before_flight import law_problem
 from gcs.workflows.check_mission import (
     CheckResult,
     check_mission,
+    cut_off_notes,
     flown_s,
     margin_warnings,
     notes_after_release,
@@ -43,7 +45,8 @@ from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import parse_setting
 from gcs.workflows.flyable import winch_violations
 from gcs.workflows.vehicle_limits import load_limits, with_settings
-from missions.model import Land, Mission, Release, Speed, Step, Takeoff, Waypoint, Winch
+from missions.fileformat import shipped
+from missions.model import Land, Mission, Release, Signals, Speed, Step, Takeoff, Term, Waypoint, Winch
 
 HEAVY, BEBOP_LIMITS = load_belief("heavy-real"), load_limits("bebop")
 BEBOP = autopilot_parameters(BEBOP_LIMITS.vehicle)
@@ -411,3 +414,32 @@ def test_the_check_before_a_flight_follows_what_shapes_paths(
     settings = () if shape is None else (("MIS_SHAPE", shape),)
     assert flyable.violations(load("hover"), "bebop", BEBOP_LIMITS, law == "plumbline", settings) == []
     assert asked == [shaped]
+
+
+def test_a_term_that_the_end_of_its_item_cuts_off_is_noted(tmp_path: Path) -> None:
+    def notes(**changes: Any) -> list[str]:
+        signals = Signals(7.0, (Term("x", 0.5, **{"rise_s": 1.2, **changes}),))
+        return list(cut_off_notes(Mission("cut", "", "", (), (Takeoff(2.0), signals, Land()))))
+
+    end = "duration_s 7 of the item"
+    assert notes() == notes(start_s=6.0) == notes(hold_s=1.0, fall_s=2.0) == []  # 93 % of the rise at 6 s
+    cut = f"note: items[1].terms[0]: rise_s = 1200 is cut off by the {end}, after 0.0084 % of its rise"
+    assert notes(rise_s=1200.0) == [cut]
+    cut = f"note: items[1].terms[0]: fall_s = 7 is cut off by the {end}, after 78 % of its fall"
+    assert notes(hold_s=1.0, fall_s=7.0) == [cut]
+    late = f"note: items[1].terms[0]: has no effect: start_s = 7 is not before the {end}"
+    assert notes(start_s=7.0) == [late]
+    path = tmp_path / "cut.toml"
+    term = '{axis = "x", amplitude_m = 0.5, rise_s = 1200.0}'
+    items = (
+        '{type = "takeoff", altitude_m = 2.0}',
+        f'{{type = "signals", duration_s = 7.0, terms = [{term}]}}',
+    )
+    path.write_text(f'title = "Cut"\nitems = [{", ".join(items)}, {{type = "land"}}]')
+    assert any(
+        "rise_s = 1200 is cut off" in line for line in check_mission(str(path), "bebop", False).lines()
+    )
+
+
+def test_no_shipped_mission_cuts_off_a_term() -> None:
+    assert not any(list(cut_off_notes(load(name))) for name in shipped())
