@@ -102,9 +102,11 @@ class Craft:
                 f"{drag_n:.2f} N; friction holds {friction_n:.2f} N ({excess_text(drag_n, friction_n)}): it "
                 "is not armed"
             )
-            yield _lack(
-                0, "friction", drag_n, friction_n, text, "vehicle and load are blown along the ground"
+            reason = (
+                f"vehicle and load are blown along the ground at more than {_ARMING_SPEED_M_S:g} m/s, and "
+                "not armed"
             )
+            yield _lack(0, "friction", drag_n, friction_n, text, reason)
 
     def _with_slack_cable(self, wind_m_s: float) -> Iterator[Lack]:
         lean, _ = self._balance(wind_m_s, self._drag_n(wind_m_s), 0.0)

@@ -378,7 +378,9 @@ def test_check_says_that_it_can_be_flown():
     assert 52.0 < told.pop("expected_s") < 67.0  # it takes 55 s
     assert told.pop("time_limit_s") > 138.0
     assert 14.0 < told.pop("wind_limit_m_s") < 15.0
-    assert told.pop("wind_reason") == "vehicle and load are blown along the ground"
+    assert told.pop("wind_reason") == (
+        "vehicle and load are blown along the ground at more than 0.3 m/s, and not armed"
+    )
     assert told.pop("battery_left_pct") is None
     assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": [], "refusals": []}
 
