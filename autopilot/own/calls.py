@@ -9,13 +9,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 
 class TooSlow(Exception):
     """A call took longer than allowed."""
 
     def __str__(self) -> str:
-        return "no answer in time"
+        return f"no answer within {USER_CALL.max_call_s:g} s: an endless loop, or too much work for one call"
 
 
 @dataclass
@@ -25,6 +26,7 @@ class UserCall:
     count: int = 0
     in_progress: bool = False
     clock: Callable[[], float] | None = None  # s
+    max_call_s: float = inf  # after which a call is broken off
 
     def begin(self) -> float:
         """Note that a call begins; return the time in s, or 0 without a clock."""

@@ -32,6 +32,7 @@ def watched_calls(real_time: bool = False, max_call_s: float = MAX_CALL_S) -> It
     stop = partial(_wake, thread) if is_main_thread else partial(USER_CALL.abort, thread)
     watch = threading.Thread(target=_watch, args=(ended, stop, max_call_s), daemon=True)
     USER_CALL.clock = time.perf_counter if real_time else None
+    USER_CALL.max_call_s = max_call_s
     before = signal.signal(_WAKE_SIGNAL, _on_wake) if is_main_thread else None
     watch.start()
     try:

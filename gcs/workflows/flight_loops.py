@@ -94,8 +94,10 @@ def run_lockstep(
             silent_s = time.monotonic() - last_received_s
             if started and silent_s > BUSY_CHECK_S and is_busy():
                 if not wait_reported:
+                    own_work = f"an answer of {' or '.join(own_code)}, or " if own_code else ""
                     notify(
-                        "waiting for the autopilot, which is computing (for example shaping a difficult path)"
+                        f"waiting for the autopilot, which is computing (for example {own_work}"
+                        "shaping a difficult path)"
                     )
                 wait_reported, last_busy_s = True, time.monotonic()
             if not reason and time.monotonic() - max(last_received_s, last_busy_s) > limit_s:

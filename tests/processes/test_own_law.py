@@ -26,7 +26,8 @@ class Fails(LoadPid):
 FAULTS = {
     "raise SystemExit(0)": "Law Fails failed: SystemExit: 0 (mine.py:8); landing by law plumbline",
     "time.sleep(600.0)": (
-        "Law Fails failed: TooSlow: no answer in time (mine.py:8); landing by law plumbline"
+        "Law Fails failed: TooSlow: no answer within 5 s: an endless loop, or too much work for one call "
+        "(mine.py:8); landing by law plumbline"
     ),
 }
 

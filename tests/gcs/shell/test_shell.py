@@ -252,7 +252,13 @@ def fly_lockstep(new_world, items, path: Path, repeat: int, turns: int = 1_000) 
     return client
 
 
-def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("own_code", "work"),
+    [((), ""), (("slow.py:Slow",), "an answer of slow.py:Slow, or ")],
+)
+def test_an_autopilot_that_works_is_waited_for(
+    new_world, items, tmp_path, monkeypatch, capsys, own_code, work
+):
     for limit in ("SILENCE_LIMIT_S", "BUSY_CHECK_S"):
         monkeypatch.setattr(loops_module, limit, 0.05)
     looked = []
@@ -272,10 +278,12 @@ def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monke
             stop,
             lambda: None,
             is_busy=lambda: not looked.append(None),
+            own_code=own_code,
         )
         ground.send(GOODBYE)
     assert client.outcome is not None and client.outcome.reason == "it has ended"
-    assert capsys.readouterr().err.count("waiting for the autopilot") == 1
+    waiting = "waiting for the autopilot, which is computing (for example"
+    assert capsys.readouterr().err.count(f"{waiting} {work}shaping a difficult path)") == 1
 
 
 def test_an_idle_autopilot_may_wait_for_what_the_user_has_written(new_world, items, tmp_path, monkeypatch):
