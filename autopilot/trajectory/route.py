@@ -74,7 +74,8 @@ def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLik
 
 def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Path:
     """A path through sampled positions (n, 3) at increasing times (n,), n >= 2, from rest to rest: the spline
-    of degree 9 through them. ValueError if shapes do not fit, or times do not increase."""
+    of degree 9 through them, which rings unless the curve's derivatives up to the fourth are 0 at both ends.
+    ValueError if shapes do not fit, or times do not increase."""
     times, places = np.asarray(times_s, np.float64), np.asarray(positions, np.float64)
     if times.ndim != 1 or len(times) < 2 or places.shape != (len(times), 3):
         raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
@@ -98,7 +99,7 @@ def slower(path: Path, factor: float) -> Path:
 
 def use(path: Path, route: Route) -> float:
     """How many times as long, roughly, the path should take to stay within what the route allows; 1 or less
-    if it already does."""
+    if it already does. Far above 1 it may be far too great: forces are not proportional to the pace."""
     times, jets = _sample_finely(path)
     min_factor = 0.0
     if not route.time_optimal:

@@ -42,7 +42,8 @@ class MyName:
         path = samples(times, positions, passes)
 
         # `use` estimates by which factor the path must be slowed down to keep the limits of speed,
-        # acceleration, rotors and cable; at 1 or less the path keeps them
+        # acceleration, rotors and cable; at 1 or less the path keeps them. Far above 1 the estimate is far
+        # too great, so each step slows down by at most 1.5.
         for _ in range(20):
             longer = use(path, route)
             if longer <= 1.0:

@@ -61,6 +61,37 @@ def test_samples_are_passed_from_rest_to_rest() -> None:
     assert np.abs(off).max() < SAMPLED
 
 
+def test_samples_of_a_curve_that_is_not_at_rest_at_its_ends_ring() -> None:
+    """Its fourth derivative is not 0 there: docs/planners.md says how far off the spline is."""
+
+    def sampled(count: int, powers: tuple[float, ...]) -> float:
+        s = np.linspace(0.0, 1.0, count)
+        share = np.polynomial.Polynomial(powers)(s)[:, None]
+        start, end = np.array(POINTS)
+        return use(samples(3.0 * s, start + share * (end - start), [0.0, 3.0]), ROUTE)
+
+    at_rest_to_the_third = (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)
+    assert sampled(11, at_rest_to_the_third) == pytest.approx(3.3, abs=0.1)
+    assert sampled(61, at_rest_to_the_third) == pytest.approx(42.0, abs=5.0)
+    exact = use(straight(3.0), ROUTE)
+    assert sampled(11, tuple(REST_TO_REST)) == pytest.approx(exact, rel=1e-3)
+    assert sampled(61, tuple(REST_TO_REST)) == pytest.approx(exact, rel=1e-3)
+
+
+def test_use_is_right_near_1_and_too_great_for_a_path_that_is_much_too_fast() -> None:
+    """docs/planners.md gives these figures, and why a planner slows down in steps."""
+
+    def needed(path: Path) -> float:
+        factors = np.linspace(1.0, 4.0, 301)
+        return next(float(factor) for factor in factors if use(slower(path, factor), ROUTE) <= 1.0)
+
+    assert use(straight(3.0), ROUTE) == pytest.approx(needed(straight(3.0)), abs=0.02)
+    assert use(straight(2.0), ROUTE) == pytest.approx(1.85, abs=0.01)
+    assert needed(straight(2.0)) == pytest.approx(1.77, abs=0.01)
+    assert use(straight(1.5), ROUTE) > 1000.0
+    assert needed(straight(1.5)) == pytest.approx(2.36, abs=0.01)
+
+
 def test_a_slower_path_is_the_same_path() -> None:
     quick, slow = straight(4.0), slower(straight(4.0), 1.5)
     assert slow.passes_s == (0.0, 6.0)
