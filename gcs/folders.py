@@ -16,7 +16,8 @@ SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
 SENSOR_LOG, SENSORS_FOLDER = "sensors.log", "sensors"  # log of a simulator, and the tables made of it
 REPEATS_FOLDER = "flights"  # in a sweep's folder: flights that were flown again, each with a report
-LOCK_FILE = ".lock"  # of a folder into which several flights are written
+LOCK_FILE = ".lock"  # of a folder of results; stays there, empty
+FLIGHT_WRITER = "a flight is in progress, or its report is being written,"  # of a flight's folder
 # every folder of results contains exactly one of these three files, which identifies its kind
 _CONTENTS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
@@ -51,9 +52,9 @@ def make_folder(path: Path, shown_path: Path | None = None) -> None:
 
 
 @contextmanager
-def reserved(path: Path, what: str) -> Iterator[None]:
-    """Lock a folder against other writers; InputError if another process holds the lock. `what` names the
-    result that is written, for the error.
+def reserved(path: Path, other_writer: str = FLIGHT_WRITER) -> Iterator[None]:
+    """Lock a folder against other writers; InputError if another process holds the lock, or if the folder
+    cannot be written. `other_writer` says for the error what the other process does.
 
     The lock ends with the process, however that ends.
     """
@@ -64,9 +65,10 @@ def reserved(path: Path, what: str) -> Iterator[None]:
         lock.acquire(blocking=False)
     except Timeout:
         raise InputError(
-            f"{path}: another {what} is writing there; wait until it has ended, or name another folder "
-            "by --out"
+            f"{path}: {other_writer} there; wait until it has ended, or name another folder by --out"
         ) from None
+    except OSError as error:
+        raise write_error(error, path) from None
     try:
         yield
     finally:

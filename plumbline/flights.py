@@ -16,7 +16,14 @@ from autopilot.shell.atomic_file import write_atomically
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError, write_error
-from gcs.folders import PAGE_FILE, SENSORS_FOLDER, TLOG_FILE, check_no_other_results, make_folder
+from gcs.folders import (
+    PAGE_FILE,
+    SENSORS_FOLDER,
+    TLOG_FILE,
+    check_no_other_results,
+    make_folder,
+    reserved,
+)
 from gcs.foreign_mission import ForeignMission
 from gcs.mission_files import load
 from gcs.workflows.flight_meta import meta_of
@@ -276,33 +283,37 @@ class Flight:
         and deletes all its files. The same flight may be written again; its logs, and the files that were
         made on demand, are kept.
         """
+        folder = file_path("out", out)
+        with errors_for_python():
+            make_folder(folder)
+            check_no_other_results(folder, TLOG_FILE)
+            with reserved(folder):
+                self._write(folder, quiet, pictures, overwrite)
+        return folder / PAGE_FILE
+
+    def _write(self, folder: Path, quiet: bool, pictures: bool, overwrite: bool) -> None:
         from gcs.analysis.readings import write_readings
         from gcs.report.build import write_meta
         from gcs.workflows.report import make_report
         from gcs.workflows.vehicle_processes import LOGS
 
-        folder = file_path("out", out)
-        with errors_for_python():
-            make_folder(folder)
-            check_no_other_results(folder, TLOG_FILE)
-            earlier = _log_in(folder)
-            if earlier not in (b"", self.tlog) and not overwrite:
-                raise GcsError(
-                    f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
-                )
-            readings = self._kept_readings  # read before their files may be replaced
-            new_meta: FlightMeta | None = self._meta
-            if earlier == self.tlog:
-                write_meta(folder, self._meta)
-                new_meta = None
-            else:
-                for name in LOGS:  # of the flight that is replaced
-                    (folder / name).unlink(missing_ok=True)
-                write_atomically(folder / TLOG_FILE, self.tlog)
-            make_report(folder / TLOG_FILE, folder, new_meta, quiet, pictures="png" if pictures else None)
-            if readings is not None:
-                write_readings(folder / SENSORS_FOLDER, readings)
-        return folder / PAGE_FILE
+        earlier = _log_in(folder)
+        if earlier not in (b"", self.tlog) and not overwrite:
+            raise GcsError(
+                f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
+            )
+        readings = self._kept_readings  # read before their files may be replaced
+        new_meta: FlightMeta | None = self._meta
+        if earlier == self.tlog:
+            write_meta(folder, self._meta)
+            new_meta = None
+        else:
+            for name in LOGS:  # of the flight that is replaced
+                (folder / name).unlink(missing_ok=True)
+            write_atomically(folder / TLOG_FILE, self.tlog)
+        make_report(folder / TLOG_FILE, folder, new_meta, quiet, pictures="png" if pictures else None)
+        if readings is not None:
+            write_readings(folder / SENSORS_FOLDER, readings)
 
     @cached_property
     def _tracks(self) -> Telemetry:

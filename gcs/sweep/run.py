@@ -59,7 +59,7 @@ def sweep(
     store = Store(directory, plan)
     check_no_other_results(directory, PLAN_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(directory)
-    with reserved(directory, "gcs sweep"):
+    with reserved(directory, "another gcs sweep is writing"):
         if fresh:
             store.clear()
             (directory / PLAN_FILE).unlink(missing_ok=True)

@@ -42,7 +42,10 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
         split_at_marks(docs, BEGIN, END)
     make_output_directory(out)
     plan, flights = experiments(), out / FLIGHTS
-    with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:
+    with (
+        reserved(out, "another gcs experiments is writing"),
+        StopRequest(STOPPING) as stop,
+    ):
         waiting = missing(plan, flights, fresh)
         with BatchDisplay(len(plan) - len(waiting), len(plan), quiet) as display:
 

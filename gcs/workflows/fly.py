@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,16 @@ from gcs.errors import (
     StoppedError,
     disk_problem,
 )
-from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, check_no_other_results, fresh_folder, make_folder
+from gcs.folders import (
+    LOCK_FILE,
+    PAGE_FILE,
+    SUMMARY_FILE,
+    TLOG_FILE,
+    check_no_other_results,
+    fresh_folder,
+    make_folder,
+    reserved,
+)
 from gcs.foreign_mission import ForeignMission, home_of, home_text
 from gcs.mission_files import load
 from gcs.shell.display import notify, stderr_is_terminal
@@ -134,6 +143,7 @@ def fly(
 
             stop.hint = "the flight is over, and its report is made; Ctrl-C again abandons the report"
             flight = _finish(mission, options, client, truth_missing, watch.stop(), out, folder, stop, on_end)
+            folder.unlock()
             if page is not None:
                 page.send_event(report=str(out.resolve()))
                 stop.hint = "the page is closed"  # the report is complete and can no longer be abandoned
@@ -264,7 +274,7 @@ def _report_abandoned(tlog: Path) -> None:
 
 class FlightFolder:
     """The output directory, from which a flight that is overwritten is deleted; if the new flight fails, our
-    files are deleted again."""
+    files are deleted again. It is locked until then, or until `unlock`."""
 
     _FILES = (TLOG_FILE, *LOGS)
 
@@ -272,9 +282,14 @@ class FlightFolder:
         self._path = path
         self._overwrite = overwrite
         self._kept = False
+        self._lock = ExitStack()
 
     def keep(self) -> None:
         self._kept = True
+
+    def unlock(self) -> None:
+        """Allow others to write into the folder, which is complete."""
+        self._lock.close()
 
     def set_aside(self) -> Path:
         """Keep what was captured under a name that is not a flight's; the next flight may use the folder."""
@@ -284,6 +299,13 @@ class FlightFolder:
     def __enter__(self) -> FlightFolder:
         make_folder(self._path)
         check_no_other_results(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
+        with ExitStack() as lock:
+            lock.enter_context(reserved(self._path))
+            self._delete_earlier_flight()
+            self._lock = lock.pop_all()
+        return self
+
+    def _delete_earlier_flight(self) -> None:
         try:
             (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
         except FileExistsError:
@@ -295,9 +317,12 @@ class FlightFolder:
             delete_report(self._path)
             for name in LOGS:
                 (self._path / name).unlink(missing_ok=True)
-        return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:
+        with self._lock:
+            self._end(error)
+
+    def _end(self, error: BaseException | None) -> None:
         problem, tlog = disk_problem(error), self._path / TLOG_FILE
         if problem:
             size = tlog.stat().st_size if tlog.exists() else 0
@@ -319,5 +344,6 @@ class FlightFolder:
     def _clear(self) -> None:
         for name in self._FILES:
             (self._path / name).unlink(missing_ok=True)
-        if not any(self._path.iterdir()):
+        if [file.name for file in self._path.iterdir()] == [LOCK_FILE]:
+            (self._path / LOCK_FILE).unlink()
             self._path.rmdir()

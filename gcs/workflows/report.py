@@ -19,6 +19,8 @@ from gcs.folders import (
     SUMMARY_FILE,
     TLOG_FILE,
     check_no_other_results,
+    make_folder,
+    reserved,
 )
 from gcs.shell.display import StepDisplay
 
@@ -119,7 +121,9 @@ def remake_report(
     if holds_log and not (folder / TLOG_FILE).samefile(tlog):
         raise InputError(f"{folder}: holds another flight; name another folder by --out")
     check = partial(_check_same_flight, folder) if out and reported and not holds_log else None
-    return make_report(tlog, folder, None, quiet, pictures=pictures, check=check), folder
+    make_folder(folder)
+    with reserved(folder):
+        return make_report(tlog, folder, None, quiet, pictures=pictures, check=check), folder
 
 
 _MEASURED = ("recorded_s", "samples", "load_error_max_m", "rotor_force_max_n")  # distinguish flights

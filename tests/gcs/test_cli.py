@@ -28,6 +28,7 @@ from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE, GcsError
+from gcs.folders import LOCK_FILE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
@@ -937,7 +938,7 @@ def test_a_running_vehicle_that_is_armed_already_leaves_the_folder_to_the_next_f
         told = "hover: refused: the vehicle is armed already; land and disarm it first"
         where = f"what the vehicle said is in {out / 'unflown.tlog'}"
         assert result.stderr.splitlines()[-1] == f"gcs: {told}; {where}"
-        assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
+        assert {path.name for path in out.iterdir()} == {"unflown.tlog", LOCK_FILE}
 
 
 @pytest.mark.parametrize("released", [0, 1])
@@ -990,7 +991,7 @@ def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_
     assert (result.exit_code, result.stdout) == (EXIT_INTERRUPTED, "")
     told = f"stopped before the vehicle was armed; what it said is in {out / 'unflown.tlog'}"
     assert result.stderr.splitlines()[-1] == f"gcs: {told}"
-    assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
+    assert {path.name for path in out.iterdir()} == {"unflown.tlog", LOCK_FILE}
     assert (out / "unflown.tlog").stat().st_size > 0
 
 

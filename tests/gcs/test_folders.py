@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from click.testing import CliRunner
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, GcsError, InputError, disk_problem, write_error
 from gcs.folders import (
+    LOCK_FILE,
     PAGE_FILE,
     PLAN_FILE,
     RESULTS_FILE,
@@ -49,11 +52,43 @@ def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pyt
 
 
 def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None:
-    with FlightFolder(tmp_path, overwrite=False):
+    in_progress = f"^{tmp_path}: a flight is in progress, or its report is being written, there; wait until "
+    with FlightFolder(tmp_path, overwrite=False) as folder:
+        (tmp_path / TLOG_FILE).write_bytes(b"of the first")
+        for overwrite in (False, True):
+            with pytest.raises(InputError, match=in_progress):
+                FlightFolder(tmp_path, overwrite).__enter__()
+        folder.keep()
+        folder.unlock()  # the page of the flight may still be open
         with pytest.raises(GcsError, match="holds a flight already"):
             FlightFolder(tmp_path, overwrite=False).__enter__()
-        with FlightFolder(tmp_path, overwrite=True) as folder:
-            folder.keep()
+        assert (tmp_path / TLOG_FILE).read_bytes() == b"of the first"
+        with FlightFolder(tmp_path, overwrite=True) as second:
+            second.keep()
+
+
+def test_no_report_is_written_where_a_flight_is_in_progress(tmp_path: Path) -> None:
+    with FlightFolder(tmp_path, overwrite=False) as folder:
+        recorded_flights.flight(1.0, recorded_flights.still).write(tmp_path / TLOG_FILE)
+        with pytest.raises(InputError, match=": a flight is in progress"):
+            remake_report(tmp_path, None, quiet=True)
+        folder.keep()
+    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, LOCK_FILE}
+
+
+def test_a_folder_whose_writer_was_killed_is_free(tmp_path: Path) -> None:
+    hold = "import sys; from pathlib import Path; from gcs.folders import reserved\n"
+    hold += "with reserved(Path(sys.argv[1])): print('locked', flush=True); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-c", hold, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as writer:
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == b"locked\n"
+        with pytest.raises(InputError, match="in progress"):
+            reserved(tmp_path).__enter__()
+        writer.kill()
+    with reserved(tmp_path):
+        pass
 
 
 def test_of_a_flight_that_is_overwritten_nothing_is_left_beside_the_new_one(tmp_path: Path) -> None:
@@ -64,7 +99,7 @@ def test_of_a_flight_that_is_overwritten_nothing_is_left_beside_the_new_one(tmp_
     with pytest.raises(KeyboardInterrupt), FlightFolder(tmp_path, overwrite=True):
         (tmp_path / TLOG_FILE).write_bytes(b"telemetry")
         raise KeyboardInterrupt
-    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, "notes.txt"}
+    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, LOCK_FILE, "notes.txt"}
 
 
 def test_the_report_of_a_log_does_not_take_the_place_of_another_flights(tmp_path: Path) -> None:
@@ -180,10 +215,11 @@ def test_a_flight_leaves_a_sweep_and_files_of_others_as_they_are(tmp_path: Path)
 
 
 def test_a_folder_that_is_written_into_is_not_anothers(tmp_path: Path) -> None:
-    in_use = reserved(tmp_path, "sweep")
+    writer = "another sweep is writing"
+    in_use = reserved(tmp_path, writer)
     with in_use, pytest.raises(InputError, match=f"^{tmp_path}: another sweep is writing there; "):
-        reserved(tmp_path, "sweep").__enter__()
-    with reserved(tmp_path, "sweep"):
+        reserved(tmp_path, writer).__enter__()
+    with reserved(tmp_path, writer):
         pass
 
 
