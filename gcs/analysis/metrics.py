@@ -293,27 +293,38 @@ def coverage_numbers(samples: Samples) -> Numbers:
     }
 
 
-DIVERGED_M = 2.0  # nearly three cable lengths of the nominal vehicle: tracking has failed
-
-
 def _disarmed(telemetry: Telemetry) -> bool:
     """Whether the vehicle was disarmed at the end: a HEARTBEAT reports it at once, the phase comes later."""
     modes, phase = telemetry.heartbeat.base_mode, telemetry.setpoint.phase
     stopped = len(modes) > 0 and not modes[-1] & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    return stopped or bool(phase[-1] == mavlink.PLUMBLINE_PHASE_DISARMED)
+    return stopped or bool((phase[-1:] == mavlink.PLUMBLINE_PHASE_DISARMED).any())
 
 
 def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
-    """The outcome of the flight judged from telemetry, for logs without a recorded outcome."""
+    """The outcome of the flight judged from telemetry, for logs without a recorded outcome: by what the
+    vehicle reported and did, as the client judges that flies it. How far the load was from its path decides
+    nothing: a receiver's bias alone may be metres, and the vehicle itself tells when it cannot follow."""
     phase = telemetry.setpoint.phase
     if len(phase) == 0 and len(samples.time_s) == 0:
         return "no telemetry"
-    error = np.linalg.norm(samples.error_m[samples.position_tracked], axis=1)
-    lost = not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any())
-    if lost or (phase == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
+    # an autopilot that knows of no load has other reasons for critical texts, and flies on
+    told_loss = telemetry.setpoint.is_reported and np.isfinite(lost_s(telemetry))
+    if not np.isfinite(samples.actual_m).all() or told_loss:
         return "diverged"
-    if failure_s(telemetry, samples) is not None and _disarmed(telemetry):
+    if not _disarmed(telemetry):
+        return "incomplete"
+    if failure_s(telemetry, samples) is not None or _left_mission(telemetry):
         return "interrupted"
-    if np.isin(phase, (*CARRIED, mavlink.PLUMBLINE_PHASE_LOWER)).any() and _disarmed(telemetry):
-        return "completed"
-    return "incomplete"
+    carried = np.isin(phase, (*CARRIED, mavlink.PLUMBLINE_PHASE_LOWER)).any()
+    return "completed" if carried else "incomplete"
+
+
+def _left_mission(telemetry: Telemetry) -> bool:
+    """Whether a mission was begun that is in the log and whose last item was not flown."""
+    setpoint, reached = telemetry.setpoint, telemetry.mission_reached
+    last = len(telemetry.mission) - 1
+    if last < 0 or not (setpoint.phase == MISSION).any():
+        return False
+    landing = np.isin(setpoint.phase, (mavlink.PLUMBLINE_PHASE_LOWER, mavlink.PLUMBLINE_PHASE_SET_DOWN))
+    flown = np.isin(phase_at(telemetry, reached.time_s), AIRBORNE) & (reached.item == last)
+    return not (flown.any() or (landing & (setpoint.item == last)).any())

@@ -77,6 +77,11 @@ class SetpointTrack:
     phase: Ints  # (n,) PLUMBLINE_PHASE
     control_mode: Ints  # (n,) PLUMBLINE_CONTROL_MODE
 
+    @property
+    def is_reported(self) -> bool:
+        """Whether the autopilot reported it; that of others is observed (`gcs.analysis.observed`)."""
+        return bool(np.isfinite(self.elapsed_s).any())
+
 
 @dataclass(frozen=True)
 class CascadeTrack:

@@ -8,11 +8,13 @@ import pytest
 from autopilot.trajectory.transfer import transfer
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.records import WireItem
 from gcs.analysis.metrics import clock_numbers
 from gcs.analysis.record import FlightMeta, flight_record
 from gcs.analysis.samples import CARRIED
 from gcs.analysis.step import Step, find_step, step_response
 from gcs.analysis.telemetry import telemetry_of
+from gcs.analysis.tracks import ItemTrack
 from tests.doubles import recorded_flights as flights
 from tests.gcs import tolerances
 
@@ -442,7 +444,7 @@ def test_what_is_no_failure(change):
         (None, 0.0, "completed"),
         ((5, 9), 0.0, "diverged"),
         ((8, 5), 0.0, "incomplete"),
-        (None, 3.0, "diverged"),
+        (None, 6.0, "completed"),  # of a receiver's bias
         (None, np.nan, "diverged"),
     ],
 )
@@ -455,6 +457,45 @@ def test_outcomes(phases, error_m, outcome):
     flight.actual[np.flatnonzero(flight.mission)[-50:]] += error_m
     assert record(flight)["outcome"] == outcome
     assert record(flight, outcome="aborted")["outcome"] == "aborted"
+
+
+@pytest.mark.parametrize(
+    ("when", "severity", "outcome"),
+    [("mission", 2, "diverged"), ("mission", 4, "completed"), ("ground", 2, "completed")],
+)
+def test_a_flight_in_which_something_critical_was_told_in_the_air_is_lost(when, severity, outcome):
+    flight = flights.flight(2.0, flights.still)
+    told_s = float(flight.time_s[np.flatnonzero(flight.mission)[20]]) if when == "mission" else 0.1
+    flight.texts.append((told_s, severity, "Law L failed: landing by law plumbline"))
+    assert record(flight)["outcome"] == outcome
+    telemetry = flight.telemetry()
+    setpoint = telemetry.setpoint
+    observed = replace(setpoint, elapsed_s=np.full_like(setpoint.elapsed_s, np.nan))
+    of_firmware = flight_record(replace(telemetry, setpoint=observed), FlightMeta())
+    assert of_firmware["outcome"] == "completed"
+
+
+@pytest.mark.parametrize(
+    ("items", "landing_item", "outcome"),
+    [(3, 2, "completed"), (3, 1, "interrupted"), (0, 0, "completed")],
+)
+def test_a_flight_that_landed_before_its_last_item_was_interrupted(items, landing_item, outcome):
+    flight = flights.flight(2.0, flights.still)
+    telemetry = flight.telemetry()
+    item = telemetry.setpoint.item.copy()
+    item[telemetry.setpoint.phase > mavlink.PLUMBLINE_PHASE_MISSION] = landing_item
+    none_reached = ItemTrack(np.empty(0), np.empty(0, dtype=np.int64))
+    telemetry = replace(
+        telemetry,
+        setpoint=replace(telemetry.setpoint, item=item),
+        mission=tuple(WireItem(*range(len(WireItem._fields))) for _ in range(items)),
+        mission_reached=none_reached,
+    )
+    assert flight_record(telemetry, FlightMeta())["outcome"] == outcome
+    reached = replace(
+        telemetry, mission_reached=ItemTrack(telemetry.setpoint.time_s[-400:-399], np.array([2]))
+    )
+    assert flight_record(reached, FlightMeta())["outcome"] == "completed"
 
 
 def test_lateness_is_known_in_real_time_only():
