@@ -311,7 +311,7 @@ class Flight:
             for name in LOGS:  # of the flight that is replaced
                 (folder / name).unlink(missing_ok=True)
             write_atomically(folder / TLOG_FILE, self.tlog)
-        make_report(folder / TLOG_FILE, folder, new_meta, quiet, pictures="png" if pictures else None)
+        make_report(folder / TLOG_FILE, folder, new_meta, quiet, pictures=("png",) if pictures else ())
         if readings is not None:
             write_readings(folder / SENSORS_FOLDER, readings)
 

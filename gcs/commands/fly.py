@@ -138,7 +138,7 @@ def fly_command(
     view: bool,
     port: int | None,
     bind: str,
-    pictures: str | None,
+    pictures: tuple[str, ...],
     required: tuple[str, ...],
     junit: Path | None,
     as_json: bool,

@@ -202,17 +202,31 @@ def truth_option(function: F) -> F:
 
 
 def pictures_option(function: F) -> F:
-    """--pictures, --pictures-pdf and --pictures-svg of every command that writes a report: the format."""
+    """--pictures, --pictures-pdf and --pictures-svg of every command that writes a report: the argument
+    `pictures` has the formats of all that are given."""
+
+    def add_format(ctx: click.Context, param: click.Parameter, picture_format: str | None) -> None:
+        ctx.params.setdefault("pictures", ())
+        if picture_format is not None:
+            ctx.params["pictures"] += (picture_format,)
+
     for picture_format, option, help_text in (
-        ("svg", "--pictures-svg", "Draw all pictures as SVG."),
-        ("pdf", "--pictures-pdf", "Draw all pictures as PDF, for papers."),
+        ("svg", "--pictures-svg", "Draw all pictures as SVG too."),
+        ("pdf", "--pictures-pdf", "Draw all pictures as PDF too, for papers."),
         (
             "png",
             "--pictures",
             "Draw track.png, position.png, error.png and the other pictures too (docs/report.md).",
         ),
     ):
-        function = click.option(option, "pictures", flag_value=picture_format, help=help_text)(function)
+        function = click.option(
+            option,
+            f"pictures_{picture_format}",
+            flag_value=picture_format,
+            expose_value=False,
+            callback=add_format,
+            help=help_text,
+        )(function)
     return function
 
 

@@ -28,7 +28,13 @@ from gcs.errors import InputError
 @json_option
 @click.option("--quiet", is_flag=True, help="Print no progress and no table.")
 def report_command(
-    source: Path, out: Path | None, pictures: str | None, mcap: bool, common: bool, as_json: bool, quiet: bool
+    source: Path,
+    out: Path | None,
+    pictures: tuple[str, ...],
+    mcap: bool,
+    common: bool,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """Write the report of a captured flight again.
 

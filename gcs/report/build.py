@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from autopilot.shell.atomic_file import write_atomically
@@ -45,7 +45,7 @@ def build_report(
     meta: FlightMeta | None = None,
     progress: Progress | None = None,
     figures: Callable[[Record], None] | None = None,
-    picture_format: str | None = None,
+    picture_formats: Sequence[str] = (),
     check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
@@ -53,8 +53,8 @@ def build_report(
     `figures` is called with the record as soon as it is complete, before the steps that take longer. `meta`,
     if given, is that of a new flight, and an earlier report in the directory is deleted; otherwise meta.json
     beside the log is read. A log that is truncated, empty or of a lost flight gives a record too, with None
-    for what cannot be known. All pictures are drawn in `picture_format` (png, pdf, svg); None: only
-    that of the page.
+    for what cannot be known. All pictures are drawn in each of `picture_formats` (png, pdf, svg);
+    without any: only that of the page.
     `check` is called with the record before anything is written, and may raise an error.
     """
     from gcs.report.draw import Drawing
@@ -70,9 +70,8 @@ def build_report(
         delete_report(out_dir)
 
     pictures = list(PICTURES[:1])  # the page contains it
-    if picture_format is not None:
-        wanted = (picture.as_format(picture_format) for picture in PICTURES)
-        pictures += (picture for picture in wanted if picture.file != pictures[0].file)
+    wanted = (picture.as_format(one) for one in picture_formats for picture in PICTURES)
+    pictures += (picture for picture in wanted if picture.file != pictures[0].file)
     sensor_log = out_dir / SENSOR_LOG
     steps = [PARQUET_FILE, SENSORS_FOLDER] if sensor_log.is_file() else [PARQUET_FILE]
     remaining = ["reading telemetry", *steps, *(picture.file for picture in pictures), PAGE_FILE]

@@ -47,7 +47,7 @@ class FlightOptions:
     estimator: str = ""  # a custom one; empty: the built-in one
     planner: str = ""
     truth_at: Address | None = None  # where the simulator of `connect` sends the truth
-    pictures: str | None = None  # format of all pictures of the report; None: only that of its page
+    pictures: tuple[str, ...] = ()  # formats of all pictures of the report; none: only that of its page
     log_sensors: bool = False  # make tables of all readings
     ignored: tuple[str, ...] = ()  # parameters in the vehicle's file that have no effect
 

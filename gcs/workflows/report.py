@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,11 +34,11 @@ def make_report(
     meta: FlightMeta | None,
     quiet: bool,
     on_record: Callable[[Record], None] | None = None,
-    pictures: str | None = None,
+    pictures: Sequence[str] = (),
     check: Callable[[Record], None] | None = None,
 ) -> Record:
     """Make the report in `out`; without `meta`, meta.json beside the log is used. `on_record` is called with
-    the record before anything is drawn. `pictures`: the format of all pictures; None: only
+    the record before anything is drawn. `pictures`: the formats of all pictures; none: only
     that of the page.
     `check` is called with the record before anything is written, and may raise an error."""
     from gcs.report.build import ReportError, build_report
@@ -108,7 +108,7 @@ def meta_beside(tlog: Path) -> FlightMeta:
 
 
 def remake_report(
-    source: Path, out: Path | None, quiet: bool, pictures: str | None = None
+    source: Path, out: Path | None, quiet: bool, pictures: Sequence[str] = ()
 ) -> tuple[Record, Path]:
     """Make the report of a log, or of the directory that contains it, again; return the record and the
     report's directory."""

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 from pyarrow import parquet
 from rich.console import Console
@@ -25,6 +26,7 @@ from gcs.analysis.definitions import GROUPS, METRICS
 from gcs.analysis.record import FlightMeta, Record, flight_record, jsonable
 from gcs.analysis.samples import PHASE_NAMES, samples_of
 from gcs.analysis.telemetry import load_telemetry
+from gcs.cli import gcs
 from gcs.report import plots, style
 from gcs.report.build import ReportError, build_report, load_meta
 from gcs.report.plots import PICTURES, View
@@ -53,7 +55,7 @@ def built(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
     told = []
     tlog = flights.case_b(duration_s=12.0).write(out / "flight.tlog")
-    record = build_report(tlog, out, META, lambda *step: told.append(step), picture_format="png")
+    record = build_report(tlog, out, META, lambda *step: told.append(step), picture_formats=["png"])
     return out, record, told
 
 
@@ -98,7 +100,7 @@ def test_the_same_log_gives_the_same_report_without_what_imports_pandas(built, t
     for name in ("array", "table"):
         monkeypatch.delattr(pyarrow, name)
     # meta.json beside the log is read when no meta is passed
-    again = build_report(out / "flight.tlog", tmp_path, picture_format="png")
+    again = build_report(out / "flight.tlog", tmp_path, picture_formats=["png"])
     assert again == {**record, "report_dir": str(tmp_path)}
     for name in FILES - {"summary.json", "flight.parquet"}:
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
@@ -264,7 +266,7 @@ def test_the_table_shows_what_is_known(built):
 @pytest.mark.parametrize("content", [b"", b"no telemetry at all, but a text" * 9])
 def test_a_log_without_a_flight_gives_a_report(tmp_path, content):
     (tmp_path / "flight.tlog").write_bytes(content)
-    record = build_report(tmp_path / "flight.tlog", tmp_path, picture_format="png")
+    record = build_report(tmp_path / "flight.tlog", tmp_path, picture_formats=["png"])
     assert record["outcome"] == "no telemetry"
     assert record["load_error_max_m"] is None
     assert {path.name for path in tmp_path.iterdir()} == FILES | {"flight.tlog"}
@@ -284,7 +286,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
     path = flight.write(tmp_path / "flight.tlog")
     path.write_bytes(path.read_bytes()[:-11])  # and the last record is cut off
     told = FlightMeta(outcome="diverged", reason="no finite state")
-    record = build_report(path, tmp_path, told, picture_format="png")
+    record = build_report(path, tmp_path, told, picture_formats=["png"])
     assert record["outcome"] == "diverged"
     assert "end where the flight was given up" in (tmp_path / "report.html").read_text(encoding="utf-8")
     text = (tmp_path / "summary.json").read_text()
@@ -298,7 +300,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
 def test_a_message_that_never_came_gives_a_report(tmp_path, silent):
     flight = flights.flight(1.0, flights.still)
     flight.drop = lambda i, kind: kind == silent
-    record = build_report(flight.write(tmp_path / "flight.tlog"), tmp_path, picture_format="png")
+    record = build_report(flight.write(tmp_path / "flight.tlog"), tmp_path, picture_formats=["png"])
     missing = {
         "load_setpoint": "load_error_max_m",
         "load_state": "load_error_max_m",
@@ -522,7 +524,7 @@ def test_pictures_beside_the_one_of_the_page_are_drawn_on_demand_and_are_of_the_
 ):
     draw_by(monkeypatch, lambda target: target.write_bytes(b"drawn"))
     made = flights.flight(1.0, flights.still).write(tmp_path / "flight.tlog")
-    build_report(made, tmp_path, META, picture_format="png")
+    build_report(made, tmp_path, META, picture_formats=["png"])
     earlier = [tmp_path / name for name in ("flight.mcap", "flight.common.tlog")]
     for path in earlier:
         path.write_bytes(b"of an earlier flight")
@@ -539,14 +541,31 @@ def test_pictures_beside_the_one_of_the_page_are_drawn_on_demand_and_are_of_the_
 def test_pictures_for_papers_are_the_same_each_time_and_go_with_the_report(tmp_path, picture_format, begin):
     files = [f"{picture.name}.{picture_format}" for picture in PICTURES]
     made = flights.case_b(duration_s=3.0).write(tmp_path / "flight.tlog")
-    build_report(made, tmp_path, META, picture_format=picture_format)
+    build_report(made, tmp_path, META, picture_formats=[picture_format])
     drawn = [(tmp_path / file).read_bytes() for file in files]
     assert all(data.startswith(begin) for data in drawn)
     assert (tmp_path / "overview.png").exists()
-    build_report(made, tmp_path, picture_format=picture_format)
+    build_report(made, tmp_path, picture_formats=[picture_format])
     assert [(tmp_path / file).read_bytes() for file in files] == drawn
     build_report(made, tmp_path, META)
     assert not any((tmp_path / file).exists() for file in files)
+
+
+def test_the_formats_of_pictures_add_up(tmp_path, monkeypatch):
+    draw_by(monkeypatch, lambda target: target.write_bytes(b"drawn"))
+    log = flights.flight(1.0, flights.still).write(tmp_path / "flight.tlog")
+    arguments = [
+        "report",
+        str(log),
+        "--pictures-svg",
+        "--pictures",
+        "--pictures-pdf",
+        "--pictures",
+        "--quiet",
+    ]
+    assert CliRunner().invoke(gcs, arguments).exit_code == 0
+    drawn = {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".pdf", ".svg")}
+    assert drawn == {f"{picture.name}.{one}" for picture in PICTURES for one in ("png", "pdf", "svg")}
 
 
 def test_a_helper_that_dies_leaves_its_pictures_to_us(tmp_path, monkeypatch):
@@ -563,6 +582,6 @@ def test_a_helper_that_dies_leaves_its_pictures_to_us(tmp_path, monkeypatch):
 
     draw_by(monkeypatch, only_here)
     made = flights.case_b(duration_s=2.0).write(tmp_path / "flight.tlog")
-    build_report(made, tmp_path, picture_format="png")
+    build_report(made, tmp_path, picture_formats=["png"])
     assert taken.exists()
     assert all((tmp_path / picture.file).read_bytes() == b"drawn here" for picture in PICTURES)
