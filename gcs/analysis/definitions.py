@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -13,7 +14,7 @@ FILE = "metrics.toml"
 UNKNOWN = "–"
 _LOST = ("diverged", "lost")  # outcomes
 _ONE_METRE = 1.0  # lengths of this or more are shown in metres, not in millimetres
-_ONE_CENTIMETRE = 0.01
+_SIGNIFICANT, _MAX_DECIMALS = 3, 8
 
 
 class _StrictModel(BaseModel):
@@ -39,26 +40,38 @@ class Metric(_StrictModel):
         if value is None:
             return UNKNOWN
         unit = self._displayed_unit
-        if unit == "mm" and abs(value) >= _ONE_METRE:
+        if self.needs_metres(record):
             return f"{value:.2f} m"
         text = f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
         return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
 
-    def formatted_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-        """The values of several records as displayed; all in metres if one is a metre or more, with as many
-        digits as the smallest of them needs."""
-        values = [record.get(self.name) for record in records]
-        if self._displayed_unit != "mm" or not any(
-            value is not None and abs(value) >= _ONE_METRE for value in values
-        ):
-            return tuple(self.formatted(record) for record in records)
-        smallest = min(abs(value) for value in values if value is not None)
-        decimals = 4 if 0.0 < smallest < _ONE_CENTIMETRE else 3
-        return tuple(UNKNOWN if value is None else f"{value:.{decimals}f} m" for value in values)
+    def formatted_alike(self, record: Mapping[str, Any], in_metres: bool) -> str:
+        """The recorded value as displayed in a table of several flights: with at least three significant
+        digits, lengths in metres if `in_metres`, else in millimetres."""
+        value, unit = record.get(self.name), self._displayed_unit
+        if value is None or self.decimals is None:
+            return self.formatted(record)
+        if unit == "mm" and in_metres:
+            return f"{_with_digits(value, 3)} m"
+        text = _with_digits(value * self.scale, self.decimals)
+        return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
+
+    def needs_metres(self, record: Mapping[str, Any]) -> bool:
+        """Whether the value is a length of a metre or more that is otherwise displayed in millimetres."""
+        value = record.get(self.name)
+        return self._displayed_unit == "mm" and value is not None and abs(value) >= _ONE_METRE
 
     @property
     def _displayed_unit(self) -> str:
         return self.unit if self.shown is None else self.shown
+
+
+def _with_digits(value: float, decimals: int) -> str:
+    """The value with this many decimals, or with more if it needs them for three significant digits."""
+    if value == 0.0:
+        return f"{value:.{decimals}f}"
+    needed = max(decimals, _SIGNIFICANT - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{needed}f}" if needed <= _MAX_DECIMALS else f"{value:.{_SIGNIFICANT - 1}e}"
 
 
 def is_lost(record: Mapping[str, Any]) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gcs.analysis.definitions import GROUPS, UNKNOWN, Group, Metric
+from gcs.analysis.definitions import GROUPS, METRICS, UNKNOWN, Group, Metric
 from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.samples import AIRBORNE, MISSION, Samples, samples_of
 from gcs.analysis.telemetry import load_telemetry
@@ -143,19 +143,18 @@ def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
 
 
 def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
-    """The figures by group, without those that are unknown or 0 in all runs or state how it was flown."""
+    """The figures by group, without those that are unknown or 0 in all runs or state how it was flown. All
+    lengths are in metres if one of them is a metre or more."""
     found = []
     same_mission = _are_of_one_mission(runs)
+    in_metres = any(metric.needs_metres(run.record) for metric in METRICS.values() for run in runs)
     for group, metrics in GROUPS:
-        rows = [
-            Figure(
-                metric,
-                metric.formatted_alike([run.record for run in runs]),
-                _best(metric, runs) if same_mission else (),
-            )
-            for metric in metrics
-            if metric.name not in _CONDITIONS and any(run.record[metric.name] for run in runs)
-        ]
+        rows = []
+        for metric in metrics:
+            if metric.name in _CONDITIONS or not any(run.record[metric.name] for run in runs):
+                continue
+            values = tuple(metric.formatted_alike(run.record, in_metres) for run in runs)
+            rows.append(Figure(metric, values, _best(metric, runs, values) if same_mission else ()))
         if rows:
             found.append((group, rows))
     return found
@@ -167,7 +166,7 @@ def _are_of_one_mission(runs: Sequence[Run]) -> bool:
     return len(names) == 1 or set(_different_steps(runs)) == {UNKNOWN}
 
 
-def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
+def _best(metric: Metric, runs: Sequence[Run], displayed: Sequence[str]) -> tuple[int, ...]:
     """The runs with the best value or one that counts as equal (`_TOLERANCE` or the same when displayed),
     among the completed flights if there are any. Empty if all of these are equal."""
     completed = [i for i, run in enumerate(runs) if run.record["outcome"] == "completed"]
@@ -177,20 +176,25 @@ def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
     if metric.better is None or metric.name in _MACHINE_DEPENDENT or not rated:
         return ()
     best = min(rated.values()) if metric.better == "less" else max(rated.values())
-    best_texts = {metric.formatted(runs[i].record) for i, value in rated.items() if value == best}
+    best_texts = {displayed[i] for i, value in rated.items() if value == best}
     good = [
         i
         for i, value in rated.items()
-        if abs(value - best) <= _TOLERANCE * abs(best) or metric.formatted(runs[i].record) in best_texts
+        if abs(value - best) <= _TOLERANCE * abs(best) or displayed[i] in best_texts
     ]
     return tuple(good) if len(good) < len(rated) else ()
+
+
+def given_conditions(runs: Sequence[Run]) -> set[str]:
+    """The names of what was given for the flights; other parameters that differ follow from it."""
+    return {*_CONDITIONS, *(name for run in runs for name in run.meta.settings)}
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
     """The label of each flight on the page, from what differs: `thesis, SIM_ACT_DELAY_MS=72`. The differences
     that tell the flights apart come first. If several flights have the same label, or none, the flight's name
     is added, which is that of its folder."""
-    given = {*_CONDITIONS, *(name for run in runs for name in run.meta.settings)}
+    given = given_conditions(runs)
     all_differences = [one for one in differences(runs) if one.name not in _NOT_IN_LABELS]
     # the given settings, without the parameters that follow from them; if none differ, as with captured
     # flights, what the vehicle reported
@@ -270,7 +274,7 @@ def comparison_table(runs: Sequence[Run]) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
     for run in runs:
-        table.add_column(Text(_heading(run.name)), justify="right", overflow="fold")
+        table.add_column(Text(heading(run.name)), justify="right", overflow="fold")
     different = differences(runs)
     for one in different:
         cells = [Text(_shortened(value)) for value in one.values]
@@ -283,11 +287,11 @@ def comparison_table(runs: Sequence[Run]) -> Table:
     return table
 
 
-def _heading(name: str) -> str:
-    """A name broken between its parts into lines of up to `_HEADING` characters; longer parts stay whole."""
+def heading(name: str, max_chars: int = _HEADING) -> str:
+    """A name broken between its parts into lines of up to `max_chars` characters; longer parts stay whole."""
     lines = [""]
     for part in re.findall(r"[^-_/. ]*[-_/. ]?", name):
-        if lines[-1] and len(lines[-1] + part) > _HEADING:
+        if lines[-1] and len(lines[-1] + part) > max_chars:
             lines.append("")
         lines[-1] += part
     return "\n".join(lines)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from gcs.report.compare import Run, cell, differences, figures
+from gcs.report.compare import Run, cell, differences, figures, given_conditions, heading
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,6 +25,7 @@ _MORE = {
 }
 _MAX_VALUE_CHARS = 14  # characters of a value; a difference with a longer one has no column
 _MIN_NAME_CHARS, _MAX_NAME_CHARS = 12, 36  # characters of a flight's name in a line, least and most
+_MAX_TITLE_CHARS = 10  # characters in a line of the title of a difference, if it can be broken
 _COLUMN_GAP = 3
 
 
@@ -34,11 +35,12 @@ class _Column(NamedTuple):
     title: str
     values: tuple[str, ...]
     best: tuple[int, ...] = ()
+    follows: bool = False  # a difference that follows from what was given
 
     @property
     def width(self) -> int:
         cells = (f"* {value}" if i in self.best else value for i, value in enumerate(self.values))
-        return max(map(len, (self.title, *cells))) + _COLUMN_GAP
+        return max(map(len, (*self.title.splitlines(), *cells))) + _COLUMN_GAP
 
 
 def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
@@ -49,12 +51,17 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
 
     free = width - min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs))) - _COLUMN_GAP
     columns, omitted = [], [one.name for one in differences(runs)]
+    settings = {name for run in runs for name in run.meta.settings}
+    lacks_setting = False  # then no parameter that follows from the settings is shown in its place
     for column in _columns(runs):
-        if column.width <= free:
-            free -= column.width
-            columns.append(column)
-            if column.title in omitted:
-                omitted.remove(column.title)
+        name = column.title.replace("\n", "")
+        if column.width > free or (column.follows and lacks_setting):
+            lacks_setting = lacks_setting or name in settings
+            continue
+        free -= column.width
+        columns.append(column)
+        if name in omitted:
+            omitted.remove(name)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("flight", overflow="fold", min_width=_MIN_NAME_CHARS)
     for column in columns:
@@ -73,7 +80,9 @@ def _columns(runs: Sequence[Run]) -> Iterator[_Column]:
         return [_Column(title, figure.values, figure.best) for title, figure in found]
 
     yield from chosen(_MAIN)
+    given = given_conditions(runs)
     for one in differences(runs):
         if max(map(len, one.values)) <= _MAX_VALUE_CHARS:
-            yield _Column(one.name, one.values)
+            title = heading(one.name, _MAX_TITLE_CHARS)
+            yield _Column(title, one.values, follows=one.name not in given)
     yield from chosen(_MORE)

@@ -177,7 +177,8 @@ def test_what_is_as_good_as_the_best_has_its_star_too(runs: list[Path]) -> None:
 
     assert best(0.1, 0.1009, 0.1011) == [0, 1]
     assert best(0.1, 0.1009) is None  # too small a difference
-    assert best(0.0001, 0.00012) is None  # both are shown as 0.1 mm
+    assert best(0.0001, 0.00012) == [0]
+    assert best(0.0, 1e-13) == [0]
     assert best(None, 0.2, 0.1) == [2]
 
 
@@ -187,8 +188,12 @@ def test_lengths_beside_each_other_are_in_one_unit(runs: list[Path]) -> None:
         replace(base, record={**base.record, "load_error_max_m": value}) for value in (0.0061, 12.3, None)
     ]
     rows = {row.metric.name: row.values for _, rows in figures(found) for row in rows}
-    assert rows["load_error_max_m"] == ("0.0061 m", "12.3000 m", "–")
-    assert rows["load_error_rms_m"][0].endswith(" mm")
+    assert rows["load_error_max_m"] == ("0.00610 m", "12.300 m", "–")
+    shown = [value for values in rows.values() for value in values]
+    assert any(value.endswith(" m") for value in rows["load_error_rms_m"])
+    assert not any(value.endswith(" mm") for value in shown)
+    in_millimetres = [value for _, rows in figures([base, base]) for row in rows for value in row.values]
+    assert not any(value.endswith(" m") for value in in_millimetres)
 
 
 def test_what_was_set_is_told_before_what_follows_from_it(runs: list[Path]) -> None:
@@ -287,6 +292,17 @@ def test_no_column_is_cut_where_the_names_of_the_flights_are_short(runs: list[Pa
     assert {"law", "seed", "SIM_WIND_E"} == {
         name for name in shown if name in ("law", "seed", "SIM_WIND_E")
     } | set(missed)
+
+
+@pytest.mark.parametrize("width", range(50, 90, 8))
+def test_what_was_set_has_a_column_before_what_follows_from_it(runs: list[Path], width: int) -> None:
+    base = replace(loaded(runs[0]), name="y1")
+    told = replace(base.telemetry, parameters={"VEH_LAG": 0.5})
+    meta = replace(base.meta, settings={"SIM_ACT_DELAY_MS": 72.0})
+    table, missed = overview([base, replace(base, name="y2", telemetry=told, meta=meta)], width)
+    titles = [str(column.header) for column in table.columns]
+    assert ("SIM_ACT_\nDELAY_MS" in titles) == ("SIM_ACT_DELAY_MS" not in missed)
+    assert not ("VEH_LAG" in titles and "SIM_ACT_DELAY_MS" in missed)
 
 
 def test_the_pages_of_many_flights_have_names_of_their_own(

@@ -39,6 +39,27 @@ def test_values_as_people_read_them(key, value, text):
     assert METRICS[key].formatted({key: value}) == text
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "in_metres", "text"),
+    [
+        ("load_error_max_m", 0.0030123, False, "3.01 mm"),
+        ("load_error_max_m", 0.0030123, True, "0.00301 m"),
+        ("load_error_max_m", 1.14749, True, "1.147 m"),
+        ("load_error_max_m", 0.1334, False, "133.4 mm"),
+        ("load_error_max_m", None, True, "–"),
+        ("psi_R_max", 8.0993e-05, False, "0.0000810"),
+        ("psi_R_max", 1e-12, False, "1.00e-12"),
+        ("psi_R_max", 0.0, False, "0.0000"),
+        ("saturated_fraction", 7.1429e-05, False, "0.00714 %"),
+        ("tilt_max_deg", 0.1234, True, "0.123°"),
+        ("slack_events", 3, False, "3"),
+        ("outcome", "completed", False, "completed"),
+    ],
+)
+def test_values_beside_those_of_other_flights_have_three_digits(key, value, in_metres, text):
+    assert METRICS[key].formatted_alike({key: value}, in_metres) == text
+
+
 def test_a_scale_belongs_to_another_unit():
     for metric in METRICS.values():
         if metric.scale != 1.0:
