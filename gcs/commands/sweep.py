@@ -139,6 +139,7 @@ def sweep_command(
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
     from gcs.batch.progress import rate_text
+    from gcs.sweep.results import interval_text
     from gcs.workflows.requirements import (
         ALL_FLOWN,
         COMPLETED,
@@ -181,9 +182,11 @@ def sweep_command(
         rate = f", {rate_text(counts.flights_per_s)}" if counts.flown else ""
         if counts.flown < counts.flights:
             rate += f"; {counts.flights - counts.flown} of them were there already"
+        interval = interval_text(counts.completed, counts.flights)
+        share = f" (95 % interval of the share: {interval} %)" if counts.flights else ""
         notify(
             f"{sweep.name}: {counts.flights} of {sweep.planned} flights flown, "
-            f"{counts.completed} completed{rate}"
+            f"{counts.completed} completed{share}{rate}"
         )
         with results_to_stdout():
             for one in () if quiet else sweep.flights:

@@ -22,7 +22,15 @@ from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plan_values import seeds_text
 from gcs.sweep.plots import draw_curve, draw_map, pooled_text
-from gcs.sweep.results import STEP_FIGURES, Cells, Flights, cells, completion_range, flights_by_law
+from gcs.sweep.results import (
+    STEP_FIGURES,
+    Cells,
+    Flights,
+    cells,
+    completion_range,
+    flights_by_law,
+    interval_text,
+)
 from gcs.sweep.standouts import Standout, base_command, repeat_command, stored_standouts
 from gcs.sweep.store import Store
 from gcs.web.page import render
@@ -102,6 +110,10 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
         "axes": [axis.tolist() for axis in found.axes],
         "flown": found.flown.ravel().tolist(),
         "completed": _json_numbers(100.0 * found.success.ravel()),
+        "interval": [
+            interval_text(round(share * flown), round(flown)) if flown else ""
+            for share, flown in zip(found.success.ravel(), found.flown.ravel(), strict=True)
+        ],
         "median": _json_numbers(1e3 * found.error_median_m.ravel()),
         "worst": _json_numbers(1e3 * found.error_worst_m.ravel()),
         "steps": _step_maps(found) if flights.are_steps else [],
@@ -176,6 +188,7 @@ def _law(flights: Flights) -> dict[str, Any]:
         "name": flights.law,
         "flights": len(flights.outcome),
         "share": f"{100.0 * outcomes['completed'] / len(flights.outcome):.1f}",
+        "interval": interval_text(outcomes["completed"], len(flights.outcome)),
         "ends": ", ".join(f"{name} {n}" for name, n in outcomes.most_common()),
         "phases": ", ".join(f"{name} {n}" for name, n in phases.most_common()) or UNKNOWN,
         "worst": f"{1e3 * worst:.1f}" if math.isfinite(worst) else UNKNOWN,

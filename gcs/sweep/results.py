@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 BINS = 8  # for a parameter whose values were drawn
 COMPLETED = "completed"
+_TAIL = 0.025  # probability beyond each end of an interval
 STEP_FIGURES = ("rise_time_90_s", "overshoot_pct", "settling_time_5pct_s")
 # of which medians are stated
 MEDIAN_FIGURES = ("load_error_max_m", "load_error_rms_m", *STEP_FIGURES, "psi_R_max", "psi_q_max")
@@ -119,14 +120,46 @@ def flights_by_law(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     return found
 
 
+def share_interval(completed: int, flights: int) -> tuple[float, float]:
+    """The 95 % confidence interval of Clopper and Pearson for the share of flights that complete, of which
+    these were drawn: the exact one of the binomial distribution, never too narrow."""
+    from scipy.special import betaincinv  # loads for a third of a second
+
+    missed = flights - completed
+    low = float(betaincinv(completed, missed + 1, _TAIL)) if completed else 0.0
+    high = float(betaincinv(completed + 1, missed, 1.0 - _TAIL)) if missed else 1.0
+    return low, high
+
+
+def share_record(completed: int, flights: int) -> dict[str, float]:
+    """The share of flights that completed, with its 95 % interval, as `gcs sweep --json` prints them."""
+    low, high = share_interval(completed, flights)
+    share = completed / max(flights, 1)
+    return {"completed_fraction": share, "completed_low_95": low, "completed_high_95": high}
+
+
+def interval_text(completed: int, flights: int) -> str:
+    """The 95 % interval of the share in percent: `40 … 100`."""
+    return " … ".join(map(_percent, share_interval(completed, flights)))
+
+
+def _percent(share: float) -> str:
+    """The share in percent, with two digits of its distance from 0 or 100 %, whichever is nearer."""
+    if share <= 0.5:
+        return f"{float(f'{100.0 * share:.2g}'):g}"
+    return f"{100.0 - float(f'{100.0 * (1.0 - share):.2g}'):.10g}"
+
+
 def law_record(flights: Flights) -> dict[str, object]:
     """Numbers and medians of the flights of one law, as `gcs sweep --json` prints them; None: not known, or
     more than half of the flights never got there."""
     medians = {name: flights.median(name) for name in MEDIAN_FIGURES}
+    completed = int(flights.completed.sum())
     return {
         "law": flights.law,
         "flights": len(flights.outcome),
-        "completed": int(flights.completed.sum()),
+        "completed": completed,
+        **share_record(completed, len(flights.outcome)),
         "medians": {name: value if np.isfinite(value) else None for name, value in medians.items()},
     }
 

@@ -60,7 +60,7 @@
     const at = map.names.length > 1 ? i * map.axes[1].length + j : i;
     const where = [labelled(map, 0, i), ...(map.names.length > 1 ? [labelled(map, 1, j)] : [])].join(", ");
     if (!map.flown[at]) return `${where}: not flown`;
-    return `${where}: ${map.flown[at]} flights, ${number(map.completed[at])} % completed; ` +
+    return `${where}: ${map.flown[at]} flights, ${number(map.completed[at])} % completed (95 % interval ${map.interval[at]} %); ` +
       [`load error median ${number(map.median[at])} mm, worst ${number(map.worst[at])} mm`,
         ...map.steps.map((step) => `${step.name} ${numberOf({ own: true }, step.values[at])} ${step.unit}`)].join(", ");
   }

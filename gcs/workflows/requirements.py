@@ -18,7 +18,12 @@ from missions.nearest import nearest_few
 
 COMPLETED = "completed"
 ALL_FLOWN = "all flights flown"  # the test case of a sweep, in which some flights may be lost
-_COUNTS = ("completed", "completed_fraction", "failed")  # figures of a sweep that depend on lost flights
+_COUNTS = (
+    "completed",
+    "completed_fraction",
+    "completed_low_95",
+    "failed",
+)  # figures of a sweep that depend on lost flights
 _NO_FIGURE = "this run has no such figure, for example because nothing happened that it measures"
 Value = float | str
 _SIGNS: dict[str, Callable[[Any, Any], bool]] = {

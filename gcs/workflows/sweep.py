@@ -22,7 +22,7 @@ from gcs.sweep.plan import SweepPlan, make_plan
 from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.plan_values import parse_seeds, parse_varied, varied_values
 from gcs.sweep.report import write_report
-from gcs.sweep.results import flights_by_law, law_record
+from gcs.sweep.results import flights_by_law, law_record, share_record
 from gcs.sweep.run import SweepResult, sweep
 from gcs.sweep.standouts import (
     Standout,
@@ -47,6 +47,8 @@ FIGURES = (  # of the record, that `--require` accepts
     "completed",
     "failed",
     "completed_fraction",
+    "completed_low_95",
+    "completed_high_95",
     "load_error_max_m",
     "planned",
     "flown",
@@ -102,7 +104,7 @@ class Sweep:
             "flights": self.counts.flights,
             "completed": self.counts.completed,
             "failed": self.counts.flights - self.counts.completed,
-            "completed_fraction": self.counts.completed / max(self.counts.flights, 1),
+            **share_record(self.counts.completed, self.counts.flights),
             "load_error_max_m": self.counts.load_error_max_m,
             "planned": self.planned,
             "flown": self.counts.flown,

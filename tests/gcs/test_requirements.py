@@ -82,11 +82,12 @@ def test_a_figure_that_there_is_not_is_told_with_a_possible_reason() -> None:
         (["load_error_max_m < 1", "completed == 1"], 1, False),
         (["failed < 4"], 1, False),
         (["completed_fraction > 0.2"], 1, False),
+        (["completed_low_95 > 0.2"], 1, False),
         ([], 1, False),
     ],
 )
 def test_lost_flights_that_nothing_judges_are_told(required: list[str], completed: int, told: bool) -> None:
-    keys = ("load_error_max_m", "completed", "failed", "completed_fraction")
+    keys = ("load_error_max_m", "completed", "failed", "completed_fraction", "completed_low_95")
     line = uncovered_failures(parse_requirements(required, keys, "gcs sweep --json"), 4, completed)
     assert ('judges the 1 completed of 4 flights; add --require "completed == 4"' in line) == told
     assert told or not line

@@ -21,6 +21,7 @@ import pyarrow
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
+from scipy.stats import binomtest
 
 from autopilot.own.own_code import OwnCode
 from autopilot.shell.compiling import Part
@@ -33,7 +34,7 @@ from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_files, sweep_origin
 from gcs.sweep.plan_values import PlanError, VariedParameter
 from gcs.sweep.report import write_report
-from gcs.sweep.results import cells, completion_range, flights_by_law, law_record
+from gcs.sweep.results import cells, completion_range, flights_by_law, interval_text, law_record
 from gcs.sweep.standouts import repeat_command, stored_standouts
 from gcs.sweep.store import Row, Store, cause_of, columns
 from tests.doubles.browser import Browser
@@ -324,7 +325,10 @@ def test_a_click_on_a_cell_gives_the_command_of_its_flight(
     open_page(browser, whole, 1280)
     assert browser.run("return document.querySelectorAll('rect.cell').length") == 3
     browser.find("rect.cell[data-cell='2']").click()
-    assert "SIM_ACT_DELAY_MS 60 ms: 2 flights, 0 % completed" in browser.find(".said").text
+    assert (
+        "SIM_ACT_DELAY_MS 60 ms: 2 flights, 0 % completed (95 % interval 0 … 84 %)"
+        in browser.find(".said").text
+    )
     lost = next(one for one in stored_standouts(directory, plan) if one.kind == "lost")
     whole_command = shlex.split(repeat_command(plan, lost, directory))
     assert shlex.split(browser.find("#chosen code").text) == whole_command[: whole_command.index("--out")]
@@ -370,6 +374,9 @@ def test_the_step_response_is_in_table_record_and_page(steps: tuple[SweepPlan, P
     (flights,) = flights_by_law(Store(directory, plan).read(), plan)
     record: Any = law_record(flights)
     assert (record["law"], record["flights"], record["completed"]) == ("thesis", 6, 4)
+    interval = binomtest(4, 6).proportion_ci(0.95, method="exact")
+    shares = [record[key] for key in ("completed_fraction", "completed_low_95", "completed_high_95")]
+    assert shares == pytest.approx([4 / 6, interval.low, interval.high], rel=1e-9)
     page = page_of(plan, directory).read_text(encoding="utf-8")
     for name, decimals in (("rise_time_90_s", 3), ("overshoot_pct", 1), ("settling_time_5pct_s", 3)):
         middle = statistics.median(row[name] for row in rows[:4])
@@ -378,6 +385,14 @@ def test_the_step_response_is_in_table_record_and_page(steps: tuple[SweepPlan, P
     found = cells(flights, plan, ("SIM_ACT_DELAY_MS",)).step_medians["rise_time_90_s"]
     assert found[1] == pytest.approx(statistics.median(row["rise_time_90_s"] for row in rows[2:4]))
     assert math.isnan(found[2]), "of lost flights"
+
+
+@pytest.mark.parametrize(
+    ("completed", "flights", "text"),
+    [(4, 4, "40 … 100"), (0, 2, "0 … 84"), (9, 10, "55 … 99.75"), (10_000, 10_000, "99.963 … 100")],
+)
+def test_the_interval_of_a_share_as_people_read_it(completed: int, flights: int, text: str) -> None:
+    assert interval_text(completed, flights) == text
 
 
 def test_flights_that_never_settle_count_in_the_median(
