@@ -49,7 +49,7 @@ def sweep(
     vary: Mapping[str, Values] | Mapping[str | tuple[str, ...], Values] | None = None,
     seeds: int | Iterable[int] = 1,
     sample: int | None = None,
-    laws: Sequence[str | type] = (DEFAULT_LAW,),
+    laws: str | type | Sequence[str | type] = (DEFAULT_LAW,),
     estimator: str | type | None = None,
     planner: str | type | None = None,
     sensors: str | Path | Sensors = "lab",
@@ -74,11 +74,11 @@ def sweep(
     `seeds`: a number N for the seeds 1 ... N, or a range or list of seeds, as `range(11, 21)` or `[3, 7]`.
     `settings`: parameters that are the same in all flights. `timeout_s`: time limit of each flight in seconds
     of the vehicle's clock; by default one and a half times the expected duration plus a minute.
-    `laws`: names, `FILE.py:CLASS`, or classes (docs/laws.md). `estimator` and `planner`: a custom one for all
-    flights, given in the same ways. `jobs`: number of flights at the same time, by default one per core;
-    `scheduler`: the address of a Dask scheduler, or a Dask client, that flies them instead. `out`: the
-    directory in which table and page are kept (docs/cli.md), and from which an interrupted sweep continues,
-    or one with more seeds or values; by default nothing is kept.
+    `laws`: names, `FILE.py:CLASS`, or classes (docs/laws.md), or one of these alone. `estimator` and
+    `planner`: a custom one for all flights, given in the same ways. `jobs`: number of flights at the same
+    time, by default one per core; `scheduler`: the address of a Dask scheduler, or a Dask client, that flies
+    them instead. `out`: the directory in which table and page are kept (docs/cli.md), and from which an
+    interrupted sweep continues, or one with more seeds or values; by default nothing is kept.
     `fresh=True` discards flights that are there already, also those of another sweep. `quiet=False` shows
     progress on stderr. A parameter that has no effect in any flight causes a warning.
 
@@ -203,8 +203,10 @@ def _seeds(seeds: Any) -> str:
     return seeds_text([whole_number(f"seeds[{i}]", one, 0, MAX_SEED) for i, one in enumerate(listed)])
 
 
-def _laws(laws: Sequence[str | type]) -> Sequence[str | type]:
-    wanted = f"a list of laws, as [{DEFAULT_LAW!r}]"
+def _laws(laws: str | type | Sequence[str | type]) -> Sequence[str | type]:
+    if isinstance(laws, str | type):
+        return [laws]
+    wanted = f"a law or a list of laws, as [{DEFAULT_LAW!r}]"
     if not (found := items("laws", laws, wanted)):
         raise GcsError(f"laws = {laws!r}; must be {wanted}")
     return found

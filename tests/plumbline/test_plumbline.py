@@ -215,6 +215,12 @@ def test_a_sweep_is_a_table() -> None:
 
 
 @pytest.mark.usefixtures("swept_here")
+def test_a_sweep_takes_one_law_as_a_flight_does() -> None:
+    found = plumbline.sweep("hover", laws="lqr", sensors="ideal", jobs=1)
+    assert found["law"].tolist() == ["lqr"]
+
+
+@pytest.mark.usefixtures("swept_here")
 def test_settings_that_are_drawn() -> None:
     vary: Mapping[str | tuple[str, ...], str | Sequence[float]] = {
         ("SIM_LOAD_MASS", "veh_load_mass"): "0.06:0.08",
@@ -334,7 +340,11 @@ WRONG: dict[str, tuple[Any, str]] = {
         lambda: plumbline.fly(plumbline.Vehicle.load("bebop")),  # type: ignore[arg-type]
         "; must be a name, the path of a file, or a plumbline.Mission",
     ),
-    "one law": (lambda: plumbline.sweep("hover", laws="lqr"), "must be a list of laws, as ['plumbline']"),
+    "no list of laws": (
+        lambda: plumbline.sweep("hover", laws=3),  # type: ignore[arg-type]
+        "laws = 3; must be a law or a list of laws, as ['plumbline']",
+    ),
+    "no such single law": (lambda: plumbline.sweep("hover", laws="pid"), "law 'pid': no control law of that"),
     "no such law": (lambda: plumbline.sweep("hover", laws=["pid"]), "law 'pid': no control law of that name"),
     "chosen law": (
         lambda: plumbline.sweep("hover", settings={"CTL_LAW": 1}),
