@@ -103,7 +103,7 @@ class Craft:
                 "is not armed"
             )
             reason = (
-                f"vehicle and load are blown along the ground at more than {_ARMING_SPEED_M_S:g} m/s, and "
+                f"vehicle and load are blown along the ground at more than {GROUND_SPEED_M_S:g} m/s, and "
                 "not armed"
             )
             yield _lack(0, "friction", drag_n, friction_n, text, reason)
