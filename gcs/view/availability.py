@@ -37,7 +37,7 @@ def unavailable_actions(view: VehicleView) -> dict[str, str]:
         "start": mission or (_NOT_TO_START.get(phase, "") if armed else not_armable),
         "resume": mission or ("" if armed else grounded) or _NOT_TO_START.get(phase, ""),
         "hold": "on the ground: nothing is under way" if idle else held or _NOT_TO_HOLD.get(phase, ""),
-        "land": grounded or _TERMINATED.get(phase, ""),
+        "land": ("" if armed else grounded) or _TERMINATED.get(phase, ""),
         "return": grounded or _NOT_TO_RETURN.get(phase, ""),
         "goto": grounded or _NOT_TO_HOLD.get(phase, ""),
         "release": "the load is released already" if view.load_released else "",

@@ -68,7 +68,7 @@ def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Deci
     ends_landing = is_landing(flight) and after.phase in IN_AIR and not is_landing(after)
     if view.estimate_problems and ends_landing and not isinstance(request, Release):
         # the next tick would begin the landing anew
-        return flight, temporarily_denied(f"Denied: {view.estimate_problems[0]}, the landing continues")
+        return flight, temporarily_denied(f"Landing continues: {view.estimate_problems[0]}")
     if after.is_failsafe and after.legs is not flight.legs:  # now it does as commanded
         after = replace(after, is_failsafe=False)
     return after, verdict
