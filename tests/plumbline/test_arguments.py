@@ -67,7 +67,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sweep jobs": (lambda v: plumbline.sweep("hover", jobs=v), (0, 1.5, "x")),
     "sweep scheduler": (lambda v: plumbline.sweep("hover", scheduler=v), ("", *NO_TEXT)),
     "sweep out": (lambda v: plumbline.sweep("hover", out=v), NO_PATH),
-    "connect": (plumbline.connect, (None, 15999, "", "x", *NO_TEXT)),
+    "connect": (plumbline.connect, (None, 0, 2**16, True, "", "x", 2.5, b"x", *NEITHER_TEXT_NOR_NUMBER)),
     "connect timeout": (lambda v: plumbline.connect("15999", timeout_s=v), (None, 0, *NO_NUMBER)),
     "connect sysid": (lambda v: plumbline.connect("15999", sysid=v), (0, 256, 1.5, "x")),
     "connect key": (lambda v: plumbline.connect("15999", signing_key=v), (3, "x", b"x", [1])),
