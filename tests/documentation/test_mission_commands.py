@@ -20,7 +20,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "missions.md"
 HEAD = "| command | parameters | |\n|---|---|---|\n"
 WORDS = {Handling.FLOWN: "", Handling.KEPT: "kept: ", Handling.REFUSED: "refused: "}
 OTHERS = (
-    f"| all others up to {mavlink.MAV_CMD_NAV_LAST} | | refused: somebody would rely on being taken there |\n"
+    f"| all others up to {mavlink.MAV_CMD_NAV_LAST} | | refused: the user expects to be flown there |\n"
     f"| all others above {mavlink.MAV_CMD_NAV_LAST} that MAVLink defines "
     "(camera, gimbal ...) | | kept: nothing is flown, a text names them |\n"
     "| what is no command of MAVLink | | refused |\n"

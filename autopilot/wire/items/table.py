@@ -92,8 +92,8 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_NAV_WAYPOINT,
-        "the load is carried there; home itself as item 0 is not flown. The yaw p4 is ignored (CONDITION_YAW "
-        "turns the nose), and so is `autocontinue` of any item",
+        "the load is carried there; home as item 0 is not flown. The yaw p4 is ignored (use CONDITION_YAW to "
+        "turn the nose), and so is `autocontinue` of every item",
         _HELD_POINT,
         Waypoint,
         is_default=True,
@@ -106,15 +106,15 @@ COMMANDS: tuple[Command, ...] = (
     Command(m.MAV_CMD_NAV_LOITER_TO_ALT, "as NAV_WAYPOINT", _POINT, Waypoint, read_steps=readers.waypoint),
     Command(
         m.MAV_CMD_NAV_LOITER_UNLIM,
-        "as NAV_WAYPOINT, held for a day",
+        "as NAV_WAYPOINT, and the load is held there for a day",
         _POINT,
         read_steps=readers.loiter_unlimited,
     ),
     Command(
         m.MAV_CMD_NAV_LOITER_TURNS,
-        "to the centre, out along a spiral of one turn, the turns (clockwise for a positive radius), back "
-        f"along another; at the last speed that was set ({SPEED_M_S:g} m/s before any), with at most "
-        f"{TURN_ACCEL_M_S2:g} m/s^2 inwards",
+        "the load is carried to the centre, moves out along a spiral of one turn, flies the turns (clockwise "
+        "for a positive radius), and comes back along another spiral. Its speed is the last one that was set "
+        f"({SPEED_M_S:g} m/s if none was), with at most {TURN_ACCEL_M_S2:g} m/s^2 towards the centre",
         (
             Number(1, "turns", "turns", "", 0.0, MAX_TURNS),
             Number(3, "radius_m", "radius", "m", -MAX_RADIUS_M, MAX_RADIUS_M),
@@ -124,19 +124,21 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_CONDITION_GATE,
-        "a waypoint; at the height of the waypoint before where p2 is 0",
+        "as NAV_WAYPOINT; if p2 is 0, at the height of the waypoint before it",
         _POINT,
         read_steps=readers.gate,
     ),
     Command(
         m.MAV_CMD_DO_CHANGE_ALTITUDE,
-        "to the height p1 (m) where the load hangs; refused where no item before it says where",
+        "the load is carried straight up or down to the height p1 (m); refused if no item before it gives "
+        "its position",
         (Choice(2, "frame", "frame", {frame: frame for frame in GLOBAL_FRAMES}),),
         read_steps=readers.change_altitude,
     ),
     Command(
         m.MAV_CMD_DO_CHANGE_SPEED,
-        "peak speed of the transfers that follow; climb, descent and a speed of -1 change nothing",
+        "sets the peak speed of the transfers that follow; for climb and descent, and with -1, it changes "
+        "nothing",
         (
             Choice(1, "kind", "speed type", _SPEED_TYPE),
             Number(
@@ -150,9 +152,9 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_CONDITION_YAW,
-        "the nose turns to p1, clockwise from north (p4 1: from where it points), at p2 deg/s (0: "
-        "`MPC_YAWRAUTO_MAX`), p3 1 clockwise, -1 counter-clockwise, 0 the shorter way. It begins with the "
-        "next item, which does not wait for it",
+        "the nose turns to p1, clockwise from north (p4 1: from its present heading), at p2 deg/s (0: "
+        "`MPC_YAWRAUTO_MAX`); p3 1 clockwise, -1 counter-clockwise, 0 the shorter way. The turn begins "
+        "together with the next item, which does not wait for it",
         (
             Number(1, "angle_deg", "angle", "deg", -360.0, 360.0),
             Choice(3, "sense", "sense", _SENSE),
@@ -162,35 +164,35 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_DO_SET_ROI_LOCATION,
-        "the nose follows the place from the next item on, until another command changes it",
+        "from the next item on the nose points at this place, until another command changes it",
         (Place(),),
         heading_command=heading.set_roi_location,
     ),
     Command(
-        m.MAV_CMD_DO_SET_ROI_NONE, "the nose stays as it points then", heading_command=heading.set_roi_none
+        m.MAV_CMD_DO_SET_ROI_NONE, "the nose keeps its present heading", heading_command=heading.set_roi_none
     ),
     Command(m.MAV_CMD_DO_SET_ROI, _ROI_TEXT, _ROI, heading_command=heading.set_roi),
     Command(m.MAV_CMD_NAV_ROI, _ROI_TEXT, _ROI, heading_command=heading.set_roi),
     Command(
         m.MAV_CMD_NAV_DELAY,
-        "a hold",
+        "the load is held for this time",
         _DELAY,
         Delay,
         is_default=True,
         constants={"param2": -1.0, "param3": -1.0, "param4": -1.0},
     ),
-    Command(m.MAV_CMD_CONDITION_DELAY, "a hold", _DELAY, Delay),
+    Command(m.MAV_CMD_CONDITION_DELAY, "as NAV_DELAY", _DELAY, Delay),
     Command(
         m.MAV_CMD_DO_JUMP,
-        f"the items from item p1 on again, p2 times (0 ... {MAX_JUMPS}) or without end (-1): then those "
-        "behind it are never flown, and the repeated ones must take at least 0.5 s. A mission that comes to "
-        f"more than {MAX_FLOWN_ITEMS} items with all repetitions is refused. If a jump becomes the present "
-        "item (MISSION_SET_CURRENT), it is taken",
+        f"the mission continues with item p1, p2 times (0 ... {MAX_JUMPS}) or without end (-1). Items "
+        "behind a jump without end are never flown, and the repeated ones must take at least 0.5 s. A "
+        f"mission of more than {MAX_FLOWN_ITEMS} items, counted with all repetitions, is refused. If a jump "
+        "becomes the present item (MISSION_SET_CURRENT), it is executed",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
-        "the load is released; behind that a place to land at needs a waypoint before it, and grab is "
-        "refused. Grab and hold where the load is held: nothing",
+        "release: the load is released. After that, a landing at another place needs a waypoint before it, "
+        "and grab is refused. Before a release, grab and hold change nothing",
         (
             Choice(1, "gripper", "gripper", _INSTANCE),
             Choice(2, "action", "gripper action", _GRIPPER_ACTION),
@@ -202,9 +204,9 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_DO_WINCH,
-        "the cable gets longer, or shorter for a negative length, where the load hangs. "
-        "Refused where the load's height is not known, as right behind an attitude run or signals that end "
-        "in motion: a waypoint first",
+        "the cable becomes longer by this length, or shorter if it is negative, while the vehicle stays in "
+        "place. Refused if the height of the load is not known, as after an attitude run or signals that "
+        "end in motion: add a waypoint before it",
         (
             Choice(1, "winch", "winch", _INSTANCE),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
@@ -229,15 +231,16 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-        "over home (not a rally point) at the height it has; and down where it is the last item",
+        "the load is carried over home (not over a rally point) at its present height; if it is the last "
+        "item, it is also set down",
         (),
         ReturnHome,
         is_default=True,
     ),
     Command(
         m.MAV_CMD_NAV_LAND,
-        "the load is set down and the vehicle lands beside it; at a place that is not where the load hangs, "
-        "there first",
+        "the load is set down and the vehicle lands beside it; if a place is given, the load is first "
+        "carried there",
         (Place(),),
         Land,
         is_default=True,
@@ -245,9 +248,9 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_NAV_PAYLOAD_PLACE,
-        "the load is carried there, lowered until it lies on the ground, and released; the vehicle flies on "
-        "without it. Without a place (x and y 0): where the load hangs. A descent other than 0 that does not "
-        "reach the ground at the height of home is refused",
+        "the load is carried there, lowered until it lies on the ground, and released; the vehicle "
+        "continues without it. Without a place (x and y 0) the load is placed where it hangs. A descent "
+        "other than 0 that does not reach the ground at the height of home is refused",
         (Number(1, "descent_m", "greatest descent", "m", 0.0, FARTHEST_M), *_POINT),
         PlaceLoad,
         is_default=True,
