@@ -18,8 +18,9 @@ from autopilot.shell.options import (
     address_option,
     home_option,
     ignore_option,
-    setting_option,
+    settings_option,
     signing_key_option,
+    vehicle_option,
 )
 from autopilot.vehicle.parameters import LAWS
 from autopilot.vehicle.shipped import VEHICLES
@@ -69,13 +70,7 @@ def _address_or_none(text: str) -> Address | None:
     metavar="[HOST:]PORT",
     help="One ground station in lockstep, instead of --gcs and --api.",
 )
-@click.option(
-    "--vehicle",
-    default="bebop",
-    show_default=True,
-    metavar="NAME|FILE",
-    help=f"The vehicle that the autopilot assumes: {VEHICLES.choice()}.",
-)
+@vehicle_option(f"The vehicle that the autopilot assumes: {VEHICLES.choice()}.")
 @click.option(
     "--law",
     metavar="NAME|FILE:CLASS",
@@ -93,14 +88,7 @@ def _address_or_none(text: str) -> Address | None:
     metavar="FILE:CLASS",
     help="Your own path planner (docs/planners.md).",
 )
-@click.option(
-    "--set",
-    "settings",
-    type=setting_option,
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.",
-)
+@settings_option("Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.")
 @ignore_option
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(

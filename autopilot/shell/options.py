@@ -322,3 +322,15 @@ def ignore_option(function: F) -> F:
         callback=in_capitals,
         help="Fly without a parameter in the vehicle's file, for example that of another law; repeatable.",
     )(function)
+
+
+def vehicle_option(help_text: str) -> Callable[[F], F]:
+    """--vehicle of `sitl` and of `autopilot`, to each of which it means another side of the vehicle."""
+    return click.option("--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help=help_text)
+
+
+def settings_option(help_text: str) -> Callable[[F], F]:
+    """--set of `sitl` and of `autopilot`, each of which has parameters of its own."""
+    return click.option(
+        "--set", "settings", type=setting_option, metavar="NAME=VALUE", multiple=True, help=help_text
+    )

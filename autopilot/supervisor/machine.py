@@ -112,7 +112,7 @@ def _reset_on_disarm(flight: Flight) -> Flight:
             step=0,
             step_anchor=None,
             stopped_run=None,
-            final_item=mission.plan.sequence[0] if mission.done and mission.plan.sequence else None,
+            final_item=mission.plan.sequence[0] if mission.done else None,
         ),
         cable=replace(flight.cable, reel_target_m=None, failed_lifts=0, slack_step=-1),
     )

@@ -452,9 +452,15 @@ def leg_time_s(flight: Flight, now_us: int) -> float:
 
 def with_condition(flight: Flight, holds: bool, now_us: int) -> Flight:
     """The flight, with the time since when the condition that ends its phase holds."""
-    if holds == (flight.condition_since_us >= 0):
-        return flight
-    return replace(flight, condition_since_us=now_us if holds else -1)
+    since_us = held_since(holds, flight.condition_since_us, now_us)
+    return flight if since_us == flight.condition_since_us else replace(flight, condition_since_us=since_us)
+
+
+def held_since(holds: bool, since_us: int, now_us: int) -> int:
+    """Since when a condition holds that has held since then (-1: it did not); -1 if it does not hold now."""
+    if not holds:
+        return -1
+    return since_us if since_us >= 0 else now_us
 
 
 def has_lasted(since_us: int, duration_us: int, now_us: int) -> bool:

@@ -39,27 +39,30 @@ class Metric(_StrictModel):
         value = record.get(self.name)
         if value is None:
             return UNKNOWN
-        unit = self._displayed_unit
         if self.needs_metres(record):
             return f"{value:.2f} m"
-        text = f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
-        return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
+        return self._with_unit(
+            f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
+        )
 
     def formatted_alike(self, record: Mapping[str, Any], in_metres: bool) -> str:
         """The recorded value as displayed in a table of several flights: with at least three significant
         digits, lengths in metres if `in_metres`, else in millimetres."""
-        value, unit = record.get(self.name), self._displayed_unit
+        value = record.get(self.name)
         if value is None or self.decimals is None:
             return self.formatted(record)
-        if unit == "mm" and in_metres:
+        if self._displayed_unit == "mm" and in_metres:
             return f"{_with_digits(value, 3)} m"
-        text = _with_digits(value * self.scale, self.decimals)
-        return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
+        return self._with_unit(_with_digits(value * self.scale, self.decimals))
 
     def needs_metres(self, record: Mapping[str, Any]) -> bool:
         """Whether the value is a length of a metre or more that is otherwise displayed in millimetres."""
         value = record.get(self.name)
         return self._displayed_unit == "mm" and value is not None and abs(value) >= _ONE_METRE
+
+    def _with_unit(self, text: str) -> str:
+        unit = self._displayed_unit
+        return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
 
     @property
     def _displayed_unit(self) -> str:

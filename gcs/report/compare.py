@@ -187,7 +187,12 @@ def _best(metric: Metric, runs: Sequence[Run], displayed: Sequence[str]) -> tupl
 
 def given_conditions(runs: Sequence[Run]) -> set[str]:
     """The names of what was given for the flights; other parameters that differ follow from it."""
-    return {*_CONDITIONS, *(name for run in runs for name in run.meta.settings)}
+    return {*_CONDITIONS, *given_settings(runs)}
+
+
+def given_settings(runs: Sequence[Run]) -> set[str]:
+    """The names of the parameters that were set in at least one of the flights."""
+    return {name for run in runs for name in run.meta.settings}
 
 
 def labels(runs: Sequence[Run]) -> list[str]:

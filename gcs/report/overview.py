@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from gcs.report.compare import Run, cell, differences, figures, given_conditions, heading
+from gcs.report.compare import Run, cell, differences, figures, given_conditions, given_settings, heading
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,8 +51,10 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
 
     free = width - min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs))) - _COLUMN_GAP
     columns, omitted = [], [one.name for one in differences(runs)]
-    settings = {name for run in runs for name in run.meta.settings}
-    lacks_setting = False  # then no parameter that follows from the settings is shown in its place
+    settings, lacks_setting = (
+        given_settings(runs),
+        False,
+    )  # then no parameter that follows from the settings is shown in its place
     for column in _columns(runs):
         name = column.title.replace("\n", "")
         if column.width > free or (column.follows and lacks_setting):

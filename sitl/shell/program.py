@@ -28,7 +28,8 @@ from autopilot.shell.options import (
     os_error_text,
     print_errors,
     reduce_latency,
-    setting_option,
+    settings_option,
+    vehicle_option,
 )
 from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.convert.geodesy import Home
@@ -85,13 +86,7 @@ def _append_to(path: Path) -> Callable[[bytes], object]:
     metavar="NAME|FILE",
     help=f"Sensor profile: {PROFILES.choice()}.",
 )
-@click.option(
-    "--vehicle",
-    default="bebop",
-    show_default=True,
-    metavar="NAME|FILE",
-    help=f"The simulated vehicle: {VEHICLES.choice()}.",
-)
+@vehicle_option(f"The simulated vehicle: {VEHICLES.choice()}.")
 @click.option(
     "--seed", default=1, show_default=True, type=WholeNumber(0, MAX_SEED), help="Seed of all noise."
 )
@@ -127,14 +122,7 @@ def _append_to(path: Path) -> Callable[[bytes], object]:
     metavar="N",
     help="Send the true state every N ticks.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
 )
-@click.option(
-    "--set",
-    "settings",
-    type=setting_option,
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.",
-)
+@settings_option("Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.")
 @click.option(
     "--log-sensors",
     type=click.Path(dir_okay=False, path_type=Path),

@@ -19,6 +19,8 @@ from autopilot.supervisor.state import (
     fence_problem,
     first_fence_violation,
     has_fence,
+    has_lasted,
+    held_since,
     interrupt_mission,
     is_fence_active,
     is_landing,
@@ -60,9 +62,8 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> WatchResult:
         area = replace(area, breach=why, last_breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
         flight = replace(flight, area=replace(area, leads_out=bool(ahead), inside_since_us=-1))
         return _reaction(flight, why, settings)
-    inside_since_us = -1 if why else area.inside_since_us if area.inside_since_us >= 0 else view.now_us
-    is_over = not why and view.now_us - inside_since_us >= CLEAR_US
-    breach = "" if is_over else area.breach
+    inside_since_us = held_since(not why, area.inside_since_us, view.now_us)
+    breach = "" if has_lasted(inside_since_us, CLEAR_US, view.now_us) else area.breach
     noted = replace(area, breach=breach, leads_out=bool(ahead), inside_since_us=inside_since_us)
     return WatchResult(flight if noted == area else replace(flight, area=noted))
 
