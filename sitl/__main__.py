@@ -10,7 +10,7 @@ def main() -> None:
     """Run the program."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for matrices this small, threads only cost time
     gc.disable()  # until everything is loaded (`reduce_latency`): loaded objects stay
-    from sitl.shell.program import main as run
+    from sitl.shell.command import main as run
 
     run()
 

@@ -18,8 +18,8 @@ _RESULT_OUTCOMES = ("completed", "diverged", "timeout")  # outcomes that are res
 ENTRIES = (
     "gcs.workflows.started_flight",
     "missions.fileformat",
-    "sitl.shell.program",
-    "autopilot.shell.program",
+    "sitl.shell.command",
+    "autopilot.shell.command",
 )
 
 

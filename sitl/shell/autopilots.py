@@ -9,7 +9,7 @@ from typing import NamedTuple
 from autopilot.geometry.machine_code import ROOT
 from autopilot.shell.options import Address, StopRequest
 from sitl.hil import HilSimulator
-from sitl.interfaces import ardupilot, betaflight, px4
+from sitl.interfaces import PLUMBLINE, ardupilot, betaflight, px4
 from sitl.pacing import Pacing
 from sitl.shell.ardupilot import run_ardupilot
 from sitl.shell.betaflight import run_betaflight
@@ -17,7 +17,6 @@ from sitl.shell.link import Link
 from sitl.shell.px4 import run_px4
 
 Run = Callable[[Link, HilSimulator, StopRequest, Callable[[str], None], Pacing | None], None]
-PLUMBLINE = "plumbline"
 
 
 class AutopilotKind(NamedTuple):

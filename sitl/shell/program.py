@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import secrets
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,31 +14,24 @@ from autopilot.shell.compiling import SIMULATOR, Compilation
 from autopilot.shell.options import (
     EXIT_ERROR,
     EXIT_USAGE,
-    MAX_SEED,
-    MAX_SPEED,
     Address,
-    ProgramCommand,
     Stop,
     StopRequest,
-    WholeNumber,
-    address_option,
     address_text,
-    home_option,
     os_error_text,
     print_errors,
     reduce_latency,
-    settings_option,
-    vehicle_option,
 )
-from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator
+from sitl.interfaces import PLUMBLINE
 from sitl.interfaces.frame import FrameError
 from sitl.pacing import Pacing
 from sitl.sensor_log import SensorLog
-from sitl.sensors.shipped import PROFILES, ProfileError
-from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
+from sitl.sensors.shipped import ProfileError
+from sitl.shell.autopilots import AUTOPILOTS, parameter_file
 from sitl.shell.link import Link
 from sitl.shell.loops import SPIN_NS, run_lockstep, run_real_time, wait_for_autopilot
 from sitl.shell.tick_loop import warm_up
@@ -70,75 +62,7 @@ def _append_to(path: Path) -> Callable[[bytes], object]:
     return append
 
 
-@click.command("sitl", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--for",
-    "interface",
-    type=click.Choice(list(AUTOPILOTS)),
-    default=PLUMBLINE,
-    show_default=True,
-    help="The autopilot that flies; see docs/autopilots.md.",
-)
-@click.option(
-    "--sensors",
-    default="lab",
-    show_default=True,
-    metavar="NAME|FILE",
-    help=f"Sensor profile: {PROFILES.choice()}.",
-)
-@vehicle_option(f"The simulated vehicle: {VEHICLES.choice()}.")
-@click.option(
-    "--seed", default=1, show_default=True, type=WholeNumber(0, MAX_SEED), help="Seed of all noise."
-)
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.0, MAX_SPEED, min_open=True),
-    metavar="NUMBER",
-    help="Maximum speed, as a multiple of real time.  [default: 1; with --lockstep: no limit]",
-)
-@click.option("--lockstep", is_flag=True, help="Run as fast as the autopilot answers.")
-@click.option(
-    "--real-time",
-    is_flag=True,
-    help="Keep to the wall clock: a late command of the autopilot is missed, and counted.",
-)
-@click.option(
-    "--listen",
-    type=address_option,
-    metavar="[HOST:]PORT",
-    help="Address for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
-)
-@click.option(
-    "--truth",
-    type=address_option,
-    metavar="[HOST:]PORT",
-    default="127.0.0.1:14560",
-    show_default=True,
-    help="Address to send the true state to, for logs and reports.",
-)
-@click.option(
-    "--truth-every",
-    type=WholeNumber(1, 1000),
-    metavar="N",
-    help="Send the true state every N ticks.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
-)
-@settings_option("Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.")
-@click.option(
-    "--log-sensors",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Log all readings and the true state, for gcs report; see docs/sensors.md.",
-)
-@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
-@click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
-@click.option(
-    "--parameters",
-    is_flag=True,
-    help="Print the path of the parameter file for the third-party autopilot, and exit.",
-)
-@click.option("--quiet", is_flag=True, help="Print errors only.")
-@click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
-def main(
+def simulate(
     interface: str,
     sensors: str,
     vehicle: str,
@@ -156,12 +80,7 @@ def main(
     parameters: bool,
     quiet: bool,
 ) -> None:
-    """Simulate a quadrotor with a load on a cable, and its sensors.
-
-    Waits for an autopilot, sends it sensor readings and receives rotor commands, by MAVLink over UDP (with
-    third-party autopilots by their own protocols). The world waits for the answer to every tick: on a busy
-    machine its clock is slower, and nothing is lost.
-    """
+    """Run the program with these options of its command (`sitl.shell.command`)."""
     if lockstep and real_time:
         raise click.UsageError("--lockstep and --real-time exclude each other")
     kind = AUTOPILOTS[interface]
@@ -193,7 +112,6 @@ def main(
         if not quiet:
             print(f"sitl: {text}", flush=True)
 
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to end in order
     link: Link | None = None
     factor = 1.0 if speed is None else speed
     unlimited = lockstep and speed is None

@@ -1,5 +1,5 @@
 """Commands that only talk to a vehicle do not load numba, which takes longer than all else that they do; nor
-does `gcs fly` before it has started its programs, or `autopilot` before it knows its options."""
+does `gcs fly` before it has started its programs, or a program before it knows its options."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ COMMANDS = ("status", "control", "param", "capture", "report", "compare", "new",
 WORKFLOWS = ("status", "parameters", "readiness", "warmup", "vehicle_processes", "before_flight", "fly")
 MODULES = [
     "autopilot.shell.command",
+    "sitl.shell.command",
     *(f"gcs.commands.{name}" for name in COMMANDS),
     *(f"gcs.workflows.{name}" for name in WORKFLOWS),
 ]

@@ -11,7 +11,7 @@ import pytest
 
 from autopilot.shell.command import main as autopilot
 from gcs.cli import gcs
-from sitl.shell.program import main as sitl
+from sitl.shell.command import main as sitl
 
 PAGE = (Path(__file__).parents[2] / "docs" / "cli.md").read_text(encoding="utf-8")
 

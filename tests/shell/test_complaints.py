@@ -12,7 +12,7 @@ from autopilot.shell.command import main as autopilot
 from autopilot.shell.options import address_option
 from gcs.cli import gcs
 from gcs.shell.link import free_port
-from sitl.shell.program import main as sitl
+from sitl.shell.command import main as sitl
 
 TWO_WRONG = """quad_mass_kg = -1.0
 load_mass_kg = "heavy"

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from autopilot.shell.command import main as autopilot
 from autopilot.shell.setting_names import check_names
-from sitl.shell.program import main as sitl
+from sitl.shell.command import main as sitl
 
 UNKNOWN = {
     "MPC_XY_VEL_MAXX": "did you mean MPC_XY_VEL_MAX?",

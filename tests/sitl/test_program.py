@@ -10,8 +10,11 @@ from click.testing import CliRunner
 
 from autopilot.shell.options import Stop, stop_signals
 from gcs.shell.link import free_port
+from sitl.interfaces import PLUMBLINE, THIRD_PARTY
 from sitl.pacing import Pacing
 from sitl.shell import program
+from sitl.shell.autopilots import AUTOPILOTS
+from sitl.shell.command import main
 
 LOCKSTEP, REAL_TIME = "lockstep", "real time"
 
@@ -50,18 +53,22 @@ def test_the_clock_is_that_of_the_wall_unless_another_is_asked_for(
     monkeypatch.setattr(program, "run_lockstep", lambda *given: run_loop(LOCKSTEP, given[4]))
     monkeypatch.setattr(program, "run_real_time", lambda *given, **_: run_loop(REAL_TIME, given[2]))
     places = [word for name in ("--listen", "--truth") for word in (name, str(free_port()))]
-    result = CliRunner().invoke(program.main, [*places, *options])
+    result = CliRunner().invoke(main, [*places, *options])
     assert (result.exit_code, run) == (0, [(loop, speed)]), result.output
     told = "in lockstep" if speed is None else f"at {speed:g} x real time"
     assert f"250 Hz {told}" in result.stdout
 
 
-@pytest.mark.parametrize("firmware", ["ardupilot", "px4", "betaflight"])
+def test_each_autopilot_that_for_offers_is_served() -> None:
+    assert list(AUTOPILOTS) == [PLUMBLINE, *THIRD_PARTY]
+
+
+@pytest.mark.parametrize("firmware", THIRD_PARTY)
 def test_a_vehicle_that_the_firmware_cannot_fly_is_refused_before_it_is_waited_for(
     kept: None, firmware: str
 ) -> None:
     places = [word for name in ("--listen", "--truth") for word in (name, str(free_port()))]
-    result = CliRunner().invoke(program.main, [*places, "--for", firmware, "--vehicle", "hexarotor"])
+    result = CliRunner().invoke(main, [*places, "--for", firmware, "--vehicle", "hexarotor"])
     assert result.exit_code == 2 and "waiting for" not in result.stdout
     assert result.stderr == (
         "sitl: --vehicle hexarotor: ArduPilot, PX4 and Betaflight need four rotors with alternating spin, "
