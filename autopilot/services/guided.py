@@ -2,7 +2,8 @@
 
 Each message becomes a request in ENU. A message that requests nothing that can be flown is refused by a
 STATUSTEXT, once in WARNING_INTERVAL_US for each reason. Body axes are level and follow the heading; a yaw of
-NaN is ignored.
+NaN is ignored. Of two ground stations that send
+their sticks, as they do whenever one is attached, one is followed.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
-from autopilot.services.records import Decide, Output, Peer, SendText, Verdict
+from autopilot.services.records import Decide, Output, Peer, SendText, Source, Verdict
 from autopilot.services.requests import (
     FollowAttitude,
     FollowRates,
@@ -25,6 +26,7 @@ from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
 MAX_BODY_RATE_RAD_S = 10.0  # of a body rate
+STICK_KEPT_US = 500_000  # without a message of its stick, another ground station's is followed
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
 _NO_YAW, _NO_YAW_RATE = 0x400, 0x800
 _RATE_BITS = 0x7  # of an attitude setpoint: about forward, right, down
@@ -204,6 +206,10 @@ def read_target(m: Any, home: Home) -> FollowTarget | Verdict:
     return FollowTarget((east, north, height), velocity, reported(_TARGET_ACCEL, m.acc))
 
 
+def _named(source: Source) -> str:
+    return f"system {source[0]}, component {source[1]}"
+
+
 def _refused(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_DENIED, text)
 
@@ -215,6 +221,8 @@ class GuidedService:
         self._home = home
         self._system = system
         self._limiter = TextLimiter()
+        self._stick_source: Source | None = None
+        self._stick_us = 0  # when its last message came
 
     def receive_local(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """SET_POSITION_TARGET_LOCAL_NED."""
@@ -232,16 +240,33 @@ class GuidedService:
         """MANUAL_CONTROL, which addresses a system and has no target component."""
         if message.target not in (0, self._system):
             return []
-        return self._handle_request(read_stick(message), now_us, decide)
+        return self._handle_stick(read_stick(message), peer, now_us, decide)
 
     def receive_channels(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """RC_CHANNELS_OVERRIDE."""
         request = read_channels(message)
-        return [] if request is None else self._handle_request(request, now_us, decide)
+        return [] if request is None else self._handle_stick(request, peer, now_us, decide)
 
     def receive_target(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """FOLLOW_TARGET, which addresses no system."""
         return self._handle_request(read_target(message, self._home), now_us, decide)
+
+    def _handle_stick(
+        self, request: FollowStick | Verdict, peer: Peer, now_us: int, decide: Decide
+    ) -> list[Output]:
+        """Follow the stick of one ground station; those of others only after it has fallen silent. This is
+        reported when one of them is moved."""
+        if isinstance(request, FollowStick):
+            source, followed = (peer.system, peer.component), self._stick_source
+            if followed is not None and followed != source and now_us - self._stick_us < STICK_KEPT_US:
+                if not any((*request.velocity_share, request.yaw_rate)):
+                    return []
+                request = _refused(
+                    f"Stick of {_named(source)} ignored: that of {_named(followed)} is followed"
+                )
+            else:
+                self._stick_source, self._stick_us = source, now_us
+        return self._handle_request(request, now_us, decide)
 
     def _handle_request(
         self, request: SetpointRequest | Verdict, now_us: int, decide: Decide

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.services.guided import (
+    STICK_KEPT_US,
     read_attitude,
     read_channels,
     read_global,
@@ -293,6 +294,25 @@ def test_a_refusal_is_said_once_in_a_while(rig):
 def test_a_stick_for_another_system_is_not_ours(rig):
     rig.send(m.MAVLink_manual_control_message(7, 0, 0, 500, 0, 0))
     assert rig.asked == []
+
+
+CENTRED, FORWARD = (m.MAVLink_manual_control_message(1, x, 0, 500, 0, 0) for x in (0, 1000))
+
+
+def test_of_two_sticks_the_first_is_followed_until_it_is_silent(rig):
+    first, second = {"system": 255}, {"system": 254}
+    rig.send(FORWARD, **first)
+    assert rig.replies(CENTRED, **second) == []  # nobody moves it: nothing to report
+    rig.run(STICK_KEPT_US - 100_000)
+    rig.send(channels(pitch=1000), **first)
+    replies = rig.replies(FORWARD, **second)
+    text = "".join(r.text for r in replies if r.get_type() == "STATUSTEXT")
+    assert text == "Stick of system 254, component 190 ignored: that of system 255, component 190 is followed"
+    assert len(rig.asked) == 2
+    rig.run(STICK_KEPT_US)
+    rig.send(CENTRED, **second)
+    rig.send(FORWARD, **first)
+    assert rig.asked[2:] == [read_stick(CENTRED)]
 
 
 def long(rig, command, *p):
