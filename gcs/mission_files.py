@@ -13,11 +13,20 @@ from missions.model import Mission
 if TYPE_CHECKING:
     from gcs.foreign_mission import ForeignMission
 
+LOOP_TEXT = (
+    "repeats items without end (DO_JUMP) until a ground station makes an item behind them the present one, "
+    "and here none can"
+)
 
-def load(name_or_path: str | PathLike[str]) -> Mission:
+
+def load(name_or_path: str | PathLike[str], with_loops: bool = False) -> Mission:
     """The mission that is flown from take-off to landing: a shipped one by its name, that of a mission file,
-    or that of a file of another ground station; GcsError states what is wrong with it."""
-    return _found(name_or_path, complete=True)
+    or that of a file of another ground station; GcsError states what is wrong with it. `with_loops`: another
+    ground station may leave a loop without end, which otherwise is wrong too."""
+    mission = _found(name_or_path, complete=True)
+    if mission.loop_ends and not with_loops:
+        raise InputError(f"{name_or_path}: {LOOP_TEXT}: gcs fly --speed 1, or gcs upload")
+    return mission
 
 
 def read(name_or_path: str | PathLike[str]) -> Mission:

@@ -14,7 +14,6 @@ from autopilot.wire.items import (
     MissionItemError,
     WireItem,
     encode_mission,
-    endless_jump_target,
     located_steps,
     step_index,
 )
@@ -34,6 +33,11 @@ def flown_steps(steps: Sequence[LocatedStep]) -> tuple[LocatedStep, ...]:
     return tuple(steps[: landing + 1])
 
 
+def loop_ends(steps: Sequence[LocatedStep]) -> tuple[int, ...]:
+    """The last step of each loop without end."""
+    return tuple(index for index, one in enumerate(steps) if one.then is not None)
+
+
 def at_home(mission: Mission, home: Home) -> Mission:
     """The mission as it is flown from another home: items of a file of another ground station stay where they
     are, and an absolute altitude becomes another height. InputError if one cannot be flown from there."""
@@ -44,7 +48,8 @@ def at_home(mission: Mission, home: Home) -> Mission:
     except MissionItemError as error:
         number = mission.numbers.items[error.seq] if error.seq < len(mission.items) else error.seq
         raise InputError(f"{mission.name}: item {number}, from the vehicle's home: {error.text}") from None
-    return replace(mission, steps=tuple(one.step for one in steps), home=home)
+    found = tuple(one.step for one in steps)
+    return replace(mission, steps=found, loop_ends=loop_ends(steps), home=home)
 
 
 def home_difference(planned: Home, home: Home) -> str:
@@ -78,7 +83,7 @@ def ends_on_ground(mission: ForeignMission) -> bool:
         case (Land(),):
             return True
         case (ReturnHome(),):
-            return endless_jump_target(mission.items, located_steps(mission.items, mission.home)) is None
+            return len(mission.steps) - 1 not in mission.loop_ends
     return False
 
 

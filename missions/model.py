@@ -242,7 +242,9 @@ KINDS: dict[type[Step], str] = {  # their names in files
 @dataclass(frozen=True, slots=True)
 class Mission:
     """A named list of steps. `assumptions` states each value that was chosen and not found in the source;
-    `locations` is `FILE:LINE` of each step in a mission file, empty if there is none."""
+    `locations` is `FILE:LINE` of each step in a mission file, empty if there is none. Behind each step of
+    `loop_ends` the mission returns to an earlier one, without end; a ground station can leave this loop for
+    the steps behind it."""
 
     name: str
     title: str
@@ -250,3 +252,4 @@ class Mission:
     assumptions: tuple[str, ...]
     steps: tuple[Step, ...]
     locations: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
+    loop_ends: tuple[int, ...] = field(default=(), kw_only=True)

@@ -117,7 +117,7 @@ from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import NO_READING, BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, endless_jump_target, read_items, unflown_items
+from autopilot.wire.items import WireItem, read_items, unflown_items
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
 from autopilot.wire.statustext import TextReader, listed
@@ -203,12 +203,13 @@ def mission_plan(
     prepared yet. A return leads to `return_to`; `planner` is a custom planner."""
     steps, visits = read_items(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    loops = {index: one.then for index, one in enumerate(steps) if one.then is not None}
     prepared = PENDING
     if limits is not None:
-        prepared = prepare(flown, sequence, limits, return_to, plan_function_for(planner))
-    repeat_from = endless_jump_target(mission.items, steps)
+        planned = plan_function_for(planner)
+        prepared = prepare(flown, sequence, limits, return_to, planned, loop_ends=loops)
     aims = tuple(s.heading_commands for s in steps)
-    return MissionPlan(flown, sequence, len(mission.items), prepared, aims, repeat_from, visits)
+    return MissionPlan(flown, sequence, len(mission.items), prepared, aims, loops, visits)
 
 
 def home_problems(origin: Any, home: Home) -> tuple[str, ...]:

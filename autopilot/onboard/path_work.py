@@ -26,11 +26,12 @@ class PathWork(NamedTuple):
     home: Vec3 = ZERO  # destination of a return
     planner: OwnSetup | None = None  # custom planner
     begin: MissionBegin = AT_HOME
+    loop_ends: tuple[int, ...] = ()
 
     def run(self) -> PreparedPaths:
         """The result; takes from a millisecond to some seconds."""
         planner = plan_function_for(self.planner)
-        return prepare(self.steps, self.sequence, self.limits, self.home, planner, self.begin)
+        return prepare(self.steps, self.sequence, self.limits, self.home, planner, self.begin, self.loop_ends)
 
     def failure(self, why: str) -> PreparedPaths:
         """The result if the work failed."""
@@ -55,8 +56,8 @@ def later_path_work(core: FlightCore, begin: MissionBegin) -> PathWork:
 
 def _path_work(core: FlightCore, begin: MissionBegin) -> PathWork:
     flight, setup = core.flight, core.setup
-    plan = flight.mission.plan
-    return PathWork(plan.steps, plan.sequence, setup.settings.limits, flight.area.home, setup.planner, begin)
+    plan, limits, home = flight.mission.plan, setup.settings.limits, flight.area.home
+    return PathWork(plan.steps, plan.sequence, limits, home, setup.planner, begin, tuple(plan.loops))
 
 
 def begin_now(core: FlightCore, now_us: int) -> MissionBegin:
@@ -98,10 +99,12 @@ def _kept_steps(flight: Flight) -> set[int]:
     """The steps whose paths are kept while the present one is flown: the present one, those on the same path
     through waypoints, and signals that follow, for which its end is made."""
     mission = flight.mission
-    steps, paths = mission.plan.steps, mission.plan.prepared.paths
+    steps, paths, loops = mission.plan.steps, mission.plan.prepared.paths, mission.plan.loops
     kept, path = {mission.step}, paths[mission.step]
     if isinstance(path, PathSegment):
         kept |= {i for i, one in enumerate(paths) if isinstance(one, PathSegment) and one.table is path.table}
-    while max(kept) + 1 < len(steps) and isinstance(steps[max(kept) + 1], LoadPath):
-        kept.add(max(kept) + 1)
+    last = max(kept)
+    while last not in loops and last + 1 < len(steps) and isinstance(steps[last + 1], LoadPath):
+        last += 1
+        kept.add(last)
     return kept

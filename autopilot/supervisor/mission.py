@@ -206,6 +206,7 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
         isinstance(leg, PathStretch)
         and isinstance(next_path, PathSegment)
         and next_path.table is leg.path.table
+        and next_path.begin_s == leg.path.end_s  # a loop leads back
     ):
         # past the waypoint without a stop; the clock continues from the end of the stretch
         assert isinstance(step, Waypoint)

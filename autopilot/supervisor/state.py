@@ -118,12 +118,14 @@ class MissionPlan:
     item_count: int = 0
     prepared: PreparedPaths = UNPREPARED
     aims: tuple[tuple[HeadingCommand, ...], ...] = ()  # of each step: the heading aims that it sets
-    repeat_from: int | None = None  # the step that follows the last one, if the mission has no end
+    # of the last step of each loop without end: the step to which it leads; not before all others, END: none
+    loops: Mapping[int, int] = field(default_factory=dict)
     visits: tuple[Visit, ...] = ()  # to the items, in the order in which they are flown
 
     def next_step(self, step: int) -> int | None:
         """The step that follows; None after the last one."""
-        return step + 1 if step + 1 < len(self.steps) else self.repeat_from
+        following = self.loops.get(step, step + 1)
+        return following if following < len(self.steps) else None
 
     def step_of_item(self, item: int, step: int, reset: bool) -> int | None:
         """The step that is flown if an item becomes the present one at this step, with its jumps taken as

@@ -104,12 +104,8 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
 
 def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     """The legs of the step after the present one, where it begins at rest where this one ends."""
-    step = flight.mission.step + 1
-    if (
-        not flight.mission.active
-        or flight.phase not in (Phase.LIFT, Phase.MISSION)
-        or step >= len(flight.mission.plan.steps)
-    ):
+    step = flight.mission.plan.next_step(flight.mission.step) if flight.mission.active else None
+    if step is None or flight.phase not in (Phase.LIFT, Phase.MISSION):
         return ()
     last = flight.legs[-1] if flight.legs else None
     if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
@@ -136,7 +132,10 @@ def _signals_of(flight: Flight, step: int) -> ShapedSignals | None:
 def hold_reduction_s(flight: Flight) -> float:
     """Time (s) that the signals before and after the present step take from its hold: to come to rest, and to
     lead in."""
-    before, after = _signals_of(flight, flight.mission.step - 1), _signals_of(flight, flight.mission.step + 1)
+    plan, step = flight.mission.plan, flight.mission.step
+    following = plan.next_step(step)
+    before = _signals_of(flight, step - 1) if step - 1 not in plan.loops else None
+    after = _signals_of(flight, following) if following is not None else None
     return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
 
 

@@ -280,7 +280,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
 def _flown_through(mission: Mission, limits: VehicleLimits) -> frozenset[int]:
     """The items along a path through waypoints, which takes as long as the limits require with every law."""
     shaping = limits.shaping._replace(shape_paths=False)
-    prepared = prepare(mission.steps, range(len(mission.steps)), shaping)
+    prepared = prepare(mission.steps, range(len(mission.steps)), shaping, loop_ends=mission.loop_ends)
     return frozenset(item for item, path in enumerate(prepared.paths) if isinstance(path, PathSegment))
 
 
@@ -350,7 +350,8 @@ def paths(
     waypoints; PlanError if its path is refused. Without `shaped`, signals are flown as requested.
     """
     shaping = limits.shaping._replace(shape_paths=shaped)
-    prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
+    items, ends = range(len(mission.steps)), mission.loop_ends
+    prepared = prepare(mission.steps, items, shaping, planner=planner, loop_ends=ends)
     if planner is not None and prepared.refusal:
         raise PlanError(prepared.refusal)
     reports = []

@@ -7,7 +7,7 @@ path, is flown as requested, slowed down or refused, depending on the user's set
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -103,14 +103,16 @@ def prepare(
     home: Vec3 = ZERO,
     planner: Planner | None = None,
     begin: MissionBegin = AT_HOME,
+    loop_ends: Collection[int] = (),
 ) -> PreparedPaths:
     """Prepare the steps; `sequence` has the mission item of each, by which the notes name it, and `home` is
     where a return leads. `planner` is a custom planner of paths through waypoints: it returns a path along
-    the route, or raises PlanError. The steps before that of `begin` are prepared as from home."""
+    the route, or raises PlanError. The steps before that of `begin` are prepared as from home. No path leads
+    from one of the `loop_ends` to the step behind it."""
     paths: list[ShapedSignals | PathSegment | None] = []
     notes: list[str] = []
     refusal = ""
-    entries = _entries(steps, limits, home, begin)
+    entries = _entries(steps, limits, home, begin, loop_ends)
     slow_paths: list[SlowPath] = []
     if planner is None:
         segments, slow_paths = _waypoint_segments(entries, limits)
@@ -147,23 +149,30 @@ def prepare(
 
 
 def _entries(
-    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin, loop_ends: Collection[int]
 ) -> tuple[TimelineEntry, ...]:
     """The timeline of the steps, which at the step of `begin` continues from its state."""
 
-    def walk(part: Sequence[Step], state: MissionState) -> tuple[TimelineEntry, ...]:
-        return tuple(timeline(part, state, home, limits.accel_m_s2, gravity_m_s2=limits.body.gravity))
+    def walk(first: int, last: int | None, state: MissionState) -> tuple[TimelineEntry, ...]:
+        ends = [step - first for step in loop_ends]
+        gravity = limits.body.gravity
+        part = steps[first:last]
+        return tuple(timeline(part, state, home, limits.accel_m_s2, gravity_m_s2=gravity, loop_ends=ends))
 
     usual_m_s = limits.speed_m_s
     at_home = MissionState(cable_m=limits.body.cable_length, speed_m_s=usual_m_s, usual_speed_m_s=usual_m_s)
-    return walk(steps[: begin.step], at_home) + walk(steps[begin.step :], begin.state or at_home)
+    return walk(0, begin.step, at_home) + walk(begin.step, None, begin.state or at_home)
 
 
 def waypoint_path_starts(
-    steps: Sequence[Step], limits: PathLimits, home: Vec3, begin: MissionBegin
+    steps: Sequence[Step],
+    limits: PathLimits,
+    home: Vec3,
+    begin: MissionBegin,
+    loop_ends: Collection[int] = (),
 ) -> dict[int, Vec3]:
     """Where each path through waypoints starts, by the index of its first step."""
-    return _path_starts(_entries(steps, limits, home, begin), limits)
+    return _path_starts(_entries(steps, limits, home, begin, loop_ends), limits)
 
 
 def _path_starts(entries: Iterable[TimelineEntry], limits: PathLimits) -> dict[int, Vec3]:

@@ -8,7 +8,7 @@ Positions are in m, ENU. They are the load's until it is released, and the vehic
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import dist, pi, sqrt
@@ -50,6 +50,7 @@ GRAVITY_M_S2 = 9.81
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
+LOOP = "a jump without end"  # what makes a position unknown
 MIN_REEL_M = 1e-4  # a winch this near to its length has nothing to do
 
 
@@ -106,6 +107,11 @@ class MissionState:
         """The position of the setpoint; None if it is unknown."""
         return None if self.unknown_after else self.expected
 
+    def behind_loop(self) -> MissionState:
+        """The state of what follows a loop that ends so: the loop may be left anywhere."""
+        # a release leaves the height unknown as well
+        return self if self.released and self.unknown_after else replace(self, unknown_after=LOOP)
+
 
 AT_ORIGIN = MissionState()
 ANYWHERE = MissionState(expected=None)
@@ -150,16 +156,18 @@ def timeline(
     accel_m_s2: float = ACCEL_M_S2,
     vertical: VerticalSpeeds = USUAL_SPEEDS,
     gravity_m_s2: float = GRAVITY_M_S2,
+    loop_ends: Collection[int] = (),
 ) -> Iterator[TimelineEntry]:
     """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`, and take at
-    least `min_move_duration`; the load is lifted and lowered at `vertical` speeds."""
+    least `min_move_duration`; the load is lifted and lowered at `vertical` speeds. What stands behind one of
+    the `loop_ends` probably begins where the loop ends."""
     before = start
     for item, step in enumerate(steps):
         after = state_after(step, before, home)
         moving, waiting = _travel_and_wait(step, before, after, accel_m_s2, vertical, gravity_m_s2)
         place = home if isinstance(step, ReturnHome) else None
         yield TimelineEntry(item, step, before, after, moving, moving.duration_s + waiting, place)
-        before = after
+        before = after.behind_loop() if item in loop_ends else after
 
 
 def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionState:

@@ -14,6 +14,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import (
     AREA_COMMANDS,
     COMMAND,
+    ENDLESS,
     Handling,
     MissionItemError,
     WireItem,
@@ -25,7 +26,7 @@ from gcs.formats.items import FormatError
 from gcs.formats.jumps import redirected
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEADER, is_home_row, read_waypoints, write_waypoints
-from gcs.mission_items import flown_steps
+from gcs.mission_items import flown_steps, loop_ends
 from missions.model import Land
 from missions.text_files import TextFileError, text_of
 
@@ -132,6 +133,12 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         for command, found in kept_items.items()
     ]
     flown = flown_steps(steps)
+    kept += [
+        f"item {number}, {numbered_name(item.command)}: repeats without end until a ground station makes an "
+        "item behind it the present one (MISSION_SET_CURRENT); expected times count one pass"
+        for number, item in zip(numbers, items, strict=True)
+        if loop_ends(flown) and item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS
+    ]
     landing = flown[-1].last if flown and isinstance(flown[-1].step, Land) else len(remaining)
     if after := numbers[landing + 1 :]:
         places = f"item {after[0]}" if len(after) == 1 else f"items {after[0]} to {after[-1]}"
@@ -142,6 +149,7 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         description="",
         assumptions=(),
         steps=tuple(one.step for one in flown),
+        loop_ends=loop_ends(flown),
         items=tuple(items),
         fence=plan.fence,
         rally=plan.rally,

@@ -98,7 +98,8 @@ def fly(
     warnings = []
     if options.connect is None and options.firmware is None:
         warnings = check_options(options)
-    mission = load(options.mission)
+    in_lockstep = options.connect is None and options.speed is None  # without other ground stations
+    mission = load(options.mission, with_loops=not in_lockstep)
     if options.connect is None and options.firmware is None:
         check_law(mission, options)
     if options.firmware is not None and isinstance(mission, ForeignMission):

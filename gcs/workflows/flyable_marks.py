@@ -34,5 +34,5 @@ def mark_flyable(mission: Mission, vehicle: str, follows_shaped: bool, settings:
 
 def _mark_name(mission: Mission, vehicle: str, follows_shaped: bool, settings: Settings) -> str:
     texts = [VEHICLES.read(one).text for one in (vehicle, belief_of(vehicle))]
-    inputs = (mission.steps, texts, follows_shaped, *settings)
+    inputs = (mission.steps, mission.loop_ends, texts, follows_shaped, *settings)
     return f"flies-{hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]}"

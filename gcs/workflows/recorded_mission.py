@@ -12,7 +12,7 @@ from gcs.analysis.record import FlightMeta
 from gcs.analysis.tracks import Telemetry
 from gcs.errors import GcsError
 from gcs.mission_files import load
-from gcs.mission_items import flown_steps, items_of
+from gcs.mission_items import flown_steps, items_of, loop_ends
 from missions.model import Mission
 
 _UNNAMED = "recorded"
@@ -29,7 +29,7 @@ def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
         return None
     if meta.mission:
         try:
-            known = load(meta.mission)
+            known = load(meta.mission, with_loops=True)
             if same_items(items_of(known, telemetry.home), telemetry.mission):
                 return known
         except GcsError:
@@ -39,7 +39,8 @@ def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
     except MissionItemError:
         return None
     name = Path(meta.mission or _UNNAMED).stem
-    return Mission(name, meta.title or name, "", (), tuple(one.step for one in steps))
+    found = tuple(one.step for one in steps)
+    return Mission(name, meta.title or name, "", (), found, loop_ends=loop_ends(steps))
 
 
 def same_items(items: Sequence[WireItem], recorded: Sequence[WireItem]) -> bool:

@@ -58,9 +58,13 @@ def ask_supervisor(
     steps, sequence = tuple(one.step for one in located), tuple(one.last for one in located)
     fenced = has_fence(Flight(area=area), settings)
     # a fence may forbid a curve
-    prepared = prepare(steps, sequence, settings.limits, planner=planner) if fenced else UNPREPARED
+    loops = {index: one.then for index, one in enumerate(located) if one.then is not None}
+    prepared = UNPREPARED
+    if fenced:
+        prepared = prepare(steps, sequence, settings.limits, planner=planner, loop_ends=loops)
     count = len(items)
-    flight = with_plan(Flight(area=area), MissionPlan(steps, sequence, count, prepared))
+    plan = MissionPlan(steps, sequence, count, prepared, loops=loops)
+    flight = with_plan(Flight(area=area), plan)
 
     def refusals(flight: Flight, settings: Settings, *requests: object) -> Iterator[str]:
         """The texts of those requests that would be refused."""

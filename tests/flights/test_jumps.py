@@ -72,7 +72,20 @@ def test_one_without_end_leads_back() -> None:
     craft = waiting(-1.0, step=2)
     assert craft.command(SET_CURRENT, JUMP) == ACCEPTED
     assert (current(craft), craft.flight.mission.step) == (FIRST, 1)
-    assert craft.command(SET_CURRENT, BEHIND) == mavlink.MAV_RESULT_DENIED
+
+
+@pytest.mark.parametrize("message", [False, True])
+def test_one_without_end_is_left_for_the_items_behind_it(message: bool) -> None:
+    craft = waiting(-1.0, step=2)
+    craft.run(OfFlight(lambda flight: flight.mission.step == 1))
+    if message:
+        craft.send(mavlink.MAVLink_mission_set_current_message(1, 1, BEHIND))
+        craft.tick()
+    else:
+        assert craft.command(SET_CURRENT, BEHIND) == ACCEPTED
+    assert current(craft) == BEHIND
+    assert rest_of(craft) == [BEHIND, BEHIND + 1]
+    assert craft.flight.mission.done
 
 
 def test_the_jumps_that_were_taken_stay_taken_unless_the_mission_is_reset() -> None:

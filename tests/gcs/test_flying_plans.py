@@ -14,12 +14,13 @@ from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_steps
 from gcs.cli import gcs
+from gcs.clients.flight import FlightClient
 from gcs.closed_loop import Conditions, fly
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.foreign_mission import ForeignMission
 from gcs.formats.missions import write_foreign
 from gcs.mission_files import is_mission_file, load, read
-from gcs.mission_items import at_home, home_difference
+from gcs.mission_items import at_home, home_difference, items_of
 from gcs.sweep.flight import fly as fly_without_wire
 from gcs.sweep.flight import start_times
 from missions.model import Land, ReturnHome, Step, Takeoff, Waypoint
@@ -146,7 +147,7 @@ def test_a_sweep_flies_it(tmp_path: Path) -> None:
         (
             PATH,
             (PLACE, command(mavlink.MAV_CMD_DO_JUMP, 1.0, -1.0)),
-            ["does not end on the ground"],
+            ["repeats items without end (DO_JUMP) until a ground station makes an item behind them the "],
         ),
         (
             (*PATH[:2], Land()),
@@ -243,3 +244,38 @@ def test_a_flight_that_a_fence_stops_says_so_when_its_time_is_over(tmp_path: Pat
     assert (outcome.name, outcome.reason) == ("timeout", f"{reason}, item 1")
     swept = fly_without_wire(mission, conditions, start_times(mission, Conditions()))
     assert (swept.outcome, swept.reason) == ("timeout", reason)
+
+
+class LeavesLoop(FlightClient):
+    """Makes an item the present one as soon as another was reached."""
+
+    leave_for, after = 4, 2
+
+    def poll(self, now_us: int) -> list[bytes]:
+        datagrams = super().poll(now_us)
+        reached = self.view.latest.get("MISSION_ITEM_REACHED")
+        if reached is not None and reached.seq == self.after:
+            target = self.connection.target
+            assert target is not None
+            leave = mavlink.MAVLink_mission_set_current_message(*target, self.leave_for)
+            datagrams.append(self.connection.frame(leave))
+            self.after = -1
+        return datagrams
+
+    @property
+    def silent_until_us(self) -> int:
+        return 0
+
+
+def test_a_loop_is_left_by_a_ground_station_and_the_mission_ends(tmp_path: Path) -> None:
+    loop = (Takeoff(1.0), Waypoint(1.0, 0.0, 1.0), Waypoint(1.0, 1.0, 1.0))
+    takeoff, *corners, home, land = encode_steps((*loop, Waypoint(0.0, 0.0, 1.0), Land()), HOME)
+    path = tmp_path / "loop.plan"
+    write_foreign(path, (takeoff, *corners, command(mavlink.MAV_CMD_DO_JUMP, 1.0, -1.0), home, land), HOME)
+    mission = load(path, with_loops=True)
+    assert mission.loop_ends == (2,)
+    client = LeavesLoop(items_of(mission, HOME), 60.0)
+    assert fly(mission, Conditions(), NoLog(), client=client).name == "completed"
+    checked = CliRunner().invoke(gcs, ["check", str(path)], prog_name="gcs").stdout
+    assert "item 3, DO_JUMP (177): repeats without end until a ground station makes an item behind" in checked
+    assert "items[4] (waypoint): " in checked

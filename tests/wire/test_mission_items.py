@@ -23,7 +23,6 @@ from autopilot.wire.items import (
     decode_items,
     encode_mission,
     encode_steps,
-    endless_jump_target,
     located_steps,
     read_items,
     unflown_items,
@@ -483,12 +482,11 @@ def test_what_is_not_flown_is_known() -> None:
     assert unflown_items([item(93, 1.0), item(203), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
 
 
-def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
+def test_a_jump_without_end_leads_back_from_the_last_step_before_it() -> None:
     items = [item(93, 1.0), item(203), item(93, 2.0), TERM, RUN, item(177, 1.0, -1.0), item(93, 9.0)]
     located = located_steps(items, HOME)
-    assert [one.last for one in located] == [0, 2, 4], "what stands behind it is never flown"
-    assert endless_jump_target(items, located) == 1
-    assert endless_jump_target(items[:-2], located) is None
+    assert [(one.last, one.then) for one in located] == [(0, None), (2, None), (4, 1), (6, None)]
+    assert [one.then for one in located_steps(items[:-2], HOME)] == [None] * 3
 
 
 @pytest.mark.parametrize(
@@ -546,7 +544,8 @@ def test_jumps_without_end_turn_the_nose_each_time() -> None:
     items = [item(22, frame=6, z=4.0), item(93, 2.0), item(115, 90.0), item(177, 1.0, -1.0)]
     steps = located_steps(items, HOME)
     assert [one.heading_commands for one in steps] == [(), (), (TurnHeading(0.0),)]
-    assert endless_jump_target(items, steps) == 1
+    assert steps[2].then == 1
+    assert read_items(items, HOME)[1][-1] == (3, 1, 0), "the jump does not lead to the hold before it"
 
 
 def test_jumps_fly_their_items_again() -> None:

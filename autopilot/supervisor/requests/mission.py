@@ -130,9 +130,7 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
         return flight, denied(f"{item} denied: the last is {plan.item_count - 1}")
     step = plan.step_of_item(seq, flight.mission.step, request.reset)
     if step is None:
-        endless = plan.repeat_from is not None
-        why = "the jump without end before it is not left" if endless else "nothing is flown from there"
-        return flight, denied(f"{item} denied: {why}")
+        return flight, denied(f"{item} denied: nothing is flown from there")
     at_item = with_current_step(flight, step)
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, item)

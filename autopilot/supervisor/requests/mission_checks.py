@@ -126,7 +126,8 @@ def is_prepared_from_here(flight: Flight, ahead: RemainingSteps, settings: Setti
     begin = mission_begin(flight, ahead, settings)
     if not prepared.paths or begin.state is None or begin.state.expected is None:
         return True
-    starts = waypoint_path_starts(mission.plan.steps, settings.limits, flight.area.home, begin)
+    plan, home = mission.plan, flight.area.home
+    starts = waypoint_path_starts(plan.steps, settings.limits, home, begin, plan.loops)
     step = min((step for step in starts if step >= mission.step), default=None)
     if step is None:
         return True

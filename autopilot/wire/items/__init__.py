@@ -6,17 +6,11 @@ durations and holds of signals), microseconds (periods) and 1e-7 degrees (the pl
 Items that were made here come back unchanged: `encode(decode(items)) == items`.
 
 Positions are positions of the load. Items that turn the nose are not steps: the nose begins to turn with the
-step after them. DO_JUMP is flown by flying its items again.
+step after them. DO_JUMP is flown by flying its items again; one without end leads back to steps before it.
 """
 
 from autopilot.wire.items.command import Command, Handling, is_home
-from autopilot.wire.items.decode import (
-    decode_items,
-    endless_jump_target,
-    located_steps,
-    read_items,
-    unflown_items,
-)
+from autopilot.wire.items.decode import ENDLESS, decode_items, located_steps, read_items, unflown_items
 from autopilot.wire.items.encode import encode_mission, encode_steps, home_item, step_index
 from autopilot.wire.items.heading import turn_heading
 from autopilot.wire.items.records import LocatedStep, MissionItemError, Visit, WireItem
@@ -26,6 +20,7 @@ __all__ = [
     "AREA_COMMANDS",
     "COMMAND",
     "COMMANDS",
+    "ENDLESS",
     "Command",
     "Handling",
     "LocatedStep",
@@ -35,7 +30,6 @@ __all__ = [
     "decode_items",
     "encode_mission",
     "encode_steps",
-    "endless_jump_target",
     "handling_of",
     "home_item",
     "is_home",

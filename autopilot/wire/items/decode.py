@@ -20,7 +20,7 @@ from autopilot.wire.items.limits import (
     MAX_TERMS,
     SHORTEST_POINT_S,
 )
-from autopilot.wire.items.records import LocatedStep, MissionItemError, Visit, WireItem
+from autopilot.wire.items.records import END, LocatedStep, MissionItemError, Visit, WireItem
 from autopilot.wire.items.table import COMMAND, handling_of
 from missions.model import (
     ORIGIN,
@@ -73,61 +73,70 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
 def read_items(
     items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO
 ) -> tuple[tuple[LocatedStep, ...], tuple[Visit, ...]]:
-    """`located_steps`, and the visits to the items in their order. An endless jump leads to a step that was
-    flown before."""
+    """`located_steps`, and the visits to the items in their order.
+
+    What a jump without end repeats is read until it comes to an item with the counts of all jumps as at an
+    earlier visit: from there on it is the same again. Then come the steps of the items behind the jump, with
+    which the mission continues if the loop is left.
+    """
     reader = _Reader(home, return_to)
-    jumps: dict[int, int] = {}  # by the item of a jump: how often it was reached
-    taken: dict[int, int] = {}  # how often it was taken
+    taken: dict[int, int] = {}  # by the item of a jump: how often it was taken
     laps: dict[tuple[tuple[int, int], ...], int] = {}
     visits: list[Visit] = []
-    flown_count = seq = 0
-    while seq < len(items):
+    visited: dict[tuple[int, int], int] = {}  # index of the visit to an item in a lap
+    behind: list[tuple[int, dict[int, int]]] = []  # items behind endless jumps, and the jumps taken by then
+    flown_count = seq = last = jump = 0  # `last` item that was read, `jump` without end that was taken
+
+    def state(item: int, counts: dict[int, int]) -> tuple[int, int]:
+        return item, laps.setdefault(tuple(counts.items()), len(laps))
+
+    while True:
+        here = state(seq, taken)
+        if here in visited or seq == len(items):  # the end of a stretch of steps
+            then: int | None = None
+            if here in visited:
+                then = visits[visited[here]].step
+                reader.check_loop(jump, then)
+                if visits[-1].item == jump:
+                    visits[-1] = visits[-1]._replace(step=then)
+            behind = [one for one in behind if state(*one) not in visited]
+            if seq == len(items):
+                last, then = seq - 1, END if behind else None
+            reader.end_stretch(last, then)
+            if then is not None:
+                visits = [v if v.step < len(reader.steps) else v._replace(step=then) for v in visits]
+            if not behind:
+                return tuple(reader.steps), tuple(visits)
+            seq, taken = behind.pop()
+            continue
         item = items[seq]
         if item.command != _POINT or item.x == 0:  # a point at time 0 begins another trajectory
             reader.end_trajectory()  # of points in a row
-        lap = laps.setdefault(tuple(taken.items()), len(laps))
-        visits.append(Visit(seq, len(reader.steps), lap))
+        visited[here] = len(visits)
+        visits.append(Visit(seq, len(reader.steps), here[1]))
+        flown_count += 1
         if item.command == mavlink.MAV_CMD_DO_JUMP:
             reader.end_step(seq - 1)
-            last = len(items) - 1
-            target = choice(seq, 1, "item to jump to", item.param1, range(last + 1), f"0 ... {last}")
+            end = len(items) - 1
+            target = choice(seq, 1, "item to jump to", item.param1, range(end + 1), f"0 ... {end}")
             allowed = f"0 ... {MAX_JUMPS}, or -1: without end"
             times = choice(seq, 2, "repetitions", item.param2, range(ENDLESS, MAX_JUMPS + 1), allowed)
             if times == ENDLESS:
                 if not any(step.last >= target for step in reader.steps):
-                    text = "a jump without end must lead back to something that is flown"
-                    raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-                if reader.lap_s(target) < _MIN_LAP_S:
-                    text = f"what a jump without end repeats must take at least {_MIN_LAP_S:g} s"
-                    raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-                reader.add_hold_to_turn(seq - 1)
-                steps = tuple(reader.steps)
-                visits[-1] = Visit(seq, next(i for i, step in enumerate(steps) if step.last >= target), lap)
-                return steps, tuple(visits)
-            jumps[seq] = jumps.get(seq, 0) + 1
-            if jumps[seq] <= times:
-                taken[seq] = jumps[seq]
+                    raise _loop_error(seq)
+                behind.append((seq + 1, dict(taken)))
+                jump, seq = seq, target
+            elif taken.get(seq, 0) < times:
+                taken[seq] = taken.get(seq, 0) + 1
                 seq = target
             else:
                 seq += 1
         else:
             reader.read(seq, item)
-            seq += 1
-        flown_count += 1
+            last, seq = seq, seq + 1
         if flown_count > MAX_FLOWN_ITEMS:
             text = f"with its jumps the mission has more than {MAX_FLOWN_ITEMS} items"
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
-    reader.end_step(len(items) - 1)
-    reader.add_hold_to_turn(len(items) - 1)
-    return tuple(reader.steps), tuple(visits)
-
-
-def endless_jump_target(items: Sequence[WireItem], steps: Sequence[LocatedStep]) -> int | None:
-    """Index of the step that follows the last one if an endless jump leads back to it; None without one."""
-    for item in items:
-        if item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS:
-            return next(i for i, step in enumerate(steps) if step.last >= item.param1)
-    return None
 
 
 def unflown_items(items: Sequence[WireItem]) -> tuple[int, ...]:
@@ -147,6 +156,7 @@ class _Reader:
         self._first = self._last = 0  # items of the terms or points so far
         self._heading_commands: list[HeadingCommand] = []  # of the next step
         self._state = ANYWHERE  # after the steps so far
+        self._stretch_begin = 0  # number of steps before those that follow one another now
 
     def read(self, seq: int, item: WireItem) -> None:
         handling = handling_of(item.command)
@@ -185,17 +195,36 @@ class _Reader:
             text = f"the load signal begun at item {self._first} has no run (31012) behind it"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
-    def add_hold_to_turn(self, seq: int) -> None:
-        """Add a hold in which the nose turns if no step follows, unless the mission lands anyway."""
+    def end_stretch(self, seq: int, then: int | None) -> None:
+        """End the steps that follow one another with item `seq`, behind which the mission continues with step
+        `then`; None: it ends."""
+        self.end_step(seq)
+        # a hold in which the nose turns if no step follows, unless the mission lands anyway
         if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
+        self._heading_commands = []
+        if then is not None and len(self.steps) > self._stretch_begin:
+            self.steps[-1] = self.steps[-1]._replace(then=then)
+            self._state = self._state.behind_loop()
+        self._stretch_begin = len(self.steps)
 
-    def lap_s(self, target: int) -> float:
-        """Time (s) of the steps from item `target` on, if they are flown again after the last step."""
-        steps = [located.step for located in self.steps if located.last >= target]
-        entries = timeline(steps, self._state, self._return_to)
+    def check_loop(self, jump: int, then: int) -> None:
+        """MissionItemError for a `jump` without end if what is flown from step `then` on takes no time until
+        it comes back."""
+        if then >= len(self.steps):
+            raise _loop_error(jump)
+        lap = [then]
+        while lap[-1] != len(self.steps) - 1:
+            following = self.steps[lap[-1]].then
+            lap.append(lap[-1] + 1 if following is None else following)
+            if len(lap) > len(self.steps) or lap[-1] == END:
+                return  # it does not come back, but to another loop
+        entries = timeline((self.steps[i].step for i in lap), self._state, self._return_to)
         # in the air a take-off only moves the load
-        return sum(one.transfer_s if isinstance(one.step, Takeoff) else one.duration_s for one in entries)
+        lap_s = sum(one.transfer_s if isinstance(one.step, Takeoff) else one.duration_s for one in entries)
+        if lap_s < _MIN_LAP_S:
+            text = f"what a jump without end repeats must take at least {_MIN_LAP_S:g} s"
+            raise MissionItemError(jump, text, mavlink.MAV_MISSION_INVALID)
 
     def _add(self, located: LocatedStep) -> None:
         if self._heading_commands and not isinstance(
@@ -259,6 +288,11 @@ class _Reader:
             trajectory = Trajectory(tuple(self._points))
             self._points = []
             self._add(LocatedStep(self._first, self._last, trajectory))
+
+
+def _loop_error(jump: int) -> MissionItemError:
+    text = "a jump without end must lead back to something that is flown"
+    return MissionItemError(jump, text, mavlink.MAV_MISSION_INVALID)
 
 
 def _steps(context: ItemContext, row: Command) -> Iterable[Step]:

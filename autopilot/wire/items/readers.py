@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from autopilot.trajectory.timeline import state_after
+from autopilot.trajectory.timeline import LOOP, state_after
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import ItemContext
 from autopilot.wire.items.fields import check
@@ -126,13 +126,15 @@ def winch(context: ItemContext) -> Iterator[Step]:
 
 
 def land(context: ItemContext) -> Iterator[Step]:
-    """A landing; to a place other than where the load hangs, the load is carried first."""
-    load_position = context.state.position
+    """A landing; to a place other than where the load hangs, the load is carried first. Behind a loop, which
+    may be left anywhere, it is carried in any case, at the height at which the loop ends."""
+    is_behind_loop = context.state.unknown_after == LOOP
+    load_position = context.state.expected if is_behind_loop else context.state.position
     if context.has_position() and context.state.released and load_position is None:
         text = "nothing between it and the release says how high the vehicle flies; put a waypoint there"
         raise context.refusal(text)
     if context.has_position() and load_position is not None:
         east, north = context["east_m"], context["north_m"]
-        if math.dist((east, north), load_position[:2]) > HOME_ITEM_RADIUS_M:
+        if is_behind_loop or math.dist((east, north), load_position[:2]) > HOME_ITEM_RADIUS_M:
             yield Waypoint(east, north, load_position[2])
     yield Land()

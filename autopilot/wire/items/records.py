@@ -8,6 +8,7 @@ from autopilot.wire.command_names import numbered_name
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import HeadingCommand, Step
 
+END = 2**31  # instead of a step: none follows
 FRAME_MISSION = mavlink.MAV_FRAME_MISSION
 FRAME_RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -38,6 +39,9 @@ class LocatedStep(NamedTuple):
     last: int
     step: Step
     heading_commands: tuple[HeadingCommand, ...] = ()  # given one after the other as the step begins
+    # index of the step that follows instead of the next one, to which a jump without end leads, or END; the
+    # next one begins wherever the loop is left
+    then: int | None = None
 
 
 class Visit(NamedTuple):

@@ -184,10 +184,11 @@ COMMANDS: tuple[Command, ...] = (
     Command(m.MAV_CMD_CONDITION_DELAY, "as NAV_DELAY", _DELAY, Delay),
     Command(
         m.MAV_CMD_DO_JUMP,
-        f"the mission continues with item p1, p2 times (0 ... {MAX_JUMPS}) or without end (-1). Items "
-        "behind a jump without end are never flown, and the repeated ones must take at least 0.5 s. A "
-        f"mission of more than {MAX_FLOWN_ITEMS} items, counted with all repetitions, is refused. If a jump "
-        "becomes the present item (MISSION_SET_CURRENT), it is executed",
+        f"the mission continues with item p1, p2 times (0 ... {MAX_JUMPS}) or without end (-1). The items "
+        "behind a jump without end are flown once one of them becomes the present item "
+        "(MISSION_SET_CURRENT), and the repeated ones must take at least 0.5 s. Another jump around it does "
+        f"not reset the count of a jump. A mission of more than {MAX_FLOWN_ITEMS} items, counted with all "
+        "repetitions, is refused. If a jump becomes the present item, it is executed",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
@@ -205,8 +206,8 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_DO_WINCH,
         "the cable becomes longer by this length, or shorter if it is negative, while the vehicle stays in "
-        "place. Refused if the height of the load is not known, as after an attitude run or signals that "
-        "end in motion: add a waypoint before it",
+        "place. Refused if the height of the load is not known, as behind a jump without end, after an "
+        "attitude run or signals that end in motion: add a waypoint before it",
         (
             Choice(1, "winch", "winch", _INSTANCE),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
