@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.guidance.legs import PathStop, Reel, winch_hold_height
-from autopilot.supervisor.heading import advance_heading
+from autopilot.supervisor.heading import advance_heading, take_reached_aims
 from autopilot.supervisor.machine import transition
 from autopilot.supervisor.mission import RELEASED_TEXT, after_last_leg
 from autopilot.supervisor.settings import Settings
@@ -63,7 +63,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 
 def _advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The first watch that finds something decides, else the legs continue."""
-    flight = advance_heading(flight, view, settings)
+    flight, aimed = take_reached_aims(advance_heading(flight, view, settings))
     for watch in WATCHES:
         result = watch(flight, view, settings)
         flight = result.flight
@@ -72,8 +72,9 @@ def _advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Re
             if result.is_failsafe:
                 flight = replace(flight, is_failsafe=True)
         if result.found:
-            return flight, Report(result.texts, result.reached)
-    return _continue_legs(flight, view, settings)
+            return flight, Report(result.texts, aimed + result.reached)
+    flight, report = _continue_legs(flight, view, settings)
+    return flight, report._replace(reached=aimed + report.reached)
 
 
 def _continue_legs(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:

@@ -16,7 +16,7 @@ from autopilot.guidance.setpoint_follower import (
 from autopilot.supervisor.motion import commanded_motion
 from autopilot.supervisor.setpoint_source import source_stream
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import IN_AIR, Flight, Phase, View
+from autopilot.supervisor.state import IN_AIR, AimedItems, Flight, Phase, View
 from missions.model import LookAt, TurnHeading
 
 # between the stored and the estimated heading on the ground; beyond it the latter is used
@@ -55,12 +55,37 @@ def with_look_at_aim(flight: Flight, request: LookAt, view: View, settings: Sett
 def with_step_heading_aims(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight with the heading aims that its present mission step sets as it begins."""
     plan, step = flight.mission.plan, flight.mission.step
-    for aim in plan.aims[step] if step < len(plan.aims) else ():
+    aims = plan.aims[step] if step < len(plan.aims) else ()
+    if not aims:
+        return flight
+    done: list[int] = []
+    turning, turn = None, flight.heading.aim
+    for item, aim in aims:
         if isinstance(aim, TurnHeading):
             flight = with_heading_aim(flight, aim, view)
+            turning, turn = item, flight.heading.aim
         else:
             flight = with_look_at_aim(flight, aim, view, settings)
-    return flight
+            done.append(item)
+    held_item = plan.sequence[step]  # a hold for the last aim is reached as a step
+    aimed = AimedItems(
+        tuple(item for item in done if item != held_item), None if turning == held_item else turning, turn
+    )
+    return replace(flight, mission=replace(flight.mission, aimed=aimed))
+
+
+def take_reached_aims(flight: Flight) -> tuple[Flight, tuple[int, ...]]:
+    """The flight, and the items among those that set an aim of its heading that are reached by now: a region
+    of interest at once, a turn when it has ended. A turn that something else replaces is never reached."""
+    mission, aimed, heading = flight.mission, flight.mission.aimed, flight.heading
+    if aimed is None:
+        return flight, ()
+    turns = mission.active and aimed.turning is not None and heading.aim == aimed.aim
+    if turns and not heading.is_settled:
+        left, reached = aimed._replace(done=()), aimed.done
+    else:
+        left, reached = None, (*aimed.done, *((aimed.turning,) if turns else ()))
+    return replace(flight, mission=replace(mission, aimed=left)), reached
 
 
 def with_heading_before_flight(flight: Flight, view: View) -> Flight:

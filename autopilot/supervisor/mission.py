@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import norm
 from autopilot.guidance.legs import LOAD_POSITION, Hold, Leg, LiftWait, PathStretch, Swing, SwingDamping
-from autopilot.supervisor.heading import with_step_heading_aims
+from autopilot.supervisor.heading import take_reached_aims, with_step_heading_aims
 from autopilot.supervisor.machine import start_phase_legs, transition, try_transition
 from autopilot.supervisor.motion import (
     AT_REST,
@@ -166,8 +166,8 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
     plan, number = flight.mission.plan, flight.mission.step
     step = plan.steps[number]
     if flight.phase == Phase.LIFT and not isinstance(step, Takeoff):  # lifted although no step requested it
-        flight = with_step_heading_aims(flight, view, settings)
-        return start_step(flight, step_event(flight), view, settings), Report()
+        flight, aimed = take_reached_aims(with_step_heading_aims(flight, view, settings))
+        return start_step(flight, step_event(flight), view, settings), Report((), aimed)
     after = plan.next_step(number)
     next_step = None if after is None else plan.steps[after]
     leg = flight.legs[0] if flight.legs else None
@@ -186,8 +186,8 @@ def _after_step(flight: Flight, view: View, settings: Settings) -> tuple[Flight,
         flight = replace(flight, mission=ended)
         text = "Mission complete, holding"
         return transition(flight, Event.DONE, view, settings), Report(((INFO, text),), reached)
-    flight = with_step_heading_aims(flight, view, settings)
-    return _next_step(flight, leg, next_step, view, settings), Report((), reached)
+    flight, aimed = take_reached_aims(with_step_heading_aims(flight, view, settings))
+    return _next_step(flight, leg, next_step, view, settings), Report((), reached + aimed)
 
 
 def _ends_item(plan: MissionPlan, step: int, following: int | None) -> bool:

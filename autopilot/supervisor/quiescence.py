@@ -196,6 +196,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or due_event(flight, settings) is not None
         or (isinstance(leg, PathStop) and winch_hold_height(leg) is not None)
         or not flight.heading.is_settled
+        or flight.mission.aimed is not None
         or (settings.fence.action != NO_ACTION and flight.phase in CARRYING and has_fence(flight, settings))
     )
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
-from autopilot.guidance.heading import HEADING_EAST, Heading
+from autopilot.guidance.heading import HEADING_EAST, Aim, Heading
 from autopilot.guidance.legs import Leg, PathResume
 from autopilot.guidance.setpoint_follower import NO_STREAM, SMOOTH_SHARE, Circle, FollowLimits, SetpointStream
 from autopilot.guidance.target import Target
@@ -117,7 +117,8 @@ class MissionPlan:
     sequence: tuple[int, ...] = ()
     item_count: int = 0
     prepared: PreparedPaths = UNPREPARED
-    aims: tuple[tuple[HeadingCommand, ...], ...] = ()  # of each step: the heading aims that it sets
+    # of each step: the heading aims that it sets, with the item of each
+    aims: tuple[tuple[tuple[int, HeadingCommand], ...], ...] = ()
     # of the last step of each loop without end: the step to which it leads; not before all others, END: none
     loops: Mapping[int, int] = field(default_factory=dict)
     visits: tuple[Visit, ...] = ()  # to the items, in the order in which they are flown
@@ -142,6 +143,14 @@ class MissionPlan:
         return next(chain(same_lap, later), found[-1].step)
 
 
+class AimedItems(NamedTuple):
+    """Items that have set an aim of the heading, and are not reported as reached yet."""
+
+    done: tuple[int, ...]
+    turning: int | None  # reached when the nose points at `aim`
+    aim: Aim
+
+
 @dataclass(frozen=True, slots=True)
 class MissionProgress:
     """The mission, how far it is flown, and its height and speed."""
@@ -153,6 +162,7 @@ class MissionProgress:
     # of a mission that is complete: the item that it ended with, after the flight the first; else None
     final_item: int | None = None
     step_anchor: Vec3 | None = None  # where the present step began
+    aimed: AimedItems | None = None
     stopped_run: PathResume | None = None  # how signals or a trajectory continue that were interrupted
     takeoff_altitude_m: float = 0.0
     speed_m_s: float = 0.0  # of transfers

@@ -154,7 +154,7 @@ class _Reader:
         self._terms: list[Term] = []
         self._points: list[TrajectoryPoint] = []
         self._first = self._last = 0  # items of the terms or points so far
-        self._heading_commands: list[HeadingCommand] = []  # of the next step
+        self._heading_commands: dict[int, HeadingCommand] = {}  # of the next step, by their items
         self._state = ANYWHERE  # after the steps so far
         self._stretch_begin = 0  # number of steps before those that follow one another now
 
@@ -167,7 +167,7 @@ class _Reader:
         row = COMMAND[item.command]
         context = ItemContext(seq, item, self._home, self._state, row)
         if row.heading_command is not None:
-            self._heading_commands.append(row.heading_command(context))
+            self._heading_commands[seq] = row.heading_command(context)
             return
         if item.command not in (_TERM, _FACTOR, _RUN):
             self._expect_no_terms(seq - 1)
@@ -202,7 +202,7 @@ class _Reader:
         # a hold in which the nose turns if no step follows, unless the mission lands anyway
         if self._heading_commands and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
             self._add(LocatedStep(seq, seq, Delay(0.0)))
-        self._heading_commands = []
+        self._heading_commands = {}
         if then is not None and len(self.steps) > self._stretch_begin:
             self.steps[-1] = self.steps[-1]._replace(then=then)
             self._state = self._state.behind_loop()
@@ -227,13 +227,10 @@ class _Reader:
             raise MissionItemError(jump, text, mavlink.MAV_MISSION_INVALID)
 
     def _add(self, located: LocatedStep) -> None:
-        if self._heading_commands and not isinstance(
-            located.step, Takeoff
-        ):  # the nose does not turn on the ground
-            located, self._heading_commands = (
-                located._replace(heading_commands=tuple(self._heading_commands)),
-                [],
-            )
+        if self._heading_commands and not isinstance(located.step, Takeoff):  # on the ground no nose turns
+            commands, items = tuple(self._heading_commands.values()), tuple(self._heading_commands)
+            located = located._replace(heading_commands=commands, heading_items=items)
+            self._heading_commands = {}
         self.steps.append(located)
         self._state = state_after(located.step, self._state, self._return_to)
 
