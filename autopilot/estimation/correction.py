@@ -223,6 +223,7 @@ def load_with_status(load: LoadEstimate, age_s: float, rejected: float, source: 
         source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 
@@ -265,6 +266,7 @@ def corrected_load(
         load.source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 

@@ -162,6 +162,7 @@ def predict_taut(
         load.source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 
@@ -229,6 +230,7 @@ def predict_slack(
         load.source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 

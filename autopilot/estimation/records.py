@@ -205,6 +205,7 @@ class LoadEstimate(NamedTuple):
     source: float  # NO_SENSOR, TRACKER or CAMERA
     laid_height: float  # m, at which it lay when its cable came taut; NOT_LAID if it is in the air
     laid_height_var: float  # m^2, of the height at which it lies or lay
+    length_share: float  # of the assumed length: what a tracked load's cable, by its pull, has of it at least
 
 
 class SensorErrors(NamedTuple):
@@ -341,6 +342,7 @@ def blank_state() -> EstimatorState:
             source=NO_SENSOR,
             laid_height=NOT_LAID,
             laid_height_var=0.0,
+            length_share=1.0,
         ),
         sensor_errors=SensorErrors((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0),

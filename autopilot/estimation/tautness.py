@@ -37,6 +37,10 @@ from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length above which a tracked load's slack cable counts as taut
 SLACK_BELOW = 0.965  # and below which a taut one counts as slack
+# A cable that is shorter than assumed never gets there. It is taut if it has pulled, at HELD_PULL of the
+# load's weight, for HELD_S, in which the distance has not changed by HELD_RANGE (m): a vehicle that pulls it
+# taut rises by more. This distance, at least SHORT_CABLE of the assumed length, replaces it in both shares.
+SHORT_CABLE, HELD_PULL, HELD_S, HELD_RANGE = 0.9, 0.4, 0.3, 0.02
 # The cable of a tracked load counts as taut only once the load's speed relative to the vehicle is known to
 # KNOWN_SPEED_STD (m/s), or SPEED_KNOWN_AFTER_S (s) after it came slack: the filter is linear in the
 # direction, which a wrong speed would soon turn far.
@@ -210,6 +214,27 @@ def _is_surely_slack(
 
 
 @kernel
+def _with_held_time(
+    load: LoadEstimate, distance: float, pull: float, tuning: EstimatorTuning, dt: float
+) -> LoadEstimate:
+    """A tracked load on a slack cable with the time for which it has pulled and kept its distance (m); this
+    distance is its length meanwhile."""
+    may_be_held = distance > SHORT_CABLE * tuning.cable_length
+    if may_be_held and pull > HELD_PULL * tuning.load_mass * tuning.gravity:
+        if abs(distance - load.length) < HELD_RANGE:
+            return _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt)
+        return _with_tautness(load, 0.0, distance, pull, 0.0)
+    return _with_tautness(load, 0.0, load.length, pull, 0.0)
+
+
+@kernel
+def _with_longer_cable(load: LoadEstimate, tuning: EstimatorTuning) -> LoadEstimate:
+    """The load on a taut cable that counted as shorter than assumed, if it turns out to be longer than so."""
+    share = load.length / tuning.cable_length
+    return with_field(load, "length_share", min(1.0, share)) if share > load.length_share else load
+
+
+@kernel
 def _must_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, history: History, tuning: EstimatorTuning
 ) -> bool:
@@ -306,6 +331,7 @@ def _with_tautness(
         load.source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 
@@ -407,6 +433,7 @@ def slacken(load: LoadEstimate, history: History, position_var: float, velocity_
         load.source,
         load.laid_height,
         laid_height_var,
+        load.length_share,
     )
 
 
@@ -437,17 +464,23 @@ def detect_tautness(
     pull = load.pull + share * (measured - load.pull)
     if load.source == TRACKER:
         distance = norm(sub(load.x_load, vehicle.x_quad))
-        carries_load = load.taut > 0.0 and pull >= LIFTING_PULL * load.tension
-        load = _with_tautness(
-            load, load.taut, load.length, pull, load.pull_duration_s + dt if carries_load else 0.0
-        )
-        if load.taut > 0.0 and load.x_load[2] > load.laid_height + LIFTED_HEIGHT:
-            load = with_field(load, "laid_height", NOT_LAID)
+        if load.taut > 0.0:
+            carried_s = load.pull_duration_s + dt if pull >= LIFTING_PULL * load.tension else 0.0
+            load = _with_tautness(load, 1.0, load.length, pull, carried_s)
+            if load.x_load[2] > load.laid_height + LIFTED_HEIGHT:
+                load = with_field(load, "laid_height", NOT_LAID)
+            return _with_longer_cable(load, tuning)
+        load = _with_held_time(load, distance, pull, tuning, dt)
         speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
         speed_known = (
             speed_var < KNOWN_SPEED_STD * KNOWN_SPEED_STD or load.tautness_age_s > SPEED_KNOWN_AFTER_S
         )
-        if load.taut == 0.0 and speed_known and distance > TAUT_ABOVE * tuning.cable_length:
+        if not speed_known:
+            return load
+        if distance > TAUT_ABOVE * load.length_share * tuning.cable_length:
+            return tauten(load, vehicle, history, tuning, distance)
+        if load.pull_duration_s > HELD_S:
+            load = with_field(load, "length_share", distance / tuning.cable_length)
             return tauten(load, vehicle, history, tuning, distance)
         return load
     weight = tuning.load_mass * tuning.gravity
@@ -496,4 +529,5 @@ def with_load_position(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
         load.source,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )

@@ -284,6 +284,36 @@ def test_a_cable_a_little_too_short_to_be_taut_is_found_slack() -> None:
     assert state.uncertainty.load < 0.01
 
 
+def held(steps: list[tuple[float, float, float]]) -> list[tuple[float, float]]:
+    """Whether the cable counts as taut, and its length, after each of `steps`: so many seconds at this
+    distance above a resting load and at this pull (N), by noiseless trackers."""
+    state, history, tuning = blank_state(), new_history(), bebop_tuning()
+    found = []
+    for seconds, distance, pull in steps:
+        thrust = tuning.quad_mass * tuning.gravity + pull
+        readings = Readings(
+            ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, tuning.gravity)),
+            (PoseReading(0.0, (0.0, 0.0, distance), (1.0, 0.0, 0.0, 0.0), ZERO, 5e-4, 5e-4, -1.0),),
+            (LoadReading(0.0, ZERO, ZERO, 5e-4, -1.0),),
+        )
+        for _ in range(round(seconds / TICK_S)):
+            state = estimate(state, history, readings, tuning, TICK_S, thrust)
+        found.append((state.load.taut, state.load.length))
+    return found
+
+
+def test_a_cable_that_is_shorter_than_assumed_is_slack_by_its_own_length() -> None:
+    """Not at 92 % of the assumed length, at which a cable as long as assumed is slack."""
+    own, weight = 0.92 * CABLE_LENGTH, bebop_tuning().load_mass * bebop_tuning().gravity
+    slack, taut, stays, again = held(
+        [(2.0, own, 0.0), (1.0, own, weight), (9.0, own, weight), (0.5, 0.95 * own, 0.0)]
+    )
+    assert slack[0] == 0.0
+    assert taut == (1.0, pytest.approx(own, abs=1e-3))
+    assert stays[0] == 1.0
+    assert again[0] == 0.0
+
+
 def definite(state: EstimatorState, history: History) -> bool:
     """Whether the used part of the covariance is symmetric to the bit and positive except for rounding."""
     used = [i for i in range(state.size) if history.covariance[i, i] != 0.0]

@@ -138,6 +138,46 @@ def laid(height_m: float = TUNING.load_height) -> LoadEstimate:
     )
 
 
+def pulled(share: float, pull: float, rise_m_s: float) -> LoadEstimate:
+    """A tracked load whose vehicle rises from this share of the cable's length above it, at this pull
+    (weights of the load)."""
+    load = laid()._replace(source=TRACKER, covariance=(0.0, 0.0, 0.0), tautness_age_s=9.0)
+    history, height = new_history(), load.x_load[2] + share * LENGTH
+    for k in range(round(0.45 / DT)):
+        vehicle = blank_state().vehicle._replace(x_quad=(0.0, 0.0, height + rise_m_s * DT * k))
+        load = detect_tautness(load, vehicle, history, pull * WEIGHT, 0.0, TUNING, DT)
+    return load
+
+
+@pytest.mark.parametrize(
+    ("share", "pull", "rise_m_s", "is_taut"),
+    [
+        (0.97, 1.0, 0.0, True),
+        (0.91, 0.45, 0.0, True),  # the load is lighter than assumed, or the vehicle
+        (0.97, 0.35, 0.0, False),
+        (0.89, 1.0, 0.0, False),  # too short to be the cable that is assumed
+        (0.91, 1.0, 0.1, False),  # a gust, or weak rotors: at this pull the vehicle rises on
+        (0.99, 0.0, 0.1, True),  # by its length
+    ],
+)
+def test_a_tracked_cable_that_is_too_short_is_taut_by_a_pull_that_stops_the_vehicle(
+    share: float, pull: float, rise_m_s: float, is_taut: bool
+) -> None:
+    load = pulled(share, pull, rise_m_s)
+    assert (load.taut > 0.0) == is_taut
+    if is_taut:
+        assert load.length == pytest.approx(share * LENGTH)
+        assert load.length_share == pytest.approx(share if share < 0.985 else 1.0)
+
+
+def test_a_short_cable_that_turns_out_longer_counts_as_longer_and_never_as_longer_than_assumed() -> None:
+    short = pulled(0.92, 1.0, 0.0)
+    vehicle, history = blank_state().vehicle, new_history()
+    for length, share in ((0.95 * LENGTH, 0.95), (0.93 * LENGTH, 0.95), (1.1 * LENGTH, 1.0)):
+        short = detect_tautness(short._replace(length=length), vehicle, history, WEIGHT, 0.0, TUNING, DT)
+        assert short.length_share == pytest.approx(share)
+
+
 @pytest.mark.parametrize(
     ("pull", "missing", "height", "is_taut"),
     [

@@ -72,6 +72,7 @@ def with_observed_position(
         CAMERA,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 

@@ -164,6 +164,7 @@ def load_ahead(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
         CAMERA,
         load.laid_height,
         GROUND_HEIGHT_STD * GROUND_HEIGHT_STD,
+        load.length_share,
     )
 
 
@@ -190,6 +191,7 @@ def suspended_load(state: EstimatorState, history: History, tuning: EstimatorTun
         CAMERA,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
     return tauten(at_end, state.vehicle, history, tuning, tuning.cable_length)
 

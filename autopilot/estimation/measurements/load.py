@@ -92,6 +92,7 @@ def with_tracked_motion(
         TRACKER,
         load.laid_height,
         load.laid_height_var,
+        load.length_share,
     )
 
 
@@ -210,7 +211,8 @@ def correct_load(
         start_scalar(history, i, innovation[i], position_var)
         add_load_position_jacobian(history, i, past, load.length, i)
     compute_gain_rows(history, 0, 3, n)
-    distance = norm(sub(reading.x_load, past.x_quad)) / tuning.cable_length
+    cable_length = load.length_share * tuning.cable_length
+    distance = norm(sub(reading.x_load, past.x_quad)) / cable_length
     short = OUTLIER_BELOW < distance < SLACK_BELOW
     rejected = not within_gate(history, LOAD, 3, tuning.gate_sigma)
     if rejected or short:
@@ -218,7 +220,7 @@ def correct_load(
         # last, the closer
         short = short or OUTLIER_BELOW < distance < REJECTED_BELOW
         if load.rejected >= MANY_REJECTIONS and load.tautness_age_s > LIFTING_S:
-            length = load.length / tuning.cable_length
+            length = load.length / cable_length
             short = short or OUTLIER_BELOW < distance < MANY_REJECTIONS_BELOW * length
         if short and load.rejected + 1.0 >= SLACK_READINGS:
             return start_load(state, history, reading, tuning)
