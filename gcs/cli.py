@@ -91,8 +91,9 @@ class Gcs(click.Group):
             from autopilot.shell.options import open_closed_streams
 
             open_closed_streams()
-        if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
-            sys.stdout.reconfigure(errors="replace")  # a terminal in Latin-1 has no Greek letters
+        # a terminal in Latin-1 has no Greek letters, nor has one in the locale C, which escapes surrogates
+        if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
+            sys.stdout.reconfigure(errors="replace")
         if sys.stdout.isatty() or sys.stderr.isatty():
             from autopilot.shell.options import tolerate_closed_terminal
 

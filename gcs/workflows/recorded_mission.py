@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import MissionItemError, WireItem, located_steps
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.tracks import Telemetry
@@ -16,6 +17,10 @@ from gcs.mission_items import flown_steps, items_of, loop_ends
 from missions.model import Mission
 
 _UNNAMED = "recorded"
+_EQUAL_FRAMES = {
+    mavlink.MAV_FRAME_GLOBAL_INT: mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+}
 
 
 def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
@@ -44,9 +49,14 @@ def recorded_mission(telemetry: Telemetry, meta: FlightMeta) -> Mission | None:
 
 
 def same_items(items: Sequence[WireItem], recorded: Sequence[WireItem]) -> bool:
-    """Whether items are those of a log, in which fractions have single precision."""
+    """Whether items are those of a log, in which fractions have single precision. A global frame and its
+    integer form are the same: places of items are integers in both."""
     if len(items) != len(recorded):
         return False
+    items, recorded = (
+        [item._replace(frame=_EQUAL_FRAMES.get(item.frame, item.frame)) for item in each]
+        for each in (items, recorded)
+    )
     for field in WireItem._fields:
         kind = np.int64 if field in ("x", "y") else np.float32
         own, logged = (np.array([getattr(item, field) for item in each], kind) for each in (items, recorded))

@@ -580,6 +580,19 @@ def test_a_mission_comes_down_as_a_file_that_goes_up_again(live, tmp_path, name)
     assert same_items(vehicle.mission, first)
 
 
+def test_a_mission_that_comes_from_a_plan_is_written_to_a_mission_file(live, tmp_path):
+    """Its places are in the frame of whole degrees, 3, where a mission file has 6."""
+    vehicle, port = live
+    plan, back = tmp_path / "back.plan", tmp_path / "back.toml"
+    for words in (("upload", "square"), ("download", str(plan)), ("upload", str(plan))):
+        assert run(*words, "--connect", port).exit_code == EXIT_DONE
+    assert {item.frame for item in vehicle.mission} >= {3}
+    assert run("download", str(back), "--connect", port).exit_code == EXIT_DONE
+    first = list(vehicle.mission)
+    assert run("upload", str(back), "--connect", port).exit_code == EXIT_DONE
+    assert vehicle.mission != first and same_items(vehicle.mission, first)
+
+
 def test_a_mission_with_items_that_mission_files_do_not_have_is_not_written_to_one(live, tmp_path):
     _, port = live
     file, back = tmp_path / "in.plan", tmp_path / "back.toml"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import shlex
+import sys
 from dataclasses import replace
 
 import click
+import pytest
 
 from gcs.cli import gcs
 from gcs.shell.link import parse_address
@@ -55,3 +58,15 @@ def test_the_recorded_command_gives_the_options_back() -> None:
         assert given["ignore"] == options.ignored
         for name in ("law", "sensors", "vehicle", "seed", "speed", "real_time", "force"):
             assert given[name] == getattr(options, name), name
+
+
+@pytest.mark.parametrize("errors", ["strict", "surrogateescape"])  # of the locale C: the second
+def test_letters_that_a_terminal_does_not_have_are_replaced(
+    monkeypatch: pytest.MonkeyPatch, errors: str
+) -> None:
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, "ascii", errors))
+    with pytest.raises(SystemExit):
+        gcs.main(["missions"])
+    print("2 \N{MULTIPLICATION SIGN}", flush=True)
+    assert written.getvalue().endswith(b"2 ?\n")
