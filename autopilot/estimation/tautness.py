@@ -230,8 +230,8 @@ def _with_held_time(
 @kernel
 def _with_longer_cable(load: LoadEstimate, tuning: EstimatorTuning) -> LoadEstimate:
     """The load on a taut cable that counted as shorter than assumed, if it turns out to be longer than so."""
-    share = load.length / tuning.cable_length
-    return with_field(load, "length_share", min(1.0, share)) if share > load.length_share else load
+    share = max(load.length_share, load.length / tuning.cable_length)
+    return with_field(load, "length_share", min(1.0, share))
 
 
 @kernel
