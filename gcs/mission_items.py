@@ -14,6 +14,7 @@ from autopilot.wire.items import (
     MissionItemError,
     WireItem,
     encode_mission,
+    endless_loops,
     located_steps,
     step_index,
 )
@@ -35,7 +36,7 @@ def flown_steps(steps: Sequence[LocatedStep]) -> tuple[LocatedStep, ...]:
 
 def loop_ends(steps: Sequence[LocatedStep]) -> tuple[int, ...]:
     """The last step of each loop without end."""
-    return tuple(index for index, one in enumerate(steps) if one.then is not None)
+    return tuple(endless_loops(steps))
 
 
 def at_home(mission: Mission, home: Home) -> Mission:

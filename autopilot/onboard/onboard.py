@@ -117,7 +117,7 @@ from autopilot.wire.compiled import MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES
 from autopilot.wire.convert.battery import NO_READING, BatteryReading, read_battery_status
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, read_items, unflown_items
+from autopilot.wire.items import WireItem, endless_loops, read_items, unflown_items
 from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
 from autopilot.wire.statustext import TextReader, listed
@@ -203,7 +203,7 @@ def mission_plan(
     prepared yet. A return leads to `return_to`; `planner` is a custom planner."""
     steps, visits = read_items(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    loops = {index: one.then for index, one in enumerate(steps) if one.then is not None}
+    loops = endless_loops(steps)
     prepared = PENDING
     if limits is not None:
         planned = plan_function_for(planner)

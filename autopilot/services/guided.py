@@ -2,8 +2,8 @@
 
 Each message becomes a request in ENU. A message that requests nothing that can be flown is refused by a
 STATUSTEXT, once in WARNING_INTERVAL_US for each reason. Body axes are level and follow the heading; a yaw of
-NaN is ignored. Of two ground stations that send
-their sticks, as they do whenever one is attached, one is followed.
+NaN is ignored. Of two ground stations that send their sticks, as they do whenever one is attached, one is
+followed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
-from autopilot.services.records import Decide, Output, Peer, SendText, Source, Verdict
+from autopilot.services.records import Decide, Output, Peer, SendText, Verdict
 from autopilot.services.requests import (
     FollowAttitude,
     FollowRates,
@@ -206,10 +206,6 @@ def read_target(m: Any, home: Home) -> FollowTarget | Verdict:
     return FollowTarget((east, north, height), velocity, reported(_TARGET_ACCEL, m.acc))
 
 
-def _named(source: Source) -> str:
-    return f"system {source[0]}, component {source[1]}"
-
-
 def _refused(text: str) -> Verdict:
     return Verdict(mavlink.MAV_RESULT_DENIED, text)
 
@@ -221,7 +217,7 @@ class GuidedService:
         self._home = home
         self._system = system
         self._limiter = TextLimiter()
-        self._stick_source: Source | None = None
+        self._stick_peer: Peer | None = None  # whose stick is followed
         self._stick_us = 0  # when its last message came
 
     def receive_local(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -257,15 +253,13 @@ class GuidedService:
         """Follow the stick of one ground station; those of others only after it has fallen silent. This is
         reported when one of them is moved."""
         if isinstance(request, FollowStick):
-            source, followed = (peer.system, peer.component), self._stick_source
-            if followed is not None and followed != source and now_us - self._stick_us < STICK_KEPT_US:
+            followed = self._stick_peer or peer
+            if followed.name != peer.name and now_us - self._stick_us < STICK_KEPT_US:
                 if not any((*request.velocity_share, request.yaw_rate)):
                     return []
-                request = _refused(
-                    f"Stick of {_named(source)} ignored: that of {_named(followed)} is followed"
-                )
+                request = _refused(f"Stick of {peer.name} ignored: that of {followed.name} is followed")
             else:
-                self._stick_source, self._stick_us = source, now_us
+                self._stick_peer, self._stick_us = peer, now_us
         return self._handle_request(request, now_us, decide)
 
     def _handle_request(

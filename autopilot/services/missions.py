@@ -524,8 +524,7 @@ def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Outp
 
 def _refused_as_busy(upload: _Upload, peer: Peer, kind: int) -> list[Output]:
     """The answer to a client that would upload or clear while another one uploads."""
-    other = upload.peer
-    text = f"Upload denied: system {other.system}, component {other.component} uploads; try again"
+    text = f"Upload denied: {upload.peer.name} uploads; try again"
     refusal = SendText(mavlink.MAV_SEVERITY_WARNING, text, _upload_of(kind), peer.link)
     return [refusal, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 

@@ -29,6 +29,11 @@ class Peer(NamedTuple):
     component: int
     addressed: Source | None = None
 
+    @property
+    def name(self) -> str:
+        """The sender, as texts name it."""
+        return f"system {self.system}, component {self.component}"
+
 
 @dataclass(frozen=True, slots=True)
 class Send:

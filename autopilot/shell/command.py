@@ -16,8 +16,9 @@ from autopilot.shell.options import (
     NonEmptyPath,
     ProgramCommand,
     address_option,
-    home_option,
     ignore_option,
+    last_options,
+    origin_option,
     settings_option,
     signing_key_option,
     vehicle_option,
@@ -90,7 +91,7 @@ def _address_or_none(text: str) -> Address | None:
 )
 @settings_option("Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.")
 @ignore_option
-@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@origin_option
 @click.option(
     "--storage",
     type=NonEmptyPath(file_okay=False, path_type=Path),
@@ -108,8 +109,7 @@ def _address_or_none(text: str) -> Address | None:
     is_flag=True,
     help="Accept a first signing key from any sender of SETUP_SIGNING.",
 )
-@click.option("--quiet", is_flag=True, help="Print errors only.")
-@click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
+@last_options("autopilot")
 def main(**options: Any) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to finish

@@ -329,6 +329,22 @@ def vehicle_option(help_text: str) -> Callable[[F], F]:
     return click.option("--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help=help_text)
 
 
+def origin_option(function: F) -> F:
+    """--home of `sitl` and of `autopilot`."""
+    help_text = "Origin of the world: degrees, metres."
+    return click.option("--home", type=home_option, metavar="LAT,LON,ALT", help=help_text)(function)
+
+
+def last_options(program: str) -> Callable[[F], F]:
+    """--quiet and --version of `sitl` and of `autopilot`."""
+
+    def add(function: F) -> F:
+        version = click.version_option(package_name="plumbline", message=f"{program} (Plumbline) %(version)s")
+        return click.option("--quiet", is_flag=True, help="Print errors only.")(version(function))
+
+    return add
+
+
 def settings_option(help_text: str) -> Callable[[F], F]:
     """--set of `sitl` and of `autopilot`, each of which has parameters of its own."""
     return click.option(

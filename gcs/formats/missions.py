@@ -133,11 +133,12 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         for command, found in kept_items.items()
     ]
     flown = flown_steps(steps)
+    ends = loop_ends(flown)
     kept += [
         f"item {number}, {numbered_name(item.command)}: repeats without end until a ground station makes an "
         "item behind it the present one (MISSION_SET_CURRENT); expected times count one pass"
         for number, item in zip(numbers, items, strict=True)
-        if loop_ends(flown) and item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS
+        if ends and item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS
     ]
     landing = flown[-1].last if flown and isinstance(flown[-1].step, Land) else len(remaining)
     if after := numbers[landing + 1 :]:
@@ -149,7 +150,7 @@ def mission_of(plan: Plan, home: Home, name: str) -> ForeignMission:
         description="",
         assumptions=(),
         steps=tuple(one.step for one in flown),
-        loop_ends=loop_ends(flown),
+        loop_ends=ends,
         items=tuple(items),
         fence=plan.fence,
         rally=plan.rally,

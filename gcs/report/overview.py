@@ -51,10 +51,8 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
 
     free = width - min(_MAX_NAME_CHARS, max(_MIN_NAME_CHARS, *(len(run.name) for run in runs))) - _COLUMN_GAP
     columns, omitted = [], [one.name for one in differences(runs)]
-    settings, lacks_setting = (
-        given_settings(runs),
-        False,
-    )  # then no parameter that follows from the settings is shown in its place
+    settings = given_settings(runs)
+    lacks_setting = False  # then no parameter that follows from the settings is shown in its place
     for column in _columns(runs):
         name = column.title.replace("\n", "")
         if column.width > free or (column.follows and lacks_setting):

@@ -23,7 +23,7 @@ from autopilot.supervisor.state import Area, Flight, MissionPlan, View, has_fenc
 from autopilot.trajectory.prepare import UNPREPARED, prepare
 from autopilot.trajectory.route import Planner
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.items import MissionItemError, located_steps
+from autopilot.wire.items import MissionItemError, endless_loops, located_steps
 from gcs.foreign_mission import home_of
 from gcs.mission_items import areas_of, items_of
 from missions.model import Mission
@@ -58,7 +58,7 @@ def ask_supervisor(
     steps, sequence = tuple(one.step for one in located), tuple(one.last for one in located)
     fenced = has_fence(Flight(area=area), settings)
     # a fence may forbid a curve
-    loops = {index: one.then for index, one in enumerate(located) if one.then is not None}
+    loops = endless_loops(located)
     prepared = UNPREPARED
     if fenced:
         prepared = prepare(steps, sequence, settings.limits, planner=planner, loop_ends=loops)

@@ -17,7 +17,8 @@ from autopilot.shell.options import (
     ProgramCommand,
     WholeNumber,
     address_option,
-    home_option,
+    last_options,
+    origin_option,
     settings_option,
     vehicle_option,
 )
@@ -85,15 +86,14 @@ from sitl.sensors.shipped import PROFILES
     metavar="FILE",
     help="Log all readings and the true state, for gcs report; see docs/sensors.md.",
 )
-@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@origin_option
 @click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
 @click.option(
     "--parameters",
     is_flag=True,
     help="Print the path of the parameter file for the third-party autopilot, and exit.",
 )
-@click.option("--quiet", is_flag=True, help="Print errors only.")
-@click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
+@last_options("sitl")
 def main(**options: Any) -> None:
     """Simulate a quadrotor with a load on a cable, and its sensors.
 

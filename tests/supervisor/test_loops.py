@@ -23,7 +23,14 @@ from autopilot.trajectory.waypoint_path import PathSegment
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence
-from autopilot.wire.items import MissionItemError, WireItem, encode_steps, located_steps, read_items
+from autopilot.wire.items import (
+    MissionItemError,
+    WireItem,
+    encode_steps,
+    endless_loops,
+    located_steps,
+    read_items,
+)
 from missions.model import Delay, Land, ReturnHome, Signals, Step, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
 
@@ -80,7 +87,7 @@ def test_steps_follow_one_another_as_the_items_with_any_jumps_in_jumps() -> None
             steps, visits = read_items(items, HOME)
         except MissionItemError:
             continue
-        loops = {i: one.then for i, one in enumerate(steps) if one.then is not None}
+        loops = endless_loops(steps)
         flown, sequence = tuple(one.step for one in steps), tuple(one.last for one in steps)
         plan = MissionPlan(flown, sequence, len(items), loops=loops, visits=visits)
 

@@ -10,7 +10,14 @@ step after them. DO_JUMP is flown by flying its items again; one without end lea
 """
 
 from autopilot.wire.items.command import Command, Handling, is_home
-from autopilot.wire.items.decode import ENDLESS, decode_items, located_steps, read_items, unflown_items
+from autopilot.wire.items.decode import (
+    ENDLESS,
+    decode_items,
+    endless_loops,
+    located_steps,
+    read_items,
+    unflown_items,
+)
 from autopilot.wire.items.encode import encode_mission, encode_steps, home_item, step_index
 from autopilot.wire.items.heading import turn_heading
 from autopilot.wire.items.records import LocatedStep, MissionItemError, Visit, WireItem
@@ -30,6 +37,7 @@ __all__ = [
     "decode_items",
     "encode_mission",
     "encode_steps",
+    "endless_loops",
     "handling_of",
     "home_item",
     "is_home",

@@ -139,6 +139,11 @@ def read_items(
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
 
 
+def endless_loops(steps: Sequence[LocatedStep]) -> dict[int, int]:
+    """Of the last step of each loop without end: the step to which it leads, or END."""
+    return {index: one.then for index, one in enumerate(steps) if one.then is not None}
+
+
 def unflown_items(items: Sequence[WireItem]) -> tuple[int, ...]:
     """Numbers of the items that are kept and not flown."""
     return tuple(seq for seq, item in enumerate(items) if handling_of(item.command) is not Handling.FLOWN)
