@@ -24,6 +24,8 @@ from autopilot.control.actuators.disturbance_observer import (
     nominal_on_ground,
     observe,
     slowed_by_noise,
+    with_extra_load,
+    with_extra_weight,
     with_wind_on_load,
 )
 from autopilot.control.actuators.lag_equalisation import equalise_lags
@@ -75,6 +77,7 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
+from autopilot.estimation.tautness import with_learned_mass
 from autopilot.estimation.vibration import measured_accel_noise
 from autopilot.geometry.addresses import call_at, call_kernel_at, numbers_at
 from autopilot.geometry.compiler import INNER_OPTIONS
@@ -214,15 +217,23 @@ def _jet(table: Array, at: int) -> Jet:
 
 
 @kernel
-def measured_pull(control: ControlMemory, state: State, constants: CoreConstants) -> float:
-    """Pull of the cable on the vehicle (N): the force on it besides weight, rotors, drag and wind."""
+def measured_pull(control: ControlMemory, state: State, extra_mass: float, constants: CoreConstants) -> float:
+    """Pull of the cable on the vehicle (N): the force on it besides weight, rotors, drag and wind.
+    `extra_mass` (kg) is the mass of the vehicle beyond the assumed one."""
     vehicle, a = constants.vehicle, state.a_quad
     specific_force = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(control.thrust, column(state.R, 2), drag_force(state.v_quad, constants.drag))
-    known = add(known, control.observed.push)
+    known = add(known, with_extra_weight(control.observed, extra_mass, vehicle).push)
     return cable_force(
         sub(scale(vehicle.quad_mass, specific_force), known), state.q_cable, column(state.R, 2)
     )
+
+
+@kernel
+def learned_extra_mass(estimator: EstimatorState, constants: CoreConstants) -> float:
+    """The mass (kg) of the vehicle beyond the assumed one, as far as the estimator has learned it."""
+    tuning = constants.tuning
+    return with_learned_mass(tuning, estimator.slack_pull).quad_mass - tuning.quad_mass
 
 
 @kernel
@@ -301,7 +312,7 @@ def update_estimate(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         estimator.load.taut > 0.0,
         estimator.load.source == TRACKER,
         tilt_angle(state.R),
-        measured_pull(control, state, constants),
+        measured_pull(control, state, learned_extra_mass(estimator, constants), constants),
         estimator.uncertainty.vertical if estimator.vehicle.source == RECEIVER else 0.0,
         problem,
         load_problem(estimator, constants.sensor_age_s),
@@ -391,15 +402,21 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         constants.factor_share,
     )
     estimator = unpack(EstimatorState, rows.estimator, 0)
+    extra_mass = learned_extra_mass(estimator, constants)
+    before, observed_vehicle = control.observed, with_cable_length(vehicle, cable.length)
+    if not summary.taut:
+        observed_vehicle = with_field(observed_vehicle, "quad_mass", vehicle.quad_mass + extra_mass)
+    elif not control.was_taut and extra_mass != 0.0:
+        before = with_extra_load(before, extra_mass, vehicle)
     observed = observe(
-        control.observed,
+        before,
         state,
         1.0 if summary.taut else 0.0,
         control.thrust,
         control.moment,
         slowed_by_noise(constants.observer, control.observed, measured_accel_noise(estimator.vibration)),
         constants.drag,
-        with_cable_length(vehicle, cable.length),
+        observed_vehicle,
         estimator.frame_share,
     )
     air = estimator.air
@@ -428,7 +445,8 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
             memory = memory_of(law_rows)
         else:
             memory = kernels_of(law).start(law, state, jet[0], jet[1])
-        with_reel = with_reel_force(observed, state, cable.accel, vehicle.quad_mass)
+        known = observed if summary.taut else with_extra_weight(observed, extra_mass, vehicle)
+        with_reel = with_reel_force(known, state, cable.accel, vehicle.quad_mass)
         memory, command = run_law(law, memory, state, jet, stretch, actuation, with_reel, cable, vehicle)
         pack(memory, law_rows.memory, 0)
         moment = command.moment

@@ -52,7 +52,7 @@ from autopilot.estimation.records import (
     ImuReading,
 )
 from autopilot.estimation.release import release_load
-from autopilot.estimation.tautness import is_never_observed
+from autopilot.estimation.tautness import is_never_observed, with_learned_mass
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.geometry.packed import unpack, with_field
@@ -162,7 +162,7 @@ def estimate(
     v_L = v_Q + L q' + L' q.
     """
     state = with_length_change(state, length_change)
-    tuning = with_field(tuning, "cable_length", cable.length)
+    tuning = with_learned_mass(with_field(tuning, "cable_length", cable.length), state.slack_pull)
     reeling, along = cable.rate != 0.0 and state.load.taut != 0.0, state.load.q_cable
     if isinf(cable.length):
         state = release_load(state, history, tuning)

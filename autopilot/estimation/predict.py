@@ -48,6 +48,7 @@ from autopilot.estimation.records import (
 from autopilot.estimation.tautness import (
     add_snatch_uncertainty,
     averaged_missing_pull,
+    averaged_slack_pull,
     cable_is_unloaded,
     detect_tautness,
     is_pull_known,
@@ -371,6 +372,7 @@ def predict(
         vibration,
         clipping,
         averaged_missing_pull(load, vehicle, history, state.missing_pull, tuning, dt),
+        averaged_slack_pull(state.slack_pull, measured, load, vehicle, R[2][2], history, tuning, dt),
         frame_share,
         thrust,
         state.resets,

@@ -284,6 +284,7 @@ class EstimatorState(NamedTuple):
     vibration: Vibration
     clipping: Clipping
     missing_pull: float  # N, averaged over time: the cable's pull by the pendulum less the measured pull
+    slack_pull: float  # N, the pull that would be measured with the assumed mass while the cable is slack
     frame_share: float  # of the air's force on the vehicle across the rotors' axis: see `cable_pull`
     last_thrust: float  # N, assumed at the last prediction
     resets: float
@@ -351,6 +352,7 @@ def blank_state() -> EstimatorState:
         vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
         clipping=Clipping(ZERO, 0.0, inf, 0.0),
         missing_pull=0.0,
+        slack_pull=0.0,
         frame_share=UNKNOWN_FRAME_SHARE,
         last_thrust=0.0,
         resets=0.0,

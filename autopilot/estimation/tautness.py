@@ -17,6 +17,7 @@ from autopilot.estimation.records import (
     DIRECTION,
     LENGTH,
     MOUNTING,
+    NO_SENSOR,
     NOT_LAID,
     POSITION,
     RATE,
@@ -83,6 +84,10 @@ MISSING_PULL_TIME_S = 2.0  # time constant with which the missing part of the pu
 CERTAIN_PULL = 0.5
 # of the cable's length above a load on the ground: higher up, the vehicle is off the ground
 MIN_FLOWN_HEIGHT = 0.2
+# What a slack cable seems to pull is an error of the vehicle's mass, or of the rotors' force. It is learned
+# with this time constant while the rotors' axis is upright (cosine), up to MAX_SLACK_PULL of the vehicle's
+# weight. EXPLAINED_PULL of the load's weight disturbs nothing.
+SLACK_PULL_TIME_S, LEARNING_UPRIGHT, MAX_SLACK_PULL, EXPLAINED_PULL = 1.0, 0.985, 0.4, 0.2
 # A cable that begins to pull, at SNATCH_PULL of the load's weight, stops vehicle and load along it at once;
 # before, its ends moved apart at about SNATCH_SPEED (m/s). This happens between two samples of the
 # accelerometer.
@@ -269,6 +274,51 @@ def averaged_missing_pull(
     elif load.tautness_age_s <= LIFTING_S:
         return before
     return before + dt / MISSING_PULL_TIME_S * (load.tension - load.pull - before)
+
+
+@kernel
+def averaged_slack_pull(
+    before: float,
+    measured: float,
+    load: LoadEstimate,
+    vehicle: VehicleEstimate,
+    upward: float,
+    history: History,
+    tuning: EstimatorTuning,
+    dt: float,
+) -> float:
+    """The pull (N) that the assumed mass of the vehicle would show while the cable is slack.
+
+    `measured` (N) is the pull by this sample with the mass of `with_learned_mass`, `upward` the vertical part
+    of the rotors' axis. It is learned while an upright vehicle in the air is nearer to its load than any
+    cable that pulls. Were the vehicle standing, it would seem to be pushed up by more than MAX_SLACK_PULL.
+    """
+    if load.taut > 0.0 or load.source == NO_SENSOR or upward < LEARNING_UPRIGHT:
+        return before
+    height = vehicle.x_quad[2] - load.x_load[2]
+    distance = norm(sub(load.x_load, vehicle.x_quad))
+    is_slack = distance < SHORT_CABLE * tuning.cable_length
+    if load.source != TRACKER:
+        is_slack = is_slack and _is_surely_slack(load, vehicle, history, tuning)
+    in_air = height > MIN_FLOWN_HEIGHT * tuning.cable_length
+    if not (is_slack and in_air) or abs(measured) > MAX_SLACK_PULL * tuning.quad_mass * tuning.gravity:
+        return before
+    raw = measured + beyond_noise(before, tuning)
+    return before + dt / SLACK_PULL_TIME_S * (raw - before)
+
+
+@kernel
+def beyond_noise(slack_pull: float, tuning: EstimatorTuning) -> float:
+    """The part of `slack_pull` (N) that neither gusts nor rotors explain, but a wrong mass."""
+    explained = EXPLAINED_PULL * tuning.load_mass * tuning.gravity
+    return slack_pull - min(explained, max(-explained, slack_pull))
+
+
+@kernel
+def with_learned_mass(tuning: EstimatorTuning, slack_pull: float) -> EstimatorTuning:
+    """The tuning with the mass of the vehicle that the pull of a slack cable shows."""
+    extra_mass = beyond_noise(slack_pull, tuning) / tuning.gravity
+    return with_field(tuning, "quad_mass", tuning.quad_mass + extra_mass)
 
 
 @kernel

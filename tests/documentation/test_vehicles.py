@@ -82,16 +82,27 @@ farther.
 
 ## How exact lengths and masses must be
 
-The autopilot learns the weight of the load, but neither the length of the cable nor the weight of the
-vehicle. `bebop` flew `hover` with assumed cables of 0.5 to 3 m and true ones that were up to 9 % shorter and
-5 % longer, eight flights each. With `lab` its greatest error was 2 to 4 mm in all of them: trackers show the
-true length. With `rtk` the assumed length decides how high the load is, so that an error of 5 % of 3 m made
-the greatest error 0.16 m instead of 0.05 m. A tracked load whose cable is shorter by 10 % or more is not
-lifted; the text names the length at which the cable pulls. One that is longer by up to 25 % is flown.
+The autopilot learns the weight of the load. It learns the length of the cable from a tracker only, and the
+weight of the vehicle roughly.
 
-A vehicle of 1.2 kg with 0.25 kg on 1.5 m of cable flew with `VEH_QUAD_MASS` 1.00 to 1.35; with 1.4 the pull
-of the load that it measures is too small to notice
-([troubleshooting.md](troubleshooting.md#cable-never-taut-landing-)).
+`bebop` flew `hover` with assumed cables of 0.5 to 3 m, eight flights each, and with true ones that were up to
+5 % longer or shorter. With `lab`, also with up to 9 % shorter ones, its greatest error was 2 to 4 mm in all of
+them: trackers show the true length. With `rtk` the assumed length decides how high the load is, so that an
+error of 5 % of 3 m made the greatest error 0.16 m instead of 0.05 m. A tracked load whose cable is shorter by
+10 % or more is not lifted; the text names the length at which the cable pulls. One that is longer by up to
+25 % is flown.
+
+While the vehicle flies with a slack cable, what the cable seems to pull is learned as an error of
+`VEH_QUAD_MASS` ([estimator.md](estimator.md#pull-and-drag)). `bebop` flew `hover` and `case-b` with errors of
+-25 to 25 % of it with `lab` and `rtk`, and of -25 to 20 % with `gps`, eight flights each. The greatest error
+in `case-b` was, as a median in mm:
+
+| error of `VEH_QUAD_MASS` | -25 % | -20 % | -15 % | -10 % | -5 % | 0 | 5 % | 10 % | 15 % | 20 % | 25 % |
+|---|---|---|---|---|---|---|---|---|---|---|---|
+| `lab` | 16 | 12 | 10 | 8 | 6 | 4 | 4 | 4 | 5 | 6 | 13 |
+| `rtk` | 43 | 40 | 37 | 38 | 38 | 40 | 38 | 39 | 39 | 40 | 40 |
+
+With -30 % no load was lifted ([troubleshooting.md](troubleshooting.md#cable-never-taut-landing-)).
 
 ## Rotors
 

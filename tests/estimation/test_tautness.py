@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import copysign, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -26,15 +26,18 @@ from autopilot.estimation.records import (
     new_history,
 )
 from autopilot.estimation.tautness import (
+    EXPLAINED_PULL,
     LIFT_OFF_SPEED_STD,
     LIFTED_HEIGHT,
     RESTED_S,
     RESTING_SPEED,
     averaged_missing_pull,
+    averaged_slack_pull,
     cable_is_unloaded,
     detect_tautness,
     is_pull_known,
     tauten,
+    with_learned_mass,
 )
 from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross
 from autopilot.geometry.so3 import exp, quat_exp, rotation_from_quat
@@ -310,6 +313,45 @@ def test_a_pull_is_neither_drag_nor_missing_where_the_height_is_too_uncertain_to
     assert not is_pull_known(pulled, vehicle, history, 0.0, TUNING)
     assert missed(pulled, 0.0, 0.7, 8.0) == pytest.approx(-0.5, abs=0.02)
     assert missed(pulled, 0.0, 0.7, 8.0, 0.1 * TUNING.cable_length) == 0.0
+
+
+@pytest.mark.parametrize("source", [TRACKER, CAMERA])
+@pytest.mark.parametrize(
+    ("shown", "height", "upward", "learned"),
+    [
+        (0.8, 0.6, 1.0, 0.8),
+        (-0.8, 0.6, 1.0, -0.8),
+        (0.8, 0.92, 1.0, 0.0),  # the cable may pull
+        (0.8, 0.15, 1.0, 0.0),  # the vehicle may stand
+        (-2.0, 0.6, 1.0, 0.0),  # it stands
+        (0.8, 0.6, 0.97, 0.0),  # wind, against which it leans
+    ],
+)
+def test_the_pull_of_a_slack_cable_is_learned_as_an_error_of_the_mass(
+    source: float, shown: float, height: float, upward: float, learned: float
+) -> None:
+    """In weights of the load, of which the pull is measured with what was learned until then."""
+    load, history, slack_pull = laid()._replace(source=source), new_history(), 0.0
+    x_quad = (0.0, 0.0, load.x_load[2] + height * TUNING.cable_length)
+    vehicle = blank_state().vehicle._replace(x_quad=x_quad)
+
+    def learn(load: LoadEstimate) -> float:
+        tuning = with_learned_mass(TUNING, slack_pull)
+        measured = shown * WEIGHT - (tuning.quad_mass - TUNING.quad_mass) * TUNING.gravity
+        return averaged_slack_pull(slack_pull, measured, load, vehicle, upward, history, tuning, DT)
+
+    for _ in range(round(6.0 / DT)):
+        slack_pull = learn(load)
+    assert slack_pull == pytest.approx(learned * WEIGHT, abs=0.01 * WEIGHT)
+    assert learn(load._replace(taut=1.0)) == slack_pull
+    extra_kg = with_learned_mass(TUNING, slack_pull).quad_mass - TUNING.quad_mass
+    explained = copysign(min(abs(learned), EXPLAINED_PULL), learned)
+    assert extra_kg == pytest.approx((learned - explained) * TUNING.load_mass, abs=0.01 * TUNING.load_mass)
+
+
+def test_a_pull_that_disturbs_nothing_leaves_the_mass_as_it_is_to_the_bit() -> None:
+    assert with_learned_mass(TUNING, 0.19 * WEIGHT) == TUNING
+    assert with_learned_mass(TUNING, -0.19 * WEIGHT) == TUNING
 
 
 def test_the_pull_of_a_load_in_the_air_is_not_learned_as_missing() -> None:

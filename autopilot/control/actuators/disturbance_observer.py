@@ -57,7 +57,7 @@ from autopilot.control.actuators.torque_observer import (
 from autopilot.control.drag import GUST_RANDOM_WALK, Drag, air_free_direction, drag_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import force_along_cable
 
@@ -238,6 +238,27 @@ def vehicle_on_ground(observed: DisturbanceEstimate, vehicle: Vehicle) -> bool:
 def load_on_ground(observed: DisturbanceEstimate, state: State) -> bool:
     """Whether the load is no higher than where it lay while the cable was slack."""
     return not state.x_load[2] > observed.load_ground_height + _OFF_GROUND
+
+
+@kernel
+def with_extra_weight(
+    observed: DisturbanceEstimate, extra_mass: float, vehicle: Vehicle
+) -> DisturbanceEstimate:
+    """The estimate with the weight of a mass (kg) of the vehicle that is not assumed, as a push."""
+    weight = extra_mass * vehicle.gravity
+    return with_field(observed, "push", add(observed.push, (0.0, 0.0, -weight)))
+
+
+@kernel
+def with_extra_load(
+    observed: DisturbanceEstimate, extra_mass: float, vehicle: Vehicle
+) -> DisturbanceEstimate:
+    """The estimate with a mass (kg) of the vehicle that is not assumed as part of the load: in the pull, on
+    which it is learned, it is the same."""
+    least, greatest = _MIN_MASS_RATIO * vehicle.load_mass, _MAX_MASS_RATIO * vehicle.load_mass
+    load_mass = min(greatest, max(least, vehicle.load_mass + extra_mass))
+    observed = with_field(observed, "load_mass", load_mass)
+    return with_field(observed, "mass_correlation", load_mass * observed.mass_square)
 
 
 @kernel
