@@ -85,9 +85,10 @@ CERTAIN_PULL = 0.5
 # of the cable's length above a load on the ground: higher up, the vehicle is off the ground
 MIN_FLOWN_HEIGHT = 0.2
 # What a slack cable seems to pull is an error of the vehicle's mass, or of the rotors' force. It is learned
-# with this time constant while the rotors' axis is upright (cosine), up to MAX_SLACK_PULL of the vehicle's
-# weight. EXPLAINED_PULL of the load's weight disturbs nothing.
-SLACK_PULL_TIME_S, LEARNING_UPRIGHT, MAX_SLACK_PULL, EXPLAINED_PULL = 1.0, 0.985, 0.4, 0.2
+# below SURELY_SLACK of the cable's length, with this time constant, while the rotors' axis is upright
+# (cosine), up to MAX_SLACK_PULL of the vehicle's weight. EXPLAINED_PULL of the load's weight may be gusts.
+SURELY_SLACK, SLACK_PULL_TIME_S, LEARNING_UPRIGHT = 0.8, 1.0, 0.985
+MAX_SLACK_PULL, EXPLAINED_PULL = 0.4, 0.2
 # A cable that begins to pull, at SNATCH_PULL of the load's weight, stops vehicle and load along it at once;
 # before, its ends moved apart at about SNATCH_SPEED (m/s). This happens between two samples of the
 # accelerometer.
@@ -297,7 +298,8 @@ def averaged_slack_pull(
         return before
     height = vehicle.x_quad[2] - load.x_load[2]
     distance = norm(sub(load.x_load, vehicle.x_quad))
-    is_slack = distance < SHORT_CABLE * tuning.cable_length
+    height_std = sqrt(history.covariance[POSITION + 2, POSITION + 2])
+    is_slack = distance + height_std < SURELY_SLACK * tuning.cable_length
     if load.source != TRACKER:
         is_slack = is_slack and _is_surely_slack(load, vehicle, history, tuning)
     in_air = height > MIN_FLOWN_HEIGHT * tuning.cable_length

@@ -111,6 +111,8 @@ def compiled() -> SimpleNamespace:
         observe=observer.observe,
         slowed_by_noise=observer.slowed_by_noise,
         with_wind_on_load=observer.with_wind_on_load,
+        with_extra_weight=observer.with_extra_weight,
+        with_extra_load=observer.with_extra_load,
         cable_force=observer.cable_force,
     )
 
@@ -857,6 +859,30 @@ def upright(v: Vec3, vehicle: Vehicle) -> State:
     return independent.state_of(pose, vehicle)
 
 
+def a_mass_that_is_not_assumed_is_a_push_or_a_load(
+    law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
+) -> None:
+    """Over a slack cable it pushes downwards. On a taut one the load begins with it, and a vehicle that hangs
+    still, whose rotors carry the true weight, learns nothing else."""
+    blown = law.nominal_in_flight(vehicle)._replace(push=(1.0, 2.0, 3.0))
+    agree(law.with_extra_weight(blown, 0.1, vehicle).push, (1.0, 2.0, 3.0 - 0.1 * vehicle.gravity), 1e-12)
+    assert law.with_extra_weight(blown, 0.0, vehicle) == blown
+    constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
+    level, over = model.mat(np.eye(3)), (0.0, 0.0, vehicle.cable_length)
+    hanging = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, over, ZERO, level, ZERO, ZERO)
+    for extra_kg in (-0.05, 0.08):
+        observed = law.with_extra_load(law.nominal_in_flight(vehicle), extra_kg, vehicle)
+        assert observed.load_mass == pytest.approx(vehicle.load_mass + extra_kg)
+        thrust = (vehicle.quad_mass + vehicle.load_mass + extra_kg) * vehicle.gravity
+        for _ in range(100):
+            observed = law.observe(observed, hanging, 1.0, thrust, ZERO, constants, BEBOP_DRAG, vehicle, 0.5)
+        assert observed.load_mass == pytest.approx(vehicle.load_mass + extra_kg, rel=1e-9)
+        agree(observed.push, ZERO, 1e-9)
+    for extra_kg, ratio in ((-9.0, 0.25), (9.0, 4.0)):  # as what is learned is bounded
+        observed = law.with_extra_load(law.nominal_in_flight(vehicle), extra_kg, vehicle)
+        assert observed.load_mass == pytest.approx(ratio * vehicle.load_mass)
+
+
 def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Drag is learned on a vehicle that moves to and fro across its cable with three times the assumed drag,
     on one with no assumed drag, and on one without drag; at 0.2 m/s only half of the difference is."""
@@ -1163,6 +1189,7 @@ PROOFS: tuple[Callable[..., None], ...] = (
     rotors_are_believed_as_they_are,
     what_is_predicted_comes,
     mass_and_wind_are_found,
+    a_mass_that_is_not_assumed_is_a_push_or_a_load,
     drag_is_found,
     gusts_outweigh_noise,
     sudden_gusts_are_followed,

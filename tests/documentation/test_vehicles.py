@@ -86,8 +86,8 @@ The autopilot learns the weight of the load. It learns the length of the cable f
 weight of the vehicle roughly.
 
 `bebop` flew `hover` with assumed cables of 0.5 to 3 m, eight flights each, and with true ones that were up to
-5 % longer or shorter. With `lab`, also with up to 9 % shorter ones, its greatest error was 2 to 4 mm in all of
-them: trackers show the true length. With `rtk` the assumed length decides how high the load is, so that an
+5 % longer or shorter. With `lab`, also with up to 9 % shorter ones, its greatest error was 2 to 4 mm in all
+of them: trackers show the true length. With `rtk` the assumed length decides how high the load is, so that an
 error of 5 % of 3 m made the greatest error 0.16 m instead of 0.05 m. A tracked load whose cable is shorter by
 10 % or more is not lifted; the text names the length at which the cable pulls. One that is longer by up to
 25 % is flown.
@@ -100,7 +100,7 @@ in `case-b` was, as a median in mm:
 | error of `VEH_QUAD_MASS` | -25 % | -20 % | -15 % | -10 % | -5 % | 0 | 5 % | 10 % | 15 % | 20 % | 25 % |
 |---|---|---|---|---|---|---|---|---|---|---|---|
 | `lab` | 16 | 12 | 10 | 8 | 6 | 4 | 4 | 4 | 5 | 6 | 13 |
-| `rtk` | 43 | 40 | 37 | 38 | 38 | 40 | 38 | 39 | 39 | 40 | 40 |
+| `rtk` | 42 | 39 | 41 | 39 | 40 | 40 | 39 | 39 | 38 | 39 | 40 |
 
 With -30 % no load was lifted ([troubleshooting.md](troubleshooting.md#cable-never-taut-landing-)).
 
