@@ -226,11 +226,10 @@ def _with_held_time(
     """A tracked load on a slack cable with the time for which it has pulled and kept its distance (m); this
     distance is its length meanwhile."""
     may_be_held = distance > SHORT_CABLE * tuning.cable_length
-    if may_be_held and pull > HELD_PULL * tuning.load_mass * tuning.gravity:
-        if abs(distance - load.length) < HELD_RANGE:
-            return _with_tautness(load, 0.0, load.length, pull, load.pull_duration_s + dt)
-        return _with_tautness(load, 0.0, distance, pull, 0.0)
-    return _with_tautness(load, 0.0, load.length, pull, 0.0)
+    is_pulling = may_be_held and pull > HELD_PULL * tuning.load_mass * tuning.gravity
+    is_held = is_pulling and abs(distance - load.length) < HELD_RANGE
+    length = distance if is_pulling and not is_held else load.length
+    return _with_tautness(load, 0.0, length, pull, load.pull_duration_s + dt if is_held else 0.0)
 
 
 @kernel
