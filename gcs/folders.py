@@ -17,7 +17,7 @@ TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
 SENSOR_LOG, SENSORS_FOLDER = "sensors.log", "sensors"  # log of a simulator, and the tables made of it
 REPEATS_FOLDER = "flights"  # in a sweep's folder: flights that were flown again, each with a report
 LOCK_FILE = ".lock"  # of a folder of results; stays there, empty
-FLIGHT_WRITER = "a flight is in progress, or its report is being written,"  # of a flight's folder
+FLIGHT_WRITER = "a flight or capture is in progress, or a report is being written,"  # of a flight's folder
 # every folder of results contains exactly one of these three files, which identifies its kind
 _CONTENTS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
@@ -53,25 +53,31 @@ def make_folder(path: Path, shown_path: Path | None = None) -> None:
 
 @contextmanager
 def reserved(path: Path, other_writer: str = FLIGHT_WRITER) -> Iterator[None]:
-    """Lock a folder against other writers; InputError if another process holds the lock, or if the folder
-    cannot be written. `other_writer` says for the error what the other process does.
+    """Lock a folder or a single file against other writers; InputError if another process holds the lock, or
+    if the folder cannot be written. `other_writer` says for the error what the other process does.
 
-    The lock ends with the process, however that ends.
+    The lock ends with the process, however that ends. A file is locked by another one beside it, which is
+    deleted again.
     """
     from filelock import FileLock, Timeout
 
-    lock = FileLock(path / LOCK_FILE)
+    is_folder = path.is_dir()
+    lock_path = path / LOCK_FILE if is_folder else path.with_name(f".{path.name}{LOCK_FILE}")
+    lock = FileLock(lock_path)
     try:
         lock.acquire(blocking=False)
     except Timeout:
         raise InputError(
-            f"{path}: {other_writer} there; wait until it has ended, or name another folder by --out"
+            f"{path}: {other_writer} there; wait until it has ended, or name another "
+            f"{'folder' if is_folder else 'file'} by --out"
         ) from None
     except OSError as error:
         raise write_error(error, path) from None
     try:
         yield
     finally:
+        if not is_folder:
+            lock_path.unlink(missing_ok=True)
         lock.release()
 
 

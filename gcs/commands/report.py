@@ -42,23 +42,23 @@ def report_command(
     writes summary.json, flight.parquet, overview.png and report.html, all from the telemetry alone.
     """
     from gcs.shell.display import notify
-    from gcs.workflows.report import make_common, make_mcap, print_record, remake_report
+    from gcs.workflows.report import make_common, make_mcap, print_record, remade_report
 
     if mcap:
         from gcs.analysis.mcap import require_libraries
 
         require_libraries()  # before the work, not after it
-    record, folder = remake_report(source, out, quiet or as_json, pictures)
-    if as_json:
-        print_json(record)
-    elif not quiet:
-        print_record(record)
-    if record["outcome"] == "no telemetry":
-        raise InputError(f"{source}: holds no telemetry of a Plumbline vehicle")
-    if not record["samples"]:
-        notify(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
-    extra_files = [make_common(source, folder)] if common else []
-    extra_files += [make_mcap(source, folder)] if mcap else []
+    with remade_report(source, out, quiet or as_json, pictures) as (record, folder):
+        if as_json:
+            print_json(record)
+        elif not quiet:
+            print_record(record)
+        if record["outcome"] == "no telemetry":
+            raise InputError(f"{source}: holds no telemetry of a Plumbline vehicle")
+        if not record["samples"]:
+            notify(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
+        extra_files = [make_common(source, folder)] if common else []
+        extra_files += [make_mcap(source, folder)] if mcap else []
     if not as_json:
         for path in extra_files:
             click.echo(f"{path.name}: {path}")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
@@ -11,12 +14,13 @@ from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.operation import Target
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.errors import InputError, NoVehicleError, RefusedError, write_error
-from gcs.folders import TLOG_FILE, fresh_folder
+from gcs.folders import TLOG_FILE, fresh_folder, make_folder, reserved
 from gcs.shell.display import notify, stderr_is_terminal
 from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.shell.truth import TruthLink
+from gcs.workflows.flight_folder import FlightFolder
 
 
 def capture_to(
@@ -48,12 +52,7 @@ def capture_to(
         elif world.missing:
             notify(f"the log will not contain the simulator's truth: {world.missing}")
         path = out or fresh_folder("capture") / TLOG_FILE
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            file = path.open("wb")
-        except OSError as error:
-            raise write_error(error, path, "file") from None
-        with file:
+        with _opened(path, overwrite) as file:
             capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
 
             def received(datagram: bytes, now_us: int) -> None:
@@ -90,6 +89,26 @@ def _request_all(session: Session, target: Target) -> None:
             session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))
         except RefusedError as error:
             notify(str(error))
+
+
+@contextmanager
+def _opened(path: Path, overwrite: bool) -> Iterator[BinaryIO]:
+    """The log, open for writing and locked against other writers; so is the whole folder if it is a flight's,
+    from which an earlier flight is deleted."""
+    with ExitStack() as stack:
+        if path.name == TLOG_FILE:
+            stack.enter_context(FlightFolder(path.parent, overwrite)).keep()
+        else:
+            make_folder(path.parent, path)
+            if path.is_file() or not path.exists():
+                stack.enter_context(reserved(path, "another gcs capture is writing"))
+                if not overwrite:
+                    _check_no_log(path)
+        try:
+            file = stack.enter_context(path.open("wb"))
+        except OSError as error:
+            raise write_error(error, path, "file") from None
+        yield file
 
 
 def _check_no_log(out: Path) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -107,11 +108,12 @@ def meta_beside(tlog: Path) -> FlightMeta:
         raise InputError(str(error)) from None
 
 
-def remake_report(
+@contextmanager
+def remade_report(
     source: Path, out: Path | None, quiet: bool, pictures: Sequence[str] = ()
-) -> tuple[Record, Path]:
-    """Make the report of a log, or of the directory that contains it, again; return the record and the
-    report's directory."""
+) -> Iterator[tuple[Record, Path]]:
+    """Make the report of a log, or of the directory that contains it, again: the record and the report's
+    directory, which is locked against other writers until the end."""
     tlog = find_log(source)
     default_folder = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else default_folder)
@@ -123,7 +125,7 @@ def remake_report(
     check = partial(_check_same_flight, folder) if out and reported and not holds_log else None
     make_folder(folder)
     with reserved(folder):
-        return make_report(tlog, folder, None, quiet, pictures=pictures, check=check), folder
+        yield make_report(tlog, folder, None, quiet, pictures=pictures, check=check), folder
 
 
 _MEASURED = ("recorded_s", "samples", "load_error_max_m", "rotor_force_max_n")  # distinguish flights

@@ -28,7 +28,7 @@ from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE, GcsError
-from gcs.folders import LOCK_FILE
+from gcs.folders import LOCK_FILE, SUMMARY_FILE, TLOG_FILE, reserved
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
@@ -936,6 +936,42 @@ def test_a_log_that_is_there_is_kept_unless_it_may_be_lost(live, tmp_path, monke
     assert path.read_bytes() == b"earlier"
     assert run(*words, "--overwrite").exit_code == EXIT_DONE
     assert list(read_tlog(path))
+
+
+@pytest.mark.parametrize("name", [TLOG_FILE, "any.tlog"])
+def test_a_log_that_another_program_writes_is_not_captured_into(live, tmp_path, monkeypatch, name):
+    _, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    path = tmp_path / name
+    words = ["capture", "--duration", "0.1", "--overwrite", "--out", str(path), "--connect", port]
+    locked, kind = (tmp_path, "folder") if name == TLOG_FILE else (path, "file")
+    with reserved(locked):
+        result = run(*words)
+        assert result.exit_code == EXIT_USAGE, result.output
+        line = result.stderr.splitlines()[-1]
+        assert line.startswith(f"gcs: {locked}: a")
+        assert line.endswith(f" there; wait until it has ended, or name another {kind} by --out")
+        assert not path.exists()
+        beside = [*words[:-3], str(tmp_path / "beside.tlog"), *words[-2:]]
+        assert run(*beside).exit_code == EXIT_DONE, "which no one else writes"
+    assert run(*words).exit_code == EXIT_DONE
+
+
+def test_of_a_flight_that_a_capture_replaces_no_report_is_left(live, tmp_path, monkeypatch):
+    _, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    for name in (TLOG_FILE, SUMMARY_FILE, "meta.json", "notes.txt"):
+        (tmp_path / name).write_text("of an earlier flight", encoding="utf-8")
+    words = ["--out", str(tmp_path / TLOG_FILE), "--overwrite", "--connect", port]
+    assert run("capture", "--duration", "0.1", *words).exit_code == EXIT_DONE
+    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, LOCK_FILE, "notes.txt"}
+
+
+def test_a_capture_goes_to_a_device(live, monkeypatch):
+    _, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    result = run("capture", "--duration", "0.1", "--out", "/dev/null", "--connect", port)
+    assert result.exit_code == EXIT_DONE, result.output
 
 
 def test_a_running_vehicle_that_is_armed_already_leaves_the_folder_to_the_next_flight(

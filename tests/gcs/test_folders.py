@@ -25,8 +25,8 @@ from gcs.folders import (
     fresh_folder,
     reserved,
 )
-from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
-from gcs.workflows.report import make_report, remake_report
+from gcs.workflows.flight_folder import UNFLOWN_FILE, FlightFolder
+from gcs.workflows.report import make_report, remade_report
 from tests.doubles import recorded_flights
 
 
@@ -44,6 +44,11 @@ def test_flights_that_begin_in_one_second_have_folders_of_their_own(
     assert all(folder.is_dir() and folder.name.startswith("hover-") for folder in folders)
 
 
+def remake(log: Path, out: Path | None) -> None:
+    with remade_report(log, out, quiet=True):
+        pass
+
+
 def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flights").write_text("", encoding="utf-8")
@@ -52,7 +57,8 @@ def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pyt
 
 
 def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None:
-    in_progress = f"^{tmp_path}: a flight is in progress, or its report is being written, there; wait until "
+    writer = "a flight or capture is in progress, or a report is being written,"
+    in_progress = f"^{tmp_path}: {writer} there; wait until it has ended, or name another folder by --out$"
     with FlightFolder(tmp_path, overwrite=False) as folder:
         (tmp_path / TLOG_FILE).write_bytes(b"of the first")
         for overwrite in (False, True):
@@ -70,10 +76,26 @@ def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None
 def test_no_report_is_written_where_a_flight_is_in_progress(tmp_path: Path) -> None:
     with FlightFolder(tmp_path, overwrite=False) as folder:
         recorded_flights.flight(1.0, recorded_flights.still).write(tmp_path / TLOG_FILE)
-        with pytest.raises(InputError, match=": a flight is in progress"):
-            remake_report(tmp_path, None, quiet=True)
+        with pytest.raises(InputError, match=": a flight or capture is in progress"):
+            remake(tmp_path, None)
         folder.keep()
     assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, LOCK_FILE}
+
+
+def test_the_folder_of_a_report_is_locked_until_the_files_that_follow_it_are_written(tmp_path: Path) -> None:
+    recorded_flights.flight(1.0, recorded_flights.still).write(tmp_path / TLOG_FILE)
+    with remade_report(tmp_path, None, quiet=True), pytest.raises(InputError, match="in progress"):
+        FlightFolder(tmp_path, overwrite=True).__enter__()
+    with FlightFolder(tmp_path, overwrite=True):
+        pass
+
+
+def test_a_single_file_is_locked_by_another_one_that_is_deleted(tmp_path: Path) -> None:
+    file, other, writer = tmp_path / "a.tlog", tmp_path / "b.tlog", "another gcs capture is writing"
+    expected = f"^{file}: {writer} there; wait until it has ended, or name another file by --out$"
+    with reserved(file, writer), reserved(other, writer), pytest.raises(InputError, match=expected):
+        reserved(file, writer).__enter__()
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_whose_writer_was_killed_is_free(tmp_path: Path) -> None:
@@ -108,7 +130,7 @@ def test_the_report_of_a_log_does_not_take_the_place_of_another_flights(tmp_path
         log.parent.mkdir()
         recorded_flights.flight(float(seconds), recorded_flights.still).write(log)
     with pytest.raises(InputError, match=r"other: holds another flight; name another folder by --out$"):
-        remake_report(logs[0], tmp_path / "other", quiet=True)
+        remake(logs[0], tmp_path / "other")
     assert list((tmp_path / "other").iterdir()) == [logs[1]]
 
 
@@ -117,16 +139,16 @@ def test_the_report_of_a_log_does_not_take_the_place_of_another_logs(tmp_path: P
     for seconds, log in enumerate(logs, start=1):
         recorded_flights.flight(float(seconds), recorded_flights.still).write(log)
     for _ in range(2):  # the same log may be reported again
-        remake_report(logs[0], out, quiet=True)
+        remake(logs[0], out)
     before = {file.name: file.read_bytes() for file in out.iterdir()}
     with pytest.raises(InputError, match=r"report: holds the report of another flight; name another folder"):
-        remake_report(logs[1], out, quiet=True)
+        remake(logs[1], out)
     assert {file.name: file.read_bytes() for file in out.iterdir()} == before
     (out / SUMMARY_FILE).unlink()
     with pytest.raises(
         InputError, match=r"holds a report\.html that is not of a flight; name another folder"
     ):
-        remake_report(logs[0], out, quiet=True)
+        remake(logs[0], out)
 
 
 def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
